@@ -19,7 +19,7 @@ from mbs.components.couplings import Transmission
 from mbs.errors import AssemblyError
 from mbs.spatial import Inertia, Khalil, MatrixRotation, Pose
 
-_SAME_PLACE = 1e-8
+_SAME_POSE = 1e-8
 """Distance [m] or angle [rad] by which welds on two ways around may differ: angles that files give
 with nine digits, far less than any clearance."""
 
@@ -82,7 +82,7 @@ def connection_graph(
     Args:
         mechanism: components and connections.
         symbols: CasADi symbol of every parameter.
-        values: a number for every parameter, to compare places with.
+        values: a number for every parameter, to compare positions with.
 
     Raises:
         AssemblyError: something is not connected, or welds contradict each other.
@@ -112,7 +112,7 @@ def connection_graph(
 
 
 def _check_transmissions(mechanism: Mechanism) -> None:
-    """Refuse a gear, rack or screw between coordinates that do not turn or slide as it needs."""
+    """Refuse a gear, rack or screw between coordinates of other kinds than it needs."""
     motions = {
         freedom.coordinate_of(joint.name): freedom.motion
         for joint in mechanism.joints()
@@ -226,10 +226,10 @@ def _require_same_place(port: Port, first: Pose, second: Pose, at: _Evaluator) -
     difference = at(first.matrix - second.matrix)
     gap = float(np.linalg.norm(difference[:3, 3]))
     chord = float(np.linalg.norm(difference[:3, :3])) / (2 * np.sqrt(2))
-    turn = 2 * np.arcsin(min(1.0, chord))
-    if max(gap, turn) > _SAME_PLACE:
+    angle = 2 * np.arcsin(min(1.0, chord))
+    if max(gap, angle) > _SAME_POSE:
         raise AssemblyError(
-            f"{port[0]!r} is welded at two places that differ by {gap:.3g} m and {turn:.3g} rad;"
+            f"{port[0]!r} is welded at two places that differ by {gap:.3g} m and {angle:.3g} rad;"
             " take one of the welds away"
         )
 
@@ -259,11 +259,11 @@ def _edge(
 
 def _size(nodes: int, edges: Sequence[Edge], at: _Evaluator) -> float:
     """The largest distance between two joints of one body; one where there is none [m]."""
-    places = at(casadi.horzcat(SX(3, 0), *(p for e in edges for p in (e.pose_a.p, e.pose_b.p))))
+    points = at(casadi.horzcat(SX(3, 0), *(p for e in edges for p in (e.pose_a.p, e.pose_b.p))))
     on: list[list[Any]] = [[] for _ in range(nodes)]
     for number, edge in enumerate(edges):
-        on[edge.a].append(places[:, 2 * number])
-        on[edge.b].append(places[:, 2 * number + 1])
+        on[edge.a].append(points[:, 2 * number])
+        on[edge.b].append(points[:, 2 * number + 1])
 
     def spread(points: Sequence[Any]) -> float:
         gaps = (math.hypot(*(p - q)) for k, p in enumerate(points) for q in points[:k])
@@ -325,8 +325,8 @@ def spanning_tree(
     """A spanning tree that keeps driven joints, cuts the freest passive ones, and stays shallow.
 
     Prim's algorithm from the world: among the joints that reach a new body, the one that is
-    least wanted as a cut comes first, then the one with the fewest freedoms, then the one nearest
-    to the base, which keeps loops short. Least wanted is a passive joint whose coordinate
+    least useful as a cut comes first, then the one with the fewest freedoms, then the one nearest
+    to the base, which keeps loops short. Least useful is a passive joint whose coordinate
     something refers to, then a driven or guessed one, then any other; a driven joint that is cut
     keeps its coordinate. Constraints, which place nothing, are always cut.
 
@@ -345,7 +345,7 @@ def spanning_tree(
     reached = {0} | {edge.a for edge in chosen} | {edge.b for edge in chosen}
     for number in range(len(graph.nodes)):
         if number not in reached:
-            raise AssemblyError(_unreached(name, graph, number))
+            raise AssemblyError(_describe_unreached(name, graph, number))
     for edge in chosen:
         if edge.joint.name in cut:
             raise AssemblyError(
@@ -359,7 +359,7 @@ def spanning_tree(
     return SpanningTree(tuple(branches), cuts)
 
 
-def _unreached(name: str, graph: BodyGraph, number: int) -> str:
+def _describe_unreached(name: str, graph: BodyGraph, number: int) -> str:
     """That nothing places a node, and what to do."""
     holders = [e.joint for e in graph.edges if number in (e.a, e.b) and not e.joint.places]
     where = f"{name}: no chain of joints leads from the world to {graph.nodes[number].name!r}"
@@ -382,8 +382,8 @@ def _prim(graph: BodyGraph, need: set[str], keep: set[str], cut: set[str]) -> li
             joint = edge.joint
             if joint.places and node in (edge.a, edge.b):
                 driven = joint.carries_effort
-                wanted = driven or joint.name in need or joint.name in keep
-                rank = 0 if joint.name in need and not driven else 1 if wanted else 2
+                chosen = driven or joint.name in need or joint.name in keep
+                rank = 0 if joint.name in need and not driven else 1 if chosen else 2
                 key = (joint.name in cut, rank, joint.nv, depth[node], number)
                 heapq.heappush(queue, (key, number))
 

@@ -2,7 +2,7 @@
 
 The pose between two consecutive axes is decomposed into gamma, b, alpha, d, theta, r. Since
 Rz(gamma) Tz(b) commutes with the motion of the joint before, the gamma and b of the first joint on
-a link are moved into theta and r of the link itself: frame j then sits where the classical
+a link are absorbed into theta and r of the link itself: frame j then sits where the classical
 notation puts it, with x along the common perpendicular to the next axis. Frames that a table gave
 stay as they were given. Where the common perpendicular is far, or a symbol may move it anywhere,
 the frame stays at the described origin, and fixed frames lead to it (`spatial.khalil.frames_to`).
@@ -234,9 +234,9 @@ def _chosen_frames(drafts: Sequence[_DescribedLink], size: float) -> list[_Chose
             *fixed, placement = frames_to(pose, size)
             if before is not None and not before.settled:
                 first, *others = (*fixed, placement)
-                moved, left = first.split()
-                before.placement = before.placement.rotate(moved.gamma).shift(moved.b)
-                before.shift = moved.pose()
+                shared, left = first.split()
+                before.placement = before.placement.rotate(shared.gamma).shift(shared.b)
+                before.shift = shared.pose()
                 *fixed, placement = (left, *others)
             via = tuple(fixed)
         if before is not None:

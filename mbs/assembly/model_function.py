@@ -53,13 +53,13 @@ def function_table(function: ModelFunction) -> str:
         velocities and efforts with the limits that the joints describe.
     """
     lines = [f"{function.name()} of {function.system.name}"]
-    for way, names, shape in (
+    for kind, names, shape in (
         ("input", function.name_in(), function.size_in),
         ("output", function.name_out(), function.size_out),
     ):
         for name in names:
             lines += [
-                f"{way} {name} {shape(name)}",
+                f"{kind} {name} {shape(name)}",
                 *_rows_of_elements(function, name, shape(name)[0]),
             ]
     return "\n".join(lines)
@@ -235,23 +235,23 @@ class ModelFunction(Function):
         return self._of_one
 
     def guard(self) -> Callable[..., bool] | None:
-        """What tells whether arrays are valid inputs, for calls that go past `__call__`.
+        """What determines whether arrays are valid inputs, for calls that go past `__call__`.
 
         Returns:
             None where nothing but the inputs' own numbers is asked; else a call with all inputs in
-            their order, false also where it cannot tell.
+            their order, false also where it cannot decide.
         """
         valid = self.valid()
         if valid is None:
             return None
-        places = [self.name_in().index(name) for name in valid.name_in()]
+        indices = [self.name_in().index(name) for name in valid.name_in()]
         made: list[Function] = []
 
         def holds(*args: Any) -> bool:
             if not made:
                 made.append(compiled(valid))
             try:
-                return bool(float(made[0](*(args[k] for k in places))[0]) == 1.0)
+                return bool(float(made[0](*(args[k] for k in indices))[0]) == 1.0)
             except (MbsError, RuntimeError, NotImplementedError, TypeError, ValueError):
                 return False
 
@@ -341,29 +341,29 @@ class ModelFunction(Function):
         return value
 
     def _check_size(self, name: str, shape: tuple[int, ...], value: Any) -> None:
-        wanted, width = self._sizes[name]
+        expected, width = self._sizes[name]
         rows, columns = (*shape, 1, 1)[:2]
         if width > 1 and not self.elements(name):
-            if rows == wanted and columns % width == 0:
+            if rows == expected and columns % width == 0:
                 return
             raise ModelError(
-                f"{self._title}: {name} has the shape {shape}, it needs {(wanted, width)}"
+                f"{self._title}: {name} has the shape {shape}, it needs {(expected, width)}"
             )
-        square = shape == (wanted, wanted) and wanted > 1 and width != wanted
+        square = shape == (expected, expected) and expected > 1 and width != expected
         if square and not isinstance(value, (SX, MX, DM)):
             raise ModelError(
                 f"{self._title}: {name} is an array of shape {shape}, whose states may be rows or"
                 " columns; give casadi.DM(array), whose columns are states, or take"
                 " mbs.native.batch, whose rows are"
             )
-        if len(shape) <= 2 and (rows == wanted or (rows, columns) == (1, wanted)):
+        if len(shape) <= 2 and (rows == expected or (rows, columns) == (1, expected)):
             return
         if shape == () and isinstance(value, (int, float)) and value == 0:
             return
         elements = ", ".join(element for element, _ in self.elements(name))
         known = f": {elements}" if elements else ""
         has = f"the shape {shape}" if len(shape) > 1 else f"{rows} values"
-        raise ModelError(f"{self._title}: {name} has {has}, it needs {wanted}{known}")
+        raise ModelError(f"{self._title}: {name} has {has}, it needs {expected}{known}")
 
     def _require_valid(self, inputs: dict[str, Any]) -> None:
         """Refuse numbers at which the model has no sense."""
@@ -452,7 +452,7 @@ def model_function(
 
     Args:
         system: whose model it is; its cache keeps the Function.
-        key: the name of the Function, then whatever tells it from others of the same name.
+        key: the name of the Function, then whatever distinguishes it from others of the same name.
         build: gives the named inputs and outputs on CasADi symbols and, where there are any, the
             named scalars between them. When the system has parameters they become the last
             input p.

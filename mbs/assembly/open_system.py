@@ -74,14 +74,14 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     prove(mechanism, framed, places, symbols, _trial_values(parameters))
     joints = {joint.name: joint for joint in mechanism.joints()}
     in_loops = _looped_joints(framed) | _driven_joints(mechanism)
-    moved = [
+    moving_links = [
         (link.motion, link.name, joints[name])
         for link, name in zip(framed.tree.links, framed.joints, strict=True)
     ]
-    actuated = [_is_actuated(joint, in_loops) for _, _, joint in moved]
-    coordinates = position_coordinates(moved, actuated)
+    actuated = [_is_actuated(joint, in_loops) for _, _, joint in moving_links]
+    coordinates = position_coordinates(moving_links, actuated)
     _check_names(mechanism, coordinates)
-    speeds = velocity_coordinates(moved, actuated)
+    speeds = velocity_coordinates(moving_links, actuated)
     cut = _cut_coordinates(framed.cuts)
     frames = _frames(mechanism, places, symbols)
     joints_found = joint_rows(mechanism, places, framed.cuts, symbols)

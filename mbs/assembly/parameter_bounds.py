@@ -120,15 +120,15 @@ def _tighter(a: Bounds, b: Bounds) -> Bounds:
 def _bounds(check: Callable[[float], object]) -> Bounds:
     """What a rule refuses among values below zero, of zero, and above one."""
     low: float | None = None
-    taken = not all(_refused(check, value) for value in _ABOVE_ZERO)
-    if taken and all(_refused(check, value) for value in _BELOW_ZERO):
-        open_end = _refused(check, 0.0) and not _refused(check, MORE_THAN_ZERO)
+    taken = not all(_is_refused(check, value) for value in _ABOVE_ZERO)
+    if taken and all(_is_refused(check, value) for value in _BELOW_ZERO):
+        open_end = _is_refused(check, 0.0) and not _is_refused(check, MORE_THAN_ZERO)
         low = MORE_THAN_ZERO if open_end else 0.0
-    above = all(_refused(check, value) for value in _ABOVE_ONE)
-    return low, 1.0 if above and not _refused(check, 1.0) else None
+    above = all(_is_refused(check, value) for value in _ABOVE_ONE)
+    return low, 1.0 if above and not _is_refused(check, 1.0) else None
 
 
-def _refused(check: Callable[[float], object], value: float) -> bool:
+def _is_refused(check: Callable[[float], object], value: float) -> bool:
     try:
         check(value)
     except (DescriptionError, ArithmeticError):

@@ -70,7 +70,7 @@ class Adjustable:
 
     Attributes:
         name: kind and number of the link, such as M3, d4, Fv1; d4_1 for the first fixed frame on
-            the way to link 4; G1, G2, G3 for gravity; of the place of a cut joint
+            the path to link 4; G1, G2, G3 for gravity; of the position of a cut joint
             `joint.frame_a.x`.
         kind: a member of `GROUPS`.
         owner: what it belongs to: ("link", number from 0), ("fixed frame", "4_1"), ("gravity",
@@ -98,7 +98,7 @@ def _of_link(j: int, link: Link) -> Iterator[Adjustable]:
     for k, frame in enumerate(link.via):
         label = f"{j + 1}_{k + 1}"
         for kind, value in zip(PLACEMENT, frame.parameters, strict=True):
-            text = f"Khalil parameter {kind} of fixed frame {k + 1} on the way to link {j + 1}"
+            text = f"Khalil parameter {kind} of fixed frame {k + 1} on the path to link {j + 1}"
             owner = ("fixed frame", label)
             yield Adjustable(f"{kind}{label}", kind, owner, value, _FIXED_UNITS[kind], text)
     values = dict(zip(TEN_PARAMETERS, elements(link.inertia.parameters), strict=True))
@@ -145,7 +145,7 @@ def symbolic(system: System, what: Sequence[str]) -> System:
     parameters are those of a whole link about the origin of its frame and in its axes, as SYMORO
     names them: M3 alone changes the mass and leaves first moments and inertia where they are, so
     that the centre of mass moves. Where Fixed joints divide a link, the change is one of the body
-    that none of them holds. Lengths are the Khalil parameters of the frames and the places of
+    that none of them holds. Lengths are the Khalil parameters of the frames and the positions of
     joints that were cut; what is fixed on a link stays where it is on the link. The configuration
     stays too.
 
@@ -197,7 +197,7 @@ def _choose(system: System, names: Sequence[str]) -> list[Adjustable]:
     rows = adjustables(system)
     single = {row.name: row for row in rows}
     own = {parameter.name for parameter in system.parameters}
-    wanted: dict[str, None] = {}
+    needed: dict[str, None] = {}
     for name in names:
         if name in GROUPS:
             kinds = GROUPS[name]
@@ -207,8 +207,8 @@ def _choose(system: System, names: Sequence[str]) -> list[Adjustable]:
             found = [single[name]]
         else:
             found = _of_body(system, rows, name)
-        wanted |= dict.fromkeys(row.name for row in found if not _is_itself(row, own))
-    return [row for row in rows if row.name in wanted]
+        needed |= dict.fromkeys(row.name for row in found if not _is_itself(row, own))
+    return [row for row in rows if row.name in needed]
 
 
 def _is_number(row: Adjustable) -> bool:
@@ -316,7 +316,7 @@ def _frame(frame: Khalil, values: _Symbols) -> Khalil:
     return Khalil(*(values.get(kind, old) for kind, old in six)) if values else frame
 
 
-def _moved(pose: Pose, values: _Symbols) -> Pose:
+def _with_position(pose: Pose, values: _Symbols) -> Pose:
     if not values:
         return pose
     return pose.at(casadi.vertcat(*(values.get(k, pose.p[i]) for i, k in enumerate("xyz"))))
@@ -333,8 +333,8 @@ def _cut(cut: Cut, given: _Given) -> Cut:
     name = cut.edge.joint.name
     return replace(
         cut,
-        pose_a=_moved(cut.pose_a, given.get((name, "a"), {})),
-        pose_b=_moved(cut.pose_b, given.get((name, "b"), {})),
+        pose_a=_with_position(cut.pose_a, given.get((name, "a"), {})),
+        pose_b=_with_position(cut.pose_b, given.get((name, "b"), {})),
     )
 
 
@@ -355,7 +355,7 @@ def _moves(cut: Cut, given: _Given) -> Iterator[tuple[Frame, Frame]]:
     for side, (link, pose) in zip("ab", cut.frames, strict=True):
         values = given.get((cut.edge.joint.name, side), {})
         if values:
-            yield (link, pose), (link, _moved(pose, values))
+            yield (link, pose), (link, _with_position(pose, values))
 
 
 def _is_same(one: Frame, other: Frame) -> bool:

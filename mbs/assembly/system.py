@@ -110,9 +110,9 @@ def _tree(system: System) -> list[str]:
         f" {_count(system.nq, 'position')} q and {_count(system.nv, 'velocity')} v."
     ]
     for number, link in enumerate(links, start=1):
-        carried = [row.name for row in system.bodies if row.link == number]
+        bodies = [row.name for row in system.bodies if row.link == number]
         before = "the base" if link.antecedent < 0 else f"link {link.antecedent + 1}"
-        what = ", ".join(carried) if carried else without.get(link.name, "a frame without a body")
+        what = ", ".join(bodies) if bodies else without.get(link.name, "a frame without a body")
         lines.append(
             f"  link {number}: {link.motion.value} {link.name} from {before} carries {what}"
         )
@@ -225,7 +225,7 @@ class System:
         parts: force elements, drives and all other components by their equations.
         joints: every joint and constraint, those of the tree and those that were cut.
         sensors: what reads the motion and changes nothing.
-        shafts: inertias and rigid gears of drive lines, and the coordinates that they turn with.
+        shafts: inertias and rigid gears of drive lines, and the coordinates that they rotate with.
         z: (nz, 1) symbols of the states of parts.
         u: (nu, 1) symbols of the inputs of parts.
         bounds: least and greatest value of the parameters that have one, by name.
@@ -337,7 +337,7 @@ class System:
 
     @property
     def free(self) -> tuple[int, ...]:
-        """Numbers of the velocities whose positions may be chosen: active, or held by discs."""
+        """Indices of the velocities whose positions may be chosen: active, or those of discs."""
         return self.closure.free if self.closure else tuple(range(self.nv))
 
     @property

@@ -183,7 +183,7 @@ class Closure:
             where there are more motors than these, or others, the motors.
         free: numbers of the velocities whose positions may be chosen: the active ones, and what
             rolling discs alone hold.
-        varies: whether the dropped rows follow from the kept ones in a way that changes with the
+        varies: whether the dropped rows follow from the kept ones in a manner that changes with the
             configuration, so that other rows may be independent elsewhere.
         gruebler: mobility by the Gruebler-Kutzbach count of rows.
         residual: largest closure residual at the assembled configuration.
@@ -389,8 +389,8 @@ class CoordinateCoupling:
     def value(self, q: SX) -> SX:
         """The driven coordinate for positions of the others."""
         driver = q[self.driver]
-        led = sum((c * driver**k for k, c in enumerate(self.coefficients)), SX(0))
-        return led + self.shift(q)
+        value = sum((c * driver**k for k, c in enumerate(self.coefficients)), SX(0))
+        return value + self.shift(q)
 
     def shift(self, q: SX) -> SX:
         """What the coordinates beside the driver add to the driven one."""

@@ -38,7 +38,7 @@ class ValidityRow:
 
     Attributes:
         kind: what is wrong where it is larger.
-        name: what it tells.
+        name: what it states.
         residual: (1, 1).
         bound: (1, 1) or a number.
         sentence: what is wrong where it is larger, and what to do.
@@ -113,7 +113,7 @@ def all_hold(
 
     Args:
         system: whose cache keeps it.
-        key: tells it from others of the system.
+        key: distinguishes it from others of the system.
         inputs: the symbols of the rows by name.
         rows: of which it is made.
     """

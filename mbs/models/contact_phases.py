@@ -28,11 +28,11 @@ from mbs.models.dae_phases import (
     Standing,
     Touching,
     checked_points,
+    constrained_elements,
     friction_cone,
-    held_elements,
+    modes_of,
     phase_dae,
     point_rows,
-    ways_of,
 )
 from mbs.models.inverse_dynamics import tree_efforts
 from mbs.models.symbols import ModelSymbols, surroundings, symbols_of
@@ -66,8 +66,8 @@ class ContactPhases:
         """``phase(q, v, tau) -> a, f, lam``: accelerations, forces of planes, efforts of loops.
 
         A a + H = tau + J_f' f + J' lam, and the points that touch have no acceleration where they
-        are held. Nothing pulls back what has drifted. Points that hold each other, such as four
-        corners of one foot, share their forces.
+        are constrained. Nothing pulls back what has drifted. Points that constrain each other, such
+        as four corners of one foot, share their forces.
 
         Args:
             touching: the points that do.
@@ -77,20 +77,20 @@ class ContactPhases:
             lam (r, 1), as of `direct_dynamics(system, coordinates="tree")`.
 
         Raises:
-            ModelError: there is no such point, or a point touches in no known way.
+            ModelError: there is no such point, or a point touches in no known mode.
         """
-        ways = self._ways(touching)
+        modes = self._modes(touching)
 
         def build() -> tuple[Named, Named]:
             s = symbols_of(self.system, "tree")
             tau, rows = SX.sym("tau", s.size), point_rows(self.system, s, self.points)
             H = _efforts(self.system, s, SX.zeros(s.size))
             _, psi = loop_rows(self.system, s)
-            a, f, lam = self._held(s, rows, ways, (tau - H, -rows.bias, -psi))
+            a, f, lam = self._solve_constrained(s, rows, modes, (tau - H, -rows.bias, -psi))
             inputs: Named = [("q", s.q), ("v", s.v), ("tau", tau)]
             return inputs, [("a", a), ("f", f), *self._loops("lam", lam)]
 
-        return model_function(self.system, ("phase", self.points, ways), build)
+        return model_function(self.system, ("phase", self.points, modes), build)
 
     def residuals(self, touching: Touching = ()) -> Function:
         """``phase_residuals(q, v, a, tau, f, lam) -> motion, contact, loops``: zero in the phase.
@@ -102,13 +102,13 @@ class ContactPhases:
 
         Returns:
             Function of q, v, a, tau, f and, of a closed system, lam; motion (nv, 1) efforts that
-            are missing [N m or N]; contact (3, n), the acceleration of a point where it is held
-            [m/s^2], its force where it is free [N]; loops (r, 1), J a + dJ/dt v.
+            are missing [N m or N]; contact (3, n), the acceleration of a point where it is
+            constrained [m/s^2], its force where it is free [N]; loops (r, 1), J a + dJ/dt v.
 
         Raises:
             ModelError: as of `accelerations`.
         """
-        ways = self._ways(touching)
+        modes = self._modes(touching)
 
         def build() -> tuple[Named, Named]:
             s = symbols_of(self.system, "tree")
@@ -117,22 +117,25 @@ class ContactPhases:
             f, lam = SX.sym("f", 3, len(self.points)), SX.sym("lam", psi.numel())
             pushed = casadi.mtimes(rows.J.T, casadi.vec(f)) + casadi.mtimes(J.T, lam)
             motion = _efforts(self.system, s, a) - tau - pushed
-            held = held_elements(ways)
-            moved = held * (casadi.mtimes(rows.J, a) + rows.bias)
-            contact = casadi.reshape(moved, f.shape) + casadi.reshape(1 - held, f.shape) * f
+            constrained = constrained_elements(modes)
+            accelerations = constrained * (casadi.mtimes(rows.J, a) + rows.bias)
+            contact = (
+                casadi.reshape(accelerations, f.shape)
+                + casadi.reshape(1 - constrained, f.shape) * f
+            )
             loops = casadi.mtimes(J, a) + psi
             inputs: Named = [("q", s.q), ("v", s.v), ("a", a), ("tau", tau), ("f", f)]
             outputs: Named = [("motion", motion), ("contact", contact)]
             return [*inputs, *self._loops("lam", lam)], [*outputs, *self._loops("loops", loops)]
 
-        return model_function(self.system, ("phase_residuals", self.points, ways), build)
+        return model_function(self.system, ("phase_residuals", self.points, modes), build)
 
     def impact(self, touching: Touching) -> Function:
         """``touchdown(q, v) -> v_plus, P``: velocities after the points have landed for good.
 
         A (v_plus - v) = J_f' P + J' Lambda: the points that touch then have no velocity where they
-        are held, loops stay closed, and nothing rebounds. A point that touched before and is to
-        leave without being pulled is not among those that touch.
+        are constrained, loops stay closed, and nothing rebounds. A point that touched before and is
+        to leave without being pulled is not among those that touch.
 
         Args:
             touching: the points that do after it.
@@ -144,16 +147,16 @@ class ContactPhases:
         Raises:
             ModelError: as of `accelerations`.
         """
-        ways = self._ways(touching)
+        modes = self._modes(touching)
 
         def build() -> tuple[Named, Named]:
             s = symbols_of(self.system, "tree")
             rows, (J, _) = point_rows(self.system, s, self.points), loop_rows(self.system, s)
             asked = SX.zeros(s.size), -rows.V, -casadi.mtimes(J, s.v)
-            dv, P, _ = self._held(s, rows, ways, asked)
+            dv, P, _ = self._solve_constrained(s, rows, modes, asked)
             return [("q", s.q), ("v", s.v)], [("v_plus", s.v + dv), ("P", P)]
 
-        return model_function(self.system, ("touchdown", self.points, ways), build)
+        return model_function(self.system, ("touchdown", self.points, modes), build)
 
     def motion(self) -> Function:
         """``points(q, v) -> r, V``: where the points are and how they move, in every phase alike.
@@ -223,27 +226,27 @@ class ContactPhases:
                 with the velocities v0.
             Unclosable: no configuration with the positions q0 lets all of them touch.
         """
-        ways, begin = self._ways(touching), PhaseStart(q0, v0, tau0, parameters)
+        modes, begin = self._modes(touching), PhaseStart(q0, v0, tau0, parameters)
         explicit = self.accelerations(touching)
-        return phase_dae(Standing(self.system, self.points, ways), explicit, form, begin)
+        return phase_dae(Standing(self.system, self.points, modes), explicit, form, begin)
 
     def _loops(self, name: str, value: SX) -> Named:
         """An input or output that only closed systems have."""
         return [(name, value)] if self.system.is_closed else []
 
-    def _ways(self, touching: Touching) -> tuple[str, ...]:
+    def _modes(self, touching: Touching) -> tuple[str, ...]:
         """Of each point how it touches."""
-        return ways_of(self.system.name, self.points, touching)
+        return modes_of(self.system.name, self.points, touching)
 
-    def _held(
-        self, s: ModelSymbols, rows: PointRows, ways: tuple[str, ...], right: tuple[SX, SX, SX]
+    def _solve_constrained(
+        self, s: ModelSymbols, rows: PointRows, modes: tuple[str, ...], right: tuple[SX, SX, SX]
     ) -> tuple[SX, SX, SX]:
         """The x, y and z of A x = b + J_f' y + J' z, J_f x = d, J x = e.
 
         Args:
             s: symbols of the tree.
             rows: of the points.
-            ways: of each point how it touches; the other rows have no part.
+            modes: of each point how it touches; the other rows have no part.
             right: b, d and e.
 
         Returns:
@@ -251,8 +254,10 @@ class ContactPhases:
         """
         b, d, e = right
         A, (J, _) = inertia_matrix(self.system.tree, s.poses), loop_rows(self.system, s)
-        kept = [k for k, held in enumerate(DM(held_elements(ways)).elements()) if held]
-        shared = casadi.densify(SX.zeros(len(kept)))  # rows that hold each other share their force
+        flags = DM(constrained_elements(modes)).elements()
+        kept = [k for k, flag in enumerate(flags) if flag]
+        # rows that constrain each other share their force
+        shared = casadi.densify(SX.zeros(len(kept)))
         x, efforts = solve_saddle(
             A,
             casadi.vertcat(J, rows.J[kept, :]),

@@ -63,7 +63,7 @@ class Rows:
         """(s, nv) the lines of J that belong to rows that bind positions."""
         return self.J[: self.positions.numel(), :]
 
-    def joined(self, other: Rows) -> Rows:
+    def join(self, other: Rows) -> Rows:
         """These rows and others of the same system; of each kind these come first."""
         s, t = self.positions.numel(), other.positions.numel()
 
@@ -104,7 +104,7 @@ def rows_of(system: System, q: SX, v: SX, a: SX) -> Rows:
 # for the index of the others.
 
 
-Held = Callable[[ModelSymbols, SX], Rows]
+ConstraintRows = Callable[[ModelSymbols, SX], Rows]
 """Rows at the symbols of the tree and its accelerations a (nv, 1)."""
 
 FORMS = ("reduced", "index1", "index2", "index3", "ggl")
@@ -147,7 +147,7 @@ def motors(system: System) -> list[int]:
     return [k for k, s in enumerate(system.speeds) if s.actuated and k not in driven]
 
 
-def implicit(system: System, form: str, held: Held | None = None) -> DaeEquations:
+def implicit(system: System, form: str, constrained: ConstraintRows | None = None) -> DaeEquations:
     """The forms with x = [q; v] and z = [a; lam], or [a; lam; mu]; the mass stays implicit.
 
     No inertia matrix is built or factorised: the rows of a are the inverse dynamic model, which
@@ -156,13 +156,13 @@ def implicit(system: System, form: str, held: Held | None = None) -> DaeEquation
     Args:
         system: open or closed.
         form: "index1", "index2", "index3" or "ggl".
-        held: rows besides those of the loops, such as points that stand.
+        constrained: rows besides those of the loops, such as points that stand.
     """
     s = symbols_of(system, "tree")
     q, v, a = s.q, s.v, SX.sym("a", system.nv)
     rows = rows_of(system, q, v, a)
-    if held is not None:
-        rows = rows.joined(held(s, a))
+    if constrained is not None:
+        rows = rows.join(constrained(s, a))
     lam, mu = SX.sym("lam", rows.J.shape[0]), SX(0, 1)
     u, tau, rates = driving(system, q, v)
     (needed,) = outputs_of(system, inverse_dynamics(system, "tree"), q, v, a)
@@ -539,13 +539,13 @@ def _winds(system: System) -> bool:
 def _branch(system: System, q: Array, p: Array) -> tuple[str, ...]:
     """The labels of the closed configuration q."""
     stages = plan(system)
-    ways = branches_at(system, stages, q, p)
-    if len(ways) < len(stages):
+    branches = branches_at(system, stages, q, p)
+    if len(branches) < len(stages):
         raise Unclosable(
-            f"{system.name}: the closed form of the loop of {stages[len(ways)].name} does not give"
-            " the start, where two branches meet; start beside it, or take form 'index2'"
+            f"{system.name}: the closed form of the loop of {stages[len(branches)].name} does not"
+            " give the start, where two branches meet; start beside it, or take form 'index2'"
         )
-    labels = [stage.labels[way] for stage, way in zip(stages, ways, strict=True)]
+    labels = [stage.labels[branch] for stage, branch in zip(stages, branches, strict=True)]
     return tuple(label for label in labels if label)
 
 

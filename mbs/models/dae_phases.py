@@ -22,10 +22,10 @@ from mbs.loops.configuration import Values, smallest_velocity
 from mbs.loops.velocity import acceleration_bias, constraint_rows, kept_rows
 from mbs.models.dae import (
     FORMS,
+    ConstraintRows,
     Dae,
     DaeEquations,
     Elements,
-    Held,
     Rows,
     driving,
     elements_of,
@@ -51,7 +51,7 @@ from mbs.text import did_you_mean, quoted
 Touching = Iterable[str] | Mapping[str, str]
 """Names of the points that stand; or for each name "fixed" or "sliding"."""
 
-WAYS = ("fixed", "sliding")
+MODES = ("fixed", "sliding")
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,14 +130,14 @@ def point_rows(system: System, s: ModelSymbols, points: Sequence[ContactPoint]) 
     return PointRows(r, V, casadi.jacobian(V, s.v), casadi.densify(casadi.vertcat(*bias)))
 
 
-def held_elements(ways: Sequence[str]) -> DM:
+def constrained_elements(modes: Sequence[str]) -> DM:
     """(3 n, 1) 1 for each element of the motion that the plane holds.
 
     Args:
-        ways: of each point "fixed", "sliding" or "" where it is free.
+        modes: of each point "fixed", "sliding" or "" where it is free.
     """
-    held = {"fixed": (1, 1, 1), "sliding": (0, 0, 1), "": (0, 0, 0)}
-    return DM([element for way in ways for element in held[way]])
+    constrained = {"fixed": (1, 1, 1), "sliding": (0, 0, 1), "": (0, 0, 0)}
+    return DM([element for mode in modes for element in constrained[mode]])
 
 
 def checked_points(name: str, points: Iterable[ContactPoint]) -> tuple[ContactPoint, ...]:
@@ -165,7 +165,7 @@ def checked_points(name: str, points: Iterable[ContactPoint]) -> tuple[ContactPo
     return every
 
 
-def ways_of(name: str, points: Sequence[ContactPoint], touching: Touching) -> tuple[str, ...]:
+def modes_of(name: str, points: Sequence[ContactPoint], touching: Touching) -> tuple[str, ...]:
     """Of each point "fixed", "sliding" or "" where it is free.
 
     Args:
@@ -174,19 +174,19 @@ def ways_of(name: str, points: Sequence[ContactPoint], touching: Touching) -> tu
         touching: those that do.
 
     Raises:
-        ModelError: there is no such point, one is named twice, or it touches in no known way.
+        ModelError: there is no such point, one is named twice, or it touches in no known mode.
     """
     names = [point.name for point in points]
     given = _ways_by_name(name, touching)
-    for point, way in given.items():
+    for point, mode in given.items():
         if point not in names:
             raise ModelError(
                 f"{name}: there is no contact point {quoted(point)}; "
                 + did_you_mean(str(point), names)
             )
-        if way not in WAYS:
+        if mode not in MODES:
             raise ModelError(
-                f"{name}: point {point!r} touches {quoted(way)}; use 'fixed' or 'sliding', or"
+                f"{name}: point {point!r} touches {quoted(mode)}; use 'fixed' or 'sliding', or"
                 " leave it out"
             )
     return tuple(given.get(point, "") for point in names)
@@ -266,24 +266,25 @@ class Standing:
     Attributes:
         system: open or closed.
         points: all that may touch.
-        ways: of each point "fixed", "sliding" or "" where it is free.
+        modes: of each point "fixed", "sliding" or "" where it is free.
     """
 
     system: System
     points: tuple[ContactPoint, ...]
-    ways: tuple[str, ...]
+    modes: tuple[str, ...]
 
     @property
-    def held(self) -> list[int]:
+    def constrained(self) -> list[int]:
         """Numbers of what planes hold among the elements x, y, z of all points."""
-        return [k for k, held in enumerate(held_elements(self.ways).elements()) if held]
+        flags = constrained_elements(self.modes).elements()
+        return [k for k, flag in enumerate(flags) if flag]
 
     @property
     def names(self) -> str:
         """Of the points that touch."""
-        return ", ".join(p.name for p, way in zip(self.points, self.ways, strict=True) if way)
+        return ", ".join(p.name for p, mode in zip(self.points, self.modes, strict=True) if mode)
 
-    def rows(self, kept: tuple[int, ...]) -> Held:
+    def rows(self, kept: tuple[int, ...]) -> ConstraintRows:
         """The kept elements as rows; the distances bind positions, and come first."""
         distances, drifts = split(kept)
         order = [*distances, *drifts]
@@ -310,21 +311,21 @@ class Standing:
         return distances, drifts
 
     def independent(self, q: Array, p: Array) -> tuple[int, ...]:
-        """The held elements that depend neither on loops nor on each other near a configuration q.
+        """Constrained elements that depend neither on loops nor on each other near q.
 
         Rows that depend on others only there, as those of a straight leg, are kept.
         """
-        held, loops = self.held, kept_rows(self.system)
+        constrained, loops = self.constrained, kept_rows(self.system)
         numbers = _numbers(self)
         matrices = []
         for configuration in self._near(q, p):
             _, _, J_loops, _, J, _ = (np.array(x) for x in numbers(configuration, 0 * q[:1], p))
-            matrices.append(np.vstack([J_loops[loops], J[held]]))
+            matrices.append(np.vstack([J_loops[loops], J[constrained]]))
         ranks = [rank(matrix) for matrix in matrices]
         best = [m for m, r in zip(matrices, ranks, strict=True) if r == max(ranks)]
         first = tuple(range(len(loops)))
         chosen = independent_rows(best, max(ranks), first)
-        return tuple(held[k - len(loops)] for k in chosen if k >= len(loops))
+        return tuple(constrained[k - len(loops)] for k in chosen if k >= len(loops))
 
     def _near(self, q: Array, p: Array) -> Iterator[Array]:
         """The configuration q, and others that touch and close the loops too."""
@@ -370,7 +371,7 @@ class Standing:
 
     def _velocity(self, q: Array, p: Array, v0: Values) -> Array:
         _, _, J_loops, _, J, _ = (np.array(x) for x in _numbers(self)(q, np.zeros(1), p))
-        rows = np.vstack([J_loops, J[self.held]])
+        rows = np.vstack([J_loops, J[self.constrained]])
         v, missed = smallest_velocity(self.system, rows, v0)
         if missed:
             raise ModelError(
@@ -449,7 +450,7 @@ def _touching(standing: Standing) -> Function:
 
     def build() -> Function:
         s = symbols_of(system, "tree")
-        distances = split(tuple(standing.held))[0]
+        distances = split(tuple(standing.constrained))[0]
         rows = [point_rows(system, s, standing.points).r[distances], norm_rows(system.tree, s.q)]
         if system.is_closed:
             rows.append(closure_rows(system, s.q))
@@ -457,7 +458,7 @@ def _touching(standing: Standing) -> Function:
         J = casadi.densify(casadi.jacobian(r, s.q))
         return Function("touching", [s.q, system.p], [r, J], {"cse": True})
 
-    function: Function = system.cached(("touching", standing.points, standing.ways), build)
+    function: Function = system.cached(("touching", standing.points, standing.modes), build)
     return function
 
 
@@ -539,7 +540,7 @@ def _built(standing: Standing, explicit: Function, form: str, kept: tuple[int, .
         made = implicit(system, form, standing.rows(kept))
         return made, _forces(standing, kept, made.z), elements_of(system, form, names)
 
-    key = ("phase dae", standing.points, standing.ways, form, kept)
+    key = ("phase dae", standing.points, standing.modes, form, kept)
     built: _Built = system.cached(key, build)
     return built
 
@@ -552,7 +553,7 @@ def _explicit(
     s = symbols_of(system, "tree")
     u, tau, rates = driving(system, s.q, s.v)
     a, f, *_ = outputs_of(system, explicit, s.q, s.v, tau)
-    rows = rows_of(system, s.q, s.v, a).joined(standing.rows(kept)(s, a))
+    rows = rows_of(system, s.q, s.v, a).join(standing.rows(kept)(s, a))
     made = equations(
         system,
         states=(casadi.vertcat(s.q, s.v, system.z), SX(0, 1), u),

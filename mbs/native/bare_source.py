@@ -103,7 +103,7 @@ def literal(value: float, real: Real) -> str:
     """A number as C reads it back to the last bit of its type.
 
     In single precision what is no zero stays none: where a length must be more than zero, a bound
-    of 1e-308 tells it.
+    of 1e-308 shows it.
 
     Args:
         value: any, also one that is not finite.

@@ -394,12 +394,12 @@ class Batch:
                     " array of its own, or an input itself"
                 )
 
-    def _threads(self, wanted: int | None, states: int) -> int:
-        if wanted is None:
-            wanted = cores()
-        elif isinstance(wanted, bool) or not hasattr(wanted, "__index__") or wanted < 1:
-            raise ModelError(f"{self._name}: threads is {quoted(wanted)}; give 1 or more, or None")
-        return max(1, min(operator.index(wanted), -(-states // _SHARE)))
+    def _threads(self, asked: int | None, states: int) -> int:
+        if asked is None:
+            asked = cores()
+        elif isinstance(asked, bool) or not hasattr(asked, "__index__") or asked < 1:
+            raise ModelError(f"{self._name}: threads is {quoted(asked)}; give 1 or more, or None")
+        return max(1, min(operator.index(asked), -(-states // _SHARE)))
 
     def _run(self, code: _Code, arrays: Sequence[Array], states: int, threads: int) -> None:
         given = len(self.inputs)
@@ -481,7 +481,7 @@ def batch(functions: Function | Iterable[Function], *, checked: bool = True) -> 
 
 
 def _valid_functions(models: Sequence[Any]) -> list[Function]:
-    """What tells whether models take a state, each once."""
+    """What determines whether models take a state, each once."""
     asked = (model.valid() for model in models)
     return list({hash(valid): valid for valid in asked if valid is not None}.values())
 

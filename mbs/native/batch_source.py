@@ -80,7 +80,7 @@ def batch_source(
     taken = [port.sparsity.nnz() for port in graph.inputs]
     given = [port.sparsity.nnz() for port in graph.outputs]
     starts = list(accumulate([*taken, *given], initial=where.count))
-    places = [f"w + {start}" for start in starts]
+    pointers = [f"w + {start}" for start in starts]
     count, shown = len(taken), len(given) - valid
     flags = [f"out[{shown + k}][0]" for k in range(valid)]
     lines = [
@@ -90,20 +90,20 @@ def batch_source(
         " long long last)",
         "{",
         "  mbs_lanes *const w = (mbs_lanes *)mbs_aligned(work);",
-        f"  const double *const in[] = {{{_pointers('const double', places[:count])}}};",
-        f"  mbs_lanes *const out[] = {{{', '.join(places[count:-1]) or '0'}}};",
+        f"  const double *const in[] = {{{_pointers('const double', pointers[:count])}}};",
+        f"  mbs_lanes *const out[] = {{{', '.join(pointers[count:-1]) or '0'}}};",
         *(
-            f"  if (!ports[{k}].row) mbs_take_same(ports + {k}, {size}, {places[k]});"
+            f"  if (!ports[{k}].row) mbs_take_same(ports + {k}, {size}, {pointers[k]});"
             for k, size in enumerate(taken)
         ),
         "  for (long long k = first; k < last; k += MBS_LANES) {",
         "    const int many = last - k < MBS_LANES ? (int)(last - k) : MBS_LANES;",
         *(
-            f"    if (ports[{k}].row) mbs_take(ports + {k}, k, many, {size}, {places[k]});"
+            f"    if (ports[{k}].row) mbs_take(ports + {k}, k, many, {size}, {pointers[k]});"
             for k, size in enumerate(taken)
         ),
         *(f"    part{k}(in, out, w);" for k in range(len(pieces))),
-        *(_flag([*zip(places, taken, strict=False)], flags, given[:shown]) if finite else ()),
+        *(_flag([*zip(pointers, taken, strict=False)], flags, given[:shown]) if finite else ()),
         *(
             f"    mbs_give(ports + {count + k}, k, many, {size}, out[{k}]);"
             for k, size in enumerate(given[:shown])
@@ -133,5 +133,5 @@ def _flag(inputs: list[tuple[str, int]], flags: list[str], outputs: list[int]) -
     ]
 
 
-def _pointers(kind: str, places: list[str]) -> str:
-    return ", ".join(f"({kind} *)({place})" for place in places) or "0"
+def _pointers(kind: str, pointers: list[str]) -> str:
+    return ", ".join(f"({kind} *)({pointer})" for pointer in pointers) or "0"

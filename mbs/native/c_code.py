@@ -80,7 +80,7 @@ def expression(
     Args:
         graph: has it.
         number: of the node.
-        written: gives the text of an operand; `operand` unless told.
+        written: gives the text of an operand; `operand` unless given.
 
     Raises:
         ModelError: the operation has no equivalent in C's library.
@@ -90,7 +90,7 @@ def expression(
 
 
 def form_of(graph: Graph, number: int) -> str:
-    """The C expression of a node with places for its operands, as `str.format` takes it.
+    """The C expression of a node with placeholders for its operands, as `str.format` takes it.
 
     Args:
         graph: has it.
@@ -163,7 +163,7 @@ def schedule(graph: Graph, phase: Sequence[int] | None = None) -> list[Step]:
 
     Args:
         graph: what to compute.
-        phase: of each node, as `phases` tells; nodes of different phases share no batch.
+        phase: of each node, as `phases` says; nodes of different phases share no batch.
     """
     phase = phase or [0] * len(graph.nodes)
     pending = graph.live()
@@ -237,14 +237,14 @@ def _take(numbers: Iterable[int], pending: list[bool]) -> list[int]:
 
 def _ancestors(graph: Graph, numbers: Iterable[int], pending: Sequence[bool]) -> list[int]:
     """These nodes and those they are made of, as far as they are not computed yet."""
-    wanted: set[int] = set()
+    needed: set[int] = set()
     stack = list(numbers)
     while stack:
         number = stack.pop()
-        if pending[number] and number not in wanted:
-            wanted.add(number)
+        if pending[number] and number not in needed:
+            needed.add(number)
             stack += graph.operands(number)
-    return sorted(wanted)
+    return sorted(needed)
 
 
 def _batches(graph: Graph, alive: Sequence[bool], phase: Sequence[int]) -> list[list[SinCosGroup]]:
@@ -289,14 +289,14 @@ class Slots:
         of: place of each node that more than one block uses.
         outputs: for each computed node where it leaves: number of the output, of the element in
             it, and the node.
-        moved: for each block the same of the inputs and constants that it copies.
+        copied: for each block the same of the inputs and constants that it copies.
         count: length of the array.
         blocks: number of blocks.
     """
 
     of: Mapping[int, int]
     outputs: Mapping[int, Sequence[Leaving]]
-    moved: Mapping[int, Sequence[Leaving]]
+    copied: Mapping[int, Sequence[Leaving]]
     count: int
     blocks: int
 
@@ -316,19 +316,19 @@ def slots(
         elsewhere: inputs, as nodes, that reach their outputs without a copy.
     """
     home = {n: k for k, steps in enumerate(blocks) for step in steps for n in gives(step)}
-    of, count = _places(graph, blocks, home)
+    of, count = _slot_numbers(graph, blocks, home)
     outputs: dict[int, list[Leaving]] = {}
-    moved: dict[int, list[Leaving]] = {}
+    copied: dict[int, list[Leaving]] = {}
     for k, nodes in enumerate(graph.results):
         for element, n in enumerate(nodes):
             if n in home:
                 outputs.setdefault(n, []).append((k, element, n))
             elif n not in elsewhere:
-                moved.setdefault(_first(graph, n, begins or {}), []).append((k, element, n))
-    return Slots(of, outputs, moved, count, len(blocks))
+                copied.setdefault(_first(graph, n, begins or {}), []).append((k, element, n))
+    return Slots(of, outputs, copied, count, len(blocks))
 
 
-def _places(
+def _slot_numbers(
     graph: Graph, blocks: Sequence[Sequence[Step]], home: Mapping[int, int]
 ) -> tuple[dict[int, int], int]:
     """The place of each node that a later block than its own uses, and how many there are."""
@@ -398,7 +398,7 @@ class BlockCode:
         return "\n".join([*head, *lines, "}"])
 
     def _body(self, number: int, steps: Sequence[Step]) -> list[str]:
-        lines = self._stores(self.where.moved.get(number, ()))
+        lines = self._stores(self.where.copied.get(number, ()))
         known: set[int] = set()
         of = self.where.of
         for step in steps:
@@ -412,9 +412,9 @@ class BlockCode:
 
     def _loads(self, step: Step, known: set[int]) -> list[str]:
         of = self.where.of
-        wanted = [n for n in dict.fromkeys(needs(self.graph, step)) if n not in known and n in of]
-        known.update(wanted)
-        return [f"  const {self.kind} t{n} = w[{of[n]}];" for n in wanted]
+        needed = [n for n in dict.fromkeys(needs(self.graph, step)) if n not in known and n in of]
+        known.update(needed)
+        return [f"  const {self.kind} t{n} = w[{of[n]}];" for n in needed]
 
     def input(self, number: int) -> str:
         """The declaration of an input."""
@@ -442,8 +442,8 @@ class BlockCode:
         rows = [(k, element, self.stored(node)) for k, element, node in leaving]
         lines: list[str] = []
         for (k, text), elements in groupby(rows, lambda row: (row[0], row[2])):
-            places = [element for _, element, _ in elements]
-            for first, last in _runs(places):
+            indices = [element for _, element, _ in elements]
+            for first, last in _runs(indices):
                 target, length = f"o{k}[{first}]", last - first + 1
                 if text == self.zero and length >= _MANY_ZEROS:
                     size = f"{length} * sizeof({self.scalar})"
@@ -453,14 +453,14 @@ class BlockCode:
         return lines
 
 
-def _runs(places: Sequence[int]) -> list[tuple[int, int]]:
+def _runs(indices: Sequence[int]) -> list[tuple[int, int]]:
     """First and last of each run of consecutive numbers."""
     runs: list[tuple[int, int]] = []
-    for place in places:
-        if runs and place == runs[-1][1] + 1:
-            runs[-1] = (runs[-1][0], place)
+    for index in indices:
+        if runs and index == runs[-1][1] + 1:
+            runs[-1] = (runs[-1][0], index)
         else:
-            runs.append((place, place))
+            runs.append((index, index))
     return runs
 
 
@@ -535,7 +535,7 @@ class LaneCode(BlockCode):
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """The work space: slots, what callers do not want, then what maps take and give.
+    """The work space: slots, what callers do not need, then what maps take and give.
 
     Attributes:
         function: the whole Function.

@@ -80,12 +80,12 @@ def compiler_found() -> bool:
 
 
 @functools.lru_cache(maxsize=8)
-def _find(wanted: str, path: str) -> Compiler:
-    if wanted.strip():
-        compiler = _probe(_words(wanted), path)
+def _find(chosen: str, path: str) -> Compiler:
+    if chosen.strip():
+        compiler = _probe(_words(chosen), path)
         if compiler is None:
             raise CompilerError(
-                f"environment variable CC is {wanted!r} and does not start; set it to a C compiler "
+                f"environment variable CC is {chosen!r} and does not start; set it to a C compiler "
                 "or unset it"
             )
         return compiler
@@ -340,10 +340,10 @@ def cache_dir() -> Path:
         a folder that exists and can be written: one that lasts as long as this process when the
         usual one cannot, or is not the user's own.
     """
-    wanted = _wanted_dir()
-    if wanted is not None and _writable(wanted) and _is_own(wanted):
-        _remove_orphans(wanted)
-        return wanted
+    chosen = _chosen_dir()
+    if chosen is not None and _writable(chosen) and _is_own(chosen):
+        _remove_orphans(chosen)
+        return chosen
     return _process_dir()
 
 
@@ -451,7 +451,7 @@ def _common_object(
 
 
 def is_whole(library: Path) -> bool:
-    """Whether the content of a library of the cache is that which its name tells."""
+    """Whether the content of a library of the cache is that which its name says."""
     try:
         facts = library.stat()
         return _checked(library, facts.st_mtime_ns, facts.st_size)
@@ -491,7 +491,7 @@ def _install(library: Path, target: Path) -> Path:
     return target
 
 
-def _wanted_dir() -> Path | None:
+def _chosen_dir() -> Path | None:
     override = os.environ.get("MBS_CACHE_DIR")
     if override:
         return Path(override)

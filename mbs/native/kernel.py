@@ -367,7 +367,7 @@ def kernel_library(
 
 @functools.cache
 def processor() -> str:
-    """What tells apart processors on which code of this one may not run."""
+    """What distinguishes processors on which code of this one may not run."""
     try:
         lines = Path("/proc/cpuinfo").read_text("utf-8", "replace").splitlines()
     except OSError:

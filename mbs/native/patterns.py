@@ -1,4 +1,4 @@
-"""C text that tells CasADi where the derivatives of compiled Functions have no elements.
+"""C text that informs CasADi where the derivatives of compiled Functions have no elements.
 
 CasADi asks the library of an external Function `f` for `jac_f_sparsity_out`. Without it every
 element of a Jacobian counts, and a Hessian takes as many directions as there are variables.

@@ -209,28 +209,28 @@ def _elements(value: SX) -> SX:
 def _in_lanes(value: SX, rows: int, columns: int) -> SX:
     """Columns side by side, LANES at a time, completed by zeros."""
     elements = casadi.vertcat(_elements(value), 0)
-    places = [
+    indices = [
         column * rows + row if column < columns else rows * columns
         for first in range(0, columns, LANES)
         for row in range(rows)
         for column in range(first, first + LANES)
     ]
-    return SX(elements[places]) if places else SX(0, 1)
+    return SX(elements[indices]) if indices else SX(0, 1)
 
 
 def _select(node: MX, values: list[SX]) -> SX:
     """Some non-zero elements of a matrix in another pattern."""
     facts, pattern = node.info(), node.sparsity()
     if "nz" in facts:
-        places = list(facts["nz"])
+        indices = list(facts["nz"])
     elif "slice" in facts:
-        places = list(_range(facts["slice"]))
+        indices = list(_range(facts["slice"]))
     else:
         inner, outer = _range(facts["inner"]), _range(facts["outer"])
-        places = [a + b for a in outer for b in inner]
-    if any(place < 0 for place in places):
+        indices = [a + b for a in outer for b in inner]
+    if any(place < 0 for place in indices):
         raise ModelError("a selection that leaves elements out is not known here")
-    return SX(pattern, _elements(values[0])[places]) if places else SX(pattern)
+    return SX(pattern, _elements(values[0])[indices]) if indices else SX(pattern)
 
 
 def _range(slice_: Mapping[str, int]) -> range:

@@ -115,14 +115,14 @@ def factor(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
 
 def _opened_first(algebra: Algebra, polynomial: Polynomial) -> int:
     """The cheapest form of a polynomial; of equals the one with its products opened."""
-    return algebra.cheapest(reversed(_ways(algebra, polynomial)))
+    return algebra.cheapest(reversed(_forms(algebra, polynomial)))
 
 
 def _opened_last(algebra: Algebra, polynomial: Polynomial) -> int:
-    return algebra.cheapest(_ways(algebra, polynomial))
+    return algebra.cheapest(_forms(algebra, polynomial))
 
 
-def _ways(algebra: Algebra, polynomial: Polynomial) -> list[partial[int]]:
+def _forms(algebra: Algebra, polynomial: Polynomial) -> list[partial[int]]:
     forms = [partial(_factor, algebra, polynomial)]
     opened = _open_products(algebra, polynomial)
     if opened != polynomial:

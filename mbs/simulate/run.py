@@ -379,7 +379,7 @@ class Leg:
             tau[list(self.driven)] = np.nan if more or not v[k] else given + power / v[k]
 
 
-def integrated(
+def integrate_legs(
     system: System,
     equations: Callable[[System], FullState],
     x0: Array,
@@ -735,7 +735,7 @@ def prescribed_motions(system: System, motion: Motion) -> list[Prescribed]:
     return found
 
 
-def started(
+def start_positions(
     system: System, motions: list[Prescribed], q0: Values, v0: Values
 ) -> tuple[Values, Values]:
     """The start of a motion, with what is prescribed of it at the time zero.
@@ -925,12 +925,12 @@ def run(
     motions = prescribed_motions(system, motion)
     require_contacts_possible(system, motions)
     effort, inputs = effort_function(system, tau), input_function(system, u)
-    given = started(system, motions, q0, v0)
+    given = start_positions(system, motions, q0, v0)
     x0 = np.concatenate([*start(system, *given, parameters), device_states(system, z0)])
     times = np.linspace(0.0, duration, steps + 1)
     rtol, atol = step_tolerances(tolerance)
     with progress(f"simulating {system.name}", 0.0, duration, quiet=quiet) as reached:
-        legs, stop = integrated(
+        legs, stop = integrate_legs(
             system,
             lambda like: state_equation(like, effort, inputs, motions),
             x0,

@@ -46,11 +46,6 @@ MOVED = [  # constant, factor, run, parts of the tolerance that tell the one fro
 ]
 
 
-@pytest.fixture(scope="module")
-def systems():
-    return {name: build() for name, build in SYSTEMS.items()}
-
-
 def scale(monkeypatch, constant, factor):
     """Compile the steps with another value of a constant."""
     given = INTEGRATE._runtime
@@ -70,13 +65,16 @@ def scale(monkeypatch, constant, factor):
     monkeypatch.setattr(INTEGRATE, "_runtime", changed)
 
 
-def outcome(systems, run):
-    """The energy error in tolerances; infinite where the motion stops."""
+def outcome(run):
+    """The energy error in tolerances; infinite where the motion stops.
+
+    Each with a system of its own: a system keeps its steps in machine code.
+    """
     name, tolerance, start = RUNS[run]
     duration = 1.0 if "q0" in start else 3.0
     try:
         result = mbs.simulate.run(
-            systems[name], duration, tolerance=tolerance, step=0.05, quiet=True, **start
+            SYSTEMS[name](), duration, tolerance=tolerance, step=0.05, quiet=True, **start
         )
     except SolverError:
         return np.inf
@@ -86,20 +84,18 @@ def outcome(systems, run):
 
 @pytest.mark.sweep
 @pytest.mark.parametrize(("constant", "factor", "run", "bound"), MOVED)
-def test_a_constant_that_is_moved_tenfold_is_told(
-    systems, monkeypatch, constant, factor, run, bound
-):
-    ours = outcome(systems, run)
+def test_a_constant_that_is_moved_tenfold_is_told(monkeypatch, constant, factor, run, bound):
+    ours = outcome(run)
     scale(monkeypatch, constant, factor)
-    assert (ours < bound) != (outcome(systems, run) < bound)
+    assert (ours < bound) != (outcome(run) < bound)
 
 
-def test_a_miss_is_named_where_it_is_larger_than_rounding(systems, monkeypatch):
+def test_a_miss_is_named_where_it_is_larger_than_rounding(monkeypatch):
     """`APART` only chooses the words of a stop."""
 
     def words():
         with pytest.raises(SolverError) as stop:
-            mbs.simulate.run(systems[-1e-12], 3.0, v0={"j1": 6.0}, tolerance=1e-10, quiet=True)
+            mbs.simulate.run(SYSTEMS[-1e-12](), 3.0, v0={"j1": 6.0}, tolerance=1e-10, quiet=True)
         return str(stop.value)
 
     assert "come near each other" in words()

@@ -405,7 +405,7 @@ class StateEquations:
     sizes: tuple[int, int, int]
 
 
-def controlled(equations: StateEquations, drive: DriveInputs, extra: int) -> StateEquations:
+def with_laws(equations: StateEquations, drive: DriveInputs, extra: int) -> StateEquations:
     """The same with inputs that the laws of a drive compute.
 
     The functions are of scalars where the laws are. Else they hold calls of the laws, which may be
@@ -572,7 +572,7 @@ def minimal_state(
     layout = minimal_layout(system, drive)
     equations = _equations(system, observe, layout, drive)
     if drive.effort is not None or drive.device is not None:
-        equations = controlled(equations, drive, layout.extra)
+        equations = with_laws(equations, drive, layout.extra)
     closure, slopes = _closure_step(system, layout) if layout.dependents else (None, None)
     return MinimalState(
         **{field.name: getattr(layout, field.name) for field in fields(layout)},

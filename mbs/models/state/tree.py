@@ -38,11 +38,11 @@ from mbs.models.state.independent import (
     Observe,
     Seen,
     StateEquations,
-    controlled,
     minimal_layout,
     motion_of,
     outputs_vector,
     point_of,
+    with_laws,
 )
 from mbs.models.state.signals import Prescribed
 from mbs.models.symbols import dense_function, outputs_of, part_equations, state_count
@@ -65,7 +65,7 @@ _NEVER = 1e300
 """Pivot of a row that is left alone: what it would move, divided by this, is zero."""
 
 
-def projected(
+def project_step(
     system: System,
     q: SX,
     v: SX,
@@ -391,7 +391,7 @@ def tree_state(
         y = casadi.vertcat(y, *observe(Seen(s.t, system.p, *seen, external)))
     rate = casadi.vertcat(position_rate(system.tree, q, v), a, rates)
     touch = (contact.contacts, contact.modes) if contact else None
-    *kept, residual = projected(system, q, v, (), s.t, touch)
+    *kept, residual = project_step(system, q, v, (), s.t, touch)
 
     def written(name: str, at: Sequence[SX], outputs: Sequence[SX]) -> Function:
         few, values = few_modes(contact, system.p, outputs)
@@ -410,8 +410,8 @@ def tree_state(
         at = dense_function("motion", point, [q, v])
         sizes = (len(motors), system.u.numel())
         sizes3 = (*sizes, s.u.numel() - sum(sizes))
-        pushed = controlled(StateEquations(forces, at, None, sizes3), drive, layout.extra)
-        moving = controlled(StateEquations(rhs, at, events, sizes3), drive, layout.extra)
+        pushed = with_laws(StateEquations(forces, at, None, sizes3), drive, layout.extra)
+        moving = with_laws(StateEquations(rhs, at, events, sizes3), drive, layout.extra)
         rhs, forces, events = moving.rhs, pushed.rhs, moving.events
     inputs = SX.sym("u", rhs.numel_in(3))
     free = [s.t, X, none, inputs]
@@ -504,7 +504,7 @@ def full_state(
     rate = casadi.vertcat(position_rate(system.tree, q, v), a, z_rate)
     through = passage(system, (t, x, p), given, z_rate, motions, contact, given_inputs=u)
     touch = (contact.contacts, contact.modes) if contact else None
-    *kept, residual = projected(system, q, v, motions, t, touch)
+    *kept, residual = project_step(system, q, v, motions, t, touch)
     rows = closure_rows(system, q)
     openness = casadi.mmax(casadi.fabs(rows)) if rows.numel() else SX(0)
     E, U = outputs_of(system, energy(system, "tree"), q, v)

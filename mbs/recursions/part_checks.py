@@ -235,6 +235,11 @@ class _Check:
                     " custom.Event(when, {state: value})"
                 )
             self._value(f"when of the event {label!r}", event.when)
+            if not isinstance(event.then, Mapping):
+                raise AssemblyError(
+                    f"{self._title}: the event {label!r} sets {_kind(event.then)}; give a dict of"
+                    " states and modes, which may be empty"
+                )
             for name, value in event.then.items():
                 if name not in self.part.states:
                     raise AssemblyError(

@@ -125,3 +125,46 @@ def test_a_motor_with_a_further_state():
     assert result["motor.heat"][-1] == pytest.approx(
         np.trapezoid(2.0 * result["motor.i"] ** 2, result.time), rel=1e-3
     )
+
+
+def test_wires_by_names_into_placed_mechanisms():
+    """Each leg's gauge holds the other's actuator: two legs that start alike move as one alone."""
+
+    class Actuator(Custom):
+        joint = custom.coordinate()
+        order = custom.input("N.m")
+        angle = custom.output("rad")
+
+        def loads(self, at):
+            return {"joint": -3.0 * at.order}
+
+        def outputs(self, at):
+            return {"angle": at.joint.q}
+
+    def leg():
+        m = mbs.Mechanism("leg", gravity=(0, 0, 0))
+        body = m.add(Body("bar", mass=1.0, inertia=(INERTIA, INERTIA, INERTIA)))
+        m.connect(m.world, Revolute("j", axis="z", actuated=False), body)
+        m.add(Actuator("act", "j"))
+        return m
+
+    one, two = leg(), mbs.Mechanism("two", gravity=(0, 0, 0))
+    one.wire("act.angle", "act.order")
+    for side in ("left", "right"):
+        two.connect(two.world, two.add(leg(), side).base)
+    refused(
+        DescriptionError,
+        "two: a wire leads to 'left.act.ordr'",
+        "left.act.order",
+        by=lambda: two.wire("right.act.angle", "left.act.ordr"),
+    )
+    two.wire("right.act.angle", "left.act.order")
+    two.wire("left.act.angle", "right.act.order")
+    system = two.assemble()
+    assert system.inputs == ()
+    start = {"left.j": 0.3, "right.j": 0.3}
+    result = mbs.simulate.run(system, 0.5, q0=start, tolerance=1e-10, quiet=True)
+    alone = mbs.simulate.run(one.assemble(), 0.5, q0={"j": 0.3}, tolerance=1e-10, quiet=True)
+    exact = 0.3 * np.cos(np.sqrt(3.0 / INERTIA) * result.time)
+    for found in (result["left.j.q"], result["right.j.q"], alone["j.q"]):
+        assert found == pytest.approx(exact, abs=1e-9)  # tolerance of 1e-10

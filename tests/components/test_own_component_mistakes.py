@@ -168,3 +168,39 @@ def test_wires_by_names_into_placed_mechanisms():
     exact = 0.3 * np.cos(np.sqrt(3.0 / INERTIA) * result.time)
     for found in (result["left.j.q"], result["right.j.q"], alone["j.q"]):
         assert found == pytest.approx(exact, abs=1e-9)  # tolerance of 1e-10
+
+
+class Lag(Custom):
+    """A torque that follows an order, on a joint without a motor."""
+
+    joint = custom.coordinate()
+    tau = custom.state("N.m", start=0.5)
+    order = custom.input("N.m")
+    shown = custom.output("N.m")
+
+    def rates(self, at):
+        return {"tau": (at.order - at.tau) / 0.2}
+
+    def loads(self, at):
+        return {"joint": at.tau - 2.0 * at.joint.q}
+
+    def outputs(self, at):
+        return {"shown": at.tau - 2.0 * at.joint.q}
+
+
+def test_small_motions_without_motors():
+    """They ended in a RuntimeError of CasADi where inputs are those of components alone."""
+    found = mbs.models.linearise(bar(Lag("lag", "j")), outputs=["lag.shown"]).at()
+    assert found.A == pytest.approx(
+        np.array([[0, 1, 0], [-2 / INERTIA, 0, 1 / INERTIA], [0, 0, -5]]), abs=1e-13
+    )
+    assert found.B == pytest.approx(np.array([[0], [0], [5]]), abs=1e-13)
+    assert found.C == pytest.approx(np.array([[-2, 0, 1]]), abs=1e-13)  # rounding, as above
+    assert found.u == (("lag.order", "N.m"),)
+
+
+def test_rates_and_outputs_without_drives():
+    devices = mbs.models.devices(bar(Lag("lag", "j")))
+    tau, rate, shown = devices(0.3, 0.0, 0.5, 0.7)
+    assert (float(tau), float(rate)) == pytest.approx((0.0, 1.0), abs=1e-15)  # rounding
+    assert float(shown) == pytest.approx(0.5 - 2.0 * 0.3, abs=1e-15)

@@ -8,8 +8,18 @@ import pytest
 from support.messages import refused
 
 import mbs
-from mbs.components import Body, Custom, DCMotor, Revolute, ShaftDamper, custom
-from mbs.errors import AssemblyError, DescriptionError, ModelError
+from mbs.components import (
+    Body,
+    Custom,
+    Cylindrical,
+    DCMotor,
+    PointMass,
+    Prismatic,
+    Revolute,
+    ShaftDamper,
+    custom,
+)
+from mbs.errors import AssemblyError, DescriptionError, ModelError, Unclosable
 
 INERTIA = 0.1  # of the bar about its joint [kg m^2]
 
@@ -191,11 +201,13 @@ class Lag(Custom):
 def test_small_motions_without_motors():
     """They ended in a RuntimeError of CasADi where inputs are those of components alone."""
     found = mbs.models.linearise(bar(Lag("lag", "j")), outputs=["lag.shown"]).at()
-    assert found.A == pytest.approx(
-        np.array([[0, 1, 0], [-2 / INERTIA, 0, 1 / INERTIA], [0, 0, -5]]), abs=1e-13
-    )
-    assert found.B == pytest.approx(np.array([[0], [0], [5]]), abs=1e-13)
-    assert found.C == pytest.approx(np.array([[-2, 0, 1]]), abs=1e-13)  # rounding, as above
+    slopes = {
+        "A": [[0, 1, 0], [-2 / INERTIA, 0, 1 / INERTIA], [0, 0, -5]],
+        "B": [[0], [0], [5]],
+        "C": [[-2, 0, 1]],
+    }
+    for name, exact in slopes.items():
+        assert np.abs(getattr(found, name) - exact).max() < 1e-13  # rounding
     assert found.u == (("lag.order", "N.m"),)
 
 
@@ -204,3 +216,48 @@ def test_rates_and_outputs_without_drives():
     tau, rate, shown = devices(0.3, 0.0, 0.5, 0.7)
     assert (float(tau), float(rate)) == pytest.approx((0.0, 1.0), abs=1e-15)  # rounding
     assert float(shown) == pytest.approx(0.5 - 2.0 * 0.3, abs=1e-15)
+
+
+class TestRows:
+    def test_that_contradict_each_other_are_open_in_metres(self):
+        mine = type(
+            "Mine",
+            (Custom,),
+            {
+                "p": custom.frame(),
+                "rows": lambda self, at: {"a": at.p.p[2] - 0.1, "b": at.p.p[2] - 0.2},
+            },
+        )
+        m = mbs.Mechanism("m", gravity=(0, 0, 0))
+        stone = m.add(PointMass("stone", mass=1.0))
+        m.connect(m.world, Prismatic("z", axis="z", actuated=False), stone)
+        m.add(mine("c", stone))
+        refused(Unclosable, "c open by 0.0707 m and 0 in direction cosines", by=m.assemble)
+
+    def test_that_leave_an_unknown_alone(self):
+        mine = type(
+            "Mine",
+            (Custom,),
+            {
+                "p": custom.frame(),
+                "s": custom.unknown(),
+                "rows": lambda self, at: {"a": at.p.p[2] - 0.1},
+            },
+        )
+        told = ("c (Mine): no row depends on the unknown 's'",)
+        refused(AssemblyError, *told, by=lambda: bar(lambda body: mine("c", body)))
+
+
+def test_an_output_that_is_named_as_a_coordinate_is():
+    class Reads(Custom):
+        joint = custom.coordinate()
+        q = custom.output("m")
+
+        def outputs(self, at):
+            return {"q": at.joint.q}
+
+    m = mbs.Mechanism("m", gravity=(0, 0, 0))
+    body = m.add(Body("bar", mass=1.0, inertia=(INERTIA, INERTIA, INERTIA)))
+    m.connect(m.world, Cylindrical("c", axis="z", actuated=False), body)
+    m.add(Reads("c.s", "c.s"))
+    refused(AssemblyError, "m: c.s.q is", "rename the component", by=m.assemble)

@@ -65,6 +65,7 @@ class SolverError(MbsError, RuntimeError):
         state: the last state that an integration reached; empty where there is none.
         singular: whether it stopped at a singular configuration.
         time: at which a motion stopped, s; None where there is no motion.
+        fired: numbers of the event indicators that are to blame; empty where none is.
         result: what a simulation had reached, a `Result`; None where it is not one that stopped.
     """
 
@@ -74,12 +75,14 @@ class SolverError(MbsError, RuntimeError):
         state: Sequence[float] = (),
         singular: bool = False,
         time: float | None = None,
+        fired: Sequence[int] = (),
     ) -> None:
         """As of every exception, with what is known of where it happened."""
         super().__init__(*args)
         self.state = tuple(state)
         self.singular = singular
         self.time = time
+        self.fired = tuple(fired)
         self.result: Any = None
 
 

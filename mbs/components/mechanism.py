@@ -20,7 +20,7 @@ from mbs.components.sensors import Sensor
 from mbs.components.shapes import Shape
 from mbs.errors import AssemblyError, DescriptionError
 from mbs.expressions import Parameter, Scalar, parameters_of
-from mbs.text import quoted
+from mbs.text import did_you_mean, quoted
 
 if TYPE_CHECKING:
     from mbs.assembly.system import System
@@ -264,7 +264,7 @@ class Mechanism:
             )
         self._weld(self._point(a), self._point(joint_or_point))
 
-    def wire(self, source: Signal | str, target: Signal) -> None:
+    def wire(self, source: Signal | str, target: Signal | str) -> None:
         """Feed an input of a component from an output or state of another one, or from a sensor.
 
         Components that are not in the mechanism yet are added.
@@ -272,7 +272,8 @@ class Mechanism:
         Args:
             source: an output such as `controller.u`; or a state or what a sensor reads, by its name
                 in results, such as "motor.i" or "encoder.q".
-            target: an input such as `motor.voltage`.
+            target: an input such as `motor.voltage`, or its name, such as "arm.motor.voltage" in a
+                mechanism that was placed here.
 
         Raises:
             DescriptionError: they are no output and no input, or a name of theirs is taken.
@@ -284,6 +285,19 @@ class Mechanism:
                 " which is no output; give an output of a component, or the name of a reading such"
                 " as 'encoder.q'"
             )
+        if isinstance(target, str):
+            inputs = {
+                f"{component.name}.{name}": Signal(component, name, "input")
+                for component in self.components.values()
+                if isinstance(component, Custom)
+                for name in component.input_names
+            }
+            if target not in inputs:
+                raise DescriptionError(
+                    f"{self.name}: a wire leads to {quoted(target)}, which is no input;"
+                    f" {did_you_mean(target, inputs) if inputs else 'no component here has one'}"
+                )
+            target = inputs[target]
         if not isinstance(target, Signal) or target.kind != "input":
             raise DescriptionError(
                 f"{self.name}: a wire leads to {_what(target)},"
@@ -508,7 +522,9 @@ class Mechanism:
 
 
 def _what(value: object) -> str:
-    """A value in a message: a component by its name."""
+    """A value in a message: a component or a signal by its name."""
     if isinstance(value, Component):
         return f"{type(value).__name__} {value.name!r}"
+    if isinstance(value, Signal):
+        return f"the {value.kind} {value}"
     return quoted(value)

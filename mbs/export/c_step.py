@@ -187,8 +187,9 @@ def step_texts(system: System, name: str, library: str, real: Real, mark: str) -
     state = minimal_state(system, lambda seen: [seen.q, seen.v, seen.a])
     if state.events is not None:
         raise ModelError(
-            f"{system.name}: rigid stops and Coulomb friction have events, which steps of a fixed"
-            " length cannot follow; take elastic stops and viscous friction, or mbs.export.fmu"
+            f"{system.name}: rigid stops, Coulomb friction and components have events, which"
+            " steps of a fixed length cannot follow; take elastic stops, viscous friction and"
+            " components without events, or mbs.export.fmu"
         )
     if state.rhs.size1_in(1) == 0:
         raise ModelError(f"{system.name}: nothing can move, so there is no motion to step through")

@@ -198,11 +198,11 @@ class Closing:
 
     def gap(self, q: Vector) -> str:
         """Which joint stays open most at q, in words and figures."""
-        labels = [(name, label) for name, label, _ in position_rows(self.system)]
+        units = [(name, unit) for name, _, unit in position_rows(self.system)]
         gaps: dict[str, list[float]] = {}
-        for (name, label), value in zip(labels, self.rows(q)[0], strict=False):
+        for (name, unit), value in zip(units, self.rows(q)[0], strict=False):
             gap = gaps.setdefault(name, [0.0, 0.0])
-            kind = 0 if label.startswith("force") else 1
+            kind = 0 if unit == "m" else 1
             gap[kind] = float(np.hypot(gap[kind], value))
         name = max(gaps, key=lambda loop: max(gaps[loop]))
         distance, other = gaps[name]

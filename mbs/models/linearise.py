@@ -229,7 +229,7 @@ def _matrices(
     A = casadi.vertcat(first, A2, A3)
     B = casadi.vertcat(SX(A11.shape[0], efforts.numel()), B2, B3)
     # tau has what motors give; their symbols were for slopes alone
-    zero = SX.zeros(motor_efforts.numel())
+    zero = SX.zeros(*motor_efforts.shape)  # (1, 0) where there is none
     return tuple(  # type: ignore[return-value]
         SX(value) for value in casadi.substitute([A, B, C, D], [motor_efforts], [zero])
     )

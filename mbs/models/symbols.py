@@ -216,14 +216,14 @@ def dense_function(name: str, inputs: list[SX], outputs: list[SX]) -> Function:
 
 
 def devices(system: System) -> Function:
-    """``devices(v, z, u) -> tau, zdot, y``: the motors and torques of the drive lines.
+    """``devices(v, z, u) -> tau, zdot, y``: motors and torques, states and outputs of components.
 
     The elements of z, u and y are those that `devices(system).elements("z")` names: states such as
     currents; inputs such as voltages and torques; what a simulation shows beside them; of all
     components that have some.
 
     Args:
-        system: open or closed, with devices.
+        system: open or closed, with devices or components that have states or outputs.
 
     Returns:
         Function of v (nv, 1) velocities of the tree, z (nz, 1) states and u (nu, 1) inputs, and of
@@ -233,13 +233,14 @@ def devices(system: System) -> Function:
         zdot (nz, 1), y (ny, 1).
 
     Raises:
-        ModelError: the system has no device.
+        ModelError: the system has no device, state or output.
     """
     require_system(system)
-    if not system.devices:
+    if not (system.devices or system.states or system.outputs):
         raise ModelError(
-            f"{system.name}: there is no motor and no torque on a flange; connect a DCMotor or a"
-            " TorqueSource, or use the efforts tau of the joints"
+            f"{system.name}: there is no motor and no torque on a flange, and no component with"
+            " states or outputs; connect a DCMotor or a TorqueSource, or use the efforts tau of the"
+            " joints"
         )
 
     def build() -> tuple[Named, Named]:

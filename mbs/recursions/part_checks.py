@@ -32,6 +32,7 @@ _SAME = 1e-8
 laws with steep slopes lose some digits."""
 _NEGATIVE = 1e-9
 """Heat below zero that is rounding, in parts of the other powers."""
+_COLUMNS = ("q", "v", "a", "tau")  # of a coordinate in results
 _FROM_AT = "take what is declared from at, such as at.k, and not from self"
 _NO_TRUTH = (
     "write casadi.if_else, casadi.fmax and casadi.logic_and where if, max and `and` ask a symbol"
@@ -51,6 +52,13 @@ def check_parts(system: System) -> None:
         return
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     at = PartsAt(system, q, v)
+    taken = {f"{c.name}.{x}" for c in (*system.coordinates, *system.speeds) for x in _COLUMNS}
+    for name, _ in (*system.states, *system.inputs, *system.outputs):
+        if name in taken:
+            raise AssemblyError(
+                f"{system.name}: {name} is a state, input or output of a component, and a column of"
+                " a coordinate; rename the component"
+            )
     for part in system.parts:
         for given in part.inputs.values():
             if isinstance(given, WireSource):
@@ -197,7 +205,7 @@ class _Check:
         return self._named("outputs", self.element.output_names)
 
     def _rows(self) -> None:
-        count = 0
+        count, bound = 0, list[SX]()
         for method in ("rows", "velocity_rows"):
             if not self.element.has(method):
                 continue
@@ -212,6 +220,7 @@ class _Check:
                         " '1'"
                     )
                 value = self._value(f"row {label!r}", row.value if isinstance(row, Row) else row)
+                bound.append(value)
                 signals = casadi.vertcat(self.system.z, self.system.u)
                 self._require_free_of(value, f"the row {label!r}", signals, "states or inputs")
                 if method == "rows":
@@ -220,6 +229,13 @@ class _Check:
                     self._require_linear(label, value)
             count += len(found)
         unknowns = self.element.names_of("unknown")
+        for name in unknowns if count else ():
+            place = self.part.coordinates[name][0].position
+            if place is not None and not casadi.depends_on(casadi.vertcat(*bound), self.q[place]):
+                raise AssemblyError(
+                    f"{self._title}: no row depends on the unknown {name!r}, which rows must"
+                    " determine; use it in one, or leave it out"
+                )
         if len(unknowns) > count:
             raise AssemblyError(
                 f"{self._title}: the number of unknowns is {len(unknowns)} and that of rows"
@@ -235,6 +251,11 @@ class _Check:
                     " custom.Event(when, {state: value})"
                 )
             self._value(f"when of the event {label!r}", event.when)
+            if not isinstance(event.then, Mapping):
+                raise AssemblyError(
+                    f"{self._title}: the event {label!r} sets {_kind(event.then)}; give a dict of"
+                    " states and modes, which may be empty"
+                )
             for name, value in event.then.items():
                 if name not in self.part.states:
                     raise AssemblyError(

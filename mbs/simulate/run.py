@@ -347,7 +347,7 @@ class Leg:
     @property
     def without_start(self) -> Leg:
         """The same without its first row, which belongs to the leg before."""
-        return Leg(self.state, self.times[1:], self.x[1:])
+        return replace(self, times=self.times[1:], x=self.x[1:])
 
     def observed(self, p: Sequence[float]) -> list[Array]:
         """What the state equation observes, (m, ..) each."""
@@ -408,12 +408,22 @@ def integrate_legs(
         where = ", ".join(f"{c.name} = {x:.6g}" for c, x in zip(system.coordinates, q, strict=True))
         lost = _lost(system, q, p) if stop.singular and system.is_closed else ""
         stop = SolverError(
-            f"{system.name}: {stop}; the configuration is {where}{lost}",
+            f"{system.name}: {_with_names(system, stop)}; the configuration is {where}{lost}",
             state=stop.state,
             singular=stop.singular,
             time=stop.time,
+            fired=stop.fired,
         )
     return legs, stop
+
+
+def _with_names(system: System, stop: SolverError) -> str:
+    """The message, with the events that are to blame by component and label."""
+    message, _, numbers = str(stop).partition("; indicators ")
+    contacts = [name for _ in KINDS for name in contacts_of(system).names]
+    names = [*contacts, *(f"{event.name}, {event.label}" for event in part_events(system))]
+    blamed = [names[k] for k in stop.fired if k < len(names)]
+    return f"{message}; it concerns {' and '.join(blamed)}" if numbers and blamed else str(stop)
 
 
 def _lost(system: System, q: Array, p: Sequence[float]) -> str:
@@ -451,10 +461,9 @@ def _integrate(
     discs = [disc.name for _, disc in rolling_discs(system)]
     if discs:
         upright = Limit(least_upright(system), _FLAT)
-        leg, motion = _leg(system, state, x0, times, p, upright, options)
-        if not motion.events:
+        leg, motion, end = _leg(system, state, x0, times, p, upright, options)
+        if end is None:
             return [leg], motion.stop
-        end = motion.events[0].time
         return [leg], SolverError(
             f"{system.name}: {' or '.join(discs)} lies flat on its plane at t = {end:.6g} s, where"
             " no single point of a disc touches; end the run before, or keep it upright",
@@ -621,11 +630,11 @@ def _with_other_rows(
         if rows not in known:
             known[rows] = system, equations(system)
         system, state = known[rows]
-        leg, motion = _leg(system, state, x0, left, p, limit, options)
+        leg, motion, end = _leg(system, state, x0, left, p, limit, options)
         legs.append(leg if not legs else leg.without_start)
-        if motion.stop is not None or not motion.events:
+        if motion.stop is not None or end is None:
             return legs, motion.stop
-        x0, end = motion.x[-1], motion.events[0].time
+        x0 = motion.x[-1]
         left = left[left > end]
         if not len(left):
             return legs, None
@@ -659,10 +668,13 @@ def _leg(
     p: Sequence[float],
     limit: Limit,
     options: dict[str, Any],
-) -> tuple[Leg, EventMotion]:
-    """One leg, and the motion whose first event is its end, if it ends early; it rests then."""
+) -> tuple[Leg, EventMotion, float | None]:
+    """One leg, the motion, and when it ended early, below the limit; it rests from then on."""
     n, n_p = len(x0), len(p)
-    t, x, pm, fired = (SX.sym(k, m) for k, m in (("t", 1), ("x", n), ("p", n_p + 1), ("f", 1)))
+    count = state.events[0].numel_out(0) if state.events else 0
+    t, x, pm, fired = (
+        SX.sym(k, m) for k, m in (("t", 1), ("x", n), ("p", n_p + 1), ("f", count + 1))
+    )
     parameters, ended = pm[:n_p], pm[n_p]
     # a rate that has no value at the end is left out
     rate = casadi.if_else(ended, 0, state.rhs(t, x, parameters))
@@ -671,10 +683,17 @@ def _leg(
     corrected, residual = state.project(t, x, parameters)
     kept = [casadi.if_else(ended, x, corrected), casadi.if_else(ended, 0, residual)]
     project = Function("project", [t, x, pm], kept)
+    # events of components, then the end
     left = limit.measure(x[: system.nq], parameters) - limit.level
+    watched, after = left, x
+    if state.events:
+        own, jump = state.events
+        watched = casadi.vertcat(own(t, x, parameters), left)
+        jumps = casadi.mmax(fired[:count])
+        after = casadi.if_else(jumps, jump(t, x, parameters, fired[:count]), x)
     events = Events(
-        Function("lost", [t, x, pm], [casadi.if_else(ended, 1, left)]),
-        Function("end", [t, x, pm, fired], [x, SX(1)]),
+        Function("watched", [t, x, pm], [casadi.if_else(ended, 1, watched)]),
+        Function("end", [t, x, pm, fired], [after, casadi.fmax(ended, fired[count])]),
         [0.0],
     )
     ending = replace(state, rhs=rhs, project=project, passage=None, prepared={})
@@ -683,8 +702,14 @@ def _leg(
         ending = replace(ending, crossings=Function("crossings", [t, x, pm], [crossed]))
     motion = _motion(ending, x0, times, events, p, options)
     reached = times[: len(motion.x)]
-    before = reached <= (motion.events[0].time if motion.events else np.inf)
-    return Leg(state, reached[before], motion.x[before]), motion
+    end = next((event.time for event in motion.events if count in event.fired), None)
+    before = reached <= (np.inf if end is None else end)
+    happened = tuple(
+        replace(event, fired=others)
+        for event in motion.events
+        if (others := tuple(k for k in event.fired if k < count))
+    )
+    return Leg(state, reached[before], motion.x[before], happened=happened), motion, end
 
 
 def _next(system: System, q: Array, p: Array) -> tuple[System, Limit | None]:
@@ -1032,7 +1057,8 @@ def _result(system: System, legs: Sequence[Leg], p: Sequence[float], stop: Stop)
     for name, unit, values in contact_columns(system, contact, contact_efforts):
         column(name, unit, values)
     values = np.column_stack(columns)
-    events = list_events(system, contact, legs[0].happened)
+    happened = [event for leg in legs for event in leg.happened]
+    events = list_events(system, contact, happened)
     stopped = None if stop is None or stop.time is None else (stop.time, str(stop))
     return Result(
         times, values, units, name=system.name, events=events, system=system, stopped=stopped

@@ -432,6 +432,7 @@ def failed(
         state=state,
         singular=reason in _SINGULAR,
         time=t,
+        fired=fired,
     )
 
 

@@ -511,7 +511,7 @@ class TestWires:
         refused(DescriptionError, "m:", "no output", by=lambda: m.wire(gain.u, gain.u))
         refused(DescriptionError, "m:", "no output", by=lambda: m.wire(3.0, gain.u))
         refused(DescriptionError, "m:", "no input", by=lambda: m.wire(gain.y, gain.y))
-        refused(DescriptionError, "m:", "no input", by=lambda: m.wire(gain.y, "k.u"))
+        refused(DescriptionError, "m:", "no input", by=lambda: m.wire(gain.y, "k.y"))
         assert m.wires == []
 
     def test_what_is_not_there(self):

@@ -8,8 +8,18 @@ import pytest
 from support.messages import refused
 
 import mbs
-from mbs.components import Body, Custom, DCMotor, Revolute, ShaftDamper, custom
-from mbs.errors import AssemblyError, DescriptionError, ModelError
+from mbs.components import (
+    Body,
+    Custom,
+    Cylindrical,
+    DCMotor,
+    PointMass,
+    Prismatic,
+    Revolute,
+    ShaftDamper,
+    custom,
+)
+from mbs.errors import AssemblyError, DescriptionError, ModelError, Unclosable
 
 INERTIA = 0.1  # of the bar about its joint [kg m^2]
 
@@ -125,3 +135,129 @@ def test_a_motor_with_a_further_state():
     assert result["motor.heat"][-1] == pytest.approx(
         np.trapezoid(2.0 * result["motor.i"] ** 2, result.time), rel=1e-3
     )
+
+
+def test_wires_by_names_into_placed_mechanisms():
+    """Each leg's gauge holds the other's actuator: two legs that start alike move as one alone."""
+
+    class Actuator(Custom):
+        joint = custom.coordinate()
+        order = custom.input("N.m")
+        angle = custom.output("rad")
+
+        def loads(self, at):
+            return {"joint": -3.0 * at.order}
+
+        def outputs(self, at):
+            return {"angle": at.joint.q}
+
+    def leg():
+        m = mbs.Mechanism("leg", gravity=(0, 0, 0))
+        body = m.add(Body("bar", mass=1.0, inertia=(INERTIA, INERTIA, INERTIA)))
+        m.connect(m.world, Revolute("j", axis="z", actuated=False), body)
+        m.add(Actuator("act", "j"))
+        return m
+
+    one, two = leg(), mbs.Mechanism("two", gravity=(0, 0, 0))
+    one.wire("act.angle", "act.order")
+    for side in ("left", "right"):
+        two.connect(two.world, two.add(leg(), side).base)
+    refused(
+        DescriptionError,
+        "two: a wire leads to 'left.act.ordr'",
+        "left.act.order",
+        by=lambda: two.wire("right.act.angle", "left.act.ordr"),
+    )
+    two.wire("right.act.angle", "left.act.order")
+    two.wire("left.act.angle", "right.act.order")
+    system = two.assemble()
+    assert system.inputs == ()
+    start = {"left.j": 0.3, "right.j": 0.3}
+    result = mbs.simulate.run(system, 0.5, q0=start, tolerance=1e-10, quiet=True)
+    alone = mbs.simulate.run(one.assemble(), 0.5, q0={"j": 0.3}, tolerance=1e-10, quiet=True)
+    exact = 0.3 * np.cos(np.sqrt(3.0 / INERTIA) * result.time)
+    for found in (result["left.j.q"], result["right.j.q"], alone["j.q"]):
+        assert found == pytest.approx(exact, abs=1e-9)  # tolerance of 1e-10
+
+
+class Lag(Custom):
+    """A torque that follows an order, on a joint without a motor."""
+
+    joint = custom.coordinate()
+    tau = custom.state("N.m", start=0.5)
+    order = custom.input("N.m")
+    shown = custom.output("N.m")
+
+    def rates(self, at):
+        return {"tau": (at.order - at.tau) / 0.2}
+
+    def loads(self, at):
+        return {"joint": at.tau - 2.0 * at.joint.q}
+
+    def outputs(self, at):
+        return {"shown": at.tau - 2.0 * at.joint.q}
+
+
+def test_small_motions_without_motors():
+    """They ended in a RuntimeError of CasADi where inputs are those of components alone."""
+    found = mbs.models.linearise(bar(Lag("lag", "j")), outputs=["lag.shown"]).at()
+    slopes = {
+        "A": [[0, 1, 0], [-2 / INERTIA, 0, 1 / INERTIA], [0, 0, -5]],
+        "B": [[0], [0], [5]],
+        "C": [[-2, 0, 1]],
+    }
+    for name, exact in slopes.items():
+        assert np.abs(getattr(found, name) - exact).max() < 1e-13  # rounding
+    assert found.u == (("lag.order", "N.m"),)
+
+
+def test_rates_and_outputs_without_drives():
+    devices = mbs.models.devices(bar(Lag("lag", "j")))
+    tau, rate, shown = devices(0.3, 0.0, 0.5, 0.7)
+    assert (float(tau), float(rate)) == pytest.approx((0.0, 1.0), abs=1e-15)  # rounding
+    assert float(shown) == pytest.approx(0.5 - 2.0 * 0.3, abs=1e-15)
+
+
+class TestRows:
+    def test_that_contradict_each_other_are_open_in_metres(self):
+        mine = type(
+            "Mine",
+            (Custom,),
+            {
+                "p": custom.frame(),
+                "rows": lambda self, at: {"a": at.p.p[2] - 0.1, "b": at.p.p[2] - 0.2},
+            },
+        )
+        m = mbs.Mechanism("m", gravity=(0, 0, 0))
+        stone = m.add(PointMass("stone", mass=1.0))
+        m.connect(m.world, Prismatic("z", axis="z", actuated=False), stone)
+        m.add(mine("c", stone))
+        refused(Unclosable, "c open by 0.0707 m and 0 in direction cosines", by=m.assemble)
+
+    def test_that_leave_an_unknown_alone(self):
+        mine = type(
+            "Mine",
+            (Custom,),
+            {
+                "p": custom.frame(),
+                "s": custom.unknown(),
+                "rows": lambda self, at: {"a": at.p.p[2] - 0.1},
+            },
+        )
+        told = ("c (Mine): no row depends on the unknown 's'",)
+        refused(AssemblyError, *told, by=lambda: bar(lambda body: mine("c", body)))
+
+
+def test_an_output_that_is_named_as_a_coordinate_is():
+    class Reads(Custom):
+        joint = custom.coordinate()
+        q = custom.output("m")
+
+        def outputs(self, at):
+            return {"q": at.joint.q}
+
+    m = mbs.Mechanism("m", gravity=(0, 0, 0))
+    body = m.add(Body("bar", mass=1.0, inertia=(INERTIA, INERTIA, INERTIA)))
+    m.connect(m.world, Cylindrical("c", axis="z", actuated=False), body)
+    m.add(Reads("c.s", "c.s"))
+    refused(AssemblyError, "m: c.s.q is", "rename the component", by=m.assemble)

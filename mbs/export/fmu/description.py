@@ -126,8 +126,9 @@ def _check_target(model: FmuModel) -> None:
         )
     if model.jumps is not None:
         raise ExportError(
-            f"FMU {model.name}: rigid stops and Coulomb friction have events, which target='bare'"
-            " does not handle; take elastic stops and viscous friction, or target='hosted'"
+            f"FMU {model.name}: rigid stops, Coulomb friction and components have events, which"
+            " target='bare' does not handle; take elastic stops, viscous friction and components"
+            " without events, or target='hosted'"
         )
     if model.sources:
         raise ExportError(

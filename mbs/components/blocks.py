@@ -40,7 +40,7 @@ class SignalBlock(Custom):
         return None if given is None else to_float(given)
 
 
-def limited(x: SX, low: SX | None, high: SX | None, width: SX) -> SX:
+def saturate(x: SX, low: SX | None, high: SX | None, width: SX) -> SX:
     """A value between limits, each of which may be missing.
 
     Args:
@@ -166,7 +166,7 @@ class Limiter(SignalBlock):
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """The input between the limits."""
-        return {"y": limited(at.u, at.low, at.high, at.width)}
+        return {"y": saturate(at.u, at.low, at.high, at.width)}
 
 
 # With states, but no limits.
@@ -266,7 +266,7 @@ class RateLimiter(SignalBlock):
     def rates(self, at: Any) -> Mapping[str, SX]:
         """Towards the input, between the largest rates."""
         down = at.rising if at.falling is None else at.falling
-        return {"x": limited((at.u - at.x) / at.time, -down, at.rising, at.width)}
+        return {"x": saturate((at.u - at.x) / at.time, -down, at.rising, at.width)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """The state."""
@@ -319,17 +319,17 @@ class ErrorController(SignalBlock):
         rate = at.ki * (at.target - at.measured)
         if at.low is not None or at.high is not None:
             tracking = at.kp / at.ki if at.tracking is None else at.tracking
-            rate += (self._limited(at) - self._unlimited(at)) / tracking
+            rate += (self._saturate(at) - self._command(at)) / tracking
         return {"x": rate}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """The sum of the parts, between the limits."""
-        return {"u": self._limited(at)}
+        return {"u": self._saturate(at)}
 
-    def _limited(self, at: Any) -> SX:
-        return limited(self._unlimited(at), at.low, at.high, SX(0))
+    def _saturate(self, at: Any) -> SX:
+        return saturate(self._command(at), at.low, at.high, SX(0))
 
-    def _unlimited(self, at: Any) -> SX:
+    def _command(self, at: Any) -> SX:
         raise NotImplementedError
 
 
@@ -350,7 +350,7 @@ class PI(ErrorController):
     tracking = custom.parameter("s", None, positive=True)
     x = custom.state()
 
-    def _unlimited(self, at: Any) -> SX:
+    def _command(self, at: Any) -> SX:
         return SX(at.kp * (at.target - at.measured) + at.x)
 
 
@@ -383,7 +383,7 @@ class PID(ErrorController):
         error = at.target - at.measured
         return {**ErrorController.rates(self, at), "f": (error - at.f) / at.filter}
 
-    def _unlimited(self, at: Any) -> SX:
+    def _command(self, at: Any) -> SX:
         error = at.target - at.measured
         return SX(at.kp * error + at.x + at.kd * (error - at.f) / at.filter)
 
@@ -402,9 +402,9 @@ class SampledBlock(SignalBlock):
 
     def events(self, at: Any) -> Mapping[str, Event]:
         """It looks again."""
-        return {"samples": Event(at.left, {"left": at.period, **self._sampled(at)})}
+        return {"samples": Event(at.left, {"left": at.period, **self._sample(at)})}
 
-    def _sampled(self, at: Any) -> Mapping[str, SX]:
+    def _sample(self, at: Any) -> Mapping[str, SX]:
         """What its modes become."""
         raise NotImplementedError
 
@@ -421,7 +421,7 @@ class SampleHold(SampledBlock):
     y = custom.output()
     sample = custom.mode()
 
-    def _sampled(self, at: Any) -> Mapping[str, SX]:
+    def _sample(self, at: Any) -> Mapping[str, SX]:
         return {"sample": at.u}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
@@ -462,16 +462,16 @@ class SampledPID(SampledBlock):
         Custom.__post_init__(self)
         self._require_order()
 
-    def _sampled(self, at: Any) -> Mapping[str, SX]:
+    def _sample(self, at: Any) -> Mapping[str, SX]:
         error = at.target - at.measured
         more = at.x + at.ki * error * at.period
         given = at.kp * error + at.kd * (error - at.error) / at.period
         whole = given + more
-        inside = limited(whole, at.low, at.high, SX(0))
+        inside = saturate(whole, at.low, at.high, SX(0))
         # the integral part grows only where the output is not at a limit already
         outwards = (whole - inside) * (more - at.x) > 0
         x = casadi.if_else(outwards, at.x, more)
-        return {"sample": limited(given + x, at.low, at.high, SX(0)), "x": x, "error": error}
+        return {"sample": saturate(given + x, at.low, at.high, SX(0)), "x": x, "error": error}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """What it holds."""

@@ -39,7 +39,7 @@ static int by_joints(core *c, const double *x, found *f) {
     return 0;
 }
 
-/* Where the motion leads from the last states that were on it. */
+/* The motion from the last states that were on it. */
 static void foretell(const core *c, double *guide) {
     static const passage_size size = MODEL_PASSAGE;
     const core_charts *m = &c->m.charts;
@@ -57,7 +57,7 @@ static int by_chart(core *c, const double *y, found *f) {
     foretell(c, guide);
     memset(f->rate, 0, sizeof f->rate);
     if (passage_state(c->passage, c->m.time, y, guide, f->X, f->slope, f->rate,
-                      &c->m.charts.turned))
+                      &c->m.charts.alignment))
         return 1;
     if (passage_jumps(c->passage, m->time, m->X, m->slope, c->m.time - m->time, f->X, f->slope))
         return 1;
@@ -125,7 +125,7 @@ static core_status choose(core *c, double least) {
         return CORE_OK;
     }
     memset(slots, 0, NX * sizeof *slots);
-    m->turned = 1.0;
+    m->alignment = 1.0;
     if (!passage_chart(c->passage, c->m.time, c->m.tree) &&
         !passage_coordinates(c->passage, c->m.time, c->m.tree, slots))
         return CORE_OK;
@@ -176,10 +176,10 @@ core_status charts_pause(core *c) {
 
 /* Not positive where other coordinates are to be taken. */
 static double indicator(core *c) {
-    return c->m.charts.tangent ? c->m.charts.turned - TURNED : room(c) - 1.0;
+    return c->m.charts.tangent ? c->m.charts.alignment - TURNED : room(c) - 1.0;
 }
 
-/* The states are on the motion, and no branch was left on the way to them. */
+/* The states are on the motion, and no branch was left on the path to them. */
 static core_status accept_states(core *c) {
     core_status status = c->m.charts.tangent ? CORE_OK : guard_pass(c);
     if (!status) follow_from_here(c);
@@ -222,7 +222,7 @@ core_status charts_update(core *c, int *changed) {
     return status;
 }
 
-/* Rates, outputs and joints a part of the way along a direction. */
+/* Rates, outputs and joints a part of the distance along a direction. */
 static int beside(core *c, const charts_tangent *along, double part, found *f) {
     double *v = c->m.values, y[NX + 1];
     int i;

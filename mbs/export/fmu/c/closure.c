@@ -21,14 +21,14 @@
 #define SMALLEST REAL(0.0009765625)
 #define STEEPEST REAL(1e4) /* nominal sizes that dependents move for one of the states */
 /* A start is followed from the start values in steps of this length at most, of the states that lead the
- * dependents, in nominal sizes; the first one is shorter and tells the slope. */
+ * dependents, in nominal sizes; the first one is shorter and shows the slope. */
 #define STRIDE REAL(0.2)
 #define FIRST REAL(1e-3)
 /* Part of a move by which the dependents may end beside where their slope leads: on another branch
  * they differ by about the difference of the slopes, on the same one by half the step. */
 #define BENT REAL(0.1)
-/* What a line that ends in a singular configuration may leave of its way, in nominal sizes: Newton
- * steps come to a millionth, and a branch that ends before its end does so anywhere. */
+/* What a line that ends in a singular configuration may leave of its length, in nominal sizes:
+ * Newton steps come to a millionth, and a branch that ends before its end does so anywhere. */
 #define LEFT REAL(1e-4)
 #define TRIALS 64 /* configurations from which a branch is looked for */
 #define RANGE REAL(3.14159265358979) /* of them about the start values, in nominal sizes */
@@ -184,8 +184,8 @@ static real miss(const loops *l, const real *z) {
 /* Numbers from -1 to 1, the same in every run. */
 static real scattered(unsigned k, unsigned i) {
     unsigned s = (k * 7919u + i * 104729u + 1u) & 0xffffffffu;
-    int turn;
-    for (turn = 0; turn < 3; turn++) {
+    int pass;
+    for (pass = 0; pass < 3; pass++) {
         s ^= (s << 13) & 0xffffffffu;
         s ^= s >> 17;
         s ^= (s << 5) & 0xffffffffu;

@@ -26,7 +26,7 @@ typedef struct {
 /* z of the configuration x, on the branch of the last accepted configuration. */
 SHARED int closure_solve(const loops *l, const real *x, real *z);
 
-/* The first configuration of a run: from the guesses, by way of the start values of the states. */
+/* The first configuration of a run: from the guesses, through the start values of the states. */
 SHARED int closure_start(const loops *l, const real *x, real *z);
 
 /* 1 where a small change of the states moves the dependent coordinates almost without bound. */

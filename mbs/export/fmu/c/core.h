@@ -104,7 +104,7 @@ typedef struct {
     int tangent;   /* local tangent coordinates */
     int loose;     /* joints were set: they are to be the states again */
     int settled;   /* the coordinates of the next steps are chosen */
-    double turned; /* how far the tangents are from those of the chart */
+    double alignment; /* of the tangents with those of the chart: 1 there, 0 across */
     double time, X[NT], slope[NT]; /* of the last states that were on the motion */
 } core_charts;
 #endif
@@ -126,7 +126,7 @@ typedef struct {
     double events[EVENTS_MEMORY(NK)];
 #endif
 #ifdef MODEL_TREE
-    int loose; /* the tree is to be moved onto its rows first */
+    int loose; /* the tree is to be projected onto its rows first */
     double tree[NT], passage[PASSAGE_MEMORY(NT)];
     double slope[NT]; /* of it, where it starts or the integrator is outside */
     double speeds[N_PASSIVE + 1]; /* of dependent joints: where they are not MODEL_START, they choose
@@ -146,7 +146,7 @@ typedef struct {
     void *host;
     core_supply supply;
     char text[CORE_TEXT], where[CORE_WHERE]; /* of the last message */
-    int discards; /* messages of discarded calls are wanted; those of errors always are */
+    int discards; /* messages of discarded calls are asked for; those of errors always are */
     int timed;    /* TIME_REFERENCE is a value reference */
     int event_mode, early_return; /* the host of a co-simulation handles events; takes part steps */
     core_watch watch;             /* or NULL */

@@ -100,7 +100,7 @@ static core_status move_in_chart(core *c, tangents *d) {
 
 #endif
 
-/* What moves when the seeds are moved. */
+/* What changes with the seeds. */
 static core_status move(core *c, tangents *d) {
     int i;
 #if MODEL_TREE_OUTSIDE
@@ -196,7 +196,7 @@ core_status core_adjoint(core *c, const core_reference *unknown, size_t n_unknow
 
 #endif
 
-/* Inputs follow what was given of their derivatives, else they are held. */
+/* Inputs follow what was given of their derivatives, else they are constant. */
 core_status core_get_output_slopes(core *c, const core_reference *ref, size_t n, const core_integer *order,
                                    double *values) {
     core_status status;

@@ -62,7 +62,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
 }
 
 /* Inputs are not set within a step; all variables can be read. */
-static int tell(void *host, double time, int may_return, double *until) {
+static int report(void *host, double time, int may_return, double *until) {
     face *f = host;
     fmi3Boolean asked = fmi3False;
     fmi3Float64 end = *until;
@@ -86,7 +86,7 @@ fmi3Instance fmi3InstantiateCoSimulation(
     f = instantiate(name, token, 1, logging, environment, logger);
     if (!f) return NULL;
     f->update = update;
-    f->model.watch = update ? tell : NULL;
+    f->model.watch = update ? report : NULL;
     f->model.event_mode = event_mode;
     f->model.early_return = early_return;
     return f;

@@ -45,15 +45,15 @@ static double scaled(double value, int exponent) {
 }
 
 /* The digits of a positive number without zeros at their end, and its power of ten. */
-static int digits_of(double value, int wanted, char *digits, int *exponent) {
+static int digits_of(double value, int kept, char *digits, int *exponent) {
     double size = value, rounded;
-    int k, count = wanted;
+    int k, count = kept;
     for (*exponent = 0; size >= 10.0; size /= 10.0) ++*exponent;
     for (; size < 1.0; size *= 10.0) --*exponent;
-    rounded = rint(scaled(value, wanted - 1 - *exponent));
-    if (rounded < power(wanted - 1)) rounded = rint(scaled(value, wanted - 1 - --*exponent));
-    if (rounded >= power(wanted)) rounded = rint(scaled(value, wanted - 1 - ++*exponent));
-    for (k = wanted; k-- > 0; rounded = floor(rounded / 10.0))
+    rounded = rint(scaled(value, kept - 1 - *exponent));
+    if (rounded < power(kept - 1)) rounded = rint(scaled(value, kept - 1 - --*exponent));
+    if (rounded >= power(kept)) rounded = rint(scaled(value, kept - 1 - ++*exponent));
+    for (k = kept; k-- > 0; rounded = floor(rounded / 10.0))
         digits[k] = (char)('0' + (int)(rounded - 10.0 * floor(rounded / 10.0)));
     while (count > 1 && digits[count - 1] == '0') count--;
     return count;

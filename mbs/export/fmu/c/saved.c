@@ -1,5 +1,5 @@
 /* Saved states: copies of the memory of an instance. As bytes they carry what they are, of which
- * model, how long, and a checksum, since bytes from outside may have been changed on the way.
+ * model, how long, and a checksum, since bytes from outside may have been changed in between.
  */
 #include "internal.h"
 
@@ -138,7 +138,7 @@ static int sane_events(const core_memory *m) {
 #if MODEL_TREE_OUTSIDE
 static int sane_charts(const core_charts *m) {
     return is_flag(m->tangent) && is_flag(m->loose) && is_flag(m->settled) &&
-           isfinite(m->time) && isfinite(m->turned) && all_finite(m->X, NT) &&
+           isfinite(m->time) && isfinite(m->alignment) && all_finite(m->X, NT) &&
            all_finite(m->slope, NT);
 }
 #endif

@@ -41,18 +41,18 @@ static int tree_rhs(void *user, double t, const double *x, double *xdot) {
 
 static int tree_project(void *user, double t, double *x) {
     core *c = user;
-    double moved[NT], residual = HUGE_VAL;
+    double projected[NT], residual = HUGE_VAL;
     int k, i;
     if (!passage_project(c->passage, t, x)) return 0;
     for (k = 0; k < PROJECTIONS; k++) {
         double scale = 1.0;
         core_point(c, &t, x, c->z);
-        c->res[0] = moved;
+        c->res[0] = projected;
         c->res[1] = &residual;
         if (mbs_tree_project(c->arg, c->res, c->iw, c->w, 0) || !isfinite(residual)) return 1;
         for (i = 0; i < NT; i++) scale = fmax(scale, fabs(x[i]));
-        if (stepper_all_finite(moved, NT))
-            memcpy(x, moved, sizeof moved);
+        if (stepper_all_finite(projected, NT))
+            memcpy(x, projected, sizeof projected);
         else if (!(residual < TOLERANCE * scale))
             return 1;
         if (residual < TOLERANCE * scale) return 0;
@@ -176,7 +176,7 @@ core_status core_start_singular(core *c, double *z) {
                "such as %s, or start elsewhere", c->name, c->m.time, core_where(c),
             MODEL_NAMES[OUTPUTS + PASSIVE_V]);
     if (passage_slope(c->passage, c->m.time, X, c->m.slope, on)) return undetermined(c);
-    memcpy(X, on, sizeof(double) * (size_t)size.nq); /* where branches cross rows tell 1e-8 of it */
+    memcpy(X, on, sizeof(double) * (size_t)size.nq); /* where branches cross rows show 1e-8 */
     c->m.singular = 1;
     core_show_tree(c);
     return CORE_OK;

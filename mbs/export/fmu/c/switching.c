@@ -14,7 +14,7 @@
 #include "guard.h"
 #include "message.h"
 
-/* Events that rounding of a time this long [s] cannot tell apart count as standing still. */
+/* Events that rounding of a time this long [s] cannot distinguish count as standing still. */
 #define CHATTER_SPAN 1e3
 
 /* The dependents are at hand where a step ends with an evaluation at its end, which looks for events
@@ -39,8 +39,8 @@ static core_status step_failed(core *c, int status) {
         "the loops cannot be closed or the equations have no solution (unclosable or singular "
         "configuration)", "the projection failed", "a derivative is not finite (singular configuration?)",
         "a singular configuration is not passed", "a singular configuration is not passed",
-        "branches of motion come near each other and do not meet, by too little to tell what turns "
-        "from what goes on; make them meet, miss by more, or ask for a looser tolerance",
+        "branches of motion come near each other and do not meet, by too little to distinguish "
+        "what reverses from what goes on; make them meet, miss by more, or ask for a looser tolerance",
         "a singular configuration is not passed",
         "it starts in a singular configuration, and its velocities choose no branch of motion",
         "an event indicator has no value (unclosable or singular configuration)",
@@ -75,8 +75,8 @@ static double *moving(core *c) {
     return c->m.values + STATES;
 }
 
-/* After something that its rows depend on has changed, the tree is moved onto them. The chart of the
- * last step may not be known any more. */
+/* After something that its rows depend on has changed, the tree is projected onto them. The chart of
+ * the last step may not be known any more. */
 static core_status tighten(core *c) {
 #ifdef MODEL_TREE
     if (!ON_TREE(c) || !c->m.loose) return CORE_OK;
@@ -101,7 +101,7 @@ void core_restart(core *c) {
     guard_forget(c);
 }
 
-/* The states follow what has moved; at_hand: the dependents are known. */
+/* The states follow what has changed; at_hand: the dependents are known. */
 static core_status accept(core *c, int at_hand) {
 #ifdef MODEL_TREE
     if (ON_TREE(c)) {

@@ -11,7 +11,7 @@
 
 /* Part of their nominal values below which velocities are at rest, as on a stop: what changes there is
  * the rounding of the equations of closure, some 1e-13 (1e-5 in single precision). A motion as slow
- * takes a year for a turn (half a day). */
+ * takes a year for a revolution (half a day). */
 #ifdef REAL_IS_FLOAT
 #define REST REAL(1e-4)
 #else

@@ -2,7 +2,7 @@
  *
  * Where the independent joints lose their hold on the dependent ones, branches of motion meet, and a
  * step may end on another one: every row of the closure holds there, energy does not. Two things
- * tell it. The determinant of a diagonal block of the slopes of the closure changes its sign: the
+ * show it. The determinant of a diagonal block of the slopes of the closure changes its sign: the
  * step has passed a singular configuration. Or velocities of dependent joints change by other than
  * what their accelerations at both ends make of the step: the motion has a kink.
  */

@@ -220,10 +220,10 @@ def _drive(
     motors = tuple(k for k, speed in enumerate(system.speeds) if speed.actuated)
     first = tuple(dict.fromkeys([*chosen, *motors]))
     if len(_independent(free, (), first)) == len(first):
-        own = _own_velocities(system)
-        if len(own) < system.nv:
-            first = _independent(free, first, own)
-        active = tuple(sorted(independent_rows(free, mobility, first)))
+        known = _own_velocities(system)
+        if len(known) < system.nv:
+            first = _independent(free, first, known)
+        active = tuple(independent_rows(free, mobility, first))
         return _Drive(active, active)
     own = _independent(free, (), chosen)
     active = _independent(free, _independent(free, own, motors), range(system.nv))

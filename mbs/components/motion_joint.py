@@ -15,6 +15,7 @@ from mbs.components.custom import Custom, Row
 from mbs.components.joints import Free
 from mbs.errors import DescriptionError
 from mbs.spatial import Pose, vector
+from mbs.text import quoted
 
 
 class MotionJoint(Custom):
@@ -83,6 +84,8 @@ class MotionJoint(Custom):
 
 def rotation(axis: str, angle: Any) -> Pose:
     """A rotation about "x", "y" or "z" by an angle [rad]."""
+    if axis not in ("x", "y", "z"):
+        raise DescriptionError(f'a rotation is about {quoted(axis)}; give "x", "y" or "z"')
     return Pose.about(axis, SX(angle))
 
 

@@ -15,6 +15,7 @@ from casadi import Function
 from numpy.typing import NDArray
 
 from mbs.assembly import Closure, Coordinate, LoopRow, System
+from mbs.components import MotionJoint
 from mbs.errors import AssemblyError, Unclosable
 from mbs.loops.closing import Closing, closure_parameters, constraint_sizes, mechanism_size
 from mbs.loops.closure import row_groups
@@ -219,6 +220,9 @@ def _drive(
     motors = tuple(k for k, speed in enumerate(system.speeds) if speed.actuated)
     first = tuple(dict.fromkeys([*chosen, *motors]))
     if len(_independent(free, (), first)) == len(first):
+        known = _own_velocities(system)
+        if len(known) < system.nv:
+            first = _independent(free, first, known)
         active = tuple(independent_rows(free, mobility, first))
         return _Drive(active, active)
     own = _independent(free, (), chosen)
@@ -228,6 +232,12 @@ def _drive(
     rest = _independent(free, _independent(free, (), driving), active)
     names = tuple(system.speeds[k].name for k in surplus)
     return _Drive(tuple(sorted(active)), tuple(sorted({*driving, *rest})), names)
+
+
+def _own_velocities(system: System) -> list[int]:
+    """All but those of frames that the motions of joints place, which no user knows."""
+    placed = {f"{p.name}.free" for p in system.parts if isinstance(p.element, MotionJoint)}
+    return [k for k, speed in enumerate(system.speeds) if speed.joint not in placed]
 
 
 def _independent(

@@ -221,8 +221,8 @@ class PartsAt:
         if name not in readings:
             raise AssemblyError(
                 f"a wire comes from {source}, which follows from the accelerations or forces of the"
-                f" motion itself; wire what positions and velocities tell, such as"
-                f" {did_you_mean(name, readings) if readings else 'an angle'}"
+                " motion itself; wire what positions and velocities tell:"
+                f" {did_you_mean(name, readings) if readings else 'such as an angle'}"
             )
         quantity = next(q for q in attached.quantities if q.name == name)
         number = quantity.elements.index(element)

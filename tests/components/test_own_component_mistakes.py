@@ -13,12 +13,14 @@ from mbs.components import (
     Custom,
     Cylindrical,
     DCMotor,
+    MotionJoint,
     PointMass,
     Prismatic,
     Revolute,
     ShaftDamper,
     custom,
 )
+from mbs.components.motion_joint import translation
 from mbs.errors import AssemblyError, DescriptionError, ModelError, Unclosable
 
 INERTIA = 0.1  # of the bar about its joint [kg m^2]
@@ -142,7 +144,7 @@ def test_wires_by_names_into_placed_mechanisms():
 
     class Actuator(Custom):
         joint = custom.coordinate()
-        order = custom.input("N.m")
+        order = custom.input("rad")
         angle = custom.output("rad")
 
         def loads(self, at):
@@ -261,3 +263,23 @@ def test_an_output_that_is_named_as_a_coordinate_is():
     m.connect(m.world, Cylindrical("c", axis="z", actuated=False), body)
     m.add(Reads("c.s", "c.s"))
     refused(AssemblyError, "m: c.s.q is", "rename the component", by=m.assemble)
+
+
+def test_the_coordinate_of_a_motion_is_independent():
+    """It was a velocity of the frame, which stands still where the curve turns back."""
+
+    class Track(MotionJoint):
+        s = custom.unknown("rad")
+
+        def motion(self, at):
+            return translation(casadi.cos(at.s), 0.5 * casadi.sin(at.s), 0)
+
+    m = mbs.Mechanism("m", gravity=(0, 0, 0))
+    body = m.add(Body("bar", mass=1.0, inertia=(INERTIA, INERTIA, INERTIA)))
+    m.connect(m.world, Track("track"), body)
+    system = m.assemble()
+    assert [system.speeds[k].name for k in system.closure.active] == ["track.s"]
+    # at s = 0 with the rate v the speed is v / 2, and the tension v^2 has no part along the track
+    q = [1.0, 0, 0, 1, 0, 0, 0, 0]
+    assert float(mbs.models.direct_dynamics(system)(q, 2.0, 0.0)) == pytest.approx(0, abs=1e-12)
+    assert float(mbs.models.energy(system)(q, 2.0)[0]) == pytest.approx(0.5, rel=1e-12)

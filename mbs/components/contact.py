@@ -38,8 +38,8 @@ _TOUCHING = 1e-9
 """Gap [m] from which on shapes count as touching where steps end: a body that is placed exactly on
 a plane is inside, whatever rounding does."""
 _INSIDE = 1e-9
-"""Distance [m] of a centre from a box from which on its direction determines the normal; nearer,
-and inside, the nearest face does."""
+"""Distance [m] of a centre from a box from which on its direction tells the normal; nearer, and
+inside, the nearest face does."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -324,7 +324,7 @@ class Contact(ForceElement):
         own = reached * (slip - slips * speed * w)
         asked = w + time * own / longest
         friction = -limit * asked / casadi.sqrt(casadi.fmax(casadi.dot(asked, asked), 1))
-        # without contact they relax, and so does what is left along a normal that rotates
+        # without contact they relax, and so does what is left along a normal that turns
         return friction, own - ((1 - reached) * bend + reached * (bend - longest * w)) / time
 
 
@@ -351,7 +351,7 @@ def damping_for(restitution: float, impact_speed: float) -> float:
 
 def _bend(x: float) -> float:
     """X - ln(1 + x), to rounding where x is small."""
-    if abs(x) > 0.1:  # the difference loses one digit there, and more below
+    if abs(x) > 0.1:  # the difference loses two digits there, the series needs 18 terms
         return x - math.log1p(x)
     return sum((-x) ** k / k for k in range(2, 20))  # 0.1^20 is below rounding
 
@@ -409,7 +409,7 @@ class SpherePlaneContact(PlaneContact):
 
     Attributes:
         body: frame at the centre of the sphere.
-        plane: frame whose plane z = 0 is the ground, and its z the normal out of it.
+        plane: frame whose plane z = 0 is the ground, and its z the way out of it.
         radius: [m].
     """
 
@@ -427,7 +427,7 @@ class CapsulePlaneContact(PlaneContact):
 
     Attributes:
         body: frame in the middle of the capsule, whose z is its axis.
-        plane: frame whose plane z = 0 is the ground, and its z the normal out of it.
+        plane: frame whose plane z = 0 is the ground, and its z the way out of it.
         radius: [m].
         length: between the centres of the end spheres [m].
     """
@@ -453,7 +453,7 @@ class WheelPlaneContact(PlaneContact):
 
     Attributes:
         body: frame at the centre of the wheel, whose y is its axle.
-        plane: frame whose plane z = 0 is the ground, and its z the normal out of it.
+        plane: frame whose plane z = 0 is the ground, and its z the way out of it.
         radius: of the circle in the middle of the rim [m].
         rim: radius of the round of the rim [m]; a thin disc where it is zero.
     """
@@ -479,7 +479,7 @@ class BoxPlaneContact(PlaneContact):
 
     Attributes:
         body: frame in the middle of the box, along its sides.
-        plane: frame whose plane z = 0 is the ground, and its z the normal out of it.
+        plane: frame whose plane z = 0 is the ground, and its z the way out of it.
         size: sides along x, y, z [m].
     """
 
@@ -498,7 +498,7 @@ class BoxPlaneContact(PlaneContact):
 
 
 def _take_size(box: Any) -> None:
-    """Convert the three sides that a user gave to expressions."""
+    """Turn the three sides that a user gave into expressions."""
     sides = three(box.size, f"{box.name}, size")
     for side in sides:
         value = to_float(side)

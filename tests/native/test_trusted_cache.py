@@ -107,7 +107,8 @@ def test_a_compiler_that_hangs_is_ended(cache, tmp_path, monkeypatch):
         ("exit 3", r"refused f\.c"),
     ],
 )
-def test_a_compiler_that_fails_is_one_kind_of_error(cache, tmp_path, script, said):
+def test_a_compiler_that_fails_is_one_kind_of_error(cache, tmp_path, monkeypatch, script, said):
+    monkeypatch.chdir(tmp_path)  # where the third writes
     with pytest.raises(CompilerError, match=said):
         cached_library(SOURCE, compiler=fake_compiler(tmp_path, script))
     assert not list(cache.iterdir())

@@ -276,6 +276,9 @@ def test_texts_that_are_refused(text, reason):
         b"1",
         10**400,
         np.zeros(2),
+        np.array(True),
+        casadi.DM(math.nan),
+        casadi.DM([1, 2]),
     ],
     ids=repr,
 )
@@ -288,7 +291,9 @@ def test_values_that_are_refused(value):
     )
 
 
-@pytest.mark.parametrize("value", [3, 3.0, np.float32(3), np.int64(3), "3", Number(3.0)])
+@pytest.mark.parametrize(
+    "value", [3, 3.0, np.float32(3), np.int64(3), np.array(3), casadi.DM(3), "3", Number(3.0)]
+)
 def test_values_that_are_numbers(value):
     assert expression(value) == Number(3.0)
 

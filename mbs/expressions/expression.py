@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from casadi import DM
 
 from mbs.errors import ExpressionError
 from mbs.text import quoted
@@ -258,7 +259,11 @@ def operation(operator: str, *operands: Scalar) -> Expression:
 
 
 def finite(value: object, where: str) -> float:
-    """The number, refused when it is not finite."""
+    """The number, refused when it is not finite; also of an array of no dimension or a 1x1 DM."""
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    elif isinstance(value, DM) and value.is_scalar():
+        value = float(value)
     if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
         try:
             number = float(value)

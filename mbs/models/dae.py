@@ -445,7 +445,8 @@ def dae(
         v0: velocities at the start by name; at rest when left out.
         tau0: efforts of motors at the start by name, the others zero; they tell u0 and z0.
         states: of components at the start by name, such as `motor.i`, the others as described.
-        inputs: of components at the start by name, such as `motor.voltage`, likewise.
+        inputs: of components at the start by name, such as `motor.voltage`, or `motor` where it has
+            one alone; likewise.
         parameters: values of symbols at the start, the others at their defaults.
 
     Raises:
@@ -471,6 +472,13 @@ def dae(
     return Dae(**parts, form=form, elements=elements, x0=x0, z0=z0, u0=u0, p0=p)
 
 
+def full_name(name: str, quantities: Sequence[tuple[str, str]]) -> str:
+    """A quantity by its own name, or by that of its component where this has no other."""
+    names = [full for full, _ in quantities]
+    owned = [full for full in names if full.rpartition(".")[0] == name]
+    return owned[0] if name not in names and len(owned) == 1 else name
+
+
 def by_name(
     system: System,
     what: str,
@@ -484,10 +492,13 @@ def by_name(
         ModelError: a name is unknown, or a value is no finite number.
     """
     names, result = [name for name, _ in quantities], np.array(otherwise, dtype=float)
-    for name, value in (values or {}).items():
+    for given, value in (values or {}).items():
+        name = full_name(str(given), quantities)
         if name not in names:
+            owners = [full.rpartition(".")[0] for full in names]
+            known = [*(one for one in owners if owners.count(one) == 1), *names]
             raise ModelError(
-                f"{system.name}: {what} names {quoted(name)}; {did_you_mean(str(name), names)}"
+                f"{system.name}: {what} names {quoted(given)}; {did_you_mean(str(given), known)}"
             )
         number = doubles(value)
         if isinstance(number, str) or number.size != 1 or not np.isfinite(number).all():

@@ -22,6 +22,7 @@ from mbs.loops.configuration import Values, start
 from mbs.loops.examine import row_independence
 from mbs.loops.velocity import constraint_jacobian, scales
 from mbs.models.contacts import KINDS, Contacts, contacts_of, require_lasting_rows, require_undriven
+from mbs.models.dae import by_name
 from mbs.models.direct_dynamics import hybrid_dynamics
 from mbs.models.inverse_dynamics import bias
 from mbs.models.measurements import measurements
@@ -212,9 +213,7 @@ def input_function(system: System, u: Effort) -> Function | None:
     if callable(u):
         return signal_function(system, signal, u)
     if isinstance(u, Mapping):
-        names = [name for name, _ in system.inputs]
-        by_name = {full_name(system, str(name)): value for name, value in u.items()}
-        values = _by_name(system, "u", by_name, names, system.u_default)
+        values = by_name(system, "u", u, system.inputs, system.u_default)
         return signal_function(system, signal, SX(DM(values)))
     return signal_function(system, signal, SX(DM(_numbers(system, "u", u))))
 
@@ -229,10 +228,9 @@ def device_states(system: System, z0: Mapping[str, float] | Sequence[float] | No
     Raises:
         ModelError: a name is unknown, or a value is no number.
     """
-    names = [name for name, _ in system.states]
     if z0 is None or isinstance(z0, Mapping):
-        return _by_name(system, "z0", z0 or {}, names, system.z_start)
-    values = _numbers(system, "z0", z0)
+        return list(by_name(system, "z0", z0, system.states, system.z_start))
+    names, values = [name for name, _ in system.states], _numbers(system, "z0", z0)
     if len(values) != len(names):
         raise ModelError(
             f"{system.name}: z0 has {len(values)} values, the devices have {len(names)} states:"
@@ -260,30 +258,6 @@ def device_columns(
     for quantities, values in tables:
         for column, (name, unit) in enumerate(quantities):
             yield name, unit, values[:, column]
-
-
-def full_name(system: System, name: str) -> str:
-    """An input by its own name, or by that of its component where this has no other."""
-    inputs = [full for full, _ in system.inputs]
-    owned = [full for full in inputs if full.rpartition(".")[0] == name]
-    return owned[0] if name not in inputs and len(owned) == 1 else name
-
-
-def _by_name(
-    system: System,
-    what: str,
-    values: Mapping[str, float],
-    names: Sequence[str],
-    otherwise: Sequence[float],
-) -> list[float]:
-    result = list(otherwise)
-    for name, value in values.items():
-        if name not in names:
-            owners = [full.rpartition(".")[0] for full in names] if what == "u" else []
-            known = [*(one for one in owners if owners.count(one) == 1), *names]
-            raise ModelError(f"{system.name}: {what} names {name!r}; {did_you_mean(name, known)}")
-        (result[names.index(name)],) = _numbers(system, f"{what} of {name}", [value])
-    return result
 
 
 def _numbers(system: System, what: str, values: Any) -> list[float]:

@@ -229,7 +229,7 @@ def test_efforts_are_added_to_what_devices_deliver():
     ("options", "parts"),
     [
         ({"u": {"moter": 1.0}}, ["u names 'moter'", "'motor'"]),
-        ({"u": {"motor": float("nan")}}, ["u of motor", "finite"]),
+        ({"u": {"motor": float("nan")}}, ["u gives nan for motor.voltage", "finite"]),
         ({"u": [1.0, 2.0]}, ["u has 2 values", "the system has 1: motor.voltage"]),
         ({"u": lambda t, q: 1.0}, ["u does not take three arguments"]),
         ({"u": lambda t, q, v: [1.0, t]}, ["u has 2 values"]),
@@ -242,6 +242,14 @@ def test_efforts_are_added_to_what_devices_deliver():
 def test_inputs_that_are_refused(options, parts):
     system = robot().assemble()
     refused(ModelError, "robot", *parts, by=lambda: run(system, 0.1, **options))
+
+
+def test_an_input_by_the_name_of_its_component():
+    """The only input of a component goes by its name too, in motions and equations alike."""
+    system = robot().assemble()
+    motion = run(system, 0.01, u={"motor": 2.0})
+    np.testing.assert_array_equal(motion["motor.voltage"], 2.0)
+    assert mbs.models.dae(system, inputs={"motor": 2.0}).u0[-1] == 2.0
 
 
 def test_inputs_of_a_system_without_motors_are_refused():

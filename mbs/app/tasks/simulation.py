@@ -25,10 +25,11 @@ from mbs.expressions import (
     to_sx,
     with_values,
 )
+from mbs.models.dae import full_name
 from mbs.models.state.signals import effort_function
 from mbs.result import Result
 from mbs.simulate import run
-from mbs.simulate.run import full_name, input_function
+from mbs.simulate.run import input_function
 from mbs.text import did_you_mean, quoted
 
 # Laws that a user writes as texts: numbers, and functions of time, positions and velocities.
@@ -342,7 +343,7 @@ def _inputs(system: System, laws: Laws, known: Mapping[str, float]) -> Any:
         return None
     input_function(system, dict.fromkeys(laws, 0.0))  # refuses devices that are not there
     names = [name for name, _ in system.inputs]
-    given = {full_name(system, name): law for name, law in laws.items()}
+    given = {full_name(name, system.inputs): law for name, law in laws.items()}
     return law_of_motion(system, given, names, known, "input")
 
 

@@ -12,7 +12,7 @@ from casadi import SX
 
 from mbs.assembly.tables import EFFORT_UNIT, AttachedSensor, Coordinate, Places, require_part
 from mbs.assembly.tree import Frame
-from mbs.components import Custom, Mechanism, Prismatic, Revolute
+from mbs.components import Custom, JointSensor, Mechanism, Prismatic, Revolute
 from mbs.components.bodies import Mount
 from mbs.components.custom import EFFORT, port_of_flange
 from mbs.errors import AssemblyError
@@ -202,7 +202,7 @@ def guesses_of_unknowns(mechanism: Mechanism) -> dict[str, float]:
 def coordinates_needed(
     mechanism: Mechanism, turns: Mapping[tuple[str, str], FlangeTurn]
 ) -> list[str]:
-    """The coordinates that components by their equations refer to.
+    """The coordinates that components by their equations refer to, also along wires.
 
     Args:
         mechanism: without flanges.
@@ -213,6 +213,10 @@ def coordinates_needed(
         found += [name for levers in part.coordinates.values() for name, _ in levers]
         shafts = [turns[part.name, port_of_flange(port)] for port in part.shaft_ports]
         found += [turn.coordinate for turn in shafts if turn.coordinate]
+    # a wire takes what its sensor reads from the tree
+    sensors = [c for c in mechanism.components.values() if isinstance(c, JointSensor)]
+    sources = [str(source) for source, _ in mechanism.wires]
+    found += [s.joint for s in sensors if any(one.startswith(f"{s.name}.") for one in sources)]
     return found
 
 

@@ -496,7 +496,7 @@ class Custom(OnPoints):
 
     - `loads(at)`: what it does to its ports, by their names. Where it is left out and `energy` is
       there, the loads are the slopes of the energy, with the opposite sign.
-    - `energy(at)`: what it stores [J]; of positions and states alone.
+    - `energy(at)`: what it stores [J]; of positions and states; inputs count as constants.
     - `dissipation(at)`: what it turns into heat [W], never negative.
     - `rates(at)`: the rate of every state, by name.
     - `rows(at)`: what must be zero, by label: each a `Row`, of positions, unknowns and parameters.

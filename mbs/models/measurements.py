@@ -11,8 +11,6 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tables import AttachedSensor
-from mbs.assembly.tree import Frame
-from mbs.components.custom import RelativeMotion, regular_length
 from mbs.errors import ModelError
 from mbs.models.joint_wrenches import motion_inputs, wrenches_of_joints
 from mbs.models.loop_kinematics import cut_coordinate
@@ -24,13 +22,14 @@ from mbs.models.symbols import (
     surroundings,
     symbols_of,
 )
-from mbs.recursions.route import (
-    BASE,
-    frame_velocity,
-    relative_acceleration,
-    relative_motion,
-    relative_pose,
+from mbs.recursions.readings import (
+    Readings,
+    axes_of,
+    coordinate_readings,
+    frame_readings,
+    in_axes,
 )
+from mbs.recursions.route import frame_velocity
 from mbs.recursions.velocities import (
     Acceleration,
     Velocity,
@@ -39,9 +38,6 @@ from mbs.recursions.velocities import (
     resting_base,
 )
 from mbs.spatial import Wrench, zeros
-
-Readings = dict[str, SX]
-"""What a sensor reads, by the names of its quantities."""
 
 
 def measurements(system: System, coordinates: str = "independent") -> Function:
@@ -118,11 +114,6 @@ class _Observed:
     accelerations: list[Acceleration]
     wrenches: list[Wrench]
 
-    def turned(self, axes: Frame, home: Frame, vectors: Readings) -> Readings:
-        """Vectors given in the axes of a frame in those of another one."""
-        R = relative_pose(self.system.tree, self.s.q, axes, home).R
-        return {name: casadi.mtimes(R, vector) for name, vector in vectors.items()}
-
 
 def _observed(
     system: System, s: ModelSymbols, a: SX, tau: SX | None, around: Surroundings
@@ -139,40 +130,10 @@ def _observed(
     )
 
 
-def _motion(state: _Observed, a: Frame, b: Frame) -> RelativeMotion:
-    return relative_motion(state.system.tree, a, b, state.s.q, state.velocities)
-
-
-def _frame_motion(state: _Observed, a: Frame, b: Frame, axes: Frame) -> Readings:
-    """How b moves, seen from a, its vectors in the given axes."""
-    motion = _motion(state, a, b)
-    rates = relative_acceleration(motion, a, b, state.accelerations)
-    vectors = {"p": motion.p, "v": motion.V, "w": motion.w, "a": rates.A, "wd": rates.wd}
-    turned = vectors if axes is a else state.turned(axes, a, vectors)
-    return {**turned, "R": motion.R}
-
-
-def _absolute(state: _Observed, attached: AttachedSensor) -> Readings:
-    (frame,) = attached.frames
-    axes = getattr(attached.sensor, "axes", "world")
-    return _frame_motion(state, BASE, frame, frame if axes == "body" else BASE)
-
-
-def _relative(state: _Observed, attached: AttachedSensor) -> Readings:
-    a, b = attached.frames
-    return _frame_motion(state, a, b, _axes(attached))
-
-
-def _axes(attached: AttachedSensor) -> Frame:
-    """The frame in whose axes a sensor between two frames reads."""
-    a, b = attached.frames
-    return {"a": a, "b": b, "world": BASE}[getattr(attached.sensor, "axes", "b")]
-
-
-def _distance(state: _Observed, attached: AttachedSensor) -> Readings:
-    motion = _motion(state, *attached.frames)
-    L = regular_length(motion.p)
-    return {"L": L, "Ld": casadi.dot(motion.p, motion.V) / L}
+def _on_frames(state: _Observed, attached: AttachedSensor) -> Readings:
+    """How a frame moves, or a distance."""
+    tree = state.system.tree
+    return frame_readings(tree, attached, state.s.q, state.velocities, state.accelerations)
 
 
 def _coordinate(state: _Observed, attached: AttachedSensor) -> Readings:
@@ -180,22 +141,15 @@ def _coordinate(state: _Observed, attached: AttachedSensor) -> Readings:
     if name in [row.name for row in system.cut_coordinates]:
         q, v, a = cut_coordinate(system, s, state.a, name)
         return {"q": q, "v": v, "a": a}
-    read: Readings = {}
-    for number, row in enumerate(system.coordinates):
-        if row.name == name:
-            read["q"] = s.q[number]
-    for number, row in enumerate(system.speeds):
-        if row.name == name:
-            read |= {"v": s.v_tree[number], "a": state.a[number]}
-    return read
+    tables = system.coordinates, system.speeds
+    return coordinate_readings(name, tables, s.q, s.v_tree, state.a)
 
 
 def _transmitted(state: _Observed, attached: AttachedSensor) -> Readings:
     assert attached.joint is not None
     f, m = state.wrenches[attached.joint]
-    axes, home = _axes(attached), attached.frames[1]
-    vectors = {"f": f, "m": m}
-    return vectors if axes is home else state.turned(axes, home, vectors)
+    home = attached.frames[1]
+    return in_axes(state.system.tree, state.s.q, {"f": f, "m": m}, axes_of(attached), home)
 
 
 def _power(state: _Observed, attached: AttachedSensor) -> Readings:
@@ -206,9 +160,7 @@ def _power(state: _Observed, attached: AttachedSensor) -> Readings:
 
 
 _READ: dict[str, Callable[[_Observed, AttachedSensor], Readings]] = {
-    "absolute": _absolute,
-    "relative": _relative,
-    "distance": _distance,
+    **dict.fromkeys(("absolute", "relative", "distance"), _on_frames),
     "coordinate": _coordinate,
     "wrench": _transmitted,
     "power": _power,

@@ -95,6 +95,9 @@ class _Check:
     def __init__(self, system: System, part: AttachedPart, at: PartsAt, q: SX, v: SX) -> None:
         self.system, self.part, self.at, self.q, self.v = system, part, at, q, v
         self.element = part.element
+        # its inputs are symbols here, whatever feeds them: it answers for itself alone
+        self.inputs = {name: SX.sym(name) for name in part.inputs}
+        self.seen = at.with_inputs(part, self.inputs)
         self.used: list[SX] = []
 
     def run(self) -> None:
@@ -109,21 +112,21 @@ class _Check:
         self._rows()
         if self.element.has("crossings"):
             free = casadi.vertcat(self.v, self.system.u)
-            for label, value in self._mapping("crossings").items():
+            for label, value in self._mapping("crossings", self.at.at(self.part)).items():
                 what = f"the crossing {label!r}"
                 self._require_free_of(self._value(what, value), what, free, "velocities or inputs")
         seen = self._outputs()
         self.used += [*seen.values(), *rates.values()]
         self._require_use_of_inputs()
         if loads and (energy is not None or heat is not None):
-            self._compare_powers(loads, energy, heat)
+            self._compare_powers(loads, energy, heat, rates)
 
     # What the methods return.
 
     def _returned(self, method: str, at: At | None = None) -> Any:
         """What a method returns; an error in it is told by its name."""
         try:
-            return getattr(self.element, method)(self.at.at(self.part) if at is None else at)
+            return getattr(self.element, method)(self.seen if at is None else at)
         except ExpressionError as error:  # numbers of self times symbols
             fault = one_line(str(error)).split(";")[0]
             raise AssemblyError(
@@ -150,7 +153,7 @@ class _Check:
         if not self.element.acts:
             return {}
         if not self.element.has("loads"):
-            return self.at.loads(self.part)
+            return self.at.slopes(self.part, lambda at: -SX(self.element.energy(at)), self.inputs)
         found = self._mapping("loads")
         ports = [*self.element.frames, *self.part.coordinates]
         for port, load in found.items():
@@ -200,8 +203,7 @@ class _Check:
         return {name: self._value(f"{method} of {name}", found[name]) for name in wanted}
 
     def _outputs(self) -> Mapping[str, SX]:
-        at = self.at.at(self.part)
-        at.__dict__["lam"] = self.at.row_efforts().get(self.part.name, {})
+        self.seen.__dict__["lam"] = self.at.row_efforts().get(self.part.name, {})
         return self._named("outputs", self.element.output_names)
 
     def _rows(self) -> None:
@@ -221,7 +223,7 @@ class _Check:
                     )
                 value = self._value(f"row {label!r}", row.value if isinstance(row, Row) else row)
                 bound.append(value)
-                signals = casadi.vertcat(self.system.z, self.system.u)
+                signals = casadi.vertcat(self.system.z, *self.inputs.values())
                 self._require_free_of(value, f"the row {label!r}", signals, "states or inputs")
                 if method == "rows":
                     self._require_free_of(value, f"the row {label!r}", self.v, "velocities")
@@ -297,7 +299,13 @@ class _Check:
 
     def _require_known(self, value: SX, what: str) -> None:
         known = casadi.vertcat(
-            self.q, self.v, self.system.z, self.system.u, self.system.p, self.at.effort_symbols
+            self.q,
+            self.v,
+            self.system.z,
+            self.system.u,
+            self.system.p,
+            self.at.effort_symbols,
+            *self.inputs.values(),
         )
         names = {symbol.element_hash() for symbol in casadi.vertsplit(known)}
         for symbol in casadi.symvar(value):
@@ -340,8 +348,8 @@ class _Check:
 
     def _require_use_of_inputs(self) -> None:
         every = casadi.veccat(*self.used) if self.used else SX(0, 1)
-        for name, given in self.part.inputs.items():
-            if isinstance(given, SX) and not casadi.depends_on(every, given):
+        for name, symbol in self.inputs.items():
+            if not casadi.depends_on(every, symbol):
                 raise AssemblyError(
                     f"{self._title}: nothing depends on the input {name!r}; use it in a method, or"
                     " leave it out"
@@ -349,18 +357,23 @@ class _Check:
 
     # Loads against the energy and the heat.
 
-    def _compare_powers(self, loads: Mapping[str, Any], energy: SX | None, heat: SX | None) -> None:
+    def _compare_powers(
+        self,
+        loads: Mapping[str, Any],
+        energy: SX | None,
+        heat: SX | None,
+        rates: Mapping[str, SX],
+    ) -> None:
         """P, the power of the loads, is what the energy and the heat leave: -dE/dt - D."""
-        system, symbols = self.system, casadi.vertcat(self.system.z, self.system.u)
+        system, symbols = self.system, casadi.vertcat(self.system.z, *self.inputs.values())
         E = SX(0) if energy is None else energy
         rate = casadi.jtimes(E, self.q, position_rate(system.tree, self.q, self.v))
-        if self.part.states and system.z.numel():
-            rate += casadi.jtimes(E, system.z, self.at.rates())
+        for name, value in rates.items():
+            rate += casadi.gradient(E, self.part.states[name]) * value
         D = SX(0) if heat is None else heat
         powers = casadi.vertcat(self._power(loads), rate, D)
         given = [self.q, self.v, symbols, system.p]
         found = Function("powers", given, [casadi.densify(powers)])
-        free_inputs = any(isinstance(one, SX) for one in self.part.inputs.values())
         for q, v, s, p in self._probes():
             P, dE, heat_at = np.array(found(q, v, s, p))[:, 0]
             back = np.array(found(q, -v, s, p))[:, 0]
@@ -374,7 +387,7 @@ class _Check:
                 )
             if heat is not None and not self.part.inputs:
                 self._require_balance(P, dE, heat_at, sizes.max())
-            elif energy is not None and not self.part.states and not free_inputs:
+            elif energy is not None and not self.part.states and not self.inputs:
                 # friction and damping give the same power both ways, the energy the opposite
                 self._require_balance((P - back[0]) / 2, (dE - back[1]) / 2, 0.0, sizes.max())
 
@@ -387,9 +400,9 @@ class _Check:
             )
 
     def _power(self, loads: Mapping[str, Any]) -> SX:
-        at, total = self.at.at(self.part), SX(0)
+        total = SX(0)
         for port, load in loads.items():
-            seen = getattr(at, port)
+            seen = getattr(self.seen, port)
             if isinstance(load, FrameLoad):
                 R = seen.R if load.own_axes else SX.eye(3)
                 total += casadi.dot(casadi.mtimes(R, load.force), seen.v)
@@ -410,7 +423,7 @@ class _Check:
             for part in quaternion_slices(system.tree):
                 q[part] /= np.linalg.norm(q[part])
             states = np.array(system.z_start) + rng.uniform(-1.0, 1.0, len(system.z_start))
-            inputs = rng.uniform(-1.0, 1.0, system.u.numel())
+            inputs = rng.uniform(-1.0, 1.0, len(self.inputs))
             v = rng.uniform(-1.0, 1.0, system.nv)
             yield q, v, np.concatenate([states, inputs]), p
 

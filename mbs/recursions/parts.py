@@ -27,14 +27,14 @@ from mbs.components.custom import (
     Load,
     RelativeMotion,
     Row,
-    regular_length,
 )
 from mbs.errors import AssemblyError
 from mbs.expressions import to_sx
 from mbs.recursions.poses import link_poses
-from mbs.recursions.route import BASE, relative_motion, relative_pose
+from mbs.recursions.readings import Readings, coordinate_readings, frame_readings
+from mbs.recursions.route import BASE, relative_motion
 from mbs.recursions.velocities import Velocity, link_velocities
-from mbs.spatial import Pose, cross, skew, zeros
+from mbs.spatial import Pose, cross, skew
 from mbs.text import did_you_mean
 
 
@@ -72,10 +72,9 @@ class PartsAt:
         self._signals: dict[WireSource, SX | None] = {}
 
     @property
-    def moving(self) -> list[Velocity]:
-        """Velocities of the links, each in its frame."""
-        if self._moving is None:
-            assert self.v is not None
+    def moving(self) -> list[Velocity] | None:
+        """Velocities of the links, each in its frame; None at rest."""
+        if self._moving is None and self.v is not None:
             self._moving = link_velocities(self.tree, link_poses(self.tree, self.q), self.v)
         return self._moving
 
@@ -84,9 +83,15 @@ class PartsAt:
     def at(self, part: AttachedPart) -> At:
         """What the methods of a component get, signals of wires included."""
         if part.name not in self._found:
-            inputs = {name: partial(self._input, part, name) for name in part.inputs}
-            self._found[part.name] = self._seen(part, inputs)
+            self._found[part.name] = self._seen(part, self._inputs_of(part))
         return self._found[part.name]
+
+    def with_inputs(self, part: AttachedPart, inputs: Mapping[str, SX]) -> At:
+        """What the methods of a component get where its inputs have these values."""
+        return self._seen(part, {name: partial(_same, value) for name, value in inputs.items()})
+
+    def _inputs_of(self, part: AttachedPart) -> Mapping[str, Callable[[], SX]]:
+        return {name: partial(self._input, part, name) for name in part.inputs}
 
     def _seen(self, part: AttachedPart, inputs: Mapping[str, Callable[[], Any]]) -> At:
         element, values = part.element, dict[str, Callable[[], Any]](inputs)
@@ -114,11 +119,7 @@ class PartsAt:
         self, seen_from: FrameAt | None, port: str, frames: Mapping[str, Frame]
     ) -> RelativeMotion:
         a = BASE if seen_from is None else frames[seen_from.port]
-        frame = frames[port]
-        if self.v is None:
-            T = relative_pose(self.tree, self.q, a, frame)
-            return RelativeMotion(T.p, T.R, zeros(), zeros())
-        motion = relative_motion(self.tree, a, frame, self.q, self.moving)
+        motion = relative_motion(self.tree, a, frames[port], self.q, self.moving)
         if not self._twists:
             return motion
         zero = SX.zeros(6)
@@ -181,7 +182,7 @@ class PartsAt:
         if part.element.binds and casadi.depends_on(value, self.effort_symbols):
             raise AssemblyError(
                 f"a wire comes from {source}, which follows from the forces that the motion itself"
-                " determines; wire what positions, velocities and states tell"
+                " determines; wire what positions, velocities and states give"
             )
         for name, symbol in placeholders.items():
             if casadi.depends_on(value, symbol):
@@ -193,8 +194,7 @@ class PartsAt:
         """The outputs of a component, and the symbols of its inputs in them."""
         if part.name not in self._outputs:
             symbols = {name: SX.sym(name) for name in part.inputs}
-            inputs = {name: partial(_same, symbol) for name, symbol in symbols.items()}
-            seen = self._seen(part, inputs)
+            seen = self.with_inputs(part, symbols)
             seen.__dict__["lam"] = self.row_efforts().get(part.name, {})
             self._outputs[part.name] = part.element.outputs(seen), symbols
         return self._outputs[part.name]
@@ -203,41 +203,26 @@ class PartsAt:
         """What a sensor reads of positions and velocities."""
         sensor = attached.sensor
         name, _, element = source.signal.partition(".")
-        readings: Mapping[str, SX] = {}
+        readings: Readings = {}
         if sensor.reads == "coordinate":
-            readings = self._on_coordinate(attached.coordinate)
+            tables = self.system.coordinates, self.system.speeds
+            readings = coordinate_readings(attached.coordinate, tables, self.q, self.v)
         elif sensor.reads in ("absolute", "relative", "distance"):
-            a, b = attached.frames if len(attached.frames) == 2 else (BASE, *attached.frames)
-            motion = relative_motion(self.tree, a, b, self.q, self.moving)
-            if sensor.reads == "distance":
-                length = regular_length(motion.p)
-                readings = {"L": length, "Ld": casadi.dot(motion.p, motion.V) / length}
-            else:
-                axes = {"world": BASE, "body": b, "a": a, "b": b}[getattr(sensor, "axes", "world")]
-                R = relative_pose(self.tree, self.q, axes, a).R
-                vectors = {"p": motion.p, "v": motion.V, "w": motion.w}
-                readings = {n: casadi.mtimes(R, vector) for n, vector in vectors.items()}
-                readings = {**readings, "R": motion.R}
+            readings = frame_readings(self.tree, attached, self.q, self.moving)
+        if attached.coordinate in [row.name for row in self.system.cut_coordinates]:
+            raise AssemblyError(
+                f"a wire comes from {source}, whose joint {attached.coordinate!r} is cut to open a"
+                " loop; cut another joint, or wire from a sensor on one of the others"
+            )
         if name not in readings:
             raise AssemblyError(
                 f"a wire comes from {source}, which follows from the accelerations or forces of the"
-                " motion itself; wire what positions and velocities tell:"
+                " motion itself; wire what positions and velocities give:"
                 f" {did_you_mean(name, readings) if readings else 'such as an angle'}"
             )
         quantity = next(q for q in attached.quantities if q.name == name)
         number = quantity.elements.index(element)
         return casadi.vec(readings[name])[number]
-
-    def _on_coordinate(self, name: str) -> Mapping[str, SX]:
-        found = {}
-        q, v = self.system.coordinates, self.system.speeds
-        for number, row in enumerate(q):
-            if row.name == name:
-                found["q"] = self.q[number]
-        for number, row in enumerate(v):
-            if row.name == name and self.v is not None:
-                found["v"] = self.v[number]
-        return found
 
     # What components do.
 
@@ -253,17 +238,23 @@ class PartsAt:
                 self._loads[part.name] = {}
         return self._loads[part.name]
 
-    def slopes(self, part: AttachedPart, value: Callable[[At], SX]) -> Mapping[str, Load]:
+    def slopes(
+        self,
+        part: AttachedPart,
+        value: Callable[[At], SX],
+        inputs: Mapping[str, SX] | None = None,
+    ) -> Mapping[str, Load]:
         """What loads do the work of a value where ports move a little, by port.
 
-        Frames are moved by x and turned by y in their own axes, coordinates by s; the slopes are
-        forces, moments and efforts.
+        Frames are moved by x and rotated by y in their own axes, coordinates by s; the slopes are
+        forces, moments and efforts. Inputs do not change.
 
         Source: Haug 1989, the principle of virtual work.
 
         Args:
             part: the component.
             value: (1, 1) of positions.
+            inputs: values of its inputs; those of this state when left out.
         """
         small = [SX.sym("d", 6) for _ in part.frames]
         frames = tuple(
@@ -271,9 +262,13 @@ class PartsAt:
             for (link, pose), d in zip(part.frames, small, strict=True)
         )
         shifts = {port: SX.sym("s") for port in part.coordinates}
-        moved = PartsAt(self.system, self.q, shifts=shifts)
         every = casadi.vertcat(SX(0, 1), *small, *shifts.values())
-        found = value(moved.at(replace(part, frames=frames)))
+        moved = replace(part, frames=frames)
+        nearby = PartsAt(self.system, self.q, shifts=shifts)
+        if inputs is None:
+            found = value(nearby._seen(moved, self._inputs_of(part)))
+        else:
+            found = value(nearby.with_inputs(moved, inputs))
         slopes = casadi.gradient(found, every)
         slopes = casadi.densify(casadi.substitute(slopes, every, SX.zeros(every.numel())))
         result: dict[str, Load] = {}

@@ -329,7 +329,7 @@ class RelativeAcceleration:
 
 
 def relative_motion(
-    tree: Tree, a: Frame, b: Frame, q: SX, moving: list[Velocity]
+    tree: Tree, a: Frame, b: Frame, q: SX, moving: list[Velocity] | None
 ) -> RelativeMotion:
     """How frame b moves, seen from frame a and in its axes.
 
@@ -338,9 +338,11 @@ def relative_motion(
         a: the frame of the observer.
         b: the frame that moves.
         q: (nq, 1) positions.
-        moving: velocities of the links, each in its frame.
+        moving: velocities of the links, each in its frame; at rest when None.
     """
     T = relative_pose(tree, q, a, b)
+    if moving is None:
+        return RelativeMotion(T.p, T.R, zeros(), zeros())
     V_a, w_a = frame_velocity(a, moving)
     V_b, w_b = frame_velocity(b, moving)
     V = casadi.mtimes(T.R, V_b) - V_a - cross(w_a, T.p)

@@ -20,6 +20,7 @@ from mbs.components import (
     DCMotor,
     Gain,
     Integrator,
+    JointEffort,
     JointSensor,
     Planar,
     Prismatic,
@@ -41,6 +42,17 @@ def pendulum(*made, gravity=(0, -9.81, 0), actuated=True, **values):
     m.connect(m.world, Revolute("j1", axis="z", actuated=actuated), bar.left)
     for make in made:
         m.add(make(bar.right))
+    return m
+
+
+def four_bar(stiffness=0.0):
+    """Four bars whose loop is cut at j3, where nothing is on it; with a spring on it."""
+    m = mbs.Mechanism("four_bar", gravity=(0, -9.81, 0))
+    a, b, c = (m.add(Box(n, length=L, mass=1.0)) for n, L in (("a", 0.3), ("b", 0.8), ("c", 0.7)))
+    m.connect(m.world, Revolute("j1", axis="z"), a.left)
+    m.connect(a.right, Revolute("j2", axis="z", actuated=False), b.left)
+    m.connect(b.right, Revolute("j3", axis="z", actuated=False, stiffness=stiffness), c.right)
+    m.connect(m.world.at(0.9, 0, 0), Revolute("j4", axis="z", actuated=False), c.left)
     return m
 
 
@@ -428,6 +440,17 @@ class TestRows:
             rows=lambda self, at: {"a": at.point.p[0] - at.order},
         )
 
+    def test_rows_of_what_wires_bring(self):
+        """The row would hold, but with other forces than those of its component."""
+        mine = of(
+            order=custom.input("rad"),
+            rows=lambda self, at: {"a": Row(at.point.p[0] - at.order, "1")},
+        )
+        m = pendulum(lambda tip: mine("c", tip))
+        m.add(JointSensor("enc", "j1"))
+        m.wire("enc.q", m.components["c"].order)
+        refused(AssemblyError, "the row 'a' depends on states or inputs", by=m.assemble)
+
     @pytest.mark.parametrize("extra", [lambda v: v**2, lambda v: v + 1, lambda v: casadi.sin(v)])
     def test_velocity_rows_are_linear(self, extra):
         refused_at_assembly(
@@ -598,6 +621,30 @@ class TestWires:
         m.wire(rail.push, gain.u)
         refused(AssemblyError, "rail.push", "forces that the motion itself", by=m.assemble)
 
+    def test_a_sensor_on_a_joint_that_would_be_cut(self):
+        """A torque by the angle of a joint of the loop is that of a spring on it."""
+        systems = []
+        for wired in (False, True):
+            m = four_bar(0.0 if wired else 3.0)
+            if wired:
+                m.add(JointSensor("enc", "j3"))
+                gain = m.add(Gain("k", -3.0))
+                m.wire("enc.q", gain.u)
+                m.wire(gain.y, m.add(JointEffort("effort", "j3")).tau)
+            systems.append(m.assemble(guess={"j1": 1.0, "j2": -0.5}))
+        given, ours = (
+            mbs.simulate.run(system, 1.0, v0={"j1": 2.0}, tolerance=1e-10, quiet=True)
+            for system in systems
+        )
+        assert np.abs(given["j1.q"] - ours["j1.q"]).max() < 1e-9  # ten tolerances
+
+    def test_a_sensor_on_a_joint_that_is_cut(self):
+        m = four_bar()
+        m.add(JointSensor("enc", "j3"))
+        m.wire("enc.q", m.add(Gain("k", -3.0)).u)
+        m.cut(m.components["j3"])
+        refused(AssemblyError, "enc.q, whose joint 'j3' is cut", by=m.assemble)
+
     def test_sensors_feed_inputs(self):
         m = pendulum()
         m.add(JointSensor("enc", "j1"))
@@ -609,6 +656,50 @@ class TestWires:
         assert np.abs(result["v.y"] - 2 * result["j1.v"]).max() < 1e-12
         assert np.abs(result["x.y"] - 2 * np.cos(result["j1.q"])).max() < 1e-12
         assert np.abs(result["vy.y"] - 2 * np.cos(result["j1.q"]) * result["j1.v"]).max() < 1e-12
+
+
+class Follower(Custom):
+    """A torsion spring whose rest angle is an input, and a torque that is another one."""
+
+    joint = custom.coordinate()
+    k = custom.parameter("N.m/rad", min=0)
+    rest = custom.input("rad")
+
+    def energy(self, at):
+        return at.k / 2 * (at.joint.q - at.rest) ** 2
+
+
+class Pushed(Follower):
+    """The same with its loads written out, and a torque beside them."""
+
+    def loads(self, at):
+        return {"joint": -at.k * (at.joint.q - at.rest) + at.rest}
+
+
+class TestEnergiesOfInputs:
+    """Inputs are constants in an energy, whatever feeds them: the loads are its partial slopes."""
+
+    @pytest.mark.parametrize("source", ["enc.q", "tip.R.xy", None])
+    @pytest.mark.parametrize(("kind", "extra"), [(Follower, 0.0), (Pushed, 1.0)])
+    def test_loads(self, source, kind, extra):
+        m = mbs.Mechanism("m", gravity=(0, 0, 0))
+        for name in ("a", "b"):
+            body = m.add(Body(name, mass=1.0, inertia=(0.1, 0.1, 0.1)))
+            m.connect(m.world, Revolute(f"j{name}", axis="z"), body)
+        m.add(JointSensor("enc", "ja"))
+        m.add(AbsoluteSensor("tip", m.components["a"]))
+        spring = m.add(kind("c", "jb", k=2.0))
+        if source:
+            m.wire(source, spring.rest)
+        system = m.assemble()
+        rest = {"enc.q": 0.3, "tip.R.xy": -np.sin(0.3), None: 0.7}[source]
+        values = {"q": [0.3, 0.1], "v": [0.2, 0.0], "a": [0.0, 0.0], "z": [], "u": [0.7]}
+        model = mbs.models.inverse_dynamics(system)
+        tau = np.array(model(*(values[name] for name in model.name_in()))).ravel()
+        assert tau == pytest.approx([0.0, -2.0 * (rest - 0.1) - extra * rest], abs=1e-14)
+        energy = mbs.models.energy(system)
+        found = energy.call({k: values[k] for k in energy.name_in()})
+        assert float(found["U"]) == pytest.approx((rest - 0.1) ** 2, abs=1e-14)
 
 
 class Rail(Custom):

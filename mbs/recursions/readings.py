@@ -1,0 +1,86 @@
+"""What sensors read of positions, velocities and accelerations, in models and along wires."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi
+from casadi import SX
+
+from mbs.assembly.tables import AttachedSensor, Coordinate
+from mbs.assembly.tree import Frame, Tree
+from mbs.components.custom import regular_length
+from mbs.recursions.route import BASE, relative_acceleration, relative_motion, relative_pose
+from mbs.recursions.velocities import Acceleration, Velocity
+
+Readings = dict[str, SX]
+"""What a sensor reads, by the names of its quantities."""
+
+
+def frame_readings(
+    tree: Tree,
+    attached: AttachedSensor,
+    q: SX,
+    velocities: list[Velocity] | None,
+    accelerations: list[Acceleration] | None = None,
+) -> Readings:
+    """What a sensor on points reads.
+
+    Args:
+        tree: the links.
+        attached: the sensor; it reads "absolute", "relative" or "distance".
+        q: (nq, 1) positions.
+        velocities: of the links, each in its frame; at rest when None.
+        accelerations: likewise, gravity left out; not read when left out.
+    """
+    frames = attached.frames
+    a, b = frames if len(frames) == 2 else (BASE, *frames)
+    motion = relative_motion(tree, a, b, q, velocities)
+    if attached.sensor.reads == "distance":
+        L = regular_length(motion.p)
+        return {"L": L, "Ld": casadi.dot(motion.p, motion.V) / L}
+    vectors = {"p": motion.p, "v": motion.V, "w": motion.w}
+    if accelerations is not None:
+        rates = relative_acceleration(motion, a, b, accelerations)
+        vectors |= {"a": rates.A, "wd": rates.wd}
+    return {**in_axes(tree, q, vectors, axes_of(attached), a), "R": motion.R}
+
+
+def axes_of(attached: AttachedSensor) -> Frame:
+    """The frame in whose axes a sensor reads its vectors."""
+    frames = attached.frames
+    a, b = frames if len(frames) == 2 else (BASE, *frames)
+    return {"world": BASE, "body": b, "a": a, "b": b}[getattr(attached.sensor, "axes", "b")]
+
+
+def in_axes(tree: Tree, q: SX, vectors: Readings, axes: Frame, home: Frame) -> Readings:
+    """Vectors given in the axes of the frame `home` in those of another one."""
+    if axes is home:
+        return vectors
+    R = relative_pose(tree, q, axes, home).R
+    return {name: casadi.mtimes(R, vector) for name, vector in vectors.items()}
+
+
+def coordinate_readings(
+    name: str,
+    tables: tuple[Sequence[Coordinate], Sequence[Coordinate]],
+    q: SX,
+    v: SX | None,
+    a: SX | None = None,
+) -> Readings:
+    """Position, velocity and acceleration of a coordinate of the tree, as far as it has them.
+
+    Args:
+        name: of the coordinate.
+        tables: the coordinates of q and of v.
+        q: (nq, 1) positions.
+        v: (nv, 1) velocities; not read when None.
+        a: (nv, 1) accelerations, likewise.
+    """
+    read: Readings = {}
+    positions, speeds = tables
+    for quantity, rows, values in (("q", positions, q), ("v", speeds, v), ("a", speeds, a)):
+        number = next((k for k, row in enumerate(rows) if row.name == name), None)
+        if values is not None and number is not None:
+            read[quantity] = values[number]
+    return read

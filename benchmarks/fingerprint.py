@@ -120,8 +120,8 @@ def _model(system: System, build: Callable[[System], Function]) -> dict[str, Any
     patterns = [function.sparsity_out(k) for k in range(function.n_out())]
     return {
         "operations": str(count(function)),
-        "zeros": [_digest(str((s.size(), s.row(), s.colind()))) for s in patterns],
-        "text": _digest(_c_text(function)),
+        "zeros": [digest(str((s.size(), s.row(), s.colind()))) for s in patterns],
+        "text": digest(c_text(function)),
     }
 
 
@@ -131,20 +131,22 @@ def _branches(system: System) -> list[str]:
         if system.is_closed:
             chosen = [f"{s.name}: {s.labels[s.chosen]} of {s.labels}" for s in plan(system)]
             return [*chosen, *(", ".join(mode.branch) for mode in modes(system))]
-        return [_digest(_c_text(inverse_geometry.function(system)))]
+        return [digest(c_text(inverse_geometry.function(system)))]
     except MbsError as error:
         return [type(error).__name__]
 
 
-def _c_text(function: Function) -> str:
+def c_text(function: Function) -> str:
+    """The C that CasADi writes of a function."""
     generator = casadi.CodeGenerator("model")
     generator.add(function)
     text: str = generator.dump()
     return text
 
 
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()[:12]
+def digest(text: str) -> str:
+    """A short mark that differs where texts do."""
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def under(kernel: str, threads: str, *given: str) -> dict[str, Any]:

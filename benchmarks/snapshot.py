@@ -14,7 +14,6 @@ python benchmarks/snapshot.py compare before.json after.json      what changed, 
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import sys
 import time
@@ -22,11 +21,11 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import casadi
 import numpy as np
 from casadi import Function
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
+from fingerprint import c_text, digest
 from support.builders import ALONE, BUILDERS, CLOSED_ALONE, OPEN_ALONE, SYSTEMS, numbers, point
 
 import mbs
@@ -81,7 +80,7 @@ def record(system: System, build: Callable[[System], Any]) -> Record:
     if f.is_a("SXFunction"):
         found["operations"] = str(count(f))
         if f.n_instructions() < CHEAP:
-            found["C"] = _digest(_c_text(f))
+            found["C"] = digest(c_text(f))
     found["seconds"] = round(time.perf_counter() - start, 2)
     return found
 
@@ -100,17 +99,6 @@ def branches(system: System) -> Record:
         return {"names": labels, "values": rows}
     except (MbsError, RuntimeError, ValueError) as error:
         return {"error": f"{type(error).__name__}: {error}"}
-
-
-def _c_text(function: Function) -> str:
-    generator = casadi.CodeGenerator("model")
-    generator.add(function)
-    text: str = generator.dump()
-    return text
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def take(path: Path, only: Sequence[str], leave: Sequence[str]) -> None:

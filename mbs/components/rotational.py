@@ -29,10 +29,63 @@ _REVERSAL = 1e-2
 _UNLOADED = 1e-2
 """Torque over which they do [N m]: that of a gear of a watch, or a hundredth of a small robot's."""
 
+# What acts on shafts by one torque.
+
+
+class _BetweenShafts(TwoFlanges):
+    """What gives a torque from flange_a to flange_b."""
+
+    torque = custom.output("N.m")
+
+    def loads(self, at: Any) -> Mapping[str, Load]:
+        """The torque, which b gets and a gives."""
+        T = self._torque(at)
+        return {"flange_a": -T, "flange_b": T}
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The torque from a to b."""
+        return {"torque": self._torque(at)}
+
+    def _torque(self, at: Any) -> SX:
+        raise NotImplementedError
+
+    def _slip(self, at: Any) -> SX:
+        return SX(at.flange_a.speed - at.flange_b.speed)
+
+
+class _SlippingShafts(_BetweenShafts):
+    """What takes all the power of its torque."""
+
+    def dissipation(self, at: Any) -> SX:
+        """What slipping takes."""
+        return SX(self._torque(at) * self._slip(at))
+
+
+class _BrakingTorque(OneFlange):
+    """What holds back one shaft by a torque, and takes all its power."""
+
+    torque = custom.output("N.m")
+
+    def loads(self, at: Any) -> Mapping[str, Load]:
+        """Against the speed."""
+        return {"flange": -self._torque(at)}
+
+    def dissipation(self, at: Any) -> SX:
+        """All its power."""
+        return SX(self._torque(at) * at.flange.speed)
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """What it takes from the shaft."""
+        return {"torque": self._torque(at)}
+
+    def _torque(self, at: Any) -> SX:
+        raise NotImplementedError
+
+
 # Springs and dampers between two shafts.
 
 
-class ShaftSpringDamperSeries(TwoFlanges):
+class ShaftSpringDamperSeries(_BetweenShafts):
     """A spring in series with a damper between two shafts, a Maxwell element.
 
     With the twist x = angle_a - angle_b and the state z, the part of it in the damper, the torque
@@ -49,16 +102,10 @@ class ShaftSpringDamperSeries(TwoFlanges):
     stiffness = custom.parameter("N.m/rad", positive=True)
     damping = custom.parameter("N.m.s/rad", positive=True)
     twist = custom.state("rad")
-    torque = custom.output("N.m")
 
     def rates(self, at: Any) -> Mapping[str, SX]:
         """Of the part of the twist that is in the damper."""
         return {"twist": self._torque(at) / at.damping}
-
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """The torque of both, on the two shafts."""
-        T = self._torque(at)
-        return {"flange_a": -T, "flange_b": T}
 
     def energy(self, at: Any) -> SX:
         """What the spring stores."""
@@ -68,10 +115,6 @@ class ShaftSpringDamperSeries(TwoFlanges):
         """What the damper takes."""
         return SX(self._torque(at) ** 2 / at.damping)
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The torque from a to b."""
-        return {"torque": self._torque(at)}
-
     def _stretch(self, at: Any) -> SX:
         return SX(at.flange_a.angle - at.flange_b.angle - at.twist)
 
@@ -79,7 +122,7 @@ class ShaftSpringDamperSeries(TwoFlanges):
         return SX(at.stiffness * self._stretch(at))
 
 
-class ElastoBacklash(TwoFlanges):
+class ElastoBacklash(_BetweenShafts):
     """An elastic shaft with play: no torque within the backlash, a spring and a damper beyond it.
 
     With the twist x = angle_a - angle_b, the depth beyond the play is d = |x| - backlash / 2. The
@@ -101,12 +144,6 @@ class ElastoBacklash(TwoFlanges):
     backlash = custom.parameter("rad", min=0)
     damping = custom.parameter("N.m.s/rad", 0.0, min=0)
     width = custom.parameter("rad", _FLANK, positive=True)
-    torque = custom.output("N.m")
-
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """The torque on the two shafts."""
-        elastic, viscous = self._torques(at)
-        return {"flange_a": -(elastic + viscous), "flange_b": elastic + viscous}
 
     def energy(self, at: Any) -> SX:
         """What the flanks store."""
@@ -116,11 +153,10 @@ class ElastoBacklash(TwoFlanges):
 
     def dissipation(self, at: Any) -> SX:
         """What the damper takes."""
-        return SX(self._torques(at)[1] * self._rate(at))
+        return SX(self._torques(at)[1] * self._slip(at))
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The torque from a to b."""
-        return {"torque": sum(self._torques(at), SX(0))}
+    def _torque(self, at: Any) -> SX:
+        return sum(self._torques(at), SX(0))
 
     def _torques(self, at: Any) -> tuple[SX, SX]:
         """The torque of the spring, and that of the damper."""
@@ -129,15 +165,12 @@ class ElastoBacklash(TwoFlanges):
             slope, ramped, _ = smooth_ramp(depth, at.width)
             elastic += sign * at.stiffness * ramped
             share += slope
-        return elastic, at.damping * share * self._rate(at)
+        return elastic, at.damping * share * self._slip(at)
 
     def _sides(self, at: Any) -> list[tuple[float, SX]]:
         """Direction and depth beyond the play of the two flanks."""
         x = at.flange_a.angle - at.flange_b.angle
         return [(1.0, x - at.backlash / 2), (-1.0, -x - at.backlash / 2)]
-
-    def _rate(self, at: Any) -> SX:
-        return SX(at.flange_a.speed - at.flange_b.speed)
 
 
 # Gears of three shafts, and gears with losses.
@@ -263,7 +296,7 @@ class LossyGear(TwoFlanges):
 # Loads, brakes and clutches.
 
 
-class QuadraticSpeedTorque(OneFlange):
+class QuadraticSpeedTorque(_BrakingTorque):
     """The load of a fan, a propeller or a pump: torque -coefficient |w| w on its shaft.
 
     Source: Modelica Association 2023.
@@ -273,26 +306,13 @@ class QuadraticSpeedTorque(OneFlange):
     """
 
     coefficient = custom.parameter("N.m.s2/rad2", min=0)
-    torque = custom.output("N.m")
-
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Against the speed."""
-        return {"flange": -self._torque(at)}
-
-    def dissipation(self, at: Any) -> SX:
-        """All its power."""
-        return SX(self._torque(at) * at.flange.speed)
-
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """What it takes to rotate it."""
-        return {"torque": self._torque(at)}
 
     def _torque(self, at: Any) -> SX:
         w = at.flange.speed
         return SX(at.coefficient * casadi.fabs(w) * w)
 
 
-class Brake(OneFlange):
+class Brake(_BrakingTorque):
     """A brake between a shaft and the housing: torque -capacity engagement tanh(w / width).
 
     The input `engagement` is the share of the normal force, from 0 for a brake that is released
@@ -309,25 +329,12 @@ class Brake(OneFlange):
     capacity = custom.parameter("N.m", min=0)
     width = custom.parameter("rad/s", _CREEP, positive=True)
     engagement = custom.input()
-    torque = custom.output("N.m")
-
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Against the speed."""
-        return {"flange": -self._torque(at)}
-
-    def dissipation(self, at: Any) -> SX:
-        """All its power."""
-        return SX(self._torque(at) * at.flange.speed)
-
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """What the shaft loses."""
-        return {"torque": self._torque(at)}
 
     def _torque(self, at: Any) -> SX:
         return friction_of(at, at.flange.speed)
 
 
-class Clutch(TwoFlanges):
+class Clutch(_SlippingShafts):
     """A friction clutch: torque capacity engagement tanh((w_a - w_b) / width) from a to b.
 
     The input `engagement` is the share of the normal force, from 0 for a clutch that is open to 1;
@@ -344,23 +351,6 @@ class Clutch(TwoFlanges):
     capacity = custom.parameter("N.m", min=0)
     width = custom.parameter("rad/s", _CREEP, positive=True)
     engagement = custom.input()
-    torque = custom.output("N.m")
-
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """The friction on the two shafts."""
-        T = self._torque(at)
-        return {"flange_a": -T, "flange_b": T}
-
-    def dissipation(self, at: Any) -> SX:
-        """What slipping takes."""
-        return SX(self._torque(at) * self._slip(at))
-
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The torque from a to b."""
-        return {"torque": self._torque(at)}
-
-    def _slip(self, at: Any) -> SX:
-        return SX(at.flange_a.speed - at.flange_b.speed)
 
     def _torque(self, at: Any) -> SX:
         return friction_of(at, self._slip(at))
@@ -371,7 +361,7 @@ def friction_of(at: Any, w: SX) -> SX:
     return SX(at.capacity * casadi.fmax(at.engagement, 0) * smooth_sign(w, at.width))
 
 
-class OneWayClutch(TwoFlanges):
+class OneWayClutch(_SlippingShafts):
     """A freewheel: flange_a drives flange_b and never brakes it.
 
     The torque from a to b is damping r(w_a - w_b), with the ramp r of a JointStop over `width`:
@@ -387,23 +377,6 @@ class OneWayClutch(TwoFlanges):
 
     damping = custom.parameter("N.m.s/rad", positive=True)
     width = custom.parameter("rad/s", _CREEP, positive=True)
-    torque = custom.output("N.m")
-
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """The torque on the two shafts."""
-        T = self._torque(at)
-        return {"flange_a": -T, "flange_b": T}
-
-    def dissipation(self, at: Any) -> SX:
-        """What slipping takes."""
-        return SX(self._torque(at) * self._slip(at))
-
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The torque from a to b."""
-        return {"torque": self._torque(at)}
-
-    def _slip(self, at: Any) -> SX:
-        return SX(at.flange_a.speed - at.flange_b.speed)
 
     def _torque(self, at: Any) -> SX:
         return SX(at.damping * smooth_ramp(self._slip(at), at.width)[1])

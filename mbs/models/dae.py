@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -27,9 +27,9 @@ from mbs.loops.velocity import acceleration_bias, independent_constraint_rows
 from mbs.models.contacts import require_no_contacts
 from mbs.models.direct_dynamics import direct_dynamics, independent_dynamics
 from mbs.models.inverse_dynamics import inverse_dynamics, own_efforts
+from mbs.models.state.signals import by_name
 from mbs.models.symbols import ModelSymbols, devices, outputs_of, part_equations, symbols_of
-from mbs.numbers import doubles
-from mbs.text import did_you_mean, quoted
+from mbs.text import quoted
 
 # What loops ask of a motion, on the levels of positions, velocities and accelerations.
 
@@ -470,43 +470,6 @@ def dae(
     z0 = _start_algebraic(system, (q, v, tau, z, u, p), equations.z.numel())
     u0 = np.concatenate([tau[motors(system)], u])
     return Dae(**parts, form=form, elements=elements, x0=x0, z0=z0, u0=u0, p0=p)
-
-
-def full_name(name: str, quantities: Sequence[tuple[str, str]]) -> str:
-    """A quantity by its own name, or by that of its component where this has no other."""
-    names = [full for full, _ in quantities]
-    owned = [full for full in names if full.rpartition(".")[0] == name]
-    return owned[0] if name not in names and len(owned) == 1 else name
-
-
-def by_name(
-    system: System,
-    what: str,
-    values: Mapping[str, float] | None,
-    quantities: Sequence[tuple[str, str]],
-    otherwise: Sequence[float],
-) -> Array:
-    """Values of states or inputs, those that are not named as they are otherwise.
-
-    Raises:
-        ModelError: a name is unknown, or a value is no finite number.
-    """
-    names, result = [name for name, _ in quantities], np.array(otherwise, dtype=float)
-    for given, value in (values or {}).items():
-        name = full_name(str(given), quantities)
-        if name not in names:
-            owners = [full.rpartition(".")[0] for full in names]
-            known = [*(one for one in owners if owners.count(one) == 1), *names]
-            raise ModelError(
-                f"{system.name}: {what} names {quoted(given)}; {did_you_mean(str(given), known)}"
-            )
-        number = doubles(value)
-        if isinstance(number, str) or number.size != 1 or not np.isfinite(number).all():
-            raise ModelError(
-                f"{system.name}: {what} gives {quoted(value)} for {name}; give a finite number"
-            )
-        result[names.index(name)] = float(number.ravel()[0])
-    return result
 
 
 _Kind = tuple[str, tuple[str, ...]]

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
+from mbs.assembly.parts import Quantity
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.assembly.tree import position_rate
 from mbs.errors import ModelError
@@ -26,10 +27,11 @@ from mbs.loops.closure import closure_rows, independent_closure
 from mbs.loops.configuration import Values, start
 from mbs.loops.velocity import velocity_rows
 from mbs.models.contacts import require_no_contacts
-from mbs.models.dae import by_name, driving, motors, start_efforts
+from mbs.models.dae import driving, motors, start_efforts
 from mbs.models.direct_dynamics import independent_dynamics
 from mbs.models.joint_wrenches import shown_outputs
 from mbs.models.measurements import readings
+from mbs.models.state.signals import by_name
 from mbs.models.symbols import (
     ModelSymbols,
     configuration_check,
@@ -42,8 +44,6 @@ from mbs.solvers.linear import solve_square
 from mbs.text import did_you_mean, quoted
 
 Array = NDArray[np.float64]
-Quantity = tuple[str, str]
-"""Name and unit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,8 +108,9 @@ class Linearisation:
             q0: positions by name, the others as assembled; loops are closed at them.
             v0: velocities by name; at rest when left out.
             tau0: efforts of motors by name, the others zero.
-            states: of components by name, such as `motor.i`, the others as described.
-            inputs: of components by name, such as `motor.voltage`, likewise.
+            states: of components by name, such as `motor.i`, the others as described; a component
+                that has one goes by its own name too.
+            inputs: likewise, such as `motor.voltage` or `motor`.
             parameters: values of symbols, the others at their defaults.
 
         Raises:

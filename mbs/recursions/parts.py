@@ -447,10 +447,15 @@ class PartEvent:
     then: Mapping[int, SX]
 
 
-def part_events(system: System) -> list[PartEvent]:
-    """What happens at once in the components of a system, in their order."""
-    q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
-    return PartsAt(system, q, v).events()
+def part_event_names(system: System) -> tuple[tuple[str, str], ...]:
+    """Component and label of what happens at once in a system, in the order of the events."""
+
+    def names() -> tuple[tuple[str, str], ...]:
+        q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
+        return tuple((event.name, event.label) for event in PartsAt(system, q, v).events())
+
+    found: tuple[tuple[str, str], ...] = system.cached("names of events", names)
+    return found
 
 
 def after_events(system: System, events: Sequence[PartEvent], fired: SX) -> SX:

@@ -22,7 +22,6 @@ from mbs.loops.configuration import Values, start
 from mbs.loops.examine import row_independence
 from mbs.loops.velocity import constraint_jacobian, scales
 from mbs.models.contacts import KINDS, Contacts, contacts_of, require_lasting_rows, require_undriven
-from mbs.models.dae import by_name
 from mbs.models.direct_dynamics import hybrid_dynamics
 from mbs.models.inverse_dynamics import bias
 from mbs.models.measurements import measurements
@@ -30,13 +29,14 @@ from mbs.models.state.signals import (
     Effort,
     LawArgument,
     Prescribed,
+    by_name,
     effort_function,
     signal_function,
     untraceable,
 )
 from mbs.models.state.tree import FullState, full_state
 from mbs.progress import progress
-from mbs.recursions.parts import part_events
+from mbs.recursions.parts import part_event_names
 from mbs.result import Result
 from mbs.simulate.arguments import count_steps, positive
 from mbs.solvers import EventMotion, Events, integrate_events
@@ -152,7 +152,7 @@ def list_events(
         contact: what contacts do, their events and those of components behind them.
         others: events of components alone, where there are no contacts.
     """
-    own = [(event.name, event.label) for event in part_events(system)]
+    own = part_event_names(system)
     happened = [(event.time, *own[k]) for event in others for k in event.fired]
     if contact is None:
         return tuple(happened)
@@ -395,7 +395,7 @@ def _with_names(system: System, stop: SolverError) -> str:
     """The message, with the events that are to blame by component and label."""
     message, _, numbers = str(stop).partition("; indicators ")
     contacts = [name for _ in KINDS for name in contacts_of(system).names]
-    names = [*contacts, *(f"{event.name}, {event.label}" for event in part_events(system))]
+    names = [*contacts, *map(", ".join, part_event_names(system))]
     blamed = [names[k] for k in stop.fired if k < len(names)]
     return f"{message}; it concerns {' and '.join(blamed)}" if numbers and blamed else str(stop)
 

@@ -25,8 +25,7 @@ from mbs.expressions import (
     to_sx,
     with_values,
 )
-from mbs.models.dae import full_name
-from mbs.models.state.signals import effort_function
+from mbs.models.state.signals import effort_function, full_name
 from mbs.result import Result
 from mbs.simulate import run
 from mbs.simulate.run import input_function

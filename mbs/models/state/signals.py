@@ -10,10 +10,14 @@ from typing import Any
 import casadi
 import numpy as np
 from casadi import DM, SX, Function
+from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.errors import ModelError
+from mbs.numbers import doubles
 from mbs.text import did_you_mean, quoted
+
+Array = NDArray[np.float64]
 
 _LONGEST_REASON = 200
 
@@ -239,3 +243,43 @@ class Prescribed:
         """Position, velocity and acceleration at a time."""
         values = casadi.substitute(list(self.laws), [self.time], [t])
         return SX(values[0]), SX(values[1]), SX(values[2])
+
+
+# Values of states and inputs of components by name.
+
+
+def full_name(name: str, quantities: Sequence[tuple[str, str]]) -> str:
+    """A quantity by its own name, or by that of its component where this has no other."""
+    names = [full for full, _ in quantities]
+    owned = [full for full in names if full.rpartition(".")[0] == name]
+    return owned[0] if name not in names and len(owned) == 1 else name
+
+
+def by_name(
+    system: System,
+    what: str,
+    values: Mapping[str, float] | None,
+    quantities: Sequence[tuple[str, str]],
+    otherwise: Sequence[float],
+) -> Array:
+    """Values of states or inputs, those that are not named as they are otherwise.
+
+    Raises:
+        ModelError: a name is unknown, or a value is no finite number.
+    """
+    names, result = [name for name, _ in quantities], np.array(otherwise, dtype=float)
+    for given, value in (values or {}).items():
+        name = full_name(str(given), quantities)
+        if name not in names:
+            owners = [full.rpartition(".")[0] for full in names]
+            known = [*(one for one in owners if owners.count(one) == 1), *names]
+            raise ModelError(
+                f"{system.name}: {what} names {quoted(given)}; {did_you_mean(str(given), known)}"
+            )
+        number = doubles(value)
+        if isinstance(number, str) or number.size != 1 or not np.isfinite(number).all():
+            raise ModelError(
+                f"{system.name}: {what} gives {quoted(value)} for {name}; give a finite number"
+            )
+        result[names.index(name)] = float(number.ravel()[0])
+    return result

@@ -10,8 +10,8 @@ TWISTS = (0.9, 1.7)
 STARTS = {"j0": 1.0, "j1": 2.0, "j2": -1.0, "j3": -2.0}
 
 
-def bennett(driven=0, cut=3, twists=TWISTS, length=0.8):
-    """Links 0 and 2 of one length and twist, 1 and 3 of the other; joint k after link k."""
+def bennett(driven=0, cut=3, twists=TWISTS, length=0.8, add=None):
+    """Links 0 and 2 of one length and twist, 1 and 3 of the other; joint k after link k; `add` may add more."""
     rng = np.random.default_rng(0)
     m = Mechanism("bennett")
     alpha, beta = twists
@@ -25,6 +25,8 @@ def bennett(driven=0, cut=3, twists=TWISTS, length=0.8):
         m.connect(bodies[k].at(size, 0, 0, rotation=_tilt(twist)), joint, bodies[(k + 1) % 4].at())
         if k == cut:
             m.cut(joint)
+    if add is not None:
+        add(m, bodies)
     return m.assemble(guess={name: x for name, x in STARTS.items() if name != f"j{cut}"})
 
 

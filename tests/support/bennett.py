@@ -11,7 +11,10 @@ STARTS = {"j0": 1.0, "j1": 2.0, "j2": -1.0, "j3": -2.0}
 
 
 def bennett(driven=0, cut=3, twists=TWISTS, length=0.8, add=None):
-    """Links 0 and 2 of one length and twist, 1 and 3 of the other; joint k after link k; `add` may add more."""
+    """Links 0 and 2 of one length and twist, 1 and 3 of the other; joint k after link k.
+
+    `add(m, bodies)` may add more.
+    """
     rng = np.random.default_rng(0)
     m = Mechanism("bennett")
     alpha, beta = twists

@@ -2,6 +2,7 @@
 
 import zipfile
 
+import casadi
 import numpy as np
 import pytest
 from elf_versions import glibc_versions
@@ -9,6 +10,7 @@ from fmu_mechanisms import CASES, imported, simulated
 from support.catalogue_systems import catalogue_system
 
 import mbs
+from mbs.components import Body, Custom, Free, Planar, RollingDisc, custom
 
 
 @pytest.mark.sweep
@@ -77,3 +79,48 @@ def test_a_library_for_linux_needs_no_glibc_after_2_17(tmp_path):
     versions = glibc_versions(library)
     assert versions
     assert max(versions) <= (2, 17)
+
+
+# ---- rows that bind velocities alone ----
+
+
+class Edge(Custom):
+    """A point slides along the x axis of its frame alone."""
+
+    point = custom.frame()
+
+    def velocity_rows(self, at):
+        """What slides across."""
+        return {"side": casadi.dot(at.point.R[:, 1], at.point.v)}
+
+
+@pytest.mark.parametrize(("fmi", "solver"), [("2.0", "dopri5"), ("3.0", "rodas")])
+def test_a_knife_edge_rotates_through_where_its_states_determine_nothing(fmi, solver, tmp_path):
+    # Neimark and Fufaev: x = g sin(slope) sin^2(w t) / (2 w^2), across the slope as a cycloid
+    m = mbs.Mechanism("sleigh", gravity=(4.0, 0, 0))
+    sleigh = m.add(Body("sleigh", mass=3.0, inertia=(0.1, 0.1, 0.2)))
+    m.connect(m.world, Planar("p", axis="z", actuated=False), sleigh)
+    m.add(Edge("edge", sleigh))
+    system = m.assemble()
+    assert [system.speeds[k].name for k in system.active] == ["p.s_x", "p.phi"]
+    path = mbs.export.fmu(system, tmp_path / "sleigh.fmu", fmi=fmi, solver=solver)
+    w, result = 1.5, mbs.simulate.fmu(path, 4.0, start={"p.phi.v": 1.5}, step=0.05, quiet=True)
+    t = result.time
+    assert np.abs(result["p.s_x.q"] - 2 / w**2 * np.sin(w * t) ** 2).max() < 1e-7
+    assert np.abs(result["p.s_y.q"] - 2 / w**2 * (w * t - 0.5 * np.sin(2 * w * t))).max() < 1e-7
+
+
+def test_a_coin_rolls_through_where_its_states_determine_nothing(tmp_path):
+    m = mbs.Mechanism("coin", gravity=(0, 0, -9.81))
+    body = m.add(Body("body", mass=0.4, inertia=(1e-3, 2e-3, 1e-3)))
+    m.connect(m.world, Free("f"), body)
+    m.connect(m.world, RollingDisc("rolls", radius=0.1, normal="z", axis="y"), body)
+    system = m.assemble(guess={"f.z": 0.1}, active=("f.wx", "f.wy", "f.wz"))
+    path = mbs.export.fmu(system, tmp_path / "coin.fmu")
+    v0 = {"f.wx": 0.3, "f.wy": 12.0, "f.wz": 1.0}
+    start = {f"{name}.v": value for name, value in v0.items()}
+    found = mbs.simulate.fmu(path, 2.0, start=start, step=0.01, tolerance=1e-9, quiet=True)
+    wanted = mbs.simulate.run(system, 2.0, v0=v0, tolerance=1e-10, quiet=True)
+    for coordinate in system.coordinates:
+        name = f"{coordinate.name}.q"
+        assert np.abs(found[name] - wanted[name]).max() < 1e-7

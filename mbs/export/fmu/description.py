@@ -513,7 +513,7 @@ class FmuModel:
     @property
     def charted(self) -> bool:
         """Whether integrators outside pass singular configurations: charts.h."""
-        return self.tree is not None and self.jumps is None
+        return self.tree is not None and self.tree.passes and self.jumps is None
 
     @property
     def slots(self) -> tuple[State, ...]:

@@ -284,6 +284,28 @@ def passage(
     )
 
 
+def _without_passages(system: System, point: tuple[SX, SX, SX, SX]) -> Passage:
+    """That of a system with rows on velocities alone: every configuration counts as regular."""
+    t, X, u, p = point
+    nq, nv = system.nq, system.nv
+    at = [t, X, SX.sym("z", 0), u, p]
+    wide = nq > nv
+    rows = [
+        *(SX(0, 1), SX(0, nq), SX(0, nv), SX(0, 1), SX(0, 1)),
+        SX.zeros(nq, nv) if wide else SX(0, nv),
+        SX.zeros(nq) if wide else SX(0, 1),
+        SX(0),
+    ]
+    forces = [SX.zeros(nv, nv), SX.zeros(nv), SX.zeros(system.z.numel())]
+    return Passage(
+        rows=dense_function("rows", at, rows),
+        forces=dense_function("forces", at, forces),
+        regularity=dense_function("regularity", at, [SX(1)]),
+        size=(nq, nv, system.z.numel(), 0, 0, 0, 0),
+        typical=1.0,
+    )
+
+
 def _position(system: System, number: int) -> int:
     """The index in q of a velocity of a joint with one degree of freedom."""
     link = next(link for link in system.tree.links if link.v.start <= number < link.v.stop)
@@ -323,6 +345,7 @@ class TreeState:
         project: `project(t, X, z, u, p) -> (X, residual)`, one Newton step onto the loops.
         start: `start(t, x, z, u, p) -> X` of states x and dependents z of the independent one.
         passage: of rows, forces and regularity.
+        passes: whether it is asked for passages; never where rows bind velocities alone.
         events: of rigid stops and Coulomb friction; None where there are none.
         rate: `rate(X) -> q'`, the rates of the positions in X.
         states: numbers in X of the states x.
@@ -336,6 +359,7 @@ class TreeState:
     project: Function
     start: Function
     passage: Passage
+    passes: bool
     events: MinimalEvents | None
     rate: Function
     states: tuple[int, ...]
@@ -357,7 +381,8 @@ def tree_state(
     """
     drive = DriveInputs() if drive is None else drive
     layout = minimal_layout(system, drive)
-    if not layout.dependents or layout.motions:
+    slips = system.closure is not None and bool(system.closure.slips)
+    if layout.motions or not (layout.dependents or slips):
         return None
     motors = layout.inputs if drive.effort is None else tuple(range(system.nv))
     s = point_of(system, layout, motors)
@@ -375,6 +400,8 @@ def tree_state(
     through = passage(
         system, (s.t, X, system.p), SX(tau + load), rates, contact=contact, inputs=s.u
     )
+    if through is None and slips:
+        through = _without_passages(system, (s.t, X, s.u, system.p))
     if through is None:
         return None
     if contact is None:
@@ -426,6 +453,7 @@ def tree_state(
         project=written("tree_project", free, [casadi.vertcat(*kept, X[n:]), residual]),
         start=written("tree_start", [s.t, s.x, s.z, inputs], [start]),
         passage=replace(through, rows=rows, forces=forces, regularity=regularity),
+        passes=not slips,
         events=events,
         states=(
             *layout.positions,

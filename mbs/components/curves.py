@@ -89,6 +89,10 @@ class PointOnCurve(Custom):
         off = at.ground.to(at.pin).p - self.spline.at(at.s)
         return dict(zip("xyz", casadi.vertsplit(off), strict=True))
 
+    def crossings(self, at: Any) -> Mapping[str, SX]:
+        """The knots of the curve."""
+        return {"knots": self.spline.bend(at.s)}
+
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """The force of the curve on the point, in axes of the ground."""
         return {f"force_{axis}": at.lam[axis] for axis in "xyz"}
@@ -165,6 +169,10 @@ class Cam(Custom):
         """What the driven coordinate is off the lift."""
         lift = self.spline.at(at.driver.q)
         return {"lift": Row(at.driven.q - lift, "m" if at.driven.unit == "m" else "1")}
+
+    def crossings(self, at: Any) -> Mapping[str, SX]:
+        """The knots of the lift."""
+        return {"knots": self.spline.bend(at.driver.q)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """What the cam does to the driven coordinate."""

@@ -36,12 +36,34 @@ class Spline:
 
     def at(self, t: SX) -> SX:
         """(d, 1) the point at t, (1, 1)."""
-        if self.period is not None:
-            t = t - self.period * casadi.floor((t - self.knots[0]) / self.period)
+        t, _ = self._within(t)
         steps = [t >= knot for knot in self.knots[1:]]
         u = t - _chosen(self.knots, steps)
         dimension = self.coefficients.shape[2]
         return casadi.vertcat(*(self._element(k, u, steps) for k in range(dimension)))
+
+    def bend(self, t: SX) -> SX:
+        """What passes through zero at every knot, where the third derivative jumps.
+
+        Between two knots it is a parabola, up and down in turn; its slope at them is 1 or -1.
+        """
+        t, turns = self._within(t)
+        knots = np.unique(self.knots)
+        if self.period is not None:
+            knots = np.append(knots, knots[0] + self.period)
+        # of the pieces between knots the first and the last go on beyond the ends
+        steps = [t >= knot for knot in knots[1:-1]]
+        count = turns * (len(knots) - 1) + sum(steps, SX(0))
+        sign = 1 - 2 * casadi.fmod(casadi.fabs(count), 2)
+        before, after = _chosen(knots[:-1], steps), _chosen(knots[1:], steps)
+        return SX(sign * (t - before) * (after - t) / (after - before))
+
+    def _within(self, t: SX) -> tuple[SX, SX]:
+        """The place within the first period that is like t, and how many periods lie between."""
+        if self.period is None:
+            return t, SX(0)
+        turns = casadi.floor((t - self.knots[0]) / self.period)
+        return SX(t - self.period * turns), SX(turns)
 
     def _element(self, k: int, u: SX, steps: Sequence[SX]) -> SX:
         value = SX(0)

@@ -45,6 +45,9 @@ of time, and arithmetic on times adds some more."""
 LEAST_TIME = 1e-3
 """Part of the last step by which the rounding of times near zero is measured, not by time itself,
 which has none there."""
+AT_START = 1e-3
+"""Part of a step before which an event is where the dense output has hardly left the start: what
+the step saw behind the event counts with its square there."""
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -161,10 +164,24 @@ class EventStepper:
 
     def _step(self, limit: float) -> int:
         """One step, cut at its first event; returns how many were tried."""
-        solver = self.solver
-        start = here = solver.t
+        solver, start, armed = self.solver, self.solver.t, self.armed.copy()
         tried = solver.step(limit)
-        end, part = solver.t, 1
+        found, end = self._first_event(start), solver.t
+        if found and found[0] < end and found[0] - start > AT_START * (end - start):
+            # its stages behind the event are of other laws: once more, as far as the event alone
+            solver.rewind(start)
+            self.left, self.armed = self._look(start), armed
+            tried += solver.step(found[0])
+            found = self._first_event(start)
+        if found:
+            event, right = found
+            self.due = self.armed & (right <= 0)
+            solver.rewind(event)
+        return tried
+
+    def _first_event(self, start: float) -> tuple[float, Array] | None:
+        """The first event in the step from start, and the indicators there."""
+        here, end, part = start, self.solver.t, 1
         while here < end:
             planned = start + part * (end - start) / LOOKS if part < LOOKS else end
             if here > start:
@@ -173,13 +190,12 @@ class EventStepper:
                 to, right = self._first_look(start, planned)
             to, right = self._dips(here, to, right)
             if self._least(right[0]) <= 0:
-                self._stop_at_event(here, to, right[0])
-                break
+                return self._locate(here, to, right[0])
             self.armed |= right[0] > 0
             self.left = right
             part += to == planned
             here = to
-        return tried
+        return None
 
     def _first_look(self, start: float, end: float) -> tuple[float, Look]:
         """What has just left zero may be back at the first look: look earlier."""
@@ -224,11 +240,6 @@ class EventStepper:
             else:
                 end, high, rise = t, value, rate
         return b, right
-
-    def _stop_at_event(self, a: float, b: float, right: Array) -> None:
-        b, right = self._locate(a, b, right)
-        self.due = self.armed & (right <= 0)
-        self.solver.rewind(b)
 
     def _locate(self, a: float, b: float, right: Array) -> tuple[float, Array]:
         """The first time after a at which an indicator is not positive, and all of them there.

@@ -1,5 +1,6 @@
 """Curves through points: continuity, beads by hand, cams."""
 
+import itertools
 import math
 
 import casadi
@@ -144,6 +145,33 @@ def cam(**options):
     element = Cam("cam", "lift", "turn", profile=np.c_[t, lift(t)], **options)
     m.add(element)
     return asked(m), derivatives(element.spline)
+
+
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize("count", [4, 5])
+def test_a_bend_is_crossed_at_every_knot(count, closed):
+    t = np.cumsum(np.random.default_rng(count).uniform(0.3, 1.0, count))
+    points, period = np.sin(3 * t)[:, None], t[-1] - t[0] + 0.4
+    spline = periodic_spline(t, points, period) if closed else natural_spline(t, points)
+    s = casadi.SX.sym("s")
+    f = casadi.Function("bend", [s], [spline.bend(s)])
+    knots = [knot + k * period for k in range(-2, 3) for knot in t] if closed else t
+    assert all(abs(float(f(knot))) < 1e-14 for knot in knots)
+    assert all(float(f(knot - 1e-3)) * float(f(knot + 1e-3)) < -1e-7 for knot in knots)
+    ends = [*knots, knots[-1] + 0.4] if closed else [knots[0] - 1, *knots, knots[-1] + 1]
+    inside = [np.linspace(a, b, 9)[1:-1] for a, b in itertools.pairwise(ends)]
+    signs = [{np.sign(float(f(x))) for x in piece} for piece in inside]
+    assert all(len(found) == 1 for found in signs)
+
+
+@pytest.mark.parametrize("method", ["dopri5", "rodas"])
+def test_steps_end_at_knots(method):
+    # steps over the jumps of the third derivative lose a hundred times as much
+    system, _ = cam()
+    result = mbs.simulate.run(
+        system, 2.0, v0={"turn": 10.0}, tolerance=1e-8, method=method, quiet=True
+    )
+    assert np.ptp(stored(result)) < 2e-7  # J, of 5
 
 
 def test_a_cam_by_hand():

@@ -144,7 +144,8 @@ def test_an_event_is_at_the_first_number_where_its_indicator_is_not_positive(pow
 
 @pytest.mark.parametrize("falling", [0.5 - T**2, ca.exp(-5 * T) - 0.2])
 def test_an_event_is_located_in_few_looks(falling, monkeypatch):
-    # halving would take 50, and secants with an end that never moves 20 and then halving
+    # halving would take 50, and secants with an end that never moves 20 and then halving; the
+    # step is made twice, the second time as far as the event, and looked at twice
     looks, state = [], Stepper.state
     monkeypatch.setattr(Stepper, "state", lambda self, t: looks.append(t) or state(self, t))
     rhs, events = clock(T)
@@ -153,7 +154,7 @@ def test_an_event_is_located_in_few_looks(falling, monkeypatch):
     motion = integrate_events(rhs, [0, 0], [0, 1], once, compiled=False)
     assert len(motion.events) == 1
     between = [t for t in looks if abs(t - motion.events[0].time) < 0.1]
-    assert len(between) <= 16
+    assert len(between) <= 20
 
 
 @BOTH

@@ -7,6 +7,9 @@
 enum { LOOKS = 2, TANGENTS = 30, SECANTS = 20, MAX_JUMPS = 20, MAX_IDLE = 100 };
 
 static const double DEPARTURE = 1e-8; /* part of a step in which what rises may become positive */
+/* Part of a step before which an event is where the dense output has hardly left the start: what the
+ * step saw behind the event counts with its square there. */
+static const double AT_START = 1e-3;
 
 /* offsets in memory; then k values each of */
 enum { LAST, IDLE, PENDING, UNSEEN, ARRAYS };
@@ -28,6 +31,7 @@ static double *right(const events *e) { return part(e, 0); }
 static double *middle(const events *e) { return part(e, 1); }
 static double *right_rate(const events *e) { return part(e, 2); }
 static double *middle_rate(const events *e) { return part(e, 3); }
+static double *at_start(const events *e) { return part(e, 4); } /* which could fire there */
 static void copy(const events *e, double *to, const double *from) {
     memcpy(to, from, sizeof(double) * (size_t)e->count);
 }
@@ -213,26 +217,29 @@ static int find_dips(const events *e, const double *x, double a, double *b) {
     return status;
 }
 
-static int stop_at_event(events *e, double *x, double a, double b) {
-    int k, status = locate(e, x, a, &b);
-    if (status) return status;
-    for (k = 0; k < e->count; k++) due(e)[k] = armed(e)[k] > 0.0 && right(e)[k] <= 0.0;
-    e->memory[PENDING] = 1.0;
-    return stepper_rewind(e->solver, x, b);
+/* Whether error control may make another step from start to an event. Steps in coordinates of a chart
+ * stay. */
+static int may_repeat(const stepper *s, double start, double event) {
+    double end = stepper_time(s);
+    return event < end && event - start > AT_START * (end - start) && s->fixed == 0.0 &&
+           !s->kept_closed;
 }
 
-int events_step(events *e, double *x, double limit) {
-    double start = stepper_time(e->solver), from = start, end;
-    int number = 1, status = events_look(e, x);
-    if (!status && !events_pending(e)) status = stepper_step(e->solver, x, limit);
-    end = stepper_time(e->solver);
+/* The first event in the step from start, with the indicators there at the right; HUGE_VAL: none. */
+static int first_event(events *e, const double *x, double start, double *event) {
+    double from = start, end = stepper_time(e->solver);
+    int number = 1, status = STEPPER_OK;
+    *event = HUGE_VAL;
     while (!status && from < end) {
         double next = number < LOOKS ? start + number * (end - start) / LOOKS : end, to = next;
         status = from > start ? look(e, x, to, right(e), right_rate(e))
                               : first_look(e, x, start, &to);
         if (!status) status = find_dips(e, x, from, &to);
         if (status) return status;
-        if (least(e, right(e)) <= 0.0) return stop_at_event(e, x, from, to);
+        if (least(e, right(e)) <= 0.0) {
+            *event = to;
+            return locate(e, x, from, event);
+        }
         arm(e, right(e));
         copy(e, left(e), right(e));
         copy(e, left_rate(e), right_rate(e));
@@ -240,6 +247,32 @@ int events_step(events *e, double *x, double limit) {
         from = to;
     }
     return status;
+}
+
+static int stop_at_event(events *e, double *x, double event) {
+    int k;
+    for (k = 0; k < e->count; k++) due(e)[k] = armed(e)[k] > 0.0 && right(e)[k] <= 0.0;
+    e->memory[PENDING] = 1.0;
+    return stepper_rewind(e->solver, x, event);
+}
+
+int events_step(events *e, double *x, double limit) {
+    stepper *s = e->solver;
+    double start = stepper_time(s), event = HUGE_VAL;
+    int status = events_look(e, x);
+    if (status || events_pending(e)) return status;
+    copy(e, at_start(e), armed(e));
+    status = stepper_step(s, x, limit);
+    if (!status) status = first_event(e, x, start, &event);
+    if (!status && event < HUGE_VAL && may_repeat(s, start, event)) {
+        /* its stages behind the event are of other laws: once more, as far as the event alone */
+        status = stepper_rewind(s, x, start);
+        if (!status) status = look(e, x, start, left(e), left_rate(e));
+        copy(e, armed(e), at_start(e));
+        if (!status) status = stepper_step(s, x, event);
+        if (!status) status = first_event(e, x, start, &event);
+    }
+    return status || event == HUGE_VAL ? status : stop_at_event(e, x, event);
 }
 
 /* What the last modes constrain is projected; those in between may constrain what they cannot. */

@@ -6,6 +6,9 @@
  * time; zero is what is smaller than the absolute tolerance. One that rises from zero or stands
  * there must leave it upwards, else it fires as soon as it is seen below.
  *
+ * The step is then made once more, to the event alone: where laws change behind it, stages there have
+ * bent the dense output.
+ *
  * The indicators and their slopes are looked at twice in each step. What falls at one look and rises
  * at the next may have been below zero between them: tangents show where to look again.
  *
@@ -17,7 +20,7 @@
 #include "stepper.h"
 
 #define EVENTS_MEMORY(k) (4 + 6 * (k))
-#define EVENTS_WORK(n, k) ((n) + 4 * (k))
+#define EVENTS_WORK(n, k) ((n) + 5 * (k))
 
 enum {
     EVENTS_FIRED = -1, /* an event has just been settled; a table ends there: call again */

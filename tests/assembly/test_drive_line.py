@@ -12,6 +12,7 @@ from mbs.components import (
     DCMotor,
     ElasticGear,
     ElasticShaft,
+    Free,
     IdealGear,
     Prismatic,
     Revolute,
@@ -308,3 +309,31 @@ def test_refused_shaft_on_a_sliding_joint():
 def test_there_are_no_devices_without_motors():
     m, _ = arm()
     refused(mbs.errors.ModelError, "no motor", by=lambda: mbs.models.devices(m.assemble()))
+
+
+def test_the_housing_takes_the_reactions_of_a_motor_and_of_a_bevel_gear():
+    # a free hull with two rotors across each other, a motor on the first, a gear between them
+    m = mbs.Mechanism("hull", gravity=(0, 0, 0))
+    hull = m.add(Body("hull", mass=10.0, inertia=(2.0, 3.0, 4.0)))
+    m.connect(m.world, Free("free"), hull)
+    spin, across = Revolute("spin", axis="z"), Revolute("across", axis="x", actuated=False)
+    m.connect(hull, spin, m.add(Body("first", mass=0.5, inertia=(0.05, 0.05, 0.1))))
+    m.connect(hull, across, m.add(Body("second", mass=0.5, inertia=(0.2, 0.1, 0.1))))
+    motor, gear = TorqueSource("motor"), IdealGear("bevel", 3.0)
+    m.connect(motor.flange, spin.flange)
+    m.connect(spin.flange, gear.flange_a)
+    m.connect(gear.flange_b, across.flange)
+    system = m.assemble()
+    result = mbs.simulate.run(system, 2.0, u={"motor": 1.5}, tolerance=1e-10, quiet=True)
+    # at rest: the whole angular momentum stays zero, and the torque goes into both rotors
+    A = np.array([[2.25, 0.2 / 3, 0], [0, 0.1, 4.2], [0.2 / 3, 0.1 + 0.2 / 9, 0.1]])
+    w_x, spin_a, w_z = np.linalg.solve(A, [0, 0, 1.5])
+    assert result["spin.a"][0] == pytest.approx(spin_a, rel=1e-12)
+    assert result["free.wx.a"][0] == pytest.approx(w_x, rel=1e-12)
+    assert result["free.wz.a"][0] == pytest.approx(w_z, rel=1e-12)
+    # and later on: about the centre, in axes at rest
+    w = np.array([result[f"free.w{axis}.v"] for axis in "xyz"])
+    own = np.diag([2.25, 3.15, 4.2]) @ w
+    own[0] += 0.2 * result["across.v"]
+    own[2] += 0.1 * result["spin.v"]
+    assert np.abs(own).max() < 1e-8

@@ -20,6 +20,7 @@ from mbs.components import custom
 from mbs.components.bodies import three
 from mbs.components.custom import Load, RelativeMotion
 from mbs.components.forces import ForceElement
+from mbs.components.shapes import Shape
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, out_of_bounds, to_float, to_sx
 from mbs.spatial import cross, vector, zeros
@@ -37,6 +38,9 @@ _ELASTIC = 0.25
 _TOUCHING = 1e-9
 """Gap [m] from which on shapes count as touching where steps end: a body that is placed exactly on
 a plane is inside, whatever rounding does."""
+_THIN = 0.03
+"""Half the width of a wheel without a round rim in pictures, part of its radius: a disc that is
+seen from its edge, too."""
 _INSIDE = 1e-9
 """Distance [m] of a centre from a box from which on its direction tells the normal; nearer, and
 inside, the nearest face does."""
@@ -421,6 +425,10 @@ class SpherePlaneContact(PlaneContact):
         """The radius."""
         return SX(at.radius)
 
+    def figures(self, at: Any) -> Mapping[str, Shape]:
+        """The sphere."""
+        return _ball("body", at.radius)
+
 
 class CapsulePlaneContact(PlaneContact):
     """A capsule on a plane, by its two end spheres, which share the load as it asks.
@@ -444,6 +452,10 @@ class CapsulePlaneContact(PlaneContact):
     def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
         """The ends a, at z < 0, and b."""
         return [vector([SX(0), SX(0), side * at.length / 2]) for side in (-1, 1)]
+
+    def figures(self, at: Any) -> Mapping[str, Shape]:
+        """The capsule."""
+        return {"body": Shape("capsule", (at.radius, at.length))}
 
 
 class WheelPlaneContact(PlaneContact):
@@ -473,6 +485,11 @@ class WheelPlaneContact(PlaneContact):
         across = vector([up[0], SX(0), up[2]])
         return [-at.radius * across / custom.regular_length(across)]
 
+    def figures(self, at: Any) -> Mapping[str, Shape]:
+        """A disc that bulges, as wide as its rim."""
+        outer = at.radius + at.rim
+        return {"body": Shape("ellipsoid", (outer, max(at.rim, _THIN * outer), outer))}
+
 
 class BoxPlaneContact(PlaneContact):
     """A box on a plane, by its eight corners.
@@ -496,6 +513,10 @@ class BoxPlaneContact(PlaneContact):
         half = _half_size(self, at)
         return [half * vector(map(SX, signs[::-1])) for signs in product((-1, 1), repeat=3)]
 
+    def figures(self, at: Any) -> Mapping[str, Shape]:
+        """The box."""
+        return _cuboid("body", self.size, at)
+
 
 def _take_size(box: Any) -> None:
     """Turn the three sides that a user gave into expressions."""
@@ -507,6 +528,18 @@ def _take_size(box: Any) -> None:
                 f"{box.name}: size has the side {value:g} m; give more than zero"
             )
     object.__setattr__(box, "size", sides)
+
+
+def _ball(port: str, radius: float) -> Mapping[str, Shape]:
+    """A sphere, none for a point."""
+    return {port: Shape("sphere", (radius,))} if radius > 0 else {}
+
+
+def _cuboid(port: str, size: Any, at: Any) -> Mapping[str, Shape]:
+    """A box, none where a side has no value."""
+    sides = [to_float(side, at.symbols) for side in size]
+    known = tuple(side for side in sides if side is not None)
+    return {port: Shape("box", known)} if len(known) == len(sides) else {}
 
 
 def _half_size(box: Any, at: Any) -> SX:
@@ -535,6 +568,10 @@ class SphereSphereContact(Contact):
         """On the line between the centres, in the middle of the overlap."""
         depth = at.radius_a + at.radius_b - motion.length
         return [Spot(depth, motion.along, -(at.radius_b - depth / 2) * motion.along)]
+
+    def figures(self, at: Any) -> Mapping[str, Shape]:
+        """Both spheres."""
+        return {**_ball("a", at.radius_a), **_ball("b", at.radius_b)}
 
 
 class SphereBoxContact(Contact):
@@ -575,6 +612,10 @@ class SphereBoxContact(Contact):
         normal = side * casadi.if_else(is_outside, outside / distance, face)
         depth = at.radius - casadi.if_else(is_outside, distance, nearest)
         return [Spot(depth, normal, -(at.radius - depth / 2) * normal)]
+
+    def figures(self, at: Any) -> Mapping[str, Shape]:
+        """The sphere and the box."""
+        return {**_ball("sphere", at.radius), **_cuboid("box", self.size, at)}
 
 
 class HeightFieldContact(Contact):
@@ -627,6 +668,10 @@ class HeightFieldContact(Contact):
                 f"{self.name}: height holds the symbols {', '.join(strange)}; make it of x, y and"
                 " numbers"
             )
+
+    def figures(self, at: Any) -> Mapping[str, Shape]:
+        """The sphere; the ground is not drawn."""
+        return _ball("body", at.radius)
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
         """Under the centre, along the gradient of the depth."""

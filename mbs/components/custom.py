@@ -28,6 +28,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
 from functools import cached_property
+from types import SimpleNamespace
 from typing import Any, ClassVar, TypeVar
 
 import casadi
@@ -35,6 +36,7 @@ from casadi import SX
 
 from mbs.components.component import Component, Point
 from mbs.components.on_points import OnPoints
+from mbs.components.shapes import Shape
 from mbs.errors import DescriptionError
 from mbs.expressions import (
     MORE_THAN_ZERO,
@@ -506,6 +508,7 @@ class Custom(OnPoints):
     - `outputs(at)`: the value of every output, by name.
     - `events(at)`: by label, when something happens at once, and what states and modes become; in
       simulations and FMUs.
+    - `figures(at)`: what it looks like at its frames, a `Shape` each, of numbers.
     - `crossings(at)`: by label, what passes through zero where the law has a bend or is short:
       simulations end a step there, and step over none of them.
 
@@ -564,6 +567,29 @@ class Custom(OnPoints):
     def names_of(self, *kinds: str) -> tuple[str, ...]:
         """The names of what is declared of some kinds, in order."""
         return tuple(name for name, what in self.declared.items() if what.kind in kinds)
+
+    def drawn(self, values: Mapping[str, float]) -> Mapping[str, Shape]:
+        """Its figures at values of the symbols; none where one of its parameters has no value.
+
+        Raises:
+            DescriptionError: a figure is no Shape, or its port is no frame.
+        """
+        numbers: dict[str, Any] = {}
+        for name in self.names_of("parameter"):
+            given = getattr(self, name)
+            number = None if given is None else to_float(given, values)
+            if given is not None and number is None:
+                return {}
+            numbers[name] = number
+        figures = self.figures(SimpleNamespace(**numbers, symbols=values))
+        for port, shape in figures.items():
+            if port not in self.frames or not isinstance(shape, Shape):
+                what = "is no frame" if port not in self.frames else f"is {quoted(shape)}"
+                raise DescriptionError(
+                    f"{self.name}: figures has {port!r}, which {what}; give a Shape by the name of"
+                    f" a frame: {', '.join(self.frames) or '(none)'}"
+                )
+        return figures
 
     @property
     def frames(self) -> Mapping[str, Point]:
@@ -661,6 +687,13 @@ class Custom(OnPoints):
         """What passes through zero where the law has a bend or is short, by label.
 
         It is of positions, states and parameters. A step of `mbs.simulate.run` ends there.
+        """
+        return {}
+
+    def figures(self, at: Any) -> Mapping[str, Shape]:
+        """What it looks like at its frames, by port; `at` has its parameters as numbers.
+
+        Pictures show it. Values of parameters that nobody gave are NaN, and there is no picture.
         """
         return {}
 

@@ -115,6 +115,7 @@ class _Check:
             for label, value in self._mapping("crossings", self.at.at(self.part)).items():
                 what = f"the crossing {label!r}"
                 self._require_free_of(self._value(what, value), what, free, "velocities or inputs")
+        self._figures()
         seen = self._outputs()
         self.used += [*seen.values(), *rates.values()]
         self._require_use_of_inputs()
@@ -205,6 +206,19 @@ class _Check:
     def _outputs(self) -> Mapping[str, SX]:
         self.seen.__dict__["lam"] = self.at.row_efforts().get(self.part.name, {})
         return self._named("outputs", self.element.output_names)
+
+    def _figures(self) -> None:
+        """What pictures show, at the defaults of the parameters."""
+        known = {p.name: p.default for p in self.system.parameters if p.default is not None}
+        try:
+            self.element.drawn(known)
+        except MbsError as error:
+            raise AssemblyError(str(error)) from error
+        except Exception as error:
+            raise AssemblyError(
+                f"{self._title}: figures raises {type(error).__name__}: {one_line(str(error))};"
+                " make Shapes of numbers, such as Shape('sphere', (at.r,))"
+            ) from error
 
     def _rows(self) -> None:
         count, bound = 0, list[SX]()

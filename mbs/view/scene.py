@@ -39,6 +39,7 @@ from mbs.view.primitives import (
 from mbs.view.shapes import (
     base_shapes,
     corners,
+    figures,
     force_shapes,
     frame_shapes,
     joint_shapes,
@@ -173,7 +174,10 @@ def scene(
     notes: list[str] = []
     visuals = list(visual_shapes(at, notes))
     seen = {item.link for item in visuals}
-    spread = np.vstack([np.zeros((0, 3)), *(corners(at, item) for item in (*solids, *visuals))])
+    drawn = list(figures(at, notes))
+    spread = np.vstack(
+        [np.zeros((0, 3)), *(corners(at, item) for item in (*solids, *visuals, *drawn))]
+    )
     sizes = measures(at, spread)
     points = np.vstack([np.zeros((1, 3)), at.points, spread])
     if not np.isfinite(points).all():
@@ -190,6 +194,7 @@ def scene(
         *link_shapes(at, sizes, solids, seen),
         *joint_shapes(at, sizes),
         *force_shapes(at, sizes),
+        *drawn,
         *frame_shapes(at, sizes),
     )
     up = (float(at.up[0]), float(at.up[1]), float(at.up[2]))

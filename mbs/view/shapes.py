@@ -175,6 +175,38 @@ def force_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
         yield _element(force, ends, float(np.linalg.norm(a - b)), sizes)
 
 
+def figures(scene: PosedLinks, notes: list[str]) -> Iterator[Visual]:
+    """What components look like at their frames.
+
+    Args:
+        scene: where they are.
+        notes: takes a sentence for each mesh that is missing or was thinned out.
+    """
+    system = scene.system
+    values = list(scene.parameters.values())
+    for part in system.parts:
+        shapes = part.element.drawn(scene.parameters)
+        for port, frame in zip(part.element.frames, part.frames, strict=True):
+            if port in shapes:
+                link, place = frame
+                both = casadi.densify(casadi.horzcat(place.R, place.p))
+                pose = np.array(casadi.Function("pose", [system.p], [both])(values))
+                yield from _drawn(shapes[port], link + 1, "force", pose, notes, "force")
+
+
+def _drawn(
+    shape: Shape, link: int, colour: str, pose: Array, notes: list[str], role: str
+) -> Iterator[Visual]:
+    """A shape of a description at a pose; one that cannot be drawn is noted."""
+    if shape.colour is not None:
+        colour = "#" + "".join(f"{round(255 * part):02x}" for part in shape.colour)
+    try:
+        yield _visual(shape, link, colour, pose, notes, role)
+    except ModelError as error:
+        if str(error) not in notes:
+            notes.append(str(error))
+
+
 def _element(
     force: SkeletonForce, ends: tuple[Vector, Vector], length: float, sizes: Measures
 ) -> SpringShape | SpanShape:
@@ -249,27 +281,23 @@ def visual_shapes(scene: PosedLinks, notes: list[str]) -> Iterator[Visual]:
     flat = casadi.Function("places", [system.p], [casadi.horzcat(*places)])
     poses = np.array(flat(list(scene.parameters.values()))).reshape(3, -1, 4).swapaxes(0, 1)
     for row, pose in zip(system.shapes, poses, strict=True):
-        colour = link_colour(row.link + 1)
-        if row.shape.colour is not None:
-            colour = "#" + "".join(f"{round(255 * part):02x}" for part in row.shape.colour)
-        try:
-            yield _visual(row.shape, row.link + 1, colour, pose, notes)
-        except ModelError as error:
-            if str(error) not in notes:
-                notes.append(str(error))
+        link = row.link + 1
+        yield from _drawn(row.shape, link, link_colour(link), pose, notes, "visual")
 
 
-def _visual(shape: Shape, link: int, colour: str, pose: Array, notes: list[str]) -> Visual:
+def _visual(
+    shape: Shape, link: int, colour: str, pose: Array, notes: list[str], role: str
+) -> Visual:
     size, middle = shape.size, pose[:, 3]
     if shape.kind == "box":
-        return BoxShape("visual", link, colour, rows(pose), (size[0], size[1], size[2]))
+        return BoxShape(role, link, colour, rows(pose), (size[0], size[1], size[2]))
     if shape.kind == "sphere":
-        return BallShape("visual", link, colour, three(middle), size[0])
+        return BallShape(role, link, colour, three(middle), size[0])
     if shape.kind in ("cylinder", "capsule"):
         half = size[1] / 2 * pose[:, 2]
         ends = three(middle - half), three(middle + half)
         round_ends = shape.kind == "capsule"
-        return (BarShape if round_ends else CylinderShape)("visual", link, colour, *ends, size[0])
+        return (BarShape if round_ends else CylinderShape)(role, link, colour, *ends, size[0])
     if shape.kind == "ellipsoid":
         points, triangles = _unit_ball()
     else:
@@ -281,16 +309,16 @@ def _visual(shape: Shape, link: int, colour: str, pose: Array, notes: list[str])
             text = f"{name}: drawn with {len(triangles)} of its {mesh.of} triangles"
             if text not in notes:
                 notes.append(text)
-    return _surface(link, colour, pose, points * np.array(size), triangles)
+    return _surface(link, colour, pose, points * np.array(size), triangles, role)
 
 
 def _surface(
-    link: int, colour: str, pose: Array, points: Array, triangles: NDArray[np.int64]
+    link: int, colour: str, pose: Array, points: Array, triangles: NDArray[np.int64], role: str
 ) -> MeshShape:
     # six digits of the largest of its lengths, less than a pixel of any picture
     digits = 6 - int(np.ceil(np.log10(max(float(np.abs(points).max()), 1e-300))))
     flat = tuple(np.round(points, min(digits, 300)).ravel().tolist())
-    return MeshShape("visual", link, colour, rows(pose), flat, tuple(triangles.ravel().tolist()))
+    return MeshShape(role, link, colour, rows(pose), flat, tuple(triangles.ravel().tolist()))
 
 
 def _unit_ball() -> tuple[Array, NDArray[np.int64]]:

@@ -5,10 +5,27 @@ import json
 import numpy as np
 import pytest
 from support.configurations import near_assembled
+from support.messages import refused
 
 import mbs
-from mbs.components import Body, Box, Cylinder, Free, PointMass, Prismatic, Revolute, Spring
-from mbs.errors import ModelError
+from mbs.components import (
+    Body,
+    Box,
+    BoxPlaneContact,
+    CapsulePlaneContact,
+    Custom,
+    Cylinder,
+    Free,
+    PointMass,
+    Prismatic,
+    Revolute,
+    Shape,
+    SpherePlaneContact,
+    Spring,
+    WheelPlaneContact,
+    custom,
+)
+from mbs.errors import AssemblyError, ModelError
 from mbs.models.skeleton import skeleton
 from mbs.view.primitives import BallShape, BarShape, LabelShape, RingShape
 from mbs.view.primitives import BoxShape as BoxShape
@@ -206,3 +223,74 @@ def test_two_roots_a_slide_and_massless_links():
         T = np.array(mbs.models.transform(system, link)(q))
         np.testing.assert_allclose(poses[link], T[:3], atol=1e-12)
     assert system.draw().svg.count("prismatic") == 1
+
+
+def test_contacts_and_components_of_ones_own_are_drawn_at_their_frames():
+    class Buoy(Custom):
+        """A float as large as its parameter says."""
+
+        point = custom.frame()
+        r = custom.parameter("m", positive=True)
+
+        def loads(self, at):
+            """Up."""
+            return {"point": custom.force((0, 0, 1))}
+
+        def figures(self, at):
+            """A red sphere."""
+            return {"point": Shape("sphere", (at.r,), (1, 0, 0))}
+
+    m = mbs.Mechanism("yard", gravity=(0, 0, -9.81), parameters={"r": 0.2})
+    bodies = [m.add(Body(f"b{k}", mass=1.0, inertia=(0.1, 0.1, 0.1))) for k in range(5)]
+    for k, body in enumerate(bodies):
+        m.connect(m.world.at(k, 0, 1), Free(f"f{k}"), body)
+    given = {"stiffness": 1e4}
+    m.add(SpherePlaneContact("ball", bodies[0].at(0, 0, 0.3), m.world, radius="r", **given))
+    m.add(BoxPlaneContact("box", bodies[1], m.world, size=("r", 0.3, 0.4), **given))
+    m.add(CapsulePlaneContact("pill", bodies[2], m.world, radius=0.1, length=0.5, **given))
+    m.add(WheelPlaneContact("wheel", bodies[3], m.world, radius=0.3, rim=0.05, **given))
+    m.add(SpherePlaneContact("point", bodies[3], m.world, **given))
+    m.add(Buoy("buoy", bodies[4], r="2*r"))
+    system = m.assemble()
+    scene = mbs.view.scene(system, parameters={"r": 0.25})
+    drawn = [one for one in scene.primitives if one.role == "force" and one.link]
+    ball, box, pill, wheel, buoy = drawn
+    assert isinstance(ball, BallShape)
+    assert ball.radius == 0.25
+    assert ball.at == pytest.approx((0, 0, 0.3))
+    assert isinstance(box, BoxShape)
+    assert box.size == (0.25, 0.3, 0.4)
+    assert isinstance(pill, BarShape)
+    assert [*pill.a, *pill.b, pill.radius] == pytest.approx([0, 0, -0.25, 0, 0, 0.25, 0.1])
+    assert np.ptp(np.reshape(wheel.points, (-1, 3)), axis=0) == pytest.approx(
+        [0.7, 0.1, 0.7], rel=0.05
+    )
+    assert (buoy.radius, buoy.colour) == (0.5, "#ff0000")
+    assert "visual" not in {one.role for one in scene.primitives}
+
+
+@pytest.mark.parametrize(
+    ("figures", "parts"),
+    [
+        (lambda self, at: {"pint": Shape("sphere", (1,))}, ["'pint'", "is no frame", "point"]),
+        (lambda self, at: {"point": 3}, ["'point'", "is 3", "give a Shape"]),
+        (lambda self, at: {"point": Shape("sphere", (-1,))}, ["sphere: size is", "above zero"]),
+        (lambda self, at: {"point": 1 / 0}, ["figures raises ZeroDivisionError"]),
+    ],
+)
+def test_figures_are_refused_where_the_mechanism_is_assembled(figures, parts):
+    class Thing(Custom):
+        """A thing."""
+
+        point = custom.frame()
+
+        def loads(self, at):
+            """Up."""
+            return {"point": custom.force((0, 0, 1))}
+
+    Thing.figures = figures
+    m = mbs.Mechanism("m")
+    body = m.add(Body("b", mass=1.0))
+    m.connect(m.world, Prismatic("x"), body)
+    m.add(Thing("thing", body))
+    refused(AssemblyError, *parts, by=m.assemble)

@@ -99,13 +99,13 @@ def _fixed_flanges(
     """
     turns: dict[Key, FlangeTurn] = {}
     for part in parts:
-        queue = deque([flange.key for flange in part.flanges] if part.held else [])
+        queue = deque([flange.key for flange in part.flanges] if part.fixed else [])
         while queue:
             key = queue.popleft()
             if key in turns:
                 continue
             owner = mechanism.components[key[0]]
-            idle = isinstance(owner, Custom) and (owner.drives or owner.lowered) and not owner.held
+            idle = isinstance(owner, Custom) and (owner.drives or owner.lowered) and not owner.fixed
             if idle or isinstance(owner, Joint):
                 raise AssemblyError(
                     f"{mechanism.name}: {type(owner).__name__} {owner.name!r} is connected to the"

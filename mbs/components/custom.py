@@ -61,8 +61,6 @@ EFFORT = "effort"
 REQUIRED: Any = object()
 """Stands where there is no default."""
 
-_KINDS_OF_FIELDS = ("frame", "coordinate", "parameter", "state", "mode", "unknown")
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Declared:
@@ -524,7 +522,7 @@ class Custom(OnPoints):
     drives: ClassVar[bool] = False
     """Whether it is a motor on its flange: models of efforts leave what it delivers to tau."""
 
-    held: ClassVar[bool] = False
+    fixed: ClassVar[bool] = False
     """Whether its flanges do not move."""
 
     shape: ClassVar[str] = "bar"
@@ -544,7 +542,7 @@ class Custom(OnPoints):
     def __post_init__(self) -> None:
         Component.__post_init__(self)
         for name, what in self.declared.items():
-            if what.kind in _KINDS_OF_FIELDS:
+            if what.kind in _CHECKS:
                 if not hasattr(self, name):
                     raise DescriptionError(
                         f"{self.name}: {type(self).__name__}.__init__ does not set {name!r}; leave"
@@ -781,7 +779,7 @@ def _make_fields(cls: type[Custom], own: Mapping[str, Declared]) -> None:
             raise DescriptionError(
                 f"{cls.__name__}: a {what.kind} cannot be named {name!r}; choose another name"
             )
-        if what.kind not in _KINDS_OF_FIELDS:
+        if what.kind not in _CHECKS:
             setattr(cls, name, _Handle(what.kind, name))
             valued.pop(name)
             continue
@@ -794,7 +792,7 @@ def _make_fields(cls: type[Custom], own: Mapping[str, Declared]) -> None:
             delattr(cls, name)
         else:
             setattr(cls, name, what.default)
-    if not any(what.kind in _KINDS_OF_FIELDS for what in own.values()):
+    if not any(what.kind in _CHECKS for what in own.values()):
         return
     cls.__annotations__ = annotations | valued
     try:
@@ -851,6 +849,7 @@ _CHECKS: Mapping[str, Callable[[Custom, str, Declared], None]] = {
     "mode": _check_number,
     "unknown": _check_number,
 }
+"""What is given to a component, by kind, and what refuses it."""
 
 __all__ = [
     "At",

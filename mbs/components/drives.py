@@ -115,7 +115,7 @@ class FixedFlange(OneFlange):
     It locks what is connected to it at zero: the end of a spring, the ring of a planetary gear.
     """
 
-    held = True
+    fixed = True
     lowered = True
 
     flange = custom.flange(slides=None)

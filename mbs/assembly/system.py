@@ -397,6 +397,23 @@ class System:
                 self._cache[key] = build()
             return self._cache[key]
 
+    def recent(self, kind: str, key: Any, build: Callable[[], Any], most: int) -> Any:
+        """What `build` made under this key, of the last few of a kind that were asked for.
+
+        Args:
+            kind: what is kept, of which there may be many.
+            key: of one of them.
+            build: makes it where it is not at hand.
+            most: how many are kept.
+        """
+        with _BUILDING:
+            kept: dict[Any, Any] = self._cache.setdefault(("recent", kind), {})
+            value = kept.pop(key) if key in kept else build()
+            kept[key] = value  # the last one now
+            while len(kept) > most:
+                del kept[next(iter(kept))]
+            return value
+
     def frame(self, name: str | int) -> tuple[int, Pose]:
         """A frame by name, or the frame of link number 1, 2, ... (0 is the base).
 

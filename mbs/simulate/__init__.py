@@ -1,7 +1,7 @@
 """Simulation: of a system by compiled code, of an FMU through an importer; of many cases."""
 
 from mbs.simulate.fmu import fmu
-from mbs.simulate.run import run
+from mbs.simulate.run import Simulator, run
 from mbs.simulate.sweep import Sweep, sweep
 
-__all__ = ["Sweep", "fmu", "run", "sweep"]
+__all__ = ["Simulator", "Sweep", "fmu", "run", "sweep"]

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import functools
+import hashlib
 import math
+import os
+import pickle
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import casadi
@@ -14,8 +21,10 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
+from mbs.assembly.system import packed, unpacked
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.errors import Interrupted, ModelError, SolverError
+from mbs.files import write_bytes
 from mbs.loops.analysis import rows_at
 from mbs.loops.closure import least_upright, rolling_discs
 from mbs.loops.configuration import Values, start
@@ -31,10 +40,13 @@ from mbs.models.state.signals import (
     Prescribed,
     by_name,
     effort_function,
+    given_inputs,
     signal_function,
     untraceable,
 )
 from mbs.models.state.tree import FullState, full_state
+from mbs.native import compiled
+from mbs.native.compiler import cache_dir
 from mbs.progress import progress
 from mbs.recursions.parts import part_event_names
 from mbs.result import Result
@@ -79,7 +91,7 @@ def require_contacts_possible(system: System, motions: Sequence[Prescribed]) -> 
     require_lasting_rows(system, contacts)
 
 
-def first_modes(system: System, x0: Array, p: Sequence[float]) -> Array:
+def first_modes(system: System, x0: Array, p: Array) -> Array:
     """(2 k,) modes at the start: what rests at a limit touches it, what moves slides.
 
     Args:
@@ -108,24 +120,18 @@ def first_modes(system: System, x0: Array, p: Sequence[float]) -> Array:
     return modes
 
 
-def contact_columns(
-    system: System, contact: ContactMotion | None, efforts: Array
-) -> Iterator[tuple[str, str, Array]]:
-    """Name, unit and values of the columns of contacts.
+def contact_columns(system: System) -> Iterator[tuple[int, str, str]]:
+    """Index, name and unit of the columns of contacts: modes side by side, then efforts.
 
     Args:
-        system: with k coordinates on which contacts act.
-        contact: their modes.
-        efforts: (m, 2 k) of the stops, then of friction.
+        system: with k coordinates on which contacts act, (2 k,) modes and (2 k,) efforts.
     """
-    if contact is None:
-        return
     contacts = contacts_of(system)
     for column, force in enumerate((*contacts.stops, *contacts.frictions)):
         if force is not None:
             unit = system.speeds[force.levers[0].velocity].unit
-            yield f"{force.element.name}.mode", "1", contact.modes[:, column]
-            yield f"{force.element.name}.effort", EFFORT_UNIT[unit], efforts[:, column]
+            yield column, f"{force.element.name}.mode", "1"
+            yield 2 * len(contacts) + column, f"{force.element.name}.effort", EFFORT_UNIT[unit]
 
 
 def every_effort(system: System, tau: Array, efforts: Array) -> Array:
@@ -239,27 +245,6 @@ def device_states(system: System, z0: Mapping[str, float] | Sequence[float] | No
     return values
 
 
-def device_columns(
-    system: System, u: Array, z: Array, y: Array
-) -> Iterator[tuple[str, str, Array]]:
-    """Name, unit and values of all that a result shows of devices, from inputs, states, outputs.
-
-    Args:
-        system: open or closed.
-        u: (m, nu) inputs at m instants.
-        z: (m, nz) states.
-        y: (m, ny) outputs.
-    """
-    tables = (
-        (system.inputs, u),
-        (system.states, z),
-        (system.outputs, y),
-    )
-    for quantities, values in tables:
-        for column, (name, unit) in enumerate(quantities):
-            yield name, unit, values[:, column]
-
-
 def _numbers(system: System, what: str, values: Any) -> list[float]:
     try:
         numbers = [float(value) for value in values]
@@ -285,6 +270,10 @@ _SINGULAR = 1e-6
 """Independence below which a configuration is singular for all rows: a thousandth, as a sine."""
 _FLAT = 1e-3
 """Sine of the angle between a rolling disc and its plane at which it counts as flat."""
+
+_INTERPRETED = 2e6
+"""Instructions that CasADi interprets in some 10 ms; what is asked for beyond them is compiled,
+which takes some tenths of a second for a mechanism of ten links."""
 
 _FIRST_STEP = 1e-9
 """Step behind a crossing [s], from which steps grow tenfold where nothing errs: what two bodies do
@@ -323,18 +312,43 @@ class Leg:
         """The same without its first row, which belongs to the leg before."""
         return replace(self, times=self.times[1:], x=self.x[1:])
 
-    def observed(self, p: Sequence[float]) -> list[Array]:
+    def observed(self, p: Array) -> list[Array]:
         """What the state equation observes, (m, ..) each."""
         observe, count = self.state.observe, len(self.times)
+        values = [np.empty((count, observe.numel_out(k))) for k in range(observe.n_out())]
         if not count:
-            return [np.empty((0, observe.numel_out(k))) for k in range(observe.n_out())]
-        own = np.repeat(np.array(p, dtype=float).reshape(-1, 1), count, axis=1)
-        every = own if self.contact is None else np.vstack([own, self.contact.modes.T])
-        values = observe.map(count)(self.times.reshape(1, -1), self.x.T, every)
-        a, tau, *others = (np.array(value).T for value in values)
+            return values
+        every = np.repeat(p[None, :], count, axis=0)
+        if self.contact is not None:
+            every = np.hstack([every, self.contact.modes])
+        # the rows follow each other in memory as CasADi has the columns of a map
+        made: Any = self._map(count).buffer()
+        buffer, evaluate = made
+        given = [np.ascontiguousarray(one, dtype=float) for one in (self.times, self.x, every)]
+        for k, one in enumerate(given):  # which hold the memory until it is read
+            buffer.set_arg(k, one.data)
+        for k, one in enumerate(values):
+            buffer.set_res(k, one.data)
+        evaluate()
+        if buffer.ret():
+            raise SolverError(f"{observe.name()} has no values along the motion")
         if self.first_slope is not None:  # the rows alone would allow other accelerations there
-            self._correct_first(a[0], tau[0], every[:, 0])
-        return [a, tau, *others]
+            self._correct_first(values[0][0], values[1][0], every[0])
+        return values
+
+    def _map(self, count: int) -> Function:
+        """`observe` for as many states; in machine code once it has been asked for often."""
+        prepared, observe = self.state.prepared, self.state.observe
+        asked = prepared.get("asked", 0) + count * observe.n_instructions()
+        if asked > _INTERPRETED and "machine code" not in prepared:
+            prepared["machine code"] = compiled(observe, derivatives=0)
+            prepared.pop("observe", None)
+        prepared["asked"] = asked
+        known: tuple[int, Function] | None = prepared.get("observe")
+        if known is None or known[0] != count:
+            function = prepared.get("machine code", observe)
+            known = prepared["observe"] = count, function.map(count)
+        return known[1]
 
     def _correct_first(self, a: Array, tau: Array, p: Array) -> None:
         """Accelerations of the branch at a singular start, and what they ask of drives.
@@ -358,7 +372,7 @@ def integrate_legs(
     equations: Callable[[System], FullState],
     x0: Array,
     times: Array,
-    p: Sequence[float],
+    p: Array,
     **options: Any,
 ) -> tuple[list[Leg], Stop]:
     """The motion at given times, in one leg for most systems, and why it ends before the last.
@@ -368,7 +382,7 @@ def integrate_legs(
         equations: the state equation of a system that differs in its independent rows alone.
         x0: (nx,) state at the first time.
         times: (m,) s, increasing.
-        p: (np,) parameters.
+        p: (np,) parameters, then the inputs that are given for this motion.
         options: of `integrate`.
 
     Returns:
@@ -391,6 +405,11 @@ def integrate_legs(
     return legs, stop
 
 
+def _own(system: System, p: Array) -> Array:
+    """The parameters of the system, without the inputs that are given for a motion."""
+    return p[: len(system.parameters)]
+
+
 def _with_names(system: System, stop: SolverError) -> str:
     """The message, with the events that are to blame by component and label."""
     message, _, numbers = str(stop).partition("; indicators ")
@@ -400,10 +419,10 @@ def _with_names(system: System, stop: SolverError) -> str:
     return f"{message}; it concerns {' and '.join(blamed)}" if numbers and blamed else str(stop)
 
 
-def _lost(system: System, q: Array, p: Sequence[float]) -> str:
+def _lost(system: System, q: Array, p: Array) -> str:
     """The joint that moves most in what the rows hold least at a configuration, in words."""
     found = scales(system)
-    J = np.array(constraint_jacobian(system)(q, np.array(p, dtype=float)))
+    J = np.array(constraint_jacobian(system)(q, _own(system, p)))
     J = J * found.rows.reshape(-1, 1) * found.columns([speed.unit for speed in system.speeds])
     assert system.closure is not None
     rank = system.nv - system.closure.mobility
@@ -420,14 +439,14 @@ def _integrate(
     equations: Callable[[System], FullState],
     x0: Array,
     times: Array,
-    p: Sequence[float],
+    p: Array,
     **options: Any,
 ) -> tuple[list[Leg], Stop]:
     state = equations(system)
     if system.closure is not None and system.closure.varies:
         if state.passage is None or not is_compilable(state.rhs):
             return _with_other_rows(system, equations, x0, times, p, options)
-        q, parameters = x0[: system.nq], np.array(p, dtype=float)
+        q, parameters = x0[: system.nq], _own(system, p)
         if float(row_independence(system)(q, parameters)) < _SINGULAR:
             state = equations(rows_at(system, q, parameters))  # the start may be regular for others
     if len(contacts_of(system)):
@@ -456,7 +475,7 @@ def _motion(
     x0: Array,
     times: Array,
     events: Events | None,
-    p: Sequence[float],
+    p: Array,
     options: dict[str, Any],
 ) -> EventMotion:
     """The motion as far as it comes; its steps end where laws of components have bends."""
@@ -483,7 +502,7 @@ def _motion(
 
 
 def with_crossings(
-    state: FullState, x0: Array, t0: float, events: Events | None, p: Sequence[float]
+    state: FullState, x0: Array, t0: float, events: Events | None, p: Array
 ) -> tuple[Events, tuple[Function, Function | None, Passage | None]]:
     """Events with the crossings behind them, and the functions of the state with their modes.
 
@@ -585,13 +604,13 @@ def _with_other_rows(
     equations: Callable[[System], FullState],
     x0: Array,
     times: Array,
-    p: Sequence[float],
+    p: Array,
     options: dict[str, Any],
 ) -> tuple[list[Leg], Stop]:
     """Legs of an over-constrained system, each with rows that suit its first configuration."""
     legs: list[Leg] = []
     start = Leg(equations(system), times[:1], x0.reshape(1, -1))
-    system, limit = _next(system, x0[: system.nq], np.array(p, dtype=float))
+    system, limit = _next(system, x0[: system.nq], _own(system, p))
     if limit is None:
         moves = x0[system.nq : system.nq + system.nv].any()
         reason = "singular" if moves else "undetermined"
@@ -613,7 +632,7 @@ def _with_other_rows(
         if not len(left):
             return legs, None
         left = np.concatenate([[end], left])
-        system, limit = _next(system, x0[: system.nq], np.array(p, dtype=float))
+        system, limit = _next(system, x0[: system.nq], _own(system, p))
         if limit is None:
             return legs, failed(end, 0.0, "singular", state=x0.tolist())
 
@@ -623,11 +642,11 @@ def _with_contacts(
     state: FullState,
     x0: Array,
     times: Array,
-    p: Sequence[float],
+    p: Array,
     options: dict[str, Any],
 ) -> tuple[list[Leg], Stop]:
     assert state.events is not None
-    first = first_modes(system, x0, p)
+    first = first_modes(system, x0, _own(system, p))
     motion = _motion(state, x0, times, Events(*state.events, first), p, options)
     contact = ContactMotion(first, motion.modes, motion.events)
     reached = times[: len(motion.x)]
@@ -639,7 +658,7 @@ def _leg(
     state: FullState,
     x0: Array,
     times: Array,
-    p: Sequence[float],
+    p: Array,
     limit: Limit,
     options: dict[str, Any],
 ) -> tuple[Leg, EventMotion, float | None]:
@@ -658,7 +677,7 @@ def _leg(
     kept = [casadi.if_else(ended, x, corrected), casadi.if_else(ended, 0, residual)]
     project = Function("project", [t, x, pm], kept)
     # events of components, then the end
-    left = limit.measure(x[: system.nq], parameters) - limit.level
+    left = limit.measure(x[: system.nq], parameters[: len(system.parameters)]) - limit.level
     watched, after = left, x
     if state.events:
         own, jump = state.events
@@ -822,31 +841,377 @@ def _value(system: System, name: str, law: Any, t: SX) -> SX:
 # What sensors read in the course of a simulation.
 
 
-def sensor_columns(system: System, motion: Mapping[str, Array]) -> Iterator[tuple[str, str, Array]]:
-    """Name, unit and values of every element that the sensors read.
+def sensor_values(system: System, motion: Mapping[str, Array]) -> Array:
+    """(n, k) values of every element that the sensors read, in their order.
 
     Args:
-        system: with or without sensors.
+        system: with sensors.
         motion: a column for each instant of q (nq, n), v, a and tau (nv, n) of the whole tree, of
             states z and inputs u of components, and of the parameters p (np, n).
     """
-    if not system.sensors:
-        return
     model = measurements(system, "tree")
     count = motion["q"].shape[1]
-    inputs = [motion[name] for name in model.name_in()]
-    read = model.map(count)(*inputs)
-    outputs = iter(read if isinstance(read, tuple) else (read,))
-    for attached in system.sensors:
-        columns = iter(attached.columns)
-        for _ in attached.quantities:
-            values = np.array(next(outputs)).T.reshape(count, -1)
-            for element in values.T:
-                name, unit = next(columns)
-                yield name, unit, element
+    read = model.map(count)(*(motion[name] for name in model.name_in()))
+    values = read if isinstance(read, tuple) else (read,)
+    return np.hstack([np.array(one).T.reshape(count, -1) for one in values])
+
+
+# What a result shows: a column for each quantity, and where its values come from.
 
 
 _SCALARS = (("kinetic_energy", "J"), ("potential_energy", "J"), ("closure_residual", "1"))
+_BLOCKS = ("x", "a", "tau", "u", "y", "scalars", "sensors", "contacts")
+"""Where values come from, side by side: the state, what the state equation observes, the rest."""
+
+
+_Column = tuple[str, str, str, int]
+"""Name and unit of a column, the block where its values are, and the index in it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Columns:
+    """The columns of a result.
+
+    Attributes:
+        units: by name, in order.
+        places: for each, its index in the blocks side by side.
+        blocks: which of them the columns are of.
+    """
+
+    units: Mapping[str, str]
+    places: NDArray[np.int64]
+    blocks: frozenset[str]
+
+
+def _columns_of(system: System, outputs: tuple[str, ...] | None) -> _Columns:
+    """All columns of a result, or those that are asked for.
+
+    Raises:
+        ModelError: a name is unknown, or there twice.
+    """
+    nq, nv, nu = system.nq, system.nv, len(system.inputs)
+    contacts = contacts_of(system)
+    sensors = [column for attached in system.sensors for column in attached.columns]
+    sizes = {
+        "x": nq + nv + len(system.states),
+        "a": nv,
+        "tau": nv,
+        "u": nu,
+        "y": len(system.outputs),
+        "scalars": len(_SCALARS),
+        "sensors": len(sensors),
+        "contacts": 4 * len(contacts),
+    }
+    first = dict(zip(_BLOCKS, np.cumsum([0, *(sizes[name] for name in _BLOCKS)]), strict=False))
+    every: list[_Column] = []
+    for k, coordinate in enumerate(system.coordinates):
+        every.append((f"{coordinate.name}.q", coordinate.unit, "x", k))
+    for k, speed in enumerate(system.speeds):
+        every.append((f"{speed.name}.v", speed.unit, "x", nq + k))
+        every.append((f"{speed.name}.a", ACCELERATION_UNIT[speed.unit], "a", k))
+        every.append((f"{speed.name}.tau", EFFORT_UNIT[speed.unit], "tau", k))
+    every += [(*scalar, "scalars", k) for k, scalar in enumerate(_SCALARS)]
+    for k, quantity in enumerate(system.inputs):
+        every.append((*quantity, "u", k))
+    for k, quantity in enumerate(system.states):
+        every.append((*quantity, "x", nq + nv + k))
+    for k, quantity in enumerate(system.outputs):
+        every.append((*quantity, "y", k))
+    every += [(name, unit, "sensors", k) for k, (name, unit) in enumerate(sensors)]
+    every += [(name, unit, "contacts", k) for k, name, unit in contact_columns(system)]
+    if outputs is not None:
+        every = _chosen(system, every, outputs)
+    return _Columns(
+        {name: unit for name, unit, *_ in every},
+        np.array([first[block] + index for *_, block, index in every], dtype=np.int64),
+        frozenset(block for *_, block, _ in every),
+    )
+
+
+def _chosen(system: System, every: Sequence[_Column], outputs: Sequence[str]) -> list[_Column]:
+    known = {column[0]: column for column in every}
+    for name in outputs:
+        if name not in known:
+            raise ModelError(
+                f"{system.name}: outputs names {quoted(name)}; {did_you_mean(str(name), known)}"
+            )
+        if list(outputs).count(name) > 1:
+            raise ModelError(f"{system.name}: outputs names {name} twice; name it once")
+    return [known[name] for name in outputs]
+
+
+def _result(system: System, legs: Sequence[Leg], p: Array, stop: Stop, columns: _Columns) -> Result:
+    times, x = np.concatenate([leg.times for leg in legs]), np.vstack([leg.x for leg in legs])
+    nq, n, np_own = system.nq, system.nq + system.nv, len(system.parameters)
+    blocks, contact = [x], legs[0].contact
+    if columns.blocks != {"x"}:
+        parts = [leg.observed(p) for leg in legs]
+        a, tau, u, y, efforts, *scalars = (np.vstack(rows) for rows in zip(*parts, strict=True))
+        sensors = np.empty((len(times), 0))
+        if "sensors" in columns.blocks:
+            every = np.repeat(p[:np_own, None], len(times), axis=1)
+            motion = {"q": x[:, :nq].T, "v": x[:, nq:n].T, "z": x[:, n:].T, "u": u.T, "p": every}
+            whole = every_effort(system, tau, efforts)
+            sensors = sensor_values(system, {**motion, "a": a.T, "tau": whole.T})
+        elif system.sensors:
+            sensors = np.empty((len(times), sum(len(one.columns) for one in system.sensors)))
+        modes = np.empty((len(times), 0)) if contact is None else contact.modes
+        blocks += [a, tau, u, y, *scalars, sensors, modes, efforts]
+    values = np.hstack(blocks)[:, columns.places]
+    happened = [event for leg in legs for event in leg.happened]
+    events = list_events(system, contact, happened)
+    stopped = None if stop is None or stop.time is None else (stop.time, str(stop))
+    return Result(
+        times,
+        values,
+        columns.units,
+        name=system.name,
+        events=events,
+        system=system,
+        stopped=stopped,
+    )
+
+
+# A system under some laws, prepared once for many motions.
+
+
+_KEPT = 8
+"""State equations that a system keeps between runs: a few laws that a script takes in turn. As many
+starts, and sets of columns."""
+
+
+class Simulator:
+    """Motions of one system under the same laws: prepared once, called many times.
+
+    Its state equation and its machine code are made at the first call, kept with the system, and on
+    disk by their content, so that another process only reads them. It may be pickled and called
+    from several threads at once.
+
+    `simulator(duration, q0=..., inputs={"j1.tau": 2.0})` is a motion as that of `run`.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        inputs: Sequence[str] = (),
+        outputs: Sequence[str] | None = None,
+        *,
+        tau: Effort = None,
+        motion: Motion = None,
+        u: Effort = None,
+        method: str = "dopri5",
+    ) -> None:
+        """Check what is given for all motions.
+
+        Args:
+            system: open or closed.
+            inputs: efforts and inputs of components that are numbers of each motion, such as
+                "j1.tau" and "motor.voltage"; they take the place of what `tau` and `u` say.
+            outputs: the columns of results, such as "j1.q"; all when left out. Accelerations,
+                efforts, energies and sensors cost nothing where no column is of them.
+            tau: as of `run`, likewise the others.
+            motion: likewise.
+            u: likewise.
+            method: likewise.
+
+        Raises:
+            ModelError: `system` is no System, a name is unknown, or a law has the wrong form.
+        """
+        require_system(system)
+        self.system = system
+        self._motions = prescribed_motions(system, motion)
+        require_contacts_possible(system, self._motions)
+        self._effort, self._inputs = effort_function(system, tau), input_function(system, u)
+        self._given = given_inputs(system, inputs)
+        self._method = method
+        if isinstance(outputs, str):
+            raise ModelError(
+                f"{system.name}: outputs is {quoted(outputs)}; give a list of names, such as"
+                f" [{quoted(outputs)}]"
+            )
+        self._outputs = None if outputs is None else tuple(outputs)
+        columns = partial(_columns_of, system, self._outputs)
+        self._columns: _Columns = system.recent("columns", self._outputs, columns, _KEPT)
+        self._key = self._key_of_laws()
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The full names of the inputs that a call may give."""
+        return tuple(one.name for one in self._given)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The columns of results."""
+        return tuple(self._columns.units)
+
+    def __repr__(self) -> str:
+        return f"<Simulator {self.system.name}: {len(self.outputs)} signals>"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A pickle holds the system and the laws; what was made of them is found on disk."""
+        laws = self._effort, self._inputs, tuple(self._motions)
+        plain = self._given, self._outputs, self._method
+        return _simulator_of, packed((self.system, laws, plain))
+
+    def __call__(
+        self,
+        duration: float,
+        *,
+        q0: Values = None,
+        v0: Values = None,
+        z0: Mapping[str, float] | Sequence[float] | None = None,
+        inputs: Mapping[str, float] | None = None,
+        parameters: Mapping[str, float] | None = None,
+        step: float = 0.01,
+        tolerance: float = 1e-8,
+        quiet: bool = True,
+    ) -> Result:
+        """One motion.
+
+        Args:
+            duration: [s].
+            q0: as of `run`, likewise the others.
+            v0: likewise.
+            z0: likewise.
+            inputs: values of those that the simulator has, the others zero or as described.
+            parameters: as of `run`, likewise the others.
+            step: likewise.
+            tolerance: likewise.
+            quiet: likewise.
+
+        Raises:
+            what `run` raises.
+        """
+        system, motions = self.system, self._motions
+        duration = positive(duration, "duration [s]", system.name)
+        tolerance = positive(tolerance, "tolerance", system.name)
+        steps = count_steps(duration, positive(step, "step [s]", system.name), system.name)
+        own = system.parameter_values(parameters)
+        p = np.array([*own, *self._values(inputs)])
+        placed = start_positions(system, motions, q0, v0)
+        x0 = np.concatenate([*_started(system, *placed, p), device_states(system, z0)])
+        times = np.linspace(0.0, duration, steps + 1)
+        rtol, atol = step_tolerances(tolerance)
+        with progress(f"simulating {system.name}", 0.0, duration, quiet=quiet) as reached:
+            legs, stop = integrate_legs(
+                system,
+                self._equations,
+                x0,
+                times,
+                p,
+                method=self._method,
+                rtol=rtol,
+                atol=atol,
+                progress=reached,
+            )
+        if motions and legs[0].first_slope is not None:
+            H = _first_bias(system, x0, self._inputs, _own(system, p))
+            legs[0] = replace(legs[0], driven=tuple(m.velocity for m in motions), first_bias=H)
+        result = _result(system, legs, p, stop, self._columns)
+        if stop is not None:
+            stop.result = result
+            raise stop
+        return result
+
+    def _values(self, inputs: Mapping[str, float] | None) -> list[float]:
+        """Numbers of the inputs that the simulator has."""
+        if not inputs:
+            return [one.default for one in self._given]
+        quantities = [(one.name, "") for one in self._given]
+        if not quantities:
+            raise ModelError(
+                f"{self.system.name}: inputs are given, but the simulator has none; name them when"
+                f" it is made: Simulator(system, inputs=[{quoted(next(iter(inputs)))}])"
+            )
+        defaults = [one.default for one in self._given]
+        return list(by_name(self.system, "inputs", inputs, quantities, defaults))
+
+    def _key_of_laws(self) -> tuple[bytes | str, ...] | None:
+        """What laws say, as text; None where they hold machine code, which has none."""
+        try:
+            laws = packed((self._effort, self._inputs, tuple(self._motions), self._given))
+        except (RuntimeError, NotImplementedError):
+            return None
+        return laws[0], *laws[1], laws[2]
+
+    def _equations(self, system: System) -> FullState:
+        """The state equation of the system, or of one that differs in its independent rows."""
+        laws = self._effort, self._inputs, self._motions, self._given
+        if self._key is None:
+            return full_state(system, *laws)
+
+        def build() -> FullState:
+            return _on_disk(system, self._key, lambda: full_state(system, *laws))
+
+        found: FullState = system.recent("state equations", self._key, build, _KEPT)
+        return found
+
+
+# State equations on disk, by all that made them: another process reads what this one derived.
+
+
+def _on_disk(system: System, laws: Any, derive: Callable[[], FullState]) -> FullState:
+    """The state equation that was derived from the same content, in whatever process.
+
+    What cannot be read is derived anew; MBS_KEEP_EQUATIONS=0 keeps nothing on disk.
+
+    Args:
+        system: open or closed.
+        laws: what else it was derived from, as text.
+        derive: makes it where it is not at hand.
+    """
+    if os.environ.get("MBS_KEEP_EQUATIONS", "1") == "0":
+        return derive()
+    content = repr((packed(system), laws, casadi.CasadiMeta.version(), _sources()))
+    name = hashlib.sha256(content.encode()).hexdigest()
+    file = cache_dir() / f"equations-{name}.pickle"
+    try:
+        found = pickle.loads(file.read_bytes())
+        if isinstance(found, FullState):
+            return found
+    except Exception:  # it is not there, or damaged
+        pass
+    made = derive()
+    with suppress(Exception):  # a full disk, or a Function without text: the next one derives too
+        write_bytes(pickle.dumps(replace(made, prepared={})), file)
+    return made
+
+
+@functools.cache
+def _sources() -> str:
+    """A hash of this package's Python, which derives the equations."""
+    total = hashlib.sha256()
+    for file in sorted(Path(__file__).parents[1].rglob("*.py")):
+        total.update(file.read_bytes())
+    return total.hexdigest()
+
+
+def _simulator_of(*state: Any) -> Simulator:
+    """The simulator that was pickled."""
+    system, (effort, inputs, motions), (given, outputs, method) = unpacked(*state)
+    made = Simulator(system, [one.name for one in given], outputs, method=method)
+    made._effort, made._inputs, made._motions = effort, inputs, list(motions)
+    made._key = made._key_of_laws()
+    return made
+
+
+def _started(system: System, q0: Values, v0: Values, p: Array) -> tuple[Array, Array]:
+    """The start of a motion; the last few are kept, for the next motion from the same one."""
+    named = [one.name for one in system.parameters]
+
+    def build() -> tuple[Array, Array]:
+        return start(system, q0, v0, dict(zip(named, _own(system, p), strict=True)))
+
+    try:
+        key = tuple(
+            tuple(sorted(dict(given).items())) if isinstance(given, Mapping) else given
+            for given in (q0, v0)
+        )
+        hash(key)
+    except TypeError:  # lists, arrays, and what is refused
+        return build()
+    found: tuple[Array, Array] = system.recent("starts", (*key, *_own(system, p)), build, _KEPT)
+    return found
 
 
 def run(
@@ -858,7 +1223,7 @@ def run(
     tau: Effort = None,
     motion: Motion = None,
     u: Effort = None,
-    z0: Values = None,
+    z0: Mapping[str, float] | Sequence[float] | None = None,
     parameters: Mapping[str, float] | None = None,
     step: float = 0.01,
     tolerance: float = 1e-8,
@@ -918,71 +1283,20 @@ def run(
     """
     require_system(system)
     duration = positive(duration, "duration [s]", system.name)
-    tolerance = positive(tolerance, "tolerance", system.name)
-    steps = count_steps(duration, positive(step, "step [s]", system.name), system.name)
-    p = system.parameter_values(parameters)
-    motions = prescribed_motions(system, motion)
-    require_contacts_possible(system, motions)
-    effort, inputs = effort_function(system, tau), input_function(system, u)
-    given = start_positions(system, motions, q0, v0)
-    x0 = np.concatenate([*start(system, *given, parameters), device_states(system, z0)])
-    times = np.linspace(0.0, duration, steps + 1)
-    rtol, atol = step_tolerances(tolerance)
-    with progress(f"simulating {system.name}", 0.0, duration, quiet=quiet) as reached:
-        legs, stop = integrate_legs(
-            system,
-            lambda like: state_equation(like, effort, inputs, motions),
-            x0,
-            times,
-            p,
-            method=method,
-            rtol=rtol,
-            atol=atol,
-            progress=reached,
-        )
-    if motions and legs[0].first_slope is not None:
-        H = _first_bias(system, x0, inputs, p)
-        legs[0] = replace(legs[0], driven=tuple(m.velocity for m in motions), first_bias=H)
-    result = _result(system, legs, p, stop)
-    if stop is not None:
-        stop.result = result
-        raise stop
-    return result
+    simulator = Simulator(system, tau=tau, motion=motion, u=u, method=method)
+    return simulator(
+        duration,
+        q0=q0,
+        v0=v0,
+        z0=z0,
+        parameters=parameters,
+        step=step,
+        tolerance=tolerance,
+        quiet=quiet,
+    )
 
 
-_KEPT = 8
-"""State equations that a system keeps between runs: a few laws that a script takes in turn."""
-
-
-def state_equation(
-    system: System,
-    effort: Function | None,
-    inputs: Function | None,
-    motions: Sequence[Prescribed],
-) -> FullState:
-    """The state equation under some laws, kept with the system for the next run under the same.
-
-    Args:
-        system: open or closed.
-        effort: as of `full_state`, likewise the others.
-        inputs: likewise.
-        motions: likewise; with any, nothing is kept.
-    """
-    try:
-        key = tuple(law and law.serialize() for law in (effort, inputs))
-    except (RuntimeError, NotImplementedError):  # laws in machine code have no text
-        return full_state(system, effort, inputs, motions)
-    if motions:
-        return full_state(system, effort, inputs, motions)
-    kept: dict[Any, FullState] = system.cached("state equations", dict)
-    if key not in kept:
-        while len(kept) >= _KEPT:
-            kept.pop(next(iter(kept)))
-        kept[key] = full_state(system, effort, inputs, motions)
-    return kept[key]
-
-
-def _first_bias(system: System, x0: Array, inputs: Function | None, p: Sequence[float]) -> Array:
+def _first_bias(system: System, x0: Array, inputs: Function | None, p: Array) -> Array:
     """(nv,) efforts of gravity and velocities at the start."""
     n = system.nq + system.nv
     q, v = x0[: system.nq], x0[system.nq : n]
@@ -997,43 +1311,3 @@ def step_tolerances(tolerance: float) -> tuple[float, float]:
     # errors of steps add up, and angles that count revolutions make no room for larger ones;
     # below some ten roundings steps would only become shorter
     return max(1e-3 * tolerance, 1e-14), max(0.04 * tolerance, 1e-13)
-
-
-def _result(system: System, legs: Sequence[Leg], p: Sequence[float], stop: Stop) -> Result:
-    times, x = np.concatenate([leg.times for leg in legs]), np.vstack([leg.x for leg in legs])
-    every = np.repeat(np.array(p, dtype=float).reshape(-1, 1), len(times), axis=1)
-    parts = [leg.observed(p) for leg in legs]
-    a, tau, u, y, contact_efforts, *scalars = (np.vstack(rows) for rows in zip(*parts, strict=True))
-    units: dict[str, str] = {}
-    columns: list[Array] = []
-
-    def column(name: str, unit: str, values: Array) -> None:
-        units[name] = unit
-        columns.append(np.ravel(values))
-
-    for k, coordinate in enumerate(system.coordinates):
-        column(f"{coordinate.name}.q", coordinate.unit, x[:, k])
-    for k, speed in enumerate(system.speeds):
-        column(f"{speed.name}.v", speed.unit, x[:, system.nq + k])
-        column(f"{speed.name}.a", ACCELERATION_UNIT[speed.unit], a[:, k])
-        column(f"{speed.name}.tau", EFFORT_UNIT[speed.unit], tau[:, k])
-    for (name, unit), values in zip(_SCALARS, scalars, strict=True):
-        column(name, unit, values)
-    for name, unit, values in device_columns(system, u, x[:, system.nq + system.nv :], y):
-        column(name, unit, values)
-    motion = {"q": x[:, : system.nq].T, "v": x[:, system.nq : system.nq + system.nv].T}
-    motion |= {"z": x[:, system.nq + system.nv :].T, "u": u.T, "p": every}
-    for name, unit, values in sensor_columns(
-        system, {**motion, "a": a.T, "tau": every_effort(system, tau, contact_efforts).T}
-    ):
-        column(name, unit, values)
-    contact = legs[0].contact
-    for name, unit, values in contact_columns(system, contact, contact_efforts):
-        column(name, unit, values)
-    values = np.column_stack(columns)
-    happened = [event for leg in legs for event in leg.happened]
-    events = list_events(system, contact, happened)
-    stopped = None if stop is None or stop.time is None else (stop.time, str(stop))
-    return Result(
-        times, values, units, name=system.name, events=events, system=system, stopped=stopped
-    )

@@ -1,12 +1,26 @@
 """What a second run of a system takes from the first one, and what it must not."""
 
+import importlib
+import os
+import pickle
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
 import mbs
-from mbs.components import JointSensor, PointMass, Prismatic, SampleHold, SpherePlaneContact
-from mbs.models.state.signals import effort_function
-from mbs.simulate.run import state_equation
+from mbs.components import (
+    Box,
+    JointSensor,
+    PointMass,
+    Prismatic,
+    Revolute,
+    SampleHold,
+    SpherePlaneContact,
+)
+
+run_module = importlib.import_module("mbs.simulate.run")
 
 
 def swing(system, **options):
@@ -24,37 +38,111 @@ def test_a_second_run_is_the_first_to_the_last_bit(name, method):
         assert one.units == first.units
 
 
-def test_equations_are_kept_by_what_drives_them():
+@pytest.mark.parametrize("limit", [0, 5e4])
+def test_what_is_observed_often_is_compiled_to_the_same_bits(limit, monkeypatch):
+    made, build = [], run_module.compiled
+    monkeypatch.setattr(run_module, "compiled", lambda *a, **k: made.append(a) or build(*a, **k))
+    system = mbs.load("four_bar").assemble()
+    first = swing(system)
+    assert not made
+    monkeypatch.setattr(run_module, "_INTERPRETED", limit)
+    again = [swing(system) for _ in range(4)]
+    assert len(made) == 1
+    for one in again:
+        assert np.array_equal(one.values, first.values)
+    shorter = mbs.simulate.run(system, 0.3, quiet=True)
+    assert np.allclose(shorter.values, first.values[:31], rtol=1e-6, atol=1e-6)
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """Names of the systems whose state equations were derived."""
+    found, derive = [], run_module.full_state
+    count = lambda system, *laws: found.append(system.name) or derive(system, *laws)  # noqa: E731
+    monkeypatch.setattr(run_module, "full_state", count)
+    return found
+
+
+def test_equations_are_kept_by_what_drives_them(made):
     system = mbs.load("planar_2r").assemble()
     motor = system.speeds[0].name
-    laws = [
-        effort_function(system, tau) for tau in (None, {motor: 1.0}, {motor: 1.0}, {motor: 2.0})
-    ]
-    none, one, same, two = (state_equation(system, law, None, []) for law in laws)
-    assert one is same
-    assert len({id(x) for x in (none, one, two)}) == 3
-    assert state_equation(system, None, None, []) is none
-    results = [swing(system, tau={motor: tau})[f"{motor}.q"][-1] for tau in (1.0, 2.0, 1.0)]
-    assert results[0] == results[2] != results[1]
+    taus = (None, {motor: 1.0}, {motor: 1.0}, {motor: 2.0}, None)
+    ends = [swing(system, tau=tau)[f"{motor}.q"][-1] for tau in taus]
+    assert len(made) == 3
+    assert ends[1] == ends[2] != ends[3]
+    assert ends[0] == ends[4] != ends[1]
 
 
-def test_few_equations_are_kept():
+def test_few_equations_are_kept(made):
     system = mbs.load("planar_2r").assemble()
     motor = system.speeds[0].name
-    for tau in range(12):
-        state_equation(system, effort_function(system, {motor: float(tau)}), None, [])
-    assert len(system.cached("state equations", dict)) == 8
+    for tau in (*range(9), 8, 1, 0):
+        swing(system, tau={motor: float(tau)})
+    assert len(made) == 10  # the first one was forgotten, no other
 
 
-def test_starts_and_parameters_need_no_new_equations():
-    m = mbs.load("planar_2r")
-    system = m.assemble()
+def test_starts_and_parameters_need_no_new_equations(made):
+    system = mbs.load("planar_2r").assemble()
     names = [c.name for c in system.coordinates]
     before = swing(system, q0={names[0]: 0.1})
-    kept = dict(system.cached("state equations", dict))
     after = swing(system, q0={names[0]: 0.4}, v0={names[1]: 1.0}, tolerance=1e-10)
-    assert dict(system.cached("state equations", dict)).keys() == kept.keys()
+    assert len(made) == 1
     assert not np.array_equal(before.values, after.values)
+
+
+@pytest.fixture
+def disk(monkeypatch, tmp_path):
+    """A folder in which equations are kept."""
+    monkeypatch.setenv("MBS_KEEP_EQUATIONS", "1")
+    monkeypatch.setenv("MBS_CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", ["four_bar", "whipple_bicycle"])
+def test_another_process_reads_what_this_one_derived(name, made, disk):
+    first, again = mbs.load(name).assemble(), mbs.load(name).assemble()
+    result = swing(first)
+    assert np.array_equal(swing(again).values, result.values)
+    assert len(made) == 1
+    program = (
+        "import sys, mbs; run = __import__('mbs.simulate.run', fromlist=['run'])\n"
+        "def derived(*a): raise SystemExit('derived')\n"
+        "run.full_state = derived\n"
+        f"r = run.run(mbs.load({name!r}).assemble(), 0.5, quiet=True)\n"
+        "print(r.values.tobytes().hex())"
+    )
+    for seed in ("1", "2"):
+        environment = {**os.environ, "PYTHONHASHSEED": seed}
+        done = subprocess.run(
+            [sys.executable, "-c", program], env=environment, capture_output=True, check=True
+        )
+        assert bytes.fromhex(done.stdout.decode().strip()) == result.values.tobytes()
+
+
+def test_what_differs_is_derived_anew(made, disk):
+    def arm(mass, law=None):
+        m = mbs.Mechanism("arm", gravity=(0, -9.81, 0))
+        bar = m.add(Box("bar", length=1.0, mass=mass))
+        m.connect(m.world, Revolute("j", axis="z"), bar.left)
+        return swing(m.assemble(), tau=law)["j.q"][-1]
+
+    arm(1.0), arm(1.0)
+    assert len(made) == 1
+    arm(1.0 + 1e-15)
+    assert len(made) == 2
+    arm(1.0, {"j": 1e-3})
+    assert len(made) == 3
+
+
+@pytest.mark.parametrize("damage", [b"", b"nonsense", pickle.dumps(3)])
+def test_damaged_equations_are_derived_anew(damage, made, disk):
+    result = swing(mbs.load("four_bar").assemble())
+    (file,) = disk.glob("equations-*.pickle")
+    whole = file.read_bytes()
+    file.write_bytes(damage)
+    assert np.array_equal(swing(mbs.load("four_bar").assemble()).values, result.values)
+    assert len(made) == 2
+    assert file.read_bytes() == whole
 
 
 def test_laws_of_time_are_told_apart():
@@ -67,14 +155,15 @@ def test_laws_of_time_are_told_apart():
     assert ends[0] == ends[2] != ends[1]
 
 
-def test_prescribed_motions_are_not_kept():
+def test_laws_of_prescribed_motions_are_told_apart(made):
     system = mbs.load("planar_2r").assemble()
     name = system.speeds[0].name
     ends = [
         swing(system, motion={f"{name}.q": lambda t, k=k: k * t})[f"{name}.q"][-1]
-        for k in (0.2, 0.6)
+        for k in (0.2, 0.6, 0.2)
     ]
-    assert ends == pytest.approx([0.1, 0.3], abs=1e-12)
+    assert ends == pytest.approx([0.1, 0.3, 0.1], abs=1e-12)
+    assert len(made) == 2
 
 
 def test_contacts_and_events_of_components_run_again_alike():

@@ -216,6 +216,55 @@ def _require_motors(system: System, tau: Mapping[str, float], driven: Sequence[s
             )
 
 
+# Efforts and inputs that are given as numbers for each motion.
+
+
+@dataclass(frozen=True, slots=True)
+class GivenInput:
+    """An effort or an input that is one number for a motion.
+
+    Attributes:
+        name: such as "j1.tau" or "motor.voltage".
+        is_effort: one of tau; else of u.
+        index: in tau or u.
+        default: where a motion gives none.
+    """
+
+    name: str
+    is_effort: bool
+    index: int
+    default: float
+
+
+def given_inputs(system: System, names: Sequence[str]) -> tuple[GivenInput, ...]:
+    """What names such as "j1.tau" and "motor.voltage" are.
+
+    Raises:
+        ModelError: a name is unknown, or there twice.
+    """
+    if isinstance(names, str):
+        raise ModelError(
+            f"{system.name}: inputs is {quoted(names)}; give a list of names, such as"
+            f" [{quoted(names)}]"
+        )
+    efforts = [f"{speed.name}.tau" for speed in system.speeds]
+    inputs = [name for name, _ in system.inputs]
+    found: dict[str, GivenInput] = {}
+    for given in names:
+        name = full_name(str(given), system.inputs)
+        if name not in efforts and name not in inputs:
+            known = did_you_mean(str(given), [*efforts, *inputs])
+            raise ModelError(f"{system.name}: inputs names {quoted(given)}; {known}")
+        if name in found:
+            raise ModelError(f"{system.name}: inputs names {name} twice; name it once")
+        if name in inputs:
+            index = inputs.index(name)
+            found[name] = GivenInput(name, False, index, float(system.u_default[index]))
+        else:
+            found[name] = GivenInput(name, True, efforts.index(name), 0.0)
+    return tuple(found.values())
+
+
 # Motions that are prescribed as functions of time.
 
 

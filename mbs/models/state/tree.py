@@ -44,7 +44,7 @@ from mbs.models.state.independent import (
     point_of,
     with_laws,
 )
-from mbs.models.state.signals import Prescribed
+from mbs.models.state.signals import GivenInput, Prescribed
 from mbs.models.symbols import dense_function, outputs_of, part_equations, state_count
 from mbs.recursions.parts import PartsAt, after_events
 from mbs.solvers.linear import partial_ldl
@@ -507,6 +507,7 @@ def full_state(
     effort: Function | None = None,
     inputs: Function | None = None,
     motions: Sequence[Prescribed] = (),
+    given: Sequence[GivenInput] = (),
 ) -> FullState:
     """The state equation of the whole tree under given joint efforts and inputs of devices.
 
@@ -516,21 +517,27 @@ def full_state(
             left out.
         inputs: `inputs(t, q, v, p) -> u`, (nu, 1), one for each device; zeros when left out.
         motions: coordinates that drives move along laws; their efforts are added to tau.
+        given: efforts and inputs that are numbers of a motion, the last elements of p, in place of
+            what the laws say of them.
     """
     nq, n = system.nq, system.nq + system.nv
     t, x = SX.sym("t"), casadi.vertcat(SX.sym("x", n), system.z)
     q, v, z, p = x[:nq], x[nq:n], x[n:], system.p
     tau = SX.zeros(system.nv) if effort is None else casadi.densify(effort(t, q, v, p))
-    u = SX(DM(system.u_default)) if inputs is None else SX(inputs(t, q, v, p))
+    u = SX(DM(system.u_default)) if inputs is None else casadi.densify(SX(inputs(t, q, v, p)))
+    for one in given:
+        symbol = SX.sym(one.name)
+        (tau if one.is_effort else u)[one.index] = symbol
+        p = casadi.vertcat(p, symbol)
     delivered, z_rate, parts = part_equations(system, q, v)
     tau += delivered
-    given = SX(tau)
+    known = SX(tau)
     contact = contact_equations(
         system, q, v, tau, {motion.velocity: motion.law(t)[2] for motion in motions}
     )
     a, tau = (contact.a, contact.tau) if contact else _accelerations(system, q, v, tau, motions, t)
     rate = casadi.vertcat(position_rate(system.tree, q, v), a, z_rate)
-    through = passage(system, (t, x, p), given, z_rate, motions, contact, given_inputs=u)
+    through = passage(system, (t, x, p), known, z_rate, motions, contact, given_inputs=u)
     touch = (contact.contacts, contact.modes) if contact else None
     *kept, residual = project_step(system, q, v, motions, t, touch)
     rows = closure_rows(system, q)

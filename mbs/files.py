@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-import tempfile
+import secrets
 import zipfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
@@ -46,11 +46,13 @@ def whole_file(path: PathLike, remedy: str = "choose a writable place") -> Itera
     folder = os.fspath(path).endswith(tuple(filter(None, ("/", os.sep, os.altsep))))
     if target.is_dir() or folder or not target.name:
         raise ExportError(f"{os.fspath(path)} is a folder; give the name of a file")
+    scratch = target.with_name(f".{target.name[:40]}.{secrets.token_hex(8)}{target.suffix}")
     try:
-        with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name[:40]}.") as name:
-            scratch = Path(name) / f"scratch{target.suffix}"
+        try:
             yield scratch
             scratch.replace(target)
+        finally:
+            scratch.unlink(missing_ok=True)
     except OSError as error:
         if isinstance(error, ExportError):
             raise

@@ -249,17 +249,19 @@ def smallest_velocity(system: System, J: Vector, v0: Values) -> tuple[Vector, st
     Returns:
         v (nv,); the velocities of v0 as text where no v has them, else an empty one.
     """
-    free = null_space(J)
     target = np.array(system.velocity(v0))
     names = [speed.name for speed in system.speeds]
     named = v0 is None or isinstance(v0, Mapping)
     rows = [k for k, name in enumerate(names) if not named or name in (v0 or {})]
-    v: Vector = free @ np.linalg.lstsq(free[rows], target[rows], rcond=None)[0]
+    v = _refine(J, rows, target[rows])
     # what does not fit differs by about its own size, what fits by rounding
-    fits = np.allclose(v[rows], target[rows], rtol=1e-6, atol=1e-9)
-    if not fits:
-        return v, ", ".join(f"{names[k]} = {target[k]:g}" for k in rows)
-    return _refine(J, rows, target[rows]), ""
+    lengths = np.linalg.norm(J, axis=1) * np.linalg.norm(v)
+    closed = np.all(np.abs(J @ v) <= 1e-6 * lengths)
+    if closed and np.allclose(v[rows], target[rows], rtol=1e-6, atol=1e-9):
+        return v, ""
+    free = null_space(J)
+    v = free @ np.linalg.lstsq(free[rows], target[rows], rcond=None)[0]
+    return v, ", ".join(f"{names[k]} = {target[k]:g}" for k in rows)
 
 
 def _refine(J: Vector, rows: list[int], target: Vector) -> Vector:

@@ -30,7 +30,7 @@ from mbs.progress import progress
 from mbs.result import Result, optional_module
 from mbs.simulate.fmu import fmu
 from mbs.simulate.fmu_variables import numbers_of
-from mbs.simulate.run import run
+from mbs.simulate.run import Simulator, run
 from mbs.text import did_you_mean, quoted
 
 # The cases of a parameter study, and the folder that keeps their results.
@@ -567,6 +567,11 @@ def _say(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}"
 
 
+_LAWS = ("tau", "motion", "u", "method")
+"""Options that are the same in all cases; what a case says of efforts and inputs is in their place,
+as numbers, so that no case has equations of its own."""
+
+
 @dataclass(frozen=True, slots=True)
 class _Run:
     """Simulation of a system."""
@@ -575,7 +580,12 @@ class _Run:
 
     def __call__(self, case: Case, options: Mapping[str, Any]) -> Result:
         given = _arguments(self.system, case)
-        return run(self.system, quiet=True, **_merge(options, given))
+        inputs = {f"{name}.tau": x for name, x in given.pop("tau", {}).items()}
+        inputs |= given.pop("u", {})
+        merged = _merge(options, given)
+        laws = {name: merged.pop(name) for name in _LAWS if name in merged}
+        simulator = Simulator(self.system, list(inputs), **laws)
+        return simulator(quiet=True, inputs=inputs, **merged)
 
 
 @dataclass(frozen=True, slots=True)

@@ -84,7 +84,7 @@ def test_listed_cases_and_efforts(system):
 
 
 def test_an_interrupted_study_goes_on(system, tmp_path, monkeypatch):
-    folder, run = tmp_path / "study", mbs.simulate.run
+    folder, run = tmp_path / "study", mbs.simulate.Simulator.__call__
     counted = []
 
     def interrupted(*arguments, **options):
@@ -93,8 +93,7 @@ def test_an_interrupted_study_goes_on(system, tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return run(*arguments, **options)
 
-    home = inspect.getmodule(mbs.simulate.sweep)
-    monkeypatch.setattr(home, "run", interrupted)
+    monkeypatch.setattr(mbs.simulate.Simulator, "__call__", interrupted)
     with pytest.raises(KeyboardInterrupt):
         mbs.simulate.sweep(system, GRID, 1.0, folder=folder, **OPTIONS)
     study = mbs.simulate.sweep(system, GRID, 1.0, folder=folder, **OPTIONS)
@@ -211,7 +210,7 @@ def test_a_broken_off_study_begins_no_further_case(system, tmp_path, monkeypatch
         raise ExportError("the disk is full")
 
     home = inspect.getmodule(mbs.simulate.sweep)
-    monkeypatch.setattr(home, "run", simulated)
+    monkeypatch.setattr(mbs.simulate.Simulator, "__call__", simulated)
     monkeypatch.setattr(home.Folder, "keep", full)
     with ThreadPoolExecutor(1) as executor, pytest.raises(ExportError, match="disk is full"):
         mbs.simulate.sweep(system, {"L": [0.1] * 50}, 0.1, executor=executor, **OPTIONS)
@@ -224,7 +223,7 @@ def test_any_error_of_a_case_is_kept_with_its_sentence(system, tmp_path, monkeyp
             raise ZeroDivisionError("no length")
         return Result(np.zeros(1), np.zeros((1, 1)), {"x": "1"})
 
-    monkeypatch.setattr(inspect.getmodule(mbs.simulate.sweep), "run", broken)
+    monkeypatch.setattr(mbs.simulate.Simulator, "__call__", broken)
     grid = {"L": [0.4, 0.6, 0.8]}
     study = mbs.simulate.sweep(system, grid, 0.1, folder=tmp_path / "s", **OPTIONS)
     assert study.failures == {1: "ZeroDivisionError: no length"}

@@ -261,7 +261,14 @@ def given_inputs(system: System, names: Sequence[str]) -> tuple[GivenInput, ...]
             index = inputs.index(name)
             found[name] = GivenInput(name, False, index, float(system.u_default[index]))
         else:
-            found[name] = GivenInput(name, True, efforts.index(name), 0.0)
+            index = efforts.index(name)
+            if not system.speeds[index].actuated:
+                driven = ", ".join(f"{s.name}.tau" for s in system.speeds if s.actuated)
+                raise ModelError(
+                    f"{system.name}: inputs names {name}, but that joint has no motor; make it"
+                    f" actuated=True, or use one of {driven or '(none)'}"
+                )
+            found[name] = GivenInput(name, True, index, 0.0)
     return tuple(found.values())
 
 

@@ -2,6 +2,7 @@
 
     python benchmarks/loops.py [--cases n1,bricard] [--rounds 5] [--output table.md]
     python benchmarks/loops.py --build          # seconds to build N = 1, 10, 40 windows
+    python benchmarks/loops.py --calls          # what a user's call costs beside the integration
     python benchmarks/loops.py --long           # 1000 s of a four-bar
 
 A time is the shortest of several runs of the integration alone, of models that are built already;
@@ -13,11 +14,12 @@ mbs whose error is not larger.
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +28,12 @@ from exudyn_twins import ExudynTwin
 from loops_cases import CASES, Case, Made, made, outputs, plain_of, run
 from loops_references import rms_error
 from mujoco_twins import MujocoTwin
+
+import mbs
+from mbs.loops.configuration import start
+from mbs.models.state.signals import effort_function
+from mbs.models.state.tree import full_state
+from mbs.simulate.run import integrate_legs, step_tolerances
 
 Array = np.ndarray[Any, Any]
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
@@ -80,6 +88,8 @@ def main() -> None:
         os.environ["MBS_CACHE_DIR"] = folder  # so that compiling is measured
         if arguments.build:
             text = build_table()
+        elif arguments.calls:
+            text = call_table()
         elif arguments.long:
             text = long_run()
         else:
@@ -190,6 +200,45 @@ def build_table() -> str:
     return _table(head, lines)
 
 
+def call_table(duration: float = 10.0, tolerance: float = 1e-6) -> str:
+    """Milliseconds of motions of 1000 rows: the integration, and what a user calls around it."""
+    lines = []
+    for name in ("n1", "n10", "n40"):
+        calls = list(_calls(CASES[name], duration, tolerance))
+        first = _seconds(calls[1])[0]
+        best = [float("inf")] * len(calls)
+        for _ in range(30):
+            best = [min(t, _seconds(call)[0]) for t, call in zip(best, calls, strict=True)]
+        cells = [f"{1e3 * t:.3g}" for t in best]
+        lines.append([CASES[name].name, cells[0], f"{1e3 * first:.0f}", *cells[1:]])
+    head = ["mechanism", "integration", "first `run`", "further `run`", "`Simulator`"]
+    return _table([*head, "one column", "another start"], lines)
+
+
+def _calls(case: Case, duration: float, tolerance: float) -> Iterator[Callable[[], Any]]:
+    """The integration as `run` has it, `run`, and simulators, in the order of the table."""
+    system = case.build().assemble()
+    p, times = np.zeros(0), np.linspace(0.0, duration, round(100 * duration) + 1)
+    x0 = np.concatenate(start(system, None, case.v0, None))
+    rtol, atol = step_tolerances(tolerance)
+    state = full_state(system, effort_function(system, case.tau))
+    options: dict[str, Any] = {"method": case.method, "rtol": rtol, "atol": atol}
+    yield lambda: integrate_legs(system, lambda _: state, x0, times, p, **options)
+    laws: dict[str, Any] = {"tau": case.tau, "method": case.method}
+    given: dict[str, Any] = {"tolerance": tolerance, "v0": case.v0}
+    yield lambda: mbs.simulate.run(system, duration, quiet=True, **laws, **given)
+    column = [f"{system.coordinates[0].name}.q"]
+    whole = mbs.simulate.Simulator(system, **laws)
+    one = mbs.simulate.Simulator(system, outputs=column, **laws)
+    yield lambda: whole(duration, **given)
+    yield lambda: one(duration, **given)
+    # starts that differ from call to call
+    speed = system.speeds[system.active[0]].name
+    first = system.velocity(case.v0)[system.active[0]]
+    others = ({**(case.v0 or {}), speed: first + 1e-4 * k} for k in itertools.count(1))
+    yield lambda: whole(duration, tolerance=tolerance, v0=next(others))
+
+
 def long_run(seconds: float = 1000.0, tolerance: float = 1e-9) -> str:
     """A four-bar for a long time, through the singular configurations: what drifts, in a table."""
     case = CASES["n1"]
@@ -229,6 +278,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--cases", default=",".join(CASES))
     parser.add_argument("--rounds", type=int, default=5, help="turns of the contenders")
     parser.add_argument("--build", action="store_true", help="time building alone")
+    parser.add_argument("--calls", action="store_true", help="time a user's calls")
     parser.add_argument("--long", action="store_true", help="1000 s of a four-bar")
     parser.add_argument("--output", help="Markdown file to write")
     return parser.parse_args()

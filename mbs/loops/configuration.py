@@ -259,9 +259,12 @@ def smallest_velocity(system: System, J: Vector, v0: Values) -> tuple[Vector, st
     closed = np.all(np.abs(J @ v) <= 1e-6 * lengths)
     if closed and np.allclose(v[rows], target[rows], rtol=1e-6, atol=1e-9):
         return v, ""
+    # rows that are nearly dependent: what they leave free decides
     free = null_space(J)
-    v = free @ np.linalg.lstsq(free[rows], target[rows], rcond=None)[0]
-    return v, ", ".join(f"{names[k]} = {target[k]:g}" for k in rows)
+    near: Vector = free @ np.linalg.lstsq(free[rows], target[rows], rcond=None)[0]
+    if np.allclose(near[rows], target[rows], rtol=1e-6, atol=1e-9):
+        return v, ""
+    return near, ", ".join(f"{names[k]} = {target[k]:g}" for k in rows)
 
 
 def _refine(J: Vector, rows: list[int], target: Vector) -> Vector:

@@ -100,6 +100,7 @@ struct passage {
 static void lower(const double *L, int n, double *b) {
     int i, k;
     for (k = 0; k < n; k++) {
+        if (b[k] == 0.0) continue; /* rows of loops touch few joints */
         b[k] /= L[k * n + k];
         for (i = k + 1; i < n; i++) b[i] -= L[k * n + i] * b[k];
     }
@@ -124,7 +125,7 @@ static int cholesky(double *M, int n) {
         column[k] = sqrt(column[k]);
         for (i = k + 1; i < n; i++) column[i] /= column[k];
         for (j = k + 1; j < n; j++)
-            for (i = j; i < n; i++) M[j * n + i] -= column[i] * column[j];
+            for (i = j; i < n && column[j] != 0.0; i++) M[j * n + i] -= column[i] * column[j];
     }
     return 0;
 }
@@ -181,7 +182,7 @@ static int pivoted(double *A, int n, int m, int rank, double least, int *order, 
     for (j = 0; j < m; j++) order[j] = j;
     for (k = 0; k < rank; k++) {
         double most = -1.0;
-        int longest = k, kept = order[k];
+        int longest = k, kept = order[k], end = n;
         for (j = k; j < m; j++) {
             double size = 0.0;
             for (i = k; i < n; i++) size += A[j * n + i] * A[j * n + i];
@@ -197,8 +198,9 @@ static int pivoted(double *A, int n, int m, int rank, double least, int *order, 
         order[k] = order[longest];
         order[longest] = kept;
         weight[k] = dense_reflection(A + k * n + k, n - k);
+        while (end > k + 1 && A[k * n + end - 1] == 0.0) end--; /* what it leaves alone */
         for (j = k + 1; j < m; j++)
-            dense_reflect(A + k * n + k, weight[k], n - k, A + j * n + k);
+            dense_reflect(A + k * n + k, weight[k], end - k, A + j * n + k);
     }
     return rank;
 }

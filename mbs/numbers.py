@@ -65,15 +65,16 @@ def on_arrays(function: Function) -> OnArrays:
         raise ValueError(f"{function.name()} has a sparse output; densify it")
 
     def evaluated(*arguments: Array) -> list[Array]:
-        buffer, run = function.buffer()
+        made: Any = function.buffer()
+        buffer, run = made
         given = [np.ascontiguousarray(value, dtype=float) for value in arguments]
         if [array.size for array in given] != sizes:
             raise ValueError(f"{function.name()} takes arrays of {sizes} elements")
         found = [np.empty((columns, rows)) for rows, columns in shapes]
         for k, array in enumerate(given):
-            buffer.set_arg(k, memoryview(array.reshape(-1)))
+            buffer.set_arg(k, array.reshape(-1).data)
         for k, array in enumerate(found):
-            buffer.set_res(k, memoryview(array.reshape(-1)))
+            buffer.set_res(k, array.reshape(-1).data)
         run()
         return [np.ascontiguousarray(array.T) for array in found]
 

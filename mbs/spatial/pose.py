@@ -43,7 +43,7 @@ class Pose:
     @staticmethod
     def identity() -> Pose:
         """The frame itself."""
-        return Pose(SX(_EYE), zeros())
+        return Pose(+_EYE, zeros())
 
     @staticmethod
     def rotation(R: SX) -> Pose:
@@ -106,7 +106,7 @@ class Pose:
 
 def _own(value: SX) -> SX:
     """A dense copy, to be changed."""
-    return SX(value) if value.is_dense() else casadi.densify(value)
+    return +value if value.is_dense() else casadi.densify(value)
 
 
 @formula((3, 3), (3, 1))

@@ -6,7 +6,7 @@ from functools import wraps
 from typing import Any, ParamSpec, TypeVar, cast
 
 import casadi
-from casadi import DM, SX, Function
+from casadi import SX, Function
 
 _ROUNDING = 2e-15
 """Part of its terms that a sum may have left from their rounding: some ten units of their last
@@ -96,6 +96,11 @@ def elements(value: SX) -> list[SX]:
     return cast("list[SX]", dense.nonzeros())
 
 
+def numbers(value: SX) -> list[float]:
+    """The elements of a matrix of constants, column by column."""
+    return [float(element) for element in elements(value)]
+
+
 # Operators and functions of CasADi look through its types for what they are given, which takes
 # several times as long as the operation. What is known to be SX goes by these where much is made.
 
@@ -154,7 +159,7 @@ def exact_product(A: SX, B: SX, C: SX | None = None) -> SX:
         dense = _sum_with_product(A, B, C)
     else:
         dense = _product(A, B) if B.is_square() else product_with_vector(A, B)
-    if dense.is_constant() and not any(0 < abs(x) < _SMALL for x in DM(dense).nonzeros()):
+    if dense.is_constant() and not any(0 < abs(x) < _SMALL for x in numbers(dense)):
         return dense
     largest = _largest_number(B) if C is None else max(_largest_number(B), _largest_number(C))
     rows = dense.shape[0]

@@ -14,6 +14,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
+# While tests are collected nothing is thrown away: there is nothing to look for.
+gc.disable()
+
 # Where values are compared the compiler need not take its time; with every case it does.
 if not EVERY_CASE:
     os.environ.setdefault("MBS_OPTIMIZE", "0")
@@ -50,3 +53,4 @@ def pytest_collection_finish():
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)
+    gc.enable()

@@ -39,8 +39,13 @@ def pytest_report_header(config):
     return f"sweeps: {part}"
 
 
+# Whole programs, of up to a quarter of a minute: begun last, one would run on beside an idle core.
+LONG = {"test_examples.py", "test_readme.py", "test_structure.py"}
+
+
 def pytest_collection_modifyitems(config, items):
-    """Of each sweep a tenth, three at least; of a rule tried with several seeds one."""
+    """Long ones first; of each sweep a tenth, three at least; of a rule with several seeds one."""
+    items.sort(key=lambda item: item.path.name not in LONG)
     if EVERY_CASE:
         return
     left = left_out(items, os.environ["MBS_TEST_SEED"])

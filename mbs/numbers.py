@@ -1,13 +1,19 @@
-"""What counts as numbers in a call, of lists, arrays and scalars, and what stands for zero."""
+"""What counts as numbers in a call, what stands for zero, and Functions of arrays."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from casadi import Function
 from numpy.typing import NDArray
 
 from mbs.text import quoted
+
+Array = NDArray[np.float64]
+OnArrays = Callable[..., list[Array]]
+"""A Function of arrays: an array for each input, a new one (rows, columns) for each output."""
 
 NONZERO = 1e-300
 """Stands for zero where one divides: zero over it is zero, numbers up to 1e8 over it are finite,
@@ -34,3 +40,42 @@ def doubles(value: Any) -> NDArray[np.float64] | str:
         what = f"an array of {array.dtype}" if isinstance(value, np.ndarray) else quoted(value)
         return f"is {what}; give numbers"
     return array.astype(float, copy=False)
+
+
+def on_arrays(function: Function) -> OnArrays:
+    """A Function of arrays, for where it is evaluated many times.
+
+    In a call CasADi looks through its types for every argument and copies every result twice,
+    which takes as long as a thousand operations; here it reads and writes the arrays themselves.
+    Each call has memory of its own: threads may share what is returned.
+
+    Args:
+        function: its outputs are dense.
+
+    Returns:
+        what takes an array for each input, of as many elements column by column, and gives a new
+        array (rows, columns) for each output.
+
+    Raises:
+        ValueError: an output is sparse; or, in a call, an array has another size than its input.
+    """
+    sizes = [function.nnz_in(k) for k in range(function.n_in())]
+    shapes = [function.size_out(k) for k in range(function.n_out())]
+    if not all(function.sparsity_out(k).is_dense() for k in range(len(shapes))):
+        raise ValueError(f"{function.name()} has a sparse output; densify it")
+
+    def evaluated(*arguments: Array) -> list[Array]:
+        made: Any = function.buffer()
+        buffer, run = made
+        given = [np.ascontiguousarray(value, dtype=float) for value in arguments]
+        if [array.size for array in given] != sizes:
+            raise ValueError(f"{function.name()} takes arrays of {sizes} elements")
+        found = [np.empty((columns, rows)) for rows, columns in shapes]
+        for k, array in enumerate(given):
+            buffer.set_arg(k, array.reshape(-1).data)
+        for k, array in enumerate(found):
+            buffer.set_res(k, array.reshape(-1).data)
+        run()
+        return [np.ascontiguousarray(array.T) for array in found]
+
+    return evaluated

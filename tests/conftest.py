@@ -14,6 +14,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
+# While tests are collected nothing is thrown away: there is nothing to look for.
+gc.disable()
+
 # Where values are compared the compiler need not take its time; with every case it does.
 if not EVERY_CASE:
     os.environ.setdefault("MBS_OPTIMIZE", "0")
@@ -39,8 +42,13 @@ def pytest_report_header(config):
     return f"sweeps: {part}"
 
 
+# Whole programs, of up to a quarter of a minute: begun last, one would run on beside an idle core.
+LONG = {"test_examples.py", "test_readme.py", "test_structure.py"}
+
+
 def pytest_collection_modifyitems(config, items):
-    """Of each sweep a tenth, three at least; of a rule tried with several seeds one."""
+    """Long ones first; of each sweep a tenth, three at least; of a rule with several seeds one."""
+    items.sort(key=lambda item: item.path.name not in LONG)
     if EVERY_CASE:
         return
     left = left_out(items, os.environ["MBS_TEST_SEED"])
@@ -53,3 +61,4 @@ def pytest_collection_finish():
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)
+    gc.enable()

@@ -14,6 +14,7 @@ from mbs.assembly import System
 from mbs.assembly.tree import norm_rows, quaternion_slices
 from mbs.errors import Unclosable
 from mbs.loops.closure import closure_rows, facing, position_rows, velocity_row_units
+from mbs.numbers import OnArrays, on_arrays
 from mbs.solvers.least_squares import gauss_newton
 
 # What rows of a closure are measured by: lengths by the size of the mechanism, cosines as such.
@@ -149,18 +150,18 @@ class Closing:
 
     def rows(self, q: Vector) -> tuple[Vector, Vector]:
         """Residual (m,) and its derivative by the free positions (m, n)."""
-        r, J = (m.full() for m in self._functions()[0](q, self.p))
+        r, J = self._functions()[0](q, self.p)
         return r.ravel(), J[:, self.free]
 
     @property
     def size(self) -> float:
         """The size of the mechanism [m]."""
-        return float(self._functions()[2](self.p)[0])
+        return float(self._functions()[2](self.p)[0][0, 0])
 
     @property
     def sizes(self) -> Vector:
         """(m,) what the rows are measured by: the size of the mechanism for lengths [m], or 1."""
-        return np.array(self._functions()[2](self.p)[1]).ravel()
+        return self._functions()[2](self.p)[1].ravel()
 
     def openness(self, q: Vector) -> float:
         """The largest row at q, (nq,), in parts of the size of the mechanism."""
@@ -194,7 +195,7 @@ class Closing:
 
     def faces(self, q: Vector) -> bool:
         """Whether no axis of a closing joint is opposed at q (nq,)."""
-        return bool(np.all(np.array(self._functions()[1](q, self.p)) > 0))
+        return bool(np.all(self._functions()[1](q, self.p)[0] > 0))
 
     def gap(self, q: Vector) -> str:
         """Which joint stays open most at q, in words and figures."""
@@ -213,10 +214,8 @@ class Closing:
         names = [coordinate.name for coordinate in self.system.coordinates]
         return ", ".join(f"{names[k]} = {q[k]:.4g}" for k in self.locked)
 
-    def _functions(self) -> tuple[Function, Function, Function]:
-        functions: tuple[Function, Function, Function] = self.system.cached(
-            "closing", lambda: _functions(self.system)
-        )
+    def _functions(self) -> list[OnArrays]:
+        functions: list[OnArrays] = self.system.cached("closing", lambda: _functions(self.system))
         return functions
 
 
@@ -235,18 +234,19 @@ def closure_parameters(system: System, values: Mapping[str, float] | None = None
     return np.array(system.parameter_values(values, needed), dtype=float)
 
 
-def _functions(system: System) -> tuple[Function, Function, Function]:
+def _functions(system: System) -> list[OnArrays]:
+    """Rows with their slope, cosines of axes that face each other, sizes."""
     q = SX.sym("q", system.nq)
     r = casadi.densify(casadi.vertcat(closure_rows(system, q), norm_rows(system.tree, q)))
     J = casadi.densify(casadi.jacobian(r, q))
-    equations = Function("equations", [q, system.p], [r, J])
     norms = norm_rows(system.tree, q)
     sizes = casadi.vertcat(row_sizes(system), SX.ones(norms.shape))
-    return (
-        equations,
-        Function("facing", [q, system.p], [facing(system, q)]),
-        Function("sizes", [system.p], [mechanism_size(system), sizes]),
+    functions = (
+        Function("equations", [q, system.p], [r, J]),
+        Function("facing", [q, system.p], [casadi.densify(facing(system, q))]),
+        Function("sizes", [system.p], [mechanism_size(system), casadi.densify(sizes)]),
     )
+    return [on_arrays(function) for function in functions]
 
 
 def _replace(q: Vector, indices: Sequence[int], values: Vector) -> Vector:

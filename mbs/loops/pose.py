@@ -17,6 +17,7 @@ from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError, Unclosable
 from mbs.loops.closing import TOLERANCE, Closed, Closing, Vector, closure_parameters
 from mbs.loops.configuration import starts
+from mbs.numbers import OnArrays, on_arrays
 from mbs.recursions.route import relative_pose
 from mbs.solvers.least_squares import gauss_newton, levenberg_marquardt
 from mbs.spatial import Pose
@@ -205,10 +206,10 @@ class Goal:
     def pose(self, q: Vector) -> tuple[Vector, Vector]:
         """The elements of the pose of the frame, (12,), and their slope by q, (12, nq)."""
         system = self.closing.system
-        function: Function = system.cached(
-            ("pose and slope", self.frame), lambda: _pose_and_slope(system, self.frame)
+        function: OnArrays = system.cached(
+            ("pose and slope", self.frame), lambda: on_arrays(_pose_and_slope(system, self.frame))
         )
-        pose, slope = (np.array(m) for m in function(q, self.closing.p))
+        pose, slope = function(q, self.closing.p)
         return pose.ravel(), slope
 
 

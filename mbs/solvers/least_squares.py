@@ -13,6 +13,8 @@ from mbs.solvers.rank import EQUAL
 
 Array = NDArray[np.float64]
 
+_sum = np.add.reduce  # as its method of arrays, without what that looks at before
+
 _CANCELLED = 1e-4
 """Part of the square of a column's length below which what is left of it is summed anew, as four of
 its sixteen digits are gone then."""
@@ -34,17 +36,17 @@ def smallest_solution(A: Array, b: Array, gap: float) -> Array:
             dependent.
     """
     n = A.shape[1]
-    W = np.column_stack([A, b])[A.any(axis=1)]
+    W = np.column_stack([A, b])[np.logical_or.reduce(A, axis=1)]
     order = list(range(n))
     rank = min(len(W), n)
-    squares = (W[:, :n] ** 2).sum(axis=0)
+    squares = _sum(W[:, :n] ** 2, axis=0)
     exact, longest = squares.copy(), float(squares.max(initial=0.0))
     for k in range(rank):
         left = squares[k:]
         lost = left < _CANCELLED * exact[k:]
-        if lost.any():
-            left[lost] = exact[k:][lost] = (W[k:, k:n][:, lost] ** 2).sum(axis=0)
-        most = left.max()
+        if np.logical_or.reduce(lost):
+            left[lost] = exact[k:][lost] = _sum(W[k:, k:n][:, lost] ** 2, axis=0)
+        most = np.maximum.reduce(left)
         if most <= gap * gap * longest:
             rank = k
             break
@@ -65,9 +67,9 @@ def smallest_solution(A: Array, b: Array, gap: float) -> Array:
     x[:rank] = X[:, -1]
     free = np.vstack([-X[:, :-1], np.eye(n - rank)])
     for k in range(n - rank):
-        u = free[:, k] / float((free[:, k] ** 2).sum()) ** 0.5
-        free[:, k + 1 :] -= u[:, None] * (u[:, None] * free[:, k + 1 :]).sum(axis=0)
-        x -= float((u * x).sum()) * u
+        u = free[:, k] / float(_sum(free[:, k] ** 2)) ** 0.5
+        free[:, k + 1 :] -= u[:, None] * _sum(u[:, None] * free[:, k + 1 :], axis=0)
+        x -= float(_sum(u * x)) * u
     solution = np.empty(n)
     solution[order] = x
     return solution
@@ -76,13 +78,13 @@ def smallest_solution(A: Array, b: Array, gap: float) -> Array:
 def _reflect(W: Array) -> None:
     """Reflect the columns so that the first one has its first element alone; others may be zero."""
     v = W[:, 0].copy()
-    size = math.sqrt((v * v).sum())
+    size = math.sqrt(_sum(v * v))
     first = -size if v[0] > 0 else size
     v[0] -= first
     rows = v.nonzero()[0]
     v = v[rows, None]
     rest = W[rows, 1:]
-    W[rows, 1:] = rest + v * ((v * rest).sum(axis=0) / (first * v[0, 0]))
+    W[rows, 1:] = rest + v * (_sum(v * rest, axis=0) / (first * v[0, 0]))
     W[0, 0] = first
 
 
@@ -143,35 +145,37 @@ def gauss_newton(
     r, J = function(x)
     if not _finite(r, J):
         return LeastSquaresResult(x, np.inf, False)
+    norm, last_digits = _norm(r), _LAST_DIGITS * np.asarray(tolerance)
     for _ in range(iterations):
-        reached = bool(np.all(np.abs(r) <= tolerance))
-        if reached and np.all(np.abs(r) <= _LAST_DIGITS * np.asarray(tolerance)):
+        size = np.abs(r)
+        reached = bool((size <= tolerance).all())
+        if reached and (size <= last_digits).all():
             break
         step = smallest_solution(J, -r, rank_tolerance)
         length = 1.0
         while length > (0.5 if reached else 1e-6):  # beyond the tolerance one step, if it helps
             trial = x + length * step
             r_trial, J_trial = function(trial)
-            lower = _norm(r_trial) < _norm(r)
-            if lower and _finite(r_trial, J_trial):
+            norm_trial = _norm(r_trial)
+            if norm_trial < norm and _finite(r_trial, J_trial):
                 break
             length /= 2
         else:
             break
         stalled = length * _norm(step) < _STALLED
-        x, r, J = trial, r_trial, J_trial
+        x, r, J, norm = trial, r_trial, J_trial, norm_trial
         if stalled or reached:
             break
-    return LeastSquaresResult(x, _norm(r), bool(np.all(np.abs(r) <= tolerance)))
+    return LeastSquaresResult(x, norm, bool((np.abs(r) <= tolerance).all()))
 
 
 def _norm(x: Vector) -> float:
     """Its sum has one order, other than that of a dot product."""
-    return float(np.sqrt(np.sum(x * x)))
+    return math.sqrt(_sum(x * x))
 
 
 def _finite(r: Vector, J: Vector) -> bool:
-    return bool(np.all(np.isfinite(r)) and np.all(np.isfinite(J)))
+    return bool(np.isfinite(r).all() and np.isfinite(J).all())
 
 
 # The smallest sum of squares, where no root is near.

@@ -9,7 +9,7 @@ import casadi
 from casadi import SX
 
 from mbs.spatial.rotation import Rotation
-from mbs.spatial.vectors import cross, exact_sum, formula, skew, zeros
+from mbs.spatial.vectors import cross, exact_sum, formula, plus, skew, times, zeros
 
 TEN_PARAMETERS = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 """Names of the inertial parameters, in the order of Khalil & Kleinfinger 1986."""
@@ -96,12 +96,12 @@ class Inertia:
         """
         if t.is_zero():
             return self
-        J, ms = SX(self.J), SX(self.ms)
-        ms[axis] = exact_sum(ms[axis], self.m * t)
-        across = t * exact_sum(self.ms[axis], ms[axis])
+        J, ms = +self.J, +self.ms
+        ms[axis] = exact_sum(ms[axis], times(self.m, t))
+        across, opposite = times(t, exact_sum(self.ms[axis], ms[axis])), -t
         for k in ((axis + 1) % 3, (axis + 2) % 3):
             J[k, k] = exact_sum(J[k, k], across)
-            J[axis, k] = J[k, axis] = exact_sum(J[axis, k], -t * self.ms[k])
+            J[axis, k] = J[k, axis] = exact_sum(J[axis, k], times(opposite, self.ms[k]))
         return Inertia(J, ms, self.m)
 
     def along_axis(self) -> tuple[Inertia, Inertia]:
@@ -109,10 +109,10 @@ class Inertia:
 
         The second is mass on the z axis: no rotation about it can be felt.
         """
-        J, on_axis = SX(self.J), zeros(3, 3)
+        J, on_axis = +self.J, zeros(3, 3)
         on_axis[0, 0] = on_axis[1, 1] = self.J[1, 1]
         J[0, 0], J[1, 1] = exact_sum(self.J[0, 0], -self.J[1, 1]), 0
-        ms, height = SX(self.ms), zeros()
+        ms, height = +self.ms, zeros()
         height[2], ms[2] = self.ms[2], 0
         return Inertia(J, ms, SX(0)), Inertia(on_axis, height, self.m)
 
@@ -159,7 +159,7 @@ class PseudoInertia:
         S = casadi.densify(-J)
         for k in range(3):
             m, n = (k + 1) % 3, (k + 2) % 3
-            S[k, k] = 0.5 * exact_sum(J[m, m] + J[n, n], -J[k, k])
+            S[k, k] = times(SX(0.5), exact_sum(plus(J[m, m], J[n, n]), -J[k, k]))
         return PseudoInertia(S, inertia.ms, inertia.m)
 
     def inertia(self) -> Inertia:
@@ -183,11 +183,12 @@ class PseudoInertia:
         """The body displaced by t [m] along a coordinate axis."""
         if t.is_zero():
             return self
-        S, ms = SX(self.S), SX(self.ms)
-        ms[axis] = exact_sum(ms[axis], self.m * t)
+        S, ms = +self.S, +self.ms
+        ms[axis] = exact_sum(ms[axis], times(self.m, t))
         for k in ((axis + 1) % 3, (axis + 2) % 3):
-            S[axis, k] = S[k, axis] = exact_sum(S[axis, k], t * self.ms[k])
-        S[axis, axis] = exact_sum(S[axis, axis], t * exact_sum(self.ms[axis], ms[axis]))
+            S[axis, k] = S[k, axis] = exact_sum(S[axis, k], times(t, self.ms[k]))
+        across = times(t, exact_sum(self.ms[axis], ms[axis]))
+        S[axis, axis] = exact_sum(S[axis, axis], across)
         return PseudoInertia(S, ms, self.m)
 
     def along_axis(self) -> tuple[PseudoInertia, PseudoInertia]:
@@ -195,7 +196,7 @@ class PseudoInertia:
 
         The second is mass on the z axis: no rotation about it can be felt.
         """
-        S, on_axis, ms, height = SX(self.S), zeros(3, 3), SX(self.ms), zeros()
+        S, on_axis, ms, height = +self.S, zeros(3, 3), +self.ms, zeros()
         on_axis[2, 2], S[2, 2] = S[2, 2], 0
         height[2], ms[2] = ms[2], 0
         return PseudoInertia(S, ms, SX(0)), PseudoInertia(on_axis, height, self.m)

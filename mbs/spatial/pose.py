@@ -10,7 +10,15 @@ import casadi
 from casadi import DM, SX
 
 from mbs.spatial.rotation import AxisRotation, MatrixRotation, Rotation, axis_rotation
-from mbs.spatial.vectors import cross, elements, exact_product, formula, is_zero, zeros
+from mbs.spatial.vectors import (
+    cross,
+    elements,
+    exact_product,
+    formula,
+    is_zero,
+    numbers,
+    zeros,
+)
 
 _EYE = casadi.densify(SX(DM.eye(3)))
 
@@ -43,7 +51,7 @@ class Pose:
     @staticmethod
     def identity() -> Pose:
         """The frame itself."""
-        return Pose(SX(_EYE), zeros())
+        return Pose(+_EYE, zeros())
 
     @staticmethod
     def rotation(R: SX) -> Pose:
@@ -80,9 +88,10 @@ class Pose:
 
     def inverse(self) -> Pose:
         """T_ji from T_ij."""
+        R = self.R.T
         return Pose(
-            self.R.T,
-            zeros() if self.p.is_zero() else exact_product(-self.R.T, self.p),
+            R,
+            zeros() if self.p.is_zero() else exact_product(-R, self.p),
             tuple(_inverse(step) for step in reversed(self.chain)),
         )
 
@@ -106,7 +115,7 @@ class Pose:
 
 def _own(value: SX) -> SX:
     """A dense copy, to be changed."""
-    return SX(value) if value.is_dense() else casadi.densify(value)
+    return +value if value.is_dense() else casadi.densify(value)
 
 
 @formula((3, 3), (3, 1))
@@ -138,7 +147,7 @@ def _inverse(step: SymbolicRotation | Pose) -> SymbolicRotation | Pose:
 
 def _with_lone_ones(R: SX) -> SX:
     """The rotation, its elements that stand alone in a row or a column exactly 1 or -1."""
-    if R.is_constant() and not _has_alone(DM(R).nonzeros()):
+    if R.is_constant() and not _has_alone(numbers(R)):
         return R
     entries = elements(R)
     for place, entry in enumerate(entries):

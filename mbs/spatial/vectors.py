@@ -6,7 +6,7 @@ from functools import wraps
 from typing import Any, ParamSpec, TypeVar, cast
 
 import casadi
-from casadi import DM, SX, Function
+from casadi import SX, Function
 
 _ROUNDING = 2e-15
 """Part of its terms that a sum may have left from their rounding: some ten units of their last
@@ -35,17 +35,23 @@ def formula(
     """
 
     def evaluated(text: Callable[Given, Made]) -> Callable[Given, Made]:
-        functions: dict[tuple[Any, ...], Function] = {}
+        functions: dict[tuple[Any, ...], tuple[Function, list[str]]] = {}
         count = len(shapes)
+        names = [f"x{k}" for k in range(count)]
 
         def on_expressions(*arguments: Any) -> Any:
             case = arguments[count:]
             if case not in functions:
-                symbols = [SX.sym(f"x{k}", *shape) for k, shape in enumerate(shapes)]
+                symbols = [SX.sym(name, *shape) for name, shape in zip(names, shapes, strict=True)]
                 found: Any = cast("Callable[..., Any]", text)(*symbols, *case)
                 results = [*found] if isinstance(found, tuple) else [found]
-                functions[case] = Function(text.__name__.strip("_"), symbols, results)
-            return functions[case](*arguments[:count])
+                outs = [f"y{k}" for k in range(len(results))]
+                title = text.__name__.strip("_")
+                functions[case] = Function(title, symbols, results, names, outs), outs
+            function, outs = functions[case]
+            # by name: of a list CasADi looks at more types before it is known to be one of SX
+            made = function.call(dict(zip(names, arguments, strict=False)))
+            return made["y0"] if len(outs) == 1 else tuple(made[name] for name in outs)
 
         return cast("Callable[Given, Made]", wraps(text)(on_expressions))
 
@@ -90,13 +96,36 @@ def elements(value: SX) -> list[SX]:
     return cast("list[SX]", dense.nonzeros())
 
 
+def numbers(value: SX) -> list[float]:
+    """The elements of a matrix of constants, column by column."""
+    return [float(element) for element in elements(value)]
+
+
+# Operators and functions of CasADi look through its types for what they are given, which takes
+# several times as long as the operation. What is known to be SX goes by these where much is made.
+
+
+def plus(a: SX, b: SX) -> SX:
+    """The expression a + b."""
+    return SX.binary(casadi.OP_ADD, a, b)
+
+
+def times(a: SX, b: SX) -> SX:
+    """The expression a * b, element by element."""
+    return SX.binary(casadi.OP_MUL, a, b)
+
+
+def _sine_and_cosine(angle: SX) -> tuple[SX, SX]:
+    return SX.unary(casadi.OP_SIN, angle), SX.unary(casadi.OP_COS, angle)
+
+
 def exact_sum(a: SX, b: SX) -> SX:
     """The scalar a + b; zero where two numbers cancel but for the rounding of their last digits.
 
     Constants that ought to cancel fold only so; what is small by itself stays.
     """
     if not (a.is_constant() and b.is_constant()):
-        return SX.binary(casadi.OP_ADD, a, b)  # a + b, without a search among types
+        return plus(a, b)
     first, second = float(a), float(b)
     total = first + second
     return SX(0 if abs(total) <= _ROUNDING * (abs(first) + abs(second)) else total)
@@ -130,7 +159,7 @@ def exact_product(A: SX, B: SX, C: SX | None = None) -> SX:
         dense = _sum_with_product(A, B, C)
     else:
         dense = _product(A, B) if B.is_square() else product_with_vector(A, B)
-    if dense.is_constant() and not any(0 < abs(x) < _SMALL for x in DM(dense).nonzeros()):
+    if dense.is_constant() and not any(0 < abs(x) < _SMALL for x in numbers(dense)):
         return dense
     largest = _largest_number(B) if C is None else max(_largest_number(B), _largest_number(C))
     rows = dense.shape[0]
@@ -141,7 +170,7 @@ def exact_product(A: SX, B: SX, C: SX | None = None) -> SX:
         # elements of A, a rotation, are at most one: most sums are told by the largest number
         if 0 < number <= 2 * _ROUNDING * largest:
             row, column = place % rows, place // rows
-            terms = [A[row, k] * B[k, column] for k in range(A.shape[1])]
+            terms = [times(A[row, k], B[k, column]) for k in range(A.shape[1])]
             if C is not None:
                 terms.append(C[row, column])
             if number <= _ROUNDING * max(_largest_number(term) for term in terms):
@@ -151,8 +180,6 @@ def exact_product(A: SX, B: SX, C: SX | None = None) -> SX:
 
 def _largest_number(value: SX) -> float:
     """The largest constant element, by its size; zero where there is none."""
-    if value.is_constant():
-        return float(casadi.norm_inf(casadi.vec(value))) if value.nnz() else 0.0
     return max((abs(float(e)) for e in elements(value) if e.is_constant()), default=0.0)
 
 
@@ -174,9 +201,8 @@ def sin_cos(angle: SX) -> tuple[SX, SX]:
     constant, rest = _split(angle)
     quarters = round(constant / _QUARTER)
     if abs(constant - quarters * _QUARTER) > _SNAP:
-        total = SX(constant) + rest
-        return casadi.sin(total), casadi.cos(total)
-    s, c = (SX(0), SX(1)) if rest.is_zero() else (casadi.sin(rest), casadi.cos(rest))
+        return _sine_and_cosine(plus(SX(constant), rest))
+    s, c = (SX(0), SX(1)) if rest.is_zero() else _sine_and_cosine(rest)
     return ((s, c), (c, -s), (-s, -c), (-c, s))[quarters % 4]
 
 
@@ -189,5 +215,5 @@ def _split(angle: SX) -> tuple[float, SX]:
         left, left_rest = _split(angle.dep(0))
         right, right_rest = _split(angle.dep(1))
         if left or right:
-            return left + sign * right, SX(left_rest + sign * right_rest)
+            return left + sign * right, plus(left_rest, times(SX(sign), right_rest))
     return 0.0, angle

@@ -200,9 +200,13 @@ def _cover(image: Array, opacity: Array, colour: Array) -> None:
 
 def _distance(grid: Array, a: Array, b: Array) -> Array:
     """From each pixel to the line from a to b."""
-    along, length = b - a, float((b - a) @ (b - a))
-    share = np.clip((grid - a) @ along / length, 0, 1) if length > 0 else np.zeros(grid.shape[:2])
-    away: Array = np.linalg.norm(grid - a - share[..., None] * along, axis=-1)
+    along, length, start = b - a, float((b - a) @ (b - a)), grid - a
+    if length == 0:
+        share = np.zeros(grid.shape[:2])
+    else:
+        share = np.minimum(np.maximum(start @ along / length, 0), 1)
+    x, y = start[..., 0] - share * along[0], start[..., 1] - share * along[1]
+    away: Array = np.sqrt(x * x + y * y)
     return away
 
 

@@ -1,5 +1,6 @@
 import ctypes
 import subprocess
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -13,6 +14,7 @@ from mbs.native.plain_source import plain_flags, plain_source
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror")
 
 
+@cache
 def long_function(steps):
     """Every value depends on those before, so that pieces hand values to each other."""
     x, p = ca.SX.sym("x", 3), ca.SX.sym("p", 2)
@@ -46,7 +48,7 @@ def called(library, function, work, *arguments):
 
 @pytest.mark.parametrize("block", [10_000, 50])
 def test_pieces_give_the_bits_of_the_interpreted_function(block, tmp_path):
-    function = long_function(4000)
+    function = long_function(2000)
     source, work = plain_source([function], block)
     library = library_of(source, tmp_path)
     rng = np.random.default_rng(1)

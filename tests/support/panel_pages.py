@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 from contextlib import asynccontextmanager
 
 from nicegui import ui
@@ -59,6 +60,14 @@ def visited(panel, robot, visit, monkeypatch):
 
 
 @asynccontextmanager
+async def simulated(root):
+    """A visitor of this page; what NiceGUI collects before and after is of this visit alone."""
+    gc.freeze()
+    async with user_simulation(root=root) as user:
+        yield user
+
+
+@asynccontextmanager
 async def _page(panel, robot):
     apps = []
 
@@ -72,7 +81,7 @@ async def _page(panel, robot):
         apps.append(app)
         ui.label("the panel stands")
 
-    async with user_simulation(root=page) as user:
+    async with simulated(page) as user:
         await user.open("/")
         await user.should_see("the panel stands", retries=PATIENT)
         yield user, apps[0]

@@ -13,9 +13,8 @@ import httpx
 from nicegui import app as server
 from nicegui import core, ui
 from nicegui.testing.user import User
-from nicegui.testing.user_simulation import user_simulation
 from support import web_tasks
-from support.panel_pages import run_visit
+from support.panel_pages import run_visit, simulated
 from support.processes import IN_PROC, is_alive
 
 from mbs.app.web.app import App
@@ -43,7 +42,7 @@ async def visits(monkeypatch, name, count=1):
 
     monkeypatch.setattr(App, "__init__", noted)
     monkeypatch.setattr(FilesMenu, "__init__", noted_menu)
-    async with user_simulation(root=page_of(Document.of_name(name))) as user:
+    async with simulated(page_of(Document.of_name(name))) as user:
         for k in range(count):
             visitor = user if k == 0 else another_user()
             await visitor.open("/")

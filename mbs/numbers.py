@@ -58,6 +58,7 @@ def on_arrays(function: Function) -> OnArrays:
 
     Raises:
         ValueError: an output is sparse; or, in a call, an array has another size than its input.
+        RuntimeError: in a call, machine code within it gives no value.
     """
     sizes = [function.nnz_in(k) for k in range(function.n_in())]
     shapes = [function.size_out(k) for k in range(function.n_out())]
@@ -76,6 +77,8 @@ def on_arrays(function: Function) -> OnArrays:
         for k, array in enumerate(found):
             buffer.set_res(k, array.reshape(-1).data)
         run()
+        if buffer.ret():
+            raise RuntimeError(f"{function.name()} has no value there")
         return [np.ascontiguousarray(array.T) for array in found]
 
     return evaluated

@@ -47,6 +47,7 @@ from mbs.models.state.signals import (
 from mbs.models.state.tree import FullState, full_state
 from mbs.native import compiled
 from mbs.native.compiler import cache_dir
+from mbs.numbers import OnArrays, on_arrays
 from mbs.progress import progress
 from mbs.recursions.parts import part_event_names
 from mbs.result import Result
@@ -315,28 +316,18 @@ class Leg:
     def observed(self, p: Array) -> list[Array]:
         """What the state equation observes, (m, ..) each."""
         observe, count = self.state.observe, len(self.times)
-        values = [np.empty((count, observe.numel_out(k))) for k in range(observe.n_out())]
         if not count:
-            return values
+            return [np.empty((0, observe.numel_out(k))) for k in range(observe.n_out())]
         every = np.repeat(p[None, :], count, axis=0)
         if self.contact is not None:
             every = np.hstack([every, self.contact.modes])
-        # the rows follow each other in memory as CasADi has the columns of a map
-        made: Any = self._map(count).buffer()
-        buffer, evaluate = made
-        given = [np.ascontiguousarray(one, dtype=float) for one in (self.times, self.x, every)]
-        for k, one in enumerate(given):  # which hold the memory until it is read
-            buffer.set_arg(k, one.data)
-        for k, one in enumerate(values):
-            buffer.set_res(k, one.data)
-        evaluate()
-        if buffer.ret():
-            raise SolverError(f"{observe.name()} has no values along the motion")
+        # rows follow each other in memory as CasADi has the columns of a map
+        values = [found.T for found in self._map(count)(self.times, self.x, every)]
         if self.first_slope is not None:  # the rows alone would allow other accelerations there
             self._correct_first(values[0][0], values[1][0], every[0])
         return values
 
-    def _map(self, count: int) -> Function:
+    def _map(self, count: int) -> OnArrays:
         """`observe` for as many states; in machine code once it has been asked for often."""
         prepared, observe = self.state.prepared, self.state.observe
         asked = prepared.get("asked", 0) + count * observe.n_instructions()
@@ -344,10 +335,10 @@ class Leg:
             prepared["machine code"] = compiled(observe, derivatives=0)
             prepared.pop("observe", None)
         prepared["asked"] = asked
-        known: tuple[int, Function] | None = prepared.get("observe")
+        known: tuple[int, OnArrays] | None = prepared.get("observe")
         if known is None or known[0] != count:
             function = prepared.get("machine code", observe)
-            known = prepared["observe"] = count, function.map(count)
+            known = prepared["observe"] = count, on_arrays(function.map(count))
         return known[1]
 
     def _correct_first(self, a: Array, tau: Array, p: Array) -> None:

@@ -426,9 +426,8 @@ def _library_in(
 
 
 def _known(folder: Path, key: str, suffix: str) -> Path | None:
-    start = f"{key}-"  # listed without `glob`, which takes ten times as long where many are kept
-    names = sorted(n for n in os.listdir(folder) if n.startswith(start) and n.endswith(suffix))
-    return next((known for name in names if is_whole(known := folder / name)), None)
+    found = sorted(folder.glob(f"{key}-*{suffix}"))
+    return next((known for known in found if is_whole(known)), None)
 
 
 _INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"', re.MULTILINE)

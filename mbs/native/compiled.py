@@ -20,9 +20,10 @@ def compiled(
 ) -> casadi.Function:
     """The same Function backed by a cached shared library.
 
-    A call whose arguments are all numpy arrays returns numpy arrays, what has one column as a
-    vector, in about a microsecond: arrays of doubles whose columns follow each other in memory are
-    neither converted nor copied. `out=` takes arrays for the outputs. Any other call is as before.
+    A call whose arguments are arrays, lists or numbers returns numpy arrays, what has one column
+    as a vector, in about a microsecond, whatever the arrays hold and however they lie in memory;
+    doubles whose columns follow each other are not even copied. `out=` takes arrays for the
+    outputs. A call with symbols, a DM or several columns is as before.
 
     Without a compiler, or when the Function holds a node that CasADi cannot write as C or calls
     an external function, the given Function stays interpreted: the answers are the same, only
@@ -55,7 +56,8 @@ def compiled(
         result: Any = with_array_calls(casadi.Function(function), None, like)
     else:
         code = casadi.external(function.name(), str(library))
-        result = with_array_calls(code, library, like)
+        plain = functools.partial(compiled, derivatives=0)
+        result = with_array_calls(code, library, like, plain)
     again = functools.partial(compiled, derivatives=derivatives, fast=fast)
     result._source = (again, (function,))
     return result  # type: ignore[no-any-return]

@@ -3,6 +3,7 @@
     python benchmarks/dynamics.py [--robots puma560,iiwa] [--quick] [--output table.md]
                                   [--others PYTHON]
     python benchmarks/dynamics.py --calls
+    python benchmarks/dynamics.py --compile
 
 Every algorithm is a loop of C++ over 64 random states; a time is the best of many blocks of
 0.15 ms. pinocchio is the prebuilt library of the installed `pin` wheel; mbs is
@@ -10,7 +11,8 @@ Every algorithm is a loop of C++ over 64 random states; a time is the best of ma
 functions of that purpose compute: derivatives with respect to q, v and a or efforts, and the
 efforts or accelerations themselves. Values are compared before anything is timed. `--others` names
 a Python that has adam or urdf2casadi: their C code is compiled with the same flags and timed too.
-`--calls` times calls of compiled Functions from Python instead, by what their arguments are.
+`--calls` times calls of compiled Functions from Python instead, by what their arguments are;
+`--compile` what `compiled(ddm)` takes, and its derivatives when they are asked for.
 """
 
 from __future__ import annotations
@@ -18,11 +20,12 @@ from __future__ import annotations
 import argparse
 import functools
 import os
+import resource
 import sys
 import tempfile
 import time
 import timeit
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -84,6 +87,9 @@ def main() -> None:
     arguments = _arguments()
     if arguments.calls:
         print(calls())
+        return
+    if arguments.compile:
+        print("\n".join(compiling()))
         return
     loops = harness()
     rows: list[Row] = []
@@ -194,6 +200,28 @@ def calls() -> str:
     return "\n".join(lines)
 
 
+def compiling() -> Iterator[str]:
+    """Seconds of `compiled(ddm)` and of its derivatives, and what the compilers needed at most."""
+    yield "| mechanism | asked for | s | of processor, s | MB |\n|---|---|---|---|---|"
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["MBS_CACHE_DIR"] = folder
+        for name in ("puma560", "chain30"):
+            ddm = mbs.models.direct_dynamics(frictionless(name, Path(folder)))
+            wants = {
+                "compiled(ddm)": lambda ddm=ddm: compiled(ddm),
+                ".forward(1)": lambda ddm=ddm: compiled(ddm).forward(1),
+                ".reverse(1)": lambda ddm=ddm: compiled(ddm).reverse(1),
+                ".jacobian()": lambda ddm=ddm: compiled(ddm).jacobian(),
+            }
+            for want, make in wants.items():
+                start, before = time.perf_counter(), sum(os.times()[:4])
+                make()
+                spent = sum(os.times()[:4]) - before
+                most = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+                took = time.perf_counter() - start
+                yield f"| {name} | {want} | {took:.1f} | {spent:.1f} | {most:.0f} |"
+
+
 def _microseconds(call: Any) -> float:
     once = max(timeit.timeit(call, number=3) / 3, 1e-7)
     number = max(1, int(2e-3 / once))
@@ -258,6 +286,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--output", help="Markdown file to write")
     parser.add_argument("--others", help="Python with adam-robotics or urdf2casadi")
     parser.add_argument("--calls", action="store_true", help="calls from Python alone")
+    parser.add_argument("--compile", action="store_true", help="what compiling takes alone")
     return parser.parse_args()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi
 import numpy as np
@@ -15,6 +16,7 @@ from mbs.assembly.tree import norm_rows, quaternion_slices
 from mbs.errors import Unclosable
 from mbs.loops.closure import closure_rows, facing, position_rows, velocity_row_units
 from mbs.solvers.least_squares import gauss_newton
+from mbs.solvers.rank import dense
 
 # What rows of a closure are measured by: lengths by the size of the mechanism, cosines as such.
 #
@@ -145,22 +147,24 @@ class Closing:
     @property
     def free(self) -> list[int]:
         """The positions that may change."""
-        return [k for k in range(self.system.nq) if k not in self.locked]
+        locked = set(self.locked)
+        return [k for k in range(self.system.nq) if k not in locked]
 
     def rows(self, q: Vector) -> tuple[Vector, Vector]:
         """Residual (m,) and its derivative by the free positions (m, n)."""
-        r, J = (m.full() for m in self._functions()[0](q, self.p))
-        return r.ravel(), J[:, self.free]
+        r, J = self._functions().equations(q, self.p)
+        slopes = dense(J)
+        return np.array(r.nonzeros()), slopes[:, self.free] if self.locked else slopes
 
     @property
     def size(self) -> float:
         """The size of the mechanism [m]."""
-        return float(self._functions()[2](self.p)[0])
+        return float(self._functions().sizes(self.p)[0])
 
     @property
     def sizes(self) -> Vector:
         """(m,) what the rows are measured by: the size of the mechanism for lengths [m], or 1."""
-        return np.array(self._functions()[2](self.p)[1]).ravel()
+        return np.array(self._functions().sizes(self.p)[1]).ravel()
 
     def openness(self, q: Vector) -> float:
         """The largest row at q, (nq,), in parts of the size of the mechanism."""
@@ -168,13 +172,18 @@ class Closing:
 
     def nearest(self, q: Vector) -> Closed:
         """The configuration that Gauss-Newton reaches from q (nq,)."""
-        start = np.array(q, dtype=float)
+        start, free = np.array(q, dtype=float), self.free
 
         def residual(x: Vector) -> tuple[Vector, Vector]:
-            return self.rows(_replace(start, self.free, x))
+            return self.rows(_replace(start, free, x))
 
-        root = gauss_newton(residual, start[self.free], tolerance=TOLERANCE * self.sizes)
-        found = _replace(start, self.free, root.x)
+        def values(x: Vector) -> Vector:
+            found = self._functions().values(_replace(start, free, x), self.p)
+            return np.array(found.nonzeros())
+
+        tolerance = TOLERANCE * self.sizes
+        root = gauss_newton(residual, start[free], tolerance=tolerance, values=values)
+        found = _replace(start, free, root.x)
         return Closed(found, root.residual, root.converged and self.faces(found))
 
     def nearby(self, q: Vector, reach: float, tries: int, seed: int) -> Iterator[Vector]:
@@ -194,7 +203,7 @@ class Closing:
 
     def faces(self, q: Vector) -> bool:
         """Whether no axis of a closing joint is opposed at q (nq,)."""
-        return bool(np.all(np.array(self._functions()[1](q, self.p)) > 0))
+        return bool(np.all(np.array(self._functions().facing(q, self.p)) > 0))
 
     def gap(self, q: Vector) -> str:
         """Which joint stays open most at q, in words and figures."""
@@ -213,11 +222,25 @@ class Closing:
         names = [coordinate.name for coordinate in self.system.coordinates]
         return ", ".join(f"{names[k]} = {q[k]:.4g}" for k in self.locked)
 
-    def _functions(self) -> tuple[Function, Function, Function]:
-        functions: tuple[Function, Function, Function] = self.system.cached(
-            "closing", lambda: _functions(self.system)
-        )
+    def _functions(self) -> ClosingFunctions:
+        functions: ClosingFunctions = self.system.cached("closing", lambda: _functions(self.system))
         return functions
+
+
+class ClosingFunctions(NamedTuple):
+    """What is computed of the closure of a system.
+
+    Attributes:
+        equations: ``(q, p) -> r, J``: all rows, dense, and their derivative by q, sparse.
+        values: ``(q, p) -> r`` alone.
+        facing: ``(q, p)``, positive where no axis is opposed.
+        sizes: ``(p)``, the size of the mechanism and what each row is measured by.
+    """
+
+    equations: Function
+    values: Function
+    facing: Function
+    sizes: Function
 
 
 def closure_parameters(system: System, values: Mapping[str, float] | None = None) -> Vector:
@@ -235,15 +258,14 @@ def closure_parameters(system: System, values: Mapping[str, float] | None = None
     return np.array(system.parameter_values(values, needed), dtype=float)
 
 
-def _functions(system: System) -> tuple[Function, Function, Function]:
+def _functions(system: System) -> ClosingFunctions:
     q = SX.sym("q", system.nq)
     r = casadi.densify(casadi.vertcat(closure_rows(system, q), norm_rows(system.tree, q)))
-    J = casadi.densify(casadi.jacobian(r, q))
-    equations = Function("equations", [q, system.p], [r, J])
     norms = norm_rows(system.tree, q)
     sizes = casadi.vertcat(row_sizes(system), SX.ones(norms.shape))
-    return (
-        equations,
+    return ClosingFunctions(
+        Function("equations", [q, system.p], [r, casadi.jacobian(r, q)]),
+        Function("values", [q, system.p], [r]),
         Function("facing", [q, system.p], [facing(system, q)]),
         Function("sizes", [system.p], [mechanism_size(system), sizes]),
     )

@@ -49,3 +49,16 @@ def test_many_windows_keep_two_rows_each():
     names = [coordinate.name for coordinate in system.coordinates]
     uprights = [q[names.index(f"a{k}")] for k in range(56)]
     assert np.array(uprights) == pytest.approx(np.full(56, 2.0), abs=1e-10)
+
+
+def test_models_of_many_windows_grow_in_proportion():
+    short, long = (n_four_bar(count).assemble() for count in (24, 48))
+    few, many = (mbs.models.direct_dynamics(system) for system in (short, long))
+    assert many.n_instructions() < 2.1 * few.n_instructions()
+    # all uprights turn as one: 24 and 48 windows of one mechanism each, energy by hand
+    for system, count in ((short, 24), (long, 48)):
+        q = mbs.loops.solve(system, {"a0": 2.1})
+        inertia = (count + 1) / 3 + count  # uprights about their ends, couplers shifted by them
+        weight = 9.81 * ((count + 1) / 2 + count) * np.cos(2.1)
+        a = mbs.models.direct_dynamics(system)(q, 1.3, -2.0)
+        assert float(a) == pytest.approx((-weight - 2.0) / inertia, rel=1e-9)

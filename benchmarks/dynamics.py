@@ -2,6 +2,8 @@
 
     python benchmarks/dynamics.py [--robots puma560,iiwa] [--quick] [--output table.md]
                                   [--others PYTHON]
+    python benchmarks/dynamics.py --calls
+    python benchmarks/dynamics.py --compile
 
 Every algorithm is a loop of C++ over 64 random states; a time is the best of many blocks of
 0.15 ms. pinocchio is the prebuilt library of the installed `pin` wheel; mbs is
@@ -9,17 +11,21 @@ Every algorithm is a loop of C++ over 64 random states; a time is the best of ma
 functions of that purpose compute: derivatives with respect to q, v and a or efforts, and the
 efforts or accelerations themselves. Values are compared before anything is timed. `--others` names
 a Python that has adam or urdf2casadi: their C code is compiled with the same flags and timed too.
+`--calls` times calls of compiled Functions from Python instead, by what their arguments are;
+`--compile` what `compiled(ddm)` takes, and its derivatives when they are asked for.
 """
 
 from __future__ import annotations
 
 import argparse
+import functools
 import os
+import resource
 import sys
 import tempfile
 import time
 import timeit
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -79,6 +85,12 @@ class Row:
 def main() -> None:
     """Measure and write."""
     arguments = _arguments()
+    if arguments.calls:
+        print(calls())
+        return
+    if arguments.compile:
+        print("\n".join(compiling()))
+        return
     loops = harness()
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as folder:
@@ -150,6 +162,66 @@ def _python_calls(row: Row, function: casadi.Function, inputs: Sequence[Array]) 
     row.casadi = _microseconds(lambda: plain(*state))
 
 
+GIVEN: dict[str, Callable[[Array], Any]] = {
+    "doubles, columns in memory": np.asfortranarray,
+    "doubles, rows in memory": np.ascontiguousarray,
+    "transposed": lambda x: np.array(x.T).T,
+    "part of a larger array": lambda x: np.repeat(x, 2, axis=0)[::2],
+    "float32": lambda x: x.astype(np.float32),
+    "integers": lambda x: np.ones(x.shape, dtype=int),
+    "other byte order": lambda x: x.astype(">f8"),
+    "column (n, 1)": lambda x: x.reshape(-1, 1) if x.ndim == 1 else x,
+    "list of numpy's numbers": lambda x: list(x) if x.ndim == 1 else [list(row) for row in x],
+    "list of Python's numbers": np.ndarray.tolist,
+}
+"""How the same numbers may be given."""
+
+
+def calls() -> str:
+    """Microseconds of a call from Python, by how the arguments are given, as Markdown."""
+    system = mbs.load("puma560").assemble()
+    T, k = casadi.SX.sym("T", 4, 4), casadi.SX.sym("k")
+    square = casadi.Function("square", [T, k], [k * casadi.mtimes(T, T)], ["T", "k"], ["y"])
+    x, pose = np.linspace(0.1, 0.6, 6), np.linspace(0, 1, 16).reshape(4, 4)
+    functions = {
+        "IDM, 3 vectors": (mbs.models.inverse_dynamics(system), (x, x, x)),
+        "DDM, 3 vectors": (mbs.models.direct_dynamics(system), (x, x, x)),
+        "A, a vector": (mbs.models.inertia_matrix(system), (x,)),
+        "(4, 4) and a number": (square, (pose, 2.0)),
+    }
+    lines = ["| given as | " + " | ".join(functions) + " |", "|---|" + "---|" * len(functions)]
+    for given, change in GIVEN.items():
+        cells = []
+        for function, state in functions.values():
+            fast = compiled(function, derivatives=0, fast=True)
+            args = [change(a) if isinstance(a, np.ndarray) else a for a in state]
+            cells.append(f"{_microseconds(functools.partial(fast, *args)):.2f}")
+        lines.append(f"| {given} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def compiling() -> Iterator[str]:
+    """Seconds of `compiled(ddm)` and of its derivatives, and what the compilers needed at most."""
+    yield "| mechanism | asked for | s | of processor, s | MB |\n|---|---|---|---|---|"
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["MBS_CACHE_DIR"] = folder
+        for name in ("puma560", "chain30"):
+            ddm = mbs.models.direct_dynamics(frictionless(name, Path(folder)))
+            wants = {
+                "compiled(ddm)": lambda ddm=ddm: compiled(ddm),
+                ".forward(1)": lambda ddm=ddm: compiled(ddm).forward(1),
+                ".reverse(1)": lambda ddm=ddm: compiled(ddm).reverse(1),
+                ".jacobian()": lambda ddm=ddm: compiled(ddm).jacobian(),
+            }
+            for want, make in wants.items():
+                start, before = time.perf_counter(), sum(os.times()[:4])
+                make()
+                spent = sum(os.times()[:4]) - before
+                most = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+                took = time.perf_counter() - start
+                yield f"| {name} | {want} | {took:.1f} | {spent:.1f} | {most:.0f} |"
+
+
 def _microseconds(call: Any) -> float:
     once = max(timeit.timeit(call, number=3) / 3, 1e-7)
     number = max(1, int(2e-3 / once))
@@ -213,6 +285,8 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--quick", action="store_true", help="fewer blocks")
     parser.add_argument("--output", help="Markdown file to write")
     parser.add_argument("--others", help="Python with adam-robotics or urdf2casadi")
+    parser.add_argument("--calls", action="store_true", help="calls from Python alone")
+    parser.add_argument("--compile", action="store_true", help="what compiling takes alone")
     return parser.parse_args()
 
 

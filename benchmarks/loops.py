@@ -3,6 +3,7 @@
     python benchmarks/loops.py [--cases n1,bricard] [--rounds 5] [--output table.md]
     python benchmarks/loops.py --build          # seconds to build N = 1, 10, 40 windows
     python benchmarks/loops.py --calls          # what a user's call costs beside the integration
+    python benchmarks/loops.py --growth         # to the first step, N = 10 .. 160, nothing cached
     python benchmarks/loops.py --long           # 1000 s of a four-bar
 
 A time is the shortest of several runs of the integration alone, of models that are built already;
@@ -16,6 +17,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import os
+import resource
 import sys
 import tempfile
 import time
@@ -33,8 +35,12 @@ import mbs
 from mbs.loops.configuration import start
 from mbs.models.state.signals import effort_function
 from mbs.models.state.tree import full_state
+from mbs.robots import n_four_bar
 from mbs.simulate.run import integrate_legs, step_tolerances
 
+GROWTH = (10, 20, 40, 80, 160)
+"""Windows of which `--growth` takes the time."""
+GROWTH_HEAD = ["mechanism", "assembly", "equations, C text", "compiler", "together", "s", "MB"]
 Array = np.ndarray[Any, Any]
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 SHOWN = (1e-6, 1e-9)
@@ -86,7 +92,9 @@ def main() -> None:
     arguments = _arguments()
     with tempfile.TemporaryDirectory() as folder:
         os.environ["MBS_CACHE_DIR"] = folder  # so that compiling is measured
-        if arguments.build:
+        if arguments.growth:
+            text = growth_table()
+        elif arguments.build:
             text = build_table()
         elif arguments.calls:
             text = call_table()
@@ -239,6 +247,27 @@ def _calls(case: Case, duration: float, tolerance: float) -> Iterator[Callable[[
     yield lambda: whole(duration, tolerance=tolerance, v0=next(others))
 
 
+def growth_table() -> str:
+    """Seconds of the processor from the description to the first step, with an empty cache."""
+    lines = []
+    for count in GROWTH:
+        with tempfile.TemporaryDirectory() as folder:
+            os.environ["MBS_CACHE_DIR"] = folder
+            start, first = time.perf_counter(), os.times()
+            system = n_four_bar(count).assemble()
+            between = os.times()
+            mbs.simulate.run(system, duration=1e-3, v0={"a0": -1.0})
+            took, last = time.perf_counter() - start, os.times()
+        assembly, equations = between.user - first.user, last.user - between.user
+        compiler = last.children_user - first.children_user
+        most = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+        seconds = (assembly, equations, compiler, assembly + equations + compiler, took)
+        cells = [f"N = {count}", *(f"{x:.1f}" for x in seconds), f"{most:.0f}"]
+        lines.append(cells)
+        print(_table(GROWTH_HEAD, lines[-1:]).splitlines()[-1], file=sys.stderr)
+    return _table(GROWTH_HEAD, lines)
+
+
 def long_run(seconds: float = 1000.0, tolerance: float = 1e-9) -> str:
     """A four-bar for a long time, through the singular configurations: what drifts, in a table."""
     case = CASES["n1"]
@@ -279,6 +308,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--rounds", type=int, default=5, help="turns of the contenders")
     parser.add_argument("--build", action="store_true", help="time building alone")
     parser.add_argument("--calls", action="store_true", help="time a user's calls")
+    parser.add_argument("--growth", action="store_true", help="time the way to the first step")
     parser.add_argument("--long", action="store_true", help="1000 s of a four-bar")
     parser.add_argument("--output", help="Markdown file to write")
     return parser.parse_args()

@@ -50,20 +50,19 @@ def on_arrays(function: Function) -> OnArrays:
     Each call has memory of its own: threads may share what is returned.
 
     Args:
-        function: its outputs are dense.
+        function: any; what is zero by structure in its outputs is zero in the arrays.
 
     Returns:
         what takes an array for each input, of as many elements column by column, and gives a new
         array (rows, columns) for each output.
 
     Raises:
-        ValueError: an output is sparse; or, in a call, an array has another size than its input.
+        ValueError: in a call, an array has another size than its input.
         RuntimeError: in a call, machine code within it gives no value.
     """
     sizes = [function.nnz_in(k) for k in range(function.n_in())]
-    shapes = [function.size_out(k) for k in range(function.n_out())]
-    if not all(function.sparsity_out(k).is_dense() for k in range(len(shapes))):
-        raise ValueError(f"{function.name()} has a sparse output; densify it")
+    patterns = [function.sparsity_out(k) for k in range(function.n_out())]
+    places = [None if one.is_dense() else one.get_triplet() for one in patterns]
 
     def evaluated(*arguments: Array) -> list[Array]:
         made: Any = function.buffer()
@@ -71,14 +70,24 @@ def on_arrays(function: Function) -> OnArrays:
         given = [np.ascontiguousarray(value, dtype=float) for value in arguments]
         if [array.size for array in given] != sizes:
             raise ValueError(f"{function.name()} takes arrays of {sizes} elements")
-        found = [np.empty((columns, rows)) for rows, columns in shapes]
+        found = [np.empty(one.nnz()) for one in patterns]
         for k, array in enumerate(given):
             buffer.set_arg(k, array.reshape(-1).data)
         for k, array in enumerate(found):
-            buffer.set_res(k, array.reshape(-1).data)
+            buffer.set_res(k, array.data)
         run()
         if buffer.ret():
             raise RuntimeError(f"{function.name()} has no value there")
-        return [np.ascontiguousarray(array.T) for array in found]
+        return list(map(_filled, found, patterns, places))
 
     return evaluated
+
+
+def _filled(values: Array, pattern: Any, places: tuple[list[int], list[int]] | None) -> Array:
+    """The matrix of these elements, zero where the pattern has none."""
+    if places is None:
+        rows, columns = pattern.shape
+        return np.ascontiguousarray(values.reshape(columns, rows).T)
+    full = np.zeros(pattern.shape)
+    full[places] = values
+    return full

@@ -47,6 +47,10 @@ def test_arrays_of_another_size_are_refused(q):
         on_arrays(FUNCTION)(q, np.ones(2))
 
 
-def test_sparse_outputs_are_refused():
-    with pytest.raises(ValueError, match="f has a sparse output; densify it"):
-        on_arrays(Function("f", [Q], [casadi.diag(Q)]))
+def test_sparse_outputs_are_filled_with_zeros():
+    pattern = casadi.jacobian(ROWS, Q)
+    f = Function("f", [Q, P], [pattern, casadi.diag(Q)])
+    q, p = np.array([0.3, -0.7, 1.9]), np.array([2.5, 0.0])
+    assert not f.sparsity_out(1).is_dense()
+    for one, other in zip(on_arrays(f)(q, p), f(q, p), strict=True):
+        np.testing.assert_array_equal(one, other.full())

@@ -16,8 +16,7 @@ from mbs.assembly.system import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.assembly.tree import quaternion_slices
 from mbs.assembly.validity import ValidityRow, all_hold, plain_fault, plain_rows
-from mbs.errors import MbsError, ModelError
-from mbs.native import compiled
+from mbs.errors import ModelError
 from mbs.numbers import doubles
 from mbs.operations.pipeline import names_found
 from mbs.text import quoted
@@ -233,29 +232,6 @@ class ModelFunction(Function):
             inputs = {name: symbols[name] for name in self.asked()}
             self._of_one = all_hold(self._system, key, inputs, rows)
         return self._of_one
-
-    def guard(self) -> Callable[..., bool] | None:
-        """What determines whether arrays are valid inputs, for calls that go past `__call__`.
-
-        Returns:
-            None where nothing but the inputs' own numbers is asked; else a call with all inputs in
-            their order, false also where it cannot decide.
-        """
-        valid = self.valid()
-        if valid is None:
-            return None
-        indices = [self.name_in().index(name) for name in valid.name_in()]
-        made: list[Function] = []
-
-        def holds(*args: Any) -> bool:
-            if not made:
-                made.append(compiled(valid))
-            try:
-                return bool(float(made[0](*(args[k] for k in indices))[0]) == 1.0)
-            except (MbsError, RuntimeError, NotImplementedError, TypeError, ValueError):
-                return False
-
-        return holds
 
     def default_of_p(self) -> NDArray[np.float64] | None:
         """Values of the parameters where they are left out; None where one has no value."""

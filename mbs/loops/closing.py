@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi
 import numpy as np
@@ -146,22 +147,23 @@ class Closing:
     @property
     def free(self) -> list[int]:
         """The positions that may change."""
-        return [k for k in range(self.system.nq) if k not in self.locked]
+        locked = set(self.locked)
+        return [k for k in range(self.system.nq) if k not in locked]
 
     def rows(self, q: Vector) -> tuple[Vector, Vector]:
         """Residual (m,) and its derivative by the free positions (m, n)."""
-        r, J = self._functions()[0](q, self.p)
-        return r.ravel(), J[:, self.free]
+        r, J = self._functions().equations(q, self.p)
+        return r.ravel(), J[:, self.free] if self.locked else J
 
     @property
     def size(self) -> float:
         """The size of the mechanism [m]."""
-        return float(self._functions()[2](self.p)[0][0, 0])
+        return float(self._functions().sizes(self.p)[0][0, 0])
 
     @property
     def sizes(self) -> Vector:
         """(m,) what the rows are measured by: the size of the mechanism for lengths [m], or 1."""
-        return self._functions()[2](self.p)[1].ravel()
+        return self._functions().sizes(self.p)[1].ravel()
 
     def openness(self, q: Vector) -> float:
         """The largest row at q, (nq,), in parts of the size of the mechanism."""
@@ -169,13 +171,17 @@ class Closing:
 
     def nearest(self, q: Vector) -> Closed:
         """The configuration that Gauss-Newton reaches from q (nq,)."""
-        start = np.array(q, dtype=float)
+        start, free = np.array(q, dtype=float), self.free
 
         def residual(x: Vector) -> tuple[Vector, Vector]:
-            return self.rows(_replace(start, self.free, x))
+            return self.rows(_replace(start, free, x))
 
-        root = gauss_newton(residual, start[self.free], tolerance=TOLERANCE * self.sizes)
-        found = _replace(start, self.free, root.x)
+        def values(x: Vector) -> Vector:
+            return self._functions().values(_replace(start, free, x), self.p)[0].ravel()
+
+        tolerance = TOLERANCE * self.sizes
+        root = gauss_newton(residual, start[free], tolerance=tolerance, values=values)
+        found = _replace(start, free, root.x)
         return Closed(found, root.residual, root.converged and self.faces(found))
 
     def nearby(self, q: Vector, reach: float, tries: int, seed: int) -> Iterator[Vector]:
@@ -195,7 +201,7 @@ class Closing:
 
     def faces(self, q: Vector) -> bool:
         """Whether no axis of a closing joint is opposed at q (nq,)."""
-        return bool(np.all(self._functions()[1](q, self.p)[0] > 0))
+        return bool(np.all(self._functions().facing(q, self.p)[0] > 0))
 
     def gap(self, q: Vector) -> str:
         """Which joint stays open most at q, in words and figures."""
@@ -214,9 +220,25 @@ class Closing:
         names = [coordinate.name for coordinate in self.system.coordinates]
         return ", ".join(f"{names[k]} = {q[k]:.4g}" for k in self.locked)
 
-    def _functions(self) -> list[OnArrays]:
-        functions: list[OnArrays] = self.system.cached("closing", lambda: _functions(self.system))
+    def _functions(self) -> ClosingFunctions:
+        functions: ClosingFunctions = self.system.cached("closing", lambda: _functions(self.system))
         return functions
+
+
+class ClosingFunctions(NamedTuple):
+    """What is computed of the closure of a system.
+
+    Attributes:
+        equations: ``(q, p) -> r, J``: all rows, and their derivative by q.
+        values: ``(q, p) -> r`` alone.
+        facing: ``(q, p)``, positive where no axis is opposed.
+        sizes: ``(p)``, the size of the mechanism and what each row is measured by.
+    """
+
+    equations: OnArrays
+    values: OnArrays
+    facing: OnArrays
+    sizes: OnArrays
 
 
 def closure_parameters(system: System, values: Mapping[str, float] | None = None) -> Vector:
@@ -234,19 +256,18 @@ def closure_parameters(system: System, values: Mapping[str, float] | None = None
     return np.array(system.parameter_values(values, needed), dtype=float)
 
 
-def _functions(system: System) -> list[OnArrays]:
-    """Rows with their slope, cosines of axes that face each other, sizes."""
+def _functions(system: System) -> ClosingFunctions:
     q = SX.sym("q", system.nq)
     r = casadi.densify(casadi.vertcat(closure_rows(system, q), norm_rows(system.tree, q)))
-    J = casadi.densify(casadi.jacobian(r, q))
     norms = norm_rows(system.tree, q)
     sizes = casadi.vertcat(row_sizes(system), SX.ones(norms.shape))
     functions = (
-        Function("equations", [q, system.p], [r, J]),
-        Function("facing", [q, system.p], [casadi.densify(facing(system, q))]),
-        Function("sizes", [system.p], [mechanism_size(system), casadi.densify(sizes)]),
+        Function("equations", [q, system.p], [r, casadi.jacobian(r, q)]),
+        Function("values", [q, system.p], [r]),
+        Function("facing", [q, system.p], [facing(system, q)]),
+        Function("sizes", [system.p], [mechanism_size(system), sizes]),
     )
-    return [on_arrays(function) for function in functions]
+    return ClosingFunctions(*map(on_arrays, functions))
 
 
 def _replace(q: Vector, indices: Sequence[int], values: Vector) -> Vector:

@@ -14,7 +14,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.loops.examine import DETERMINED
 from mbs.loops.velocity import acceleration_bias, determining_rows
-from mbs.solvers.linear import solve_square
+from mbs.solvers.block_triangular import solve_large
 from mbs.spatial import zeros
 
 
@@ -59,14 +59,14 @@ def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
     closure = system.closure
     assert closure is not None
     active, rows = list(closure.active), determining_rows(system, q)
-    W = -solve_square(rows.square, casadi.mtimes(rows.mixed, rows.J[:, active]))
+    W = -solve_large(rows.square, casadi.mtimes(rows.mixed, rows.J[:, active]))
     G = tree_rows(system, W, SX(DM.eye(len(active))))
     if v_a is None:
         return Reduction(G, None)
     v = casadi.densify(casadi.mtimes(G, v_a))
     speed = SX.sym("v", system.nv)
     psi = casadi.substitute(acceleration_bias(system, q, speed, rows.J), speed, v)
-    a_p = -solve_square(rows.square, casadi.mtimes(rows.mixed, psi))
+    a_p = -solve_large(rows.square, casadi.mtimes(rows.mixed, psi))
     return Reduction(G, tree_rows(system, a_p, zeros(len(active))))
 
 

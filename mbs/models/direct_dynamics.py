@@ -12,7 +12,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tree import normalised
 from mbs.errors import ModelError
-from mbs.loops.velocity import closure_jacobian
+from mbs.loops.velocity import closure_jacobian, constraint_jacobian, kept_rows
 from mbs.models.actuation import effort_input
 from mbs.models.constrained_accelerations import constrained_accelerations
 from mbs.models.inverse_dynamics import own_efforts, tree_efforts
@@ -31,7 +31,7 @@ from mbs.recursions.articulated_body import articulated_accelerations, inertia_p
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
 from mbs.recursions.composite_body import solve_tree, velocity_antecedents
 from mbs.recursions.poses import link_poses
-from mbs.solvers.rank import first_best, rank
+from mbs.solvers.rank import dense, first_best, rank
 from mbs.text import did_you_mean, quoted
 
 _METHODS = ("auto", "articulated", "composite")
@@ -242,7 +242,13 @@ def _loose_in_tree(system: System) -> int | None:
 
 def _loose_in_loops(system: System) -> int | None:
     """An independent velocity of a closed system that moves no inertia."""
-    A = np.array(inertia_matrix(system)(list(system.configuration)))
+    closure, q = system.closure, list(system.configuration)
+    assert closure is not None
+    active, passive = list(closure.active), list(closure.passive)
+    J = dense(constraint_jacobian(system)(q, system.p_default))[kept_rows(system)]
+    G = np.zeros((system.nv, len(active)))
+    G[active], G[passive] = np.eye(len(active)), -np.linalg.solve(J[:, passive], J[:, active])
+    A = G.T @ np.array(inertia_matrix(system, "tree")(q)) @ G
     size = 1 / np.sqrt(np.maximum(np.diag(A), _NO_INERTIA))
     A = A * np.outer(size, size)
     return None if rank(A) == len(A) else first_best(np.abs(np.linalg.svd(A)[2][-1]))

@@ -1,27 +1,30 @@
-"""Functions that take numpy arrays and give numpy arrays."""
+"""Functions that take arrays, lists and numbers and give numpy arrays."""
 
 from __future__ import annotations
 
 import ctypes
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from casadi import DM, Function, Sparsity
+from casadi import DM, MX, SX, Function, Sparsity
 
 from mbs.errors import CompilerError, ModelError
 from mbs.native.compiler import cached_library
+from mbs.numbers import doubles
 
-# A builtin that calls a compiled function on numpy arrays, without copies and conversions.
+# A builtin that calls a compiled function on numbers, without conversions in Python.
 
 
 ArrayCall: TypeAlias = Callable[..., Any]
-"""Takes arrays, gives arrays; None for what it does not take as it is."""
+"""Takes arrays, lists and numbers, gives arrays; None for what it does not take."""
 
-_MOST = 32
+_MOST = 64
+"""Inputs, and outputs, of a function that is called so; as in the C code."""
+_TYPES = (np.ndarray, np.ma.MaskedArray, float, int, list, tuple, bytes)
 _STABLE_INTERFACE = (
     "PyObject_GetBuffer",
     "PyBuffer_Release",
@@ -34,6 +37,15 @@ _STABLE_INTERFACE = (
     "PyCapsule_New",
     "PyCapsule_GetPointer",
     "PyCFunction_NewEx",
+    "PyObject_CheckBuffer",
+    "PyObject_Type",
+    "PyType_IsSubtype",
+    "PyFloat_AsDouble",
+    "PyErr_Occurred",
+    "PyList_GetItem",
+    "PyList_Size",
+    "PyTuple_GetItem",
+    "PyTuple_Size",
 )
 _Pointer = ctypes.c_void_p
 
@@ -46,56 +58,80 @@ class _Shape(ctypes.Structure):
 
 
 class _PythonInterface(ctypes.Structure):
-    _fields_ = (("none", _Pointer), *((name, _Pointer) for name in _STABLE_INTERFACE))
+    _fields_ = (
+        ("none", _Pointer),
+        *((f"type_{made.__name__}", _Pointer) for made in _TYPES),
+        *((name, _Pointer) for name in _STABLE_INTERFACE),
+    )
 
 
 class _Function(ctypes.Structure):
     _fields_ = (
         *((name, _Pointer) for name in ("evaluate", "checkout", "release", "empty")),
         ("new", _Pointer * _MOST),
+        ("guard", _Pointer),
+        ("guarded", ctypes.c_longlong * _MOST),
         *((name, ctypes.c_longlong) for name in ("inputs", "outputs", "finite")),
-        *((name, ctypes.c_longlong) for name in ("integers", "reals")),
+        *((name, ctypes.c_longlong) for name in ("arguments", "results", "integers", "reals")),
+        ("space", ctypes.c_longlong),
         ("inputs_of", _Shape * _MOST),
         ("outputs_of", _Shape * _MOST),
     )
 
 
-def array_builtin(function: Function, library: Path, finite: bool) -> ArrayCall | None:
+class InputCheck(NamedTuple):
+    """What determines whether a function takes its inputs.
+
+    Attributes:
+        builtin: of the function that gives 1 where it does.
+        inputs: the numbers of the inputs that it asks for.
+    """
+
+    builtin: Any
+    inputs: Sequence[int]
+
+
+def array_builtin(
+    function: Function, library: Path, finite: bool, guard: InputCheck | None = None
+) -> ArrayCall | None:
     """The builtin of a function in a library, in CasADi's calling convention.
 
-    Its inputs are arrays of doubles whose columns follow each other in memory; its outputs are new
-    arrays, or those that follow the inputs. It answers None for anything else.
+    Its inputs are arrays, lists and numbers: arrays of doubles whose columns follow each other in
+    memory are read where they are, others are gathered. Its outputs are new arrays, or those that
+    follow the inputs. It answers None for anything else.
 
     Args:
         function: the same function for CasADi.
         library: holds it.
-        finite: answer None too where an input or a result is not a finite number.
+        finite: answer None too where an input or a result is not a finite number, or a number
+            other than zero stands for several elements.
+        guard: answer None too where it says so.
 
     Returns:
-        the builtin; None when the function has sparse inputs, or dozens of them.
+        the builtin; None when the function has dozens of inputs or outputs.
     """
     name, code = function.name(), ctypes.CDLL(str(library))
     work = [ctypes.c_longlong() for _ in range(4)]
     code[f"{name}_work"](*map(ctypes.byref, work))
-    pointers, results, integers, reals = (number.value for number in work)
     inputs = [function.sparsity_in(k) for k in range(function.n_in())]
     outputs = [function.sparsity_out(k) for k in range(function.n_out())]
     caller = _caller()
-    dense = all(pattern.is_dense() for pattern in inputs)
-    if caller is None or not dense or max(pointers, results) > _MOST:
+    if caller is None or max(len(inputs), len(outputs)) > _MOST:
         return None
     if hasattr(code, f"{name}_incref"):
         code[f"{name}_incref"]()
-    indices = [None if pattern.is_dense() else _indices(pattern) for pattern in outputs]
-    stored = sum(rows.size for rows in indices if rows is not None)
+    # kept until the builtin has copies of them
+    indices = [None if s.is_dense() else _indices(s) for s in (*inputs, *outputs)]
     new = [_arguments_of_empty(pattern) for pattern in outputs]
     description = _Function(
         *(_address(code, f"{name}{end}") for end in ("", "_checkout", "_release")),
         id(np.empty),
         (_Pointer * _MOST)(*map(id, new)),
-        *(len(inputs), len(outputs), finite, integers, reals + stored),
-        (_Shape * _MOST)(*(_shape(pattern, None) for pattern in inputs)),
-        (_Shape * _MOST)(*map(_shape, outputs, indices)),
+        None if guard is None else id(guard.builtin.__self__),
+        (ctypes.c_longlong * _MOST)(*(() if guard is None else guard.inputs)),
+        *(len(inputs), len(outputs), finite, *(number.value for number in work), 0),
+        (_Shape * _MOST)(*map(_shape, inputs, indices)),
+        (_Shape * _MOST)(*map(_shape, outputs, indices[len(inputs) :])),
     )
     builtin: ArrayCall = caller(ctypes.byref(description))
     return builtin
@@ -132,41 +168,73 @@ def _caller() -> Callable[[Any], ArrayCall] | None:
     addresses = (
         ctypes.cast(getattr(ctypes.pythonapi, name), _Pointer).value for name in _STABLE_INTERFACE
     )
-    library.mbs_setup(ctypes.byref(_PythonInterface(id(None), *addresses)))
+    library.mbs_setup(ctypes.byref(_PythonInterface(id(None), *map(id, _TYPES), *addresses)))
     make = library.mbs_builtin
     make.restype = ctypes.py_object
     return make
 
 
-def with_array_calls(function: Function, library: Path | None, like: Any = None) -> Function:
-    """The Function, which answers arrays with arrays from now on.
+def with_array_calls(
+    function: Function,
+    library: Path | None,
+    like: Any = None,
+    code_of: Callable[[Function], Any] | None = None,
+) -> Function:
+    """The Function, which answers numbers with arrays from now on.
 
     Args:
         function: one that nobody else holds.
         library: has its code; None when it is interpreted.
         like: the method of a model that gives another Function its checks and defaults.
+        code_of: gives what determines whether a model takes its inputs as a Function of this kind.
     """
     result: Any = function if like is None else like(function)
-    call = array_builtin(function, library, like is not None) if library else None
     result.__class__ = _class_with_arrays(type(result))
-    result._arrays = call or _decline
+    result._arrays = _decline
+    if library is not None:
+        valid = None if like is None else result.valid()
+        if valid is None or code_of is None:
+            result._arrays = array_builtin(function, library, like is not None) or _decline
+        else:
+            result._arrays = _guarded(result, function, library, valid, code_of)
     result._last = None if like is None else default_of_last(function, like.__self__)
     result._inputs = function.n_in()
-    result._guard = getattr(result, "guard", lambda: None)() if library else None
+    result._model = like is not None
     return result  # type: ignore[no-any-return]
+
+
+def _guarded(
+    result: Any,
+    function: Function,
+    library: Path,
+    valid: Function,
+    code_of: Callable[[Function], Any],
+) -> ArrayCall:
+    """The builtin of a model that takes not all numbers, made when it is first called."""
+
+    def first(*args: Any) -> Any:
+        builtin = code_of(valid)._arrays
+        if hasattr(builtin, "__self__"):
+            names = function.name_in()
+            guard = InputCheck(builtin, [names.index(name) for name in valid.name_in()])
+            builtin = array_builtin(function, library, True, guard) or _decline
+        result._arrays = builtin
+        return builtin(*args)
+
+    return first
 
 
 class ArrayCalls:
     """Mixed into a class of Functions.
 
-    A call whose arguments are all numpy arrays returns a numpy array, or a tuple of them; what has
-    one column is a vector. Any other call is CasADi's.
+    A call whose arguments are all arrays, lists or numbers returns a numpy array, or a tuple of
+    them; what has one column is a vector. Any other call is CasADi's.
     """
 
     _arrays: ArrayCall
     _last: np.ndarray[Any, Any] | None
     _inputs: int
-    _guard: Callable[..., bool] | None
+    _model: bool
     _source: tuple[Callable[[Function], Function], tuple[Function]]
 
     def __call__(self, *args: Any, out: Any = None, **kwargs: Any) -> Any:
@@ -185,24 +253,43 @@ class ArrayCalls:
             ModelError: `out` does not fit; of a model, an input has a wrong size, or the result
                 is not a number.
         """
-        if not _MASKED.isdisjoint(map(type, args)):
+        if not kwargs:
+            plain = out is None and len(args) == self._inputs
+            result = self._arrays(*args) if plain else self._fast(args, out)
+            if result is not None:
+                return result if out is None else out
+        return self._slow(args, kwargs, out)
+
+    def _fast(self, args: tuple[Any, ...], out: Any) -> Any:
+        """What the builtin answers; None where it takes the arguments not as they are."""
+        if len(args) != self._inputs:
+            if self._last is None or len(args) != self._inputs - 1:
+                return None
+            args = (*args, self._last)
+        if out is None:
+            return self._arrays(*args)
+        return self._arrays(*args, *(out if isinstance(out, tuple) else (out,)))
+
+    def _slow(self, args: tuple[Any, ...], kwargs: dict[str, Any], out: Any) -> Any:
+        """CasADi's call: of symbols, of several columns, of what is refused."""
+        if any(_holds(x, np.ma.MaskedArray) for x in args):
             raise ModelError(
                 f"{self.name()}: an input has a mask, which would be passed over; give"  # type: ignore[attr-defined]
                 " array.filled(value)"
             )
-        if self._last is not None and not kwargs and len(args) == self._inputs - 1:
-            args = (*args, self._last)
-        guard = self._guard
-        if not kwargs and len(args) == self._inputs and (guard is None or guard(*args)):
-            outputs = () if out is None else out if isinstance(out, tuple) else (out,)
-            result = self._arrays(*args, *outputs)
-            if result is not None:
-                return result if out is None else out
+        numbers = bool(args) and not kwargs and not any(_holds(x, _OF_CASADI) for x in args)
+        if numbers:
+            found = [doubles(x) for x in args]
+            if not any(isinstance(x, str) for x in found):
+                result = self._fast(tuple(found), out)  # of what numpy knows to convert
+                if result is not None:
+                    return result if out is None else out
+                if not self._model:  # a model reads its arguments itself
+                    args = tuple(found)
         result = super().__call__(*args, **kwargs)  # type: ignore[misc]
         if out is not None:
             return _copy(self, result, out)
-        arrays = bool(args) and not kwargs and all(isinstance(x, _ARRAYS) for x in args)
-        return _numpy(result) if arrays else result
+        return _numpy(result) if numbers else result
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle holds what it was made of, and is compiled where it is read."""
@@ -213,8 +300,17 @@ class ArrayCalls:
         return self
 
 
-_ARRAYS = (np.ndarray, np.generic)
-_MASKED = {np.ma.MaskedArray}
+_OF_CASADI = (DM, SX, MX)
+"""With one of these among the arguments of a call, CasADi says what it returns."""
+
+
+def _holds(value: Any, kinds: type | tuple[type, ...]) -> bool:
+    """Whether an argument, or an item of a list, is of these types."""
+    if isinstance(value, (list, tuple)):
+        return any(_holds(item, kinds) for item in value)
+    return isinstance(value, kinds)
+
+
 _CLASSES: dict[type, type] = {}
 
 

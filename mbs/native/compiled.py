@@ -1,7 +1,7 @@
 """A Function as machine code: equal to the interpreted one to the last bit, or faster."""
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +10,16 @@ import casadi
 from mbs.errors import ModelError
 from mbs.native.array_calls import with_array_calls
 from mbs.native.compiler import cached_library, compiler_found, flags_for
-from mbs.native.kernel import indexed_library, kernel_library
-from mbs.native.patterns import patterns_source
+from mbs.native.derivatives_on_demand import (
+    Derivative,
+    derivatives_of,
+    fill,
+    read_record,
+    source,
+    write_record,
+)
+from mbs.native.kernel import index_key, indexed_library, kernel_library
+from mbs.native.patterns import pattern_source, patterns_source
 from mbs.text import in_c_comment, quoted
 
 
@@ -20,9 +28,10 @@ def compiled(
 ) -> casadi.Function:
     """The same Function backed by a cached shared library.
 
-    A call whose arguments are all numpy arrays returns numpy arrays, what has one column as a
-    vector, in about a microsecond: arrays of doubles whose columns follow each other in memory are
-    neither converted nor copied. `out=` takes arrays for the outputs. Any other call is as before.
+    A call whose arguments are arrays, lists or numbers returns numpy arrays, what has one column
+    as a vector, in about a microsecond, whatever the arrays hold and however they lie in memory;
+    doubles whose columns follow each other are not even copied. `out=` takes arrays for the
+    outputs. A call with symbols, a DM or several columns is as before.
 
     Without a compiler, or when the Function holds a node that CasADi cannot write as C or calls
     an external function, the given Function stays interpreted: the answers are the same, only
@@ -32,7 +41,8 @@ def compiled(
         function: any Function without free symbols.
         derivatives: how often the answer can be differentiated: 0, 1 (Jacobians, forward and
             reverse products) or 2 (Hessians too, for about five times the code), which IPOPT
-            needs unless it approximates them. Beyond it CasADi refuses to differentiate:
+            needs unless it approximates them. Their code is made when they are first asked for,
+            in whatever process, and kept. Beyond it CasADi refuses to differentiate:
             "Derivatives cannot be calculated for adj1_..", the name of the Function after it.
         fast: code for the processor of this computer, with fused multiplications and all sines
             and cosines in vector lanes: two to three times faster, equal to the interpreted
@@ -55,7 +65,8 @@ def compiled(
         result: Any = with_array_calls(casadi.Function(function), None, like)
     else:
         code = casadi.external(function.name(), str(library))
-        result = with_array_calls(code, library, like)
+        plain = functools.partial(compiled, derivatives=0)
+        result = with_array_calls(code, library, like, plain)
     again = functools.partial(compiled, derivatives=derivatives, fast=fast)
     result._source = (again, (function,))
     return result  # type: ignore[no-any-return]
@@ -66,20 +77,83 @@ def _library(function: casadi.Function, derivatives: int, fast: bool) -> Path | 
     if calls_machine_code([function]):
         return None
     options = f"{'fast' if fast else 'exact'}, {derivatives} derivatives"
-    return indexed_library(function, options, lambda: _built(function, derivatives, fast))
+    found = index_key(function, options)
+    if found is None:
+        return _built(function, derivatives, fast, None)
+    key, text = found
+    record = write_record(key, text, derivatives, fast) if derivatives else None
+    if derivatives and record is None:  # nothing can be kept on disk: all at once
+        return _built(function, derivatives, fast, None)
+    return indexed_library(key, lambda: _built(function, derivatives, fast, record))
 
 
-def _built(function: casadi.Function, derivatives: int, fast: bool) -> Path | None:
-    functions = [function, *_all_derivatives(function, derivatives)]
-    known = _products(function) if derivatives == 2 else []
-    patterns = {"patterns.c": patterns_source(known)} if known else {}
-    library = kernel_library(functions, patterns) if fast else None
+def _built(
+    function: casadi.Function, derivatives: int, fast: bool, record: Path | None
+) -> Path | None:
+    """The library of a Function, and of its derivatives, or of what makes them on demand."""
+    if record is None:
+        every = [function, *_all_derivatives(function, derivatives)]
+        known = _products(function) if derivatives == 2 else []
+        return _compiled(every, fast, {"patterns.c": patterns_source(known)} if known else {})
+    later = {"derivatives.c": source(derivatives_of(function.name(), derivatives), record)}
+    return _compiled([function], fast, later)
+
+
+def _compiled(
+    functions: Sequence[casadi.Function],
+    fast: bool,
+    further: Mapping[str, str],
+) -> Path | None:
+    """The library of Functions.
+
+    Args:
+        functions: what to compile.
+        fast: code for this processor, where there is any.
+        further: C files that belong to it.
+    """
+    library = kernel_library(functions, further) if fast else None
     if library is not None:
         return library
-    source = generated(functions)
-    if unwritten(source):
+    text = generated(functions)
+    if unwritten(text):
         return None
-    return cached_library({"function.c": source, **patterns}, flags_for(source))
+    return cached_library({"function.c": text, **further}, flags_for(text))
+
+
+def fetch_derivatives(record: str, number: int, table: int) -> None:
+    """Make a derivative of a compiled Function; called by its library when it is asked for it.
+
+    Args:
+        record: path of the file that holds the Function.
+        number: which of its derivatives.
+        table: address of where the addresses of their code go.
+
+    Raises:
+        CompilerError: the file has gone, or the compiler refused the code.
+        ModelError: it cannot be written as C.
+    """
+    function, order, fast = read_record(Path(record))
+    every = derivatives_of(function.name(), order)
+    part = every[number]
+
+    def make() -> Path | None:
+        if not part.pattern:
+            return _compiled([part.of(function)], fast, {})
+        inner = Derivative(part.name.removeprefix("jac_")).of(function)
+        # of what is compiled, to the element; of second derivatives no code is compiled
+        known = inner is function
+        text = pattern_source(inner.jacobian()) if known else patterns_source([inner])
+        return cached_library({"patterns.c": text})
+
+    options = f"{'fast' if fast else 'exact'}, {part}"
+    found = index_key(function, options)
+    library = make() if found is None else indexed_library(found[0], make)
+    if library is None:
+        raise ModelError(
+            f"{part.name} holds what CasADi cannot write as C; differentiate {function.name()}"
+            " itself in place of its machine code"
+        )
+    fill(table, library, every, number)
 
 
 def c_source(function: casadi.Function, *, derivatives: int = 0) -> str:

@@ -387,24 +387,34 @@ _SUFFIX = ".library"
 _SOURCES = (".py", ".h", ".c")
 
 
-def indexed_library(
-    function: casadi.Function, options: str, make: Callable[[], Path | None]
-) -> Path | None:
+def index_key(function: casadi.Function, options: str) -> tuple[str, str] | None:
+    """The key of a Function in the index of the cache, and its serialised text.
+
+    Args:
+        function: that is compiled.
+        options: what else decides its library.
+
+    Returns:
+        None for what holds a callback, which has no text.
+    """
+    try:
+        text = function.serialize()
+    except (RuntimeError, NotImplementedError):
+        return None
+    return _index_key(text, options), text
+
+
+def indexed_library(key: str, make: Callable[[], Path | None]) -> Path | None:
     """The library that `make` gives for a Function, remembered from run to run.
 
     Several processes may ask at once; what is damaged or has gone is made again.
 
     Args:
-        function: that is compiled.
-        options: what else decides the library.
+        key: of `index_key`.
         make: writes and compiles it; None where that cannot be done, which is not remembered.
     """
-    try:
-        text = function.serialize()
-    except (RuntimeError, NotImplementedError):  # a callback has no text
-        return make()
     folder = cache_dir()
-    entry = folder / f"{_index_key(text, options)}{_SUFFIX}"
+    entry = folder / f"{key}{_SUFFIX}"
     known = _entry(entry)
     if known is not None:
         return known

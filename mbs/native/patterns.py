@@ -6,7 +6,7 @@ element of a Jacobian counts, and a Hessian takes as many directions as there ar
 
 from collections.abc import Iterable
 
-from casadi import Function
+from casadi import Function, Sparsity
 
 _HEAD = """\
 #ifdef _WIN32
@@ -23,26 +23,40 @@ def patterns_source(functions: Iterable[Function]) -> str:
     Args:
         functions: with different names.
     """
-    return "\n".join([_HEAD, *map(_patterns, functions)])
+    return "\n".join([_HEAD, *(_pattern(f.name(), _blocks(f)) for f in functions)])
 
 
-def _patterns(function: Function) -> str:
-    """Patterns of the blocks, all inputs of the first output before those of the second."""
-    blocks = [
-        function.jac_sparsity(row, column).compress()
+def pattern_source(jacobian: Function) -> str:
+    """One C file with the sparsity of the outputs of a Function, in compressed columns.
+
+    Args:
+        jacobian: of the name that CasADi gives a Jacobian.
+    """
+    blocks = [jacobian.sparsity_out(k) for k in range(jacobian.n_out())]
+    return "\n".join([_HEAD, _pattern(jacobian.name().removeprefix("jac_"), blocks)])
+
+
+def _blocks(function: Function) -> list[Sparsity]:
+    """Patterns of the Jacobian, all inputs of the first output before those of the second."""
+    return [
+        function.jac_sparsity(row, column)
         for row in range(function.n_out())
         for column in range(function.n_in())
     ]
-    names = {tuple(block): f"{function.name()}_pattern{k}" for k, block in enumerate(blocks)}
+
+
+def _pattern(name: str, patterns: Iterable[Sparsity]) -> str:
+    blocks = [tuple(pattern.compress()) for pattern in patterns]
+    names = {block: f"{name}_pattern{k}" for k, block in enumerate(blocks)}
     arrays = [
-        f"static const long long int {name}[] = {{{', '.join(map(str, block))}}};"
-        for block, name in names.items()
+        f"static const long long int {array}[] = {{{', '.join(map(str, block))}}};"
+        for block, array in names.items()
     ]
-    cases = [f"    case {k}: return {names[tuple(block)]};" for k, block in enumerate(blocks)]
+    cases = [f"    case {k}: return {names[block]};" for k, block in enumerate(blocks)]
     return "\n".join(
         [
             *arrays,
-            f"EXPORT const long long int *jac_{function.name()}_sparsity_out(long long int k)",
+            f"EXPORT const long long int *jac_{name}_sparsity_out(long long int k)",
             "{",
             "  switch (k) {",
             *cases,

@@ -3,7 +3,7 @@
 import ctypes
 import functools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib import resources
@@ -14,10 +14,11 @@ import casadi
 import numpy as np
 import numpy.typing as npt
 
-from mbs.errors import Interrupted, SolverError
+from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.native import cached_library, compiler_found
 from mbs.native.compiled import calls_machine_code, generated, unwritten
 from mbs.native.compiler import flags_for
+from mbs.native.plain_source import plain_source
 from mbs.solvers.interpreted_run import run_interpreted
 from mbs.solvers.problem import (
     Equations,
@@ -75,6 +76,27 @@ def is_compilable(function: casadi.Function) -> bool:
     )
 
 
+_LONG = 10_000
+"""Lines of CasADi's text beyond which it is written in pieces: compilers need more than
+proportional time for long functions, and pieces of small ones cost time in every step."""
+
+
+def _in_pieces(functions: Sequence[casadi.Function]) -> str:
+    """The same functions in pieces that compilers take in linear time, to the last bit the same.
+
+    Returns:
+        an empty text where one of them has more than scalar operations.
+    """
+    try:
+        text, work = plain_source(functions)
+    except ModelError:
+        return ""
+    sizes = " ".join(f"*{name} = {size};" for name, size in work._asdict().items())
+    given = ", ".join(f"long long *{name}" for name in work._asdict())
+    lines = (f"int {f.name()}_work({given}) {{ {sizes} return 0; }}" for f in functions)
+    return "\n".join([text, *lines])
+
+
 def library_of(equations: Equations) -> ctypes.CDLL | None:
     """The compiled driver of these functions; None when CasADi can only interpret them.
 
@@ -86,7 +108,10 @@ def library_of(equations: Equations) -> ctypes.CDLL | None:
     source = generated(equations.all)
     if unwritten(source):
         return None
-    names, flags = [*_RUNTIME], [*flags_for(source)]
+    flags = [*flags_for(source)]
+    if source.count("\n") > _LONG and (pieces := _in_pieces(equations.all)):
+        source, flags = pieces, [*flags_for(pieces)]
+    names = [*_RUNTIME]
     if equations.project is not None:
         flags.append("-DMBS_PROJECT")
     if equations.jacobian is not None:

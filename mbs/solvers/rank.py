@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from casadi import DM
 from numpy.typing import NDArray
 
 Matrix = NDArray[np.float64]
@@ -22,6 +23,14 @@ by iteration are behind them), and orders narrower than what makes one choice be
 
 _FLOOR = 1e-12
 """Length of a row that counts as none: rounding of rows of about unit length leaves 1e-16."""
+
+
+def dense(matrix: DM) -> Matrix:
+    """A sparse matrix with its zeros; CasADi's own conversion makes a list of all elements."""
+    full = np.zeros(matrix.shape)
+    rows, columns = matrix.sparsity().get_triplet()
+    full[rows, columns] = matrix.nonzeros()
+    return full
 
 
 def first_best(scores: Sequence[float] | Matrix, equal: float = EQUAL) -> int:
@@ -74,15 +83,29 @@ def independent_rows(
         first: rows to take before all others, in this order.
     """
     rest = [np.array(matrix, dtype=float) for matrix in matrices]
-    chosen: list[int] = []
+    lengths = np.array([np.linalg.norm(matrix, axis=1) for matrix in rest])
+    score, chosen = _mean_lengths(lengths), list[int]()
+    left = np.flatnonzero(lengths.any(axis=0))  # rows that may still change
     for k in range(count):
-        lengths = np.array([np.linalg.norm(matrix, axis=1) for matrix in rest])
-        score = np.exp(np.mean(np.log(lengths + _FLOOR), axis=0))
-        score[chosen] = -np.inf
         pivot = first[k] if k < len(first) else first_best(score)
+        left = left[left != pivot]
+        changed = np.zeros(len(score), dtype=bool)
         for number, matrix in enumerate(rest):
             direction = matrix[pivot] / max(float(lengths[number, pivot]), _FLOOR)
-            along = np.sum(matrix * direction, axis=1)
-            rest[number] = matrix - along[:, None] * direction
+            # a row without a column in common stays as it is
+            common = matrix[np.ix_(left, direction.nonzero()[0])].any(axis=1)
+            rows = left[common]
+            along = np.sum(matrix[rows] * direction, axis=1)
+            matrix[rows] -= along[:, None] * direction
+            lengths[number, rows] = np.linalg.norm(matrix[rows], axis=1)
+            changed[rows] = True
+        score[changed] = _mean_lengths(lengths[:, changed])
+        score[pivot] = -np.inf
         chosen.append(pivot)
     return sorted(chosen)
+
+
+def _mean_lengths(lengths: Matrix) -> Matrix:
+    """The geometric mean of each column."""
+    mean: Matrix = np.exp(np.mean(np.log(lengths + _FLOOR), axis=0))
+    return mean

@@ -1,3 +1,4 @@
+import array
 import copy
 import gc
 import pickle
@@ -10,8 +11,8 @@ import pytest
 
 import mbs
 import mbs.models
-from mbs.errors import ModelError
-from mbs.native import compiled
+from mbs.errors import ModelError, Unclosable
+from mbs.native import array_calls, compiled
 
 
 def example():
@@ -75,6 +76,187 @@ def test_arrays_that_cannot_be_written_are_read(f):
     x, y = arguments()
     x.setflags(write=False)
     assert equal(f(x, y), x, y)
+
+
+LAYOUTS = {
+    "order C": np.ascontiguousarray,
+    "order F": np.asfortranarray,
+    "transposed": lambda y: np.array(y.T).T,
+    "part of a larger array": lambda y: np.pad(y, 2)[2:-2, 2:-2],
+    "every third": lambda y: np.repeat(np.repeat(y, 3, 0), 3, 1)[::3, ::3],
+    "backwards": lambda y: np.array(y[::-1, ::-1])[::-1, ::-1],
+    "Python lists": np.ndarray.tolist,
+    "tuples": lambda y: tuple(map(tuple, y)),
+    "a list of rows": list,
+    "not aligned": lambda y: np.frombuffer(b" " + y.tobytes(), offset=1).reshape(y.shape),
+}
+KINDS = ("?", "b", "B", "h", "H", "i", "I", "l", "L", "q", "Q", "e", "f", "d", "g")
+SWAPPED = (">i2", ">u4", ">i8", ">f2", ">f4", ">f8")
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """No call goes CasADi's way."""
+
+    def slow(self, args, kwargs, out):
+        raise AssertionError(f"{self.name()} went CasADi's way with {args}")
+
+    monkeypatch.setattr(array_calls.ArrayCalls, "_slow", slow)
+
+
+@pytest.fixture(params=[False, True], ids=["exact", "fast"])
+def machine_code(request):
+    return compiled(example(), fast=request.param, derivatives=0)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_every_layout_is_read_at_once(machine_code, quick, layout):
+    x, y = arguments()
+    y = np.ascontiguousarray(y)
+    assert equal(machine_code(x, LAYOUTS[layout](y)), x, y)
+
+
+@pytest.mark.parametrize("kind", [*KINDS, *SWAPPED])
+def test_every_kind_of_number_is_read_at_once(machine_code, quick, kind):
+    x, y = np.array([3, 0, 1]), np.array([[1, 0, 100], [7, 2, 1]])
+    if np.dtype(kind).kind == "f":
+        x, y = x / 4, -y / 8  # exact in every kind
+    elif np.dtype(kind).kind == "i":
+        y = -y
+    x, y = x.astype(kind), y.astype(kind)
+    assert equal(machine_code(x, y), x.astype(float), y.astype(float))
+    assert equal(machine_code(list(x), list(y)), x.astype(float), y.astype(float))
+
+
+def test_the_ends_of_short_floats():
+    f = compiled(ca.Function("f", [x := ca.SX.sym("x")], [x + 0]), derivatives=0)
+    ends = [0.0, 6e-8, -6.1e-5, 65504, np.inf, -np.inf, 2**-14, 0.1]
+    for value in np.array(ends, dtype=np.float16):
+        assert f(np.array([value]))[0] == float(value)
+    assert np.isnan(f(np.array([np.nan], dtype=np.float16))[0])
+    assert f(np.array([2**63 - 1]))[0] == 2.0**63
+    assert f(np.array([2**64 - 1], dtype=np.uint64))[0] == 2.0**64
+
+
+@pytest.mark.parametrize(
+    "x",
+    [
+        [1.0, -2, True],
+        (np.float64(1), np.int8(-2), np.True_),
+        [np.array(1.0), np.float32(-2), 1],
+        [[1.0], [-2.0], [1.0]],
+        [[1.0, -2.0, 1.0]],
+        [np.array([1.0]), np.array([-2]), [1]],
+        range(1, 4),
+        array.array("d", [1.0, -2.0, 1.0]),
+        memoryview(np.array([1.0, -2.0, 1.0])),
+    ],
+)
+def test_lists_and_what_is_like_them(machine_code, x):
+    _, y = arguments()
+    given = np.array(list(x) if isinstance(x, range) else x, dtype=float).ravel()
+    assert equal(machine_code(x, y), given, y)
+
+
+@pytest.mark.parametrize("one", [2, 2.0, True, np.float64(2), np.float32(2), np.int64(2)])
+@pytest.mark.parametrize("wrap", [lambda x: x, np.array, lambda x: [x], lambda x: np.array([[x]])])
+def test_numbers_are_read_at_once(quick, one, wrap):
+    f = compiled(ca.Function("f", [x := ca.SX.sym("x")], [3 * x]), derivatives=0)
+    assert f(wrap(one)).tolist() == [3.0 * float(one)]
+
+
+def test_one_number_stands_for_all_elements(machine_code, quick):
+    x, y = arguments()
+    assert equal(machine_code(x, 2.0), x, np.full((2, 3), 2.0))
+    assert equal(machine_code(np.array(3), y), np.full(3, 3.0), y)
+
+
+def test_only_zero_stands_for_all_elements_of_a_model(idm):
+    q = np.linspace(0.1, 0.6, 6)
+    zero = np.zeros(6)
+    for none in (0, 0.0, False, np.float64(0)):
+        assert np.array_equal(idm(q, none, 0), idm(q, zero, zero))
+    for value in (1.0, np.float64(1), np.array(1.0), np.array([1.0])):
+        with pytest.raises(ModelError, match=r"v has .* it needs 6"):
+            idm(q, value, 0)
+
+
+def test_a_sparse_input_takes_the_elements_of_its_pattern(quick):
+    x = ca.SX.sym("x", ca.Sparsity.lower(3))
+    f = compiled(ca.Function("f", [x], [2 * x]), derivatives=0)
+    given = np.arange(1.0, 10).reshape(3, 3)
+    for layout in (np.ascontiguousarray, np.asfortranarray, np.float32):
+        assert np.array_equal(f(layout(given)), 2 * np.tril(given))
+    assert np.array_equal(f(1.0), 2 * np.tril(np.ones((3, 3))))
+
+
+def test_as_many_inputs_as_a_call_may_have(quick):
+    symbols = [ca.SX.sym(f"x{k}", 2) for k in range(64)]
+    f = compiled(ca.Function("f", symbols, [sum(symbols, ca.SX(2, 1))]), derivatives=0)
+    rows = np.arange(128.0).reshape(64, 2)
+    assert np.array_equal(f(*rows), rows.sum(axis=0))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        b"abc",
+        "abc",
+        ["a", "b", "c"],
+        [1.0, 2.0],
+        [[1.0, 2.0], 3.0],
+        [1.0, None, 2.0],
+        np.array([1j, 2, 3]),
+        np.array([1, 2, 10**400], dtype=object),
+        [1, 2, 10**400],
+        np.zeros((3, 1, 1)),
+        np.array(["2020"] * 3, dtype="M8[Y]"),
+    ],
+)
+def test_what_holds_no_numbers_is_refused(machine_code, wrong, capfd):
+    _, y = arguments()
+    with pytest.raises((RuntimeError, NotImplementedError, TypeError, ModelError, ValueError)):
+        machine_code(wrong, y)
+    capfd.readouterr()
+
+
+def test_masks_are_not_passed_over(f):
+    x, y = arguments()
+    for masked in (np.ma.array(y, mask=y > 0), [np.ma.array(row) for row in y]):
+        with pytest.raises(ModelError, match="f: an input has a mask"):
+            f(x, masked)
+
+
+def test_out_of_any_layout_is_filled_at_once(machine_code, quick):
+    x, y = arguments()
+    space = np.full((9, 12), 7.0)
+    out = space[0, :8:4], space[2:4, 9:0:-4], space[4:9:4, ::5]
+    assert machine_code(x, y, out=out) is out
+    assert equal(out, x, y)
+    assert (space == 7).sum() == space.size - 14
+
+
+def test_out_may_share_memory_with_inputs(quick):
+    f = compiled(ca.Function("f", [x := ca.SX.sym("x", 3)], [x[::-1], x**2]), derivatives=0)
+    x = np.array([1.0, 2, 3])
+    squares = np.empty(3)
+    f(x, out=(x, squares))
+    assert (x.tolist(), squares.tolist()) == ([3, 2, 1], [1, 4, 9])
+
+
+def test_a_model_whose_inputs_are_checked_is_called_at_once(monkeypatch):
+    system = mbs.load("four_bar").assemble()
+    ddm = compiled(mbs.models.direct_dynamics(system), derivatives=0)
+    q = np.array(system.configuration)
+    ddm(q, 0, 0)
+    with monkeypatch.context() as patch:
+        patch.setattr(array_calls.ArrayCalls, "_slow", None)
+        first = ddm(q, np.zeros(1), 0.5)
+        assert np.array_equal(ddm(list(q), [0.0], [0.5]), first)
+    assert first == pytest.approx(np.array(mbs.models.direct_dynamics(system)(q, 0, 0.5)).ravel())
+    for off in (q + 1e-3, list(q + 1e-3)):
+        with pytest.raises(Unclosable, match="leaves the loops open"):
+            ddm(off, 0, 0)
 
 
 def test_other_arguments_go_the_way_of_casadi(f):
@@ -171,7 +353,7 @@ def test_parameters_may_be_left_out(fast):
     zero = np.zeros(1)
     assert lift(zero, zero, zero) == pytest.approx(19.62)
     assert lift(zero, zero, zero, np.ones(1)) == pytest.approx(9.81)
-    assert float(lift(0, 0, 0)) == pytest.approx(19.62)
+    assert lift(0, 0, 0)[0] == pytest.approx(19.62)
 
 
 def test_a_parameter_without_value_must_be_given():

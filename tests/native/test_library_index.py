@@ -169,7 +169,7 @@ def test_a_callback_is_left_to_the_interpreter(cache, built):
     twice = Twice()
     x = casadi.MX.sym("x")
     function = compiled(Function("outer", [x], [twice(x) + 1]), derivatives=0)
-    assert float(function(3)) == 7
+    assert function(3)[0] == 7
     assert not parts(cache)[".library"]
 
 

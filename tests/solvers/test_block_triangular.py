@@ -7,7 +7,12 @@ from casadi import DM, SX
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbs.solvers.block_triangular import block_triangular, determinant, solve_blocks
+from mbs.solvers.block_triangular import (
+    block_triangular,
+    determinant,
+    solve_blocks,
+    solve_large,
+)
 
 
 def sparse(seed, n, density):
@@ -54,3 +59,22 @@ def test_triangular_matrix_is_all_blocks_of_one():
     assert [block.size for block in block_triangular(A != 0)] == [1] * 5
     assert [block.size for block in block_triangular(np.ones((4, 4), bool))] == [4]
     assert block_triangular(np.zeros((2, 2), bool)) is None
+
+
+@pytest.mark.parametrize("pairs", [15, 30, 60])
+def test_operations_of_many_equations_in_blocks_are_proportional(pairs):
+    """Pairs of equations, each after the one before it; up to forty CasADi solves the whole."""
+    n = 2 * pairs
+    rng = np.random.default_rng(pairs)
+    near = np.subtract.outer(np.arange(n) // 2, np.arange(n) // 2)
+    A = (rng.standard_normal((n, n)) + 3 * np.eye(n)) * ((near == 0) | (near == 1))
+    order = rng.permutation(n)
+    A = A[order]
+    b = rng.standard_normal((n, 2))
+    entries = SX.sym("a", casadi.sparsify(DM(A)).sparsity())
+    right = SX.sym("b", n, 2)
+    solve = casadi.Function("solve", [entries, right], [solve_large(entries, right)])
+    found = solve(casadi.sparsify(DM(A)), b).full()
+    assert np.allclose(found, np.linalg.solve(A, b), rtol=0, atol=1e-9)
+    if pairs > 20:
+        assert solve.n_instructions() < 60 * pairs

@@ -276,8 +276,8 @@ def passage(
     txp = [t, x, p] if inputs is None else [t, x, SX.sym("z", 0), inputs, p]
     sizes = (nq, nv, rates.numel(), positions.numel(), len(anchors))
     return Passage(
-        rows=dense_function("rows", txp, rows),
-        forces=dense_function("forces", txp, forces),
+        rows=_mostly_dense("rows", txp, rows),
+        forces=_mostly_dense("forces", txp, forces),
         regularity=dense_function("regularity", txp, [regularity]),
         size=(*sizes, speeds.shape[0], int(bool(laws))),
         typical=_typical(system, q, measure),
@@ -304,6 +304,20 @@ def _without_passages(system: System, point: tuple[SX, SX, SX, SX]) -> Passage:
         size=(nq, nv, system.z.numel(), 0, 0, 0, 0),
         typical=1.0,
     )
+
+
+_LARGE = 1000
+"""Elements of an output beyond which its zeros are not written one by one: a line of C each, of
+which compilers need more than proportional time."""
+
+
+def _mostly_dense(name: str, inputs: Sequence[SX], outputs: Sequence[SX]) -> Function:
+    """A Function of dense outputs, but for those that are large and for the most part zero."""
+    values = [casadi.densify(value) for value in outputs]
+    for k, value in enumerate(values):
+        if value.numel() > _LARGE and 2 * (few := casadi.sparsify(value)).nnz() < value.numel():
+            values[k] = few
+    return Function(name, list(inputs), values, {"cse": True})
 
 
 def _position(system: System, number: int) -> int:

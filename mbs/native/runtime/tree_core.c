@@ -1,0 +1,1022 @@
+/* Inverse and direct dynamics of open trees, and their derivatives; see tree_core.h.
+ *
+ * All vectors are in the axes of the base. Wrenches, inertias and velocities of a link are about
+ * its own origin, so that no digit is lost far away from the base; where pairs of joints meet, all
+ * is about the origin of the first link of their tree, which an observer follows.
+ *
+ * What needs the link before goes from node to node; all else runs in vector lanes over nodes, and
+ * the columns of a solution in lanes side by side.
+ *
+ * Source: Khalil & Creusot 1997 (Newton and Euler); Walker & Orin 1982 (composite bodies);
+ * Featherstone 1983 (articulated bodies); Singh, Russell & Wensing 2022 (derivatives of the
+ * efforts); Carpentier & Mansard 2018 (those of the accelerations). */
+#include "tree_core.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "lanes.h"
+
+typedef mbs_lanes V;
+typedef double U __attribute__((vector_size(8 * MBS_LANES), may_alias, aligned(8)));
+typedef struct {
+  V x, y, z;
+} V3;
+typedef struct {
+  double x, y, z;
+} D3;
+
+#define INLINE static inline __attribute__((always_inline, unused))
+
+/* Vectors of three elements, of lanes and of single numbers. */
+#define OPERATIONS(T, S)                                                                      \
+  INLINE T plus##T(T a, T b) { return (T){a.x + b.x, a.y + b.y, a.z + b.z}; }                 \
+  INLINE T minus##T(T a, T b) { return (T){a.x - b.x, a.y - b.y, a.z - b.z}; }                \
+  INLINE T times##T(S s, T a) { return (T){s * a.x, s * a.y, s * a.z}; }                      \
+  INLINE T more##T(T a, S s, T b) {                                                           \
+    return (T){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};                                  \
+  }                                                                                           \
+  INLINE S dot##T(T a, T b) { return a.x * b.x + a.y * b.y + a.z * b.z; }                     \
+  INLINE T cross##T(T a, T b) {                                                               \
+    return (T){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};          \
+  }                                                                                           \
+  INLINE T plus_cross##T(T c, T a, T b) { /* c + a x b */                                     \
+    return (T){c.x + a.y * b.z - a.z * b.y, c.y + a.z * b.x - a.x * b.z,                      \
+               c.z + a.x * b.y - a.y * b.x};                                                  \
+  }                                                                                           \
+  INLINE T combine##T(T a, S x, T b, S y, T c, S z) { /* a x + b y + c z */                   \
+    return (T){a.x * x + b.x * y + c.x * z, a.y * x + b.y * y + c.y * z,                      \
+               a.z * x + b.z * y + c.z * z};                                                  \
+  }
+OPERATIONS(V3, V)
+OPERATIONS(D3, double)
+#define OF(f, a) _Generic((a), V3 : f##V3, D3 : f##D3)
+#define plus(a, b) OF(plus, a)(a, b)
+#define minus(a, b) OF(minus, a)(a, b)
+#define times(s, a) OF(times, a)(s, a)
+#define more(a, s, b) OF(more, a)(a, s, b)
+#define dot(a, b) OF(dot, a)(a, b)
+#define cross(a, b) OF(cross, a)(a, b)
+#define plus_cross(c, a, b) OF(plus_cross, a)(c, a, b)
+#define combine(a, x, b, y, c, z) OF(combine, a)(a, x, b, y, c, z)
+
+/* Rows of the work space. */
+enum {
+  X,              /* positions of joints of one velocity */
+  QD,             /* velocities */
+  QDD,            /* accelerations */
+  E,              /* 9: axes of the link in those of the link before, by columns */
+  T = E + 9,      /* 3: its origin there */
+  R = T + 3,      /* 9: axes of the link */
+  D = R + 9,      /* 3: its origin from that of the link before */
+  P = D + 3,      /* 3: and from that of the first link of the tree */
+  SL = P + 3,     /* 3: velocity of the origin for a unit velocity of the node */
+  SA = SL + 3,    /* 3: and angular */
+  W = SA + 3,     /* 3: angular velocity of the link */
+  WL = W + 3,     /* 3: of the link before */
+  WD = WL + 3,    /* 3: angular acceleration of the link */
+  WDL = WD + 3,   /* 3: of the link before */
+  VD = WDL + 3,   /* 3: acceleration of the origin of the link, minus gravity */
+  VDL = VD + 3,   /* 3: of the link before */
+  ADD = VDL + 3,  /* 3: what a node adds */
+  HB = ADD + 3,   /* 3: first moments */
+  JB = HB + 3,    /* 6: inertia */
+  F = JB + 6,     /* 3: force, of the body, then of all behind the node */
+  M = F + 3,      /* 3: and moment */
+  CM = M + 3,     /* mass of all behind the node */
+  CH = CM + 1,    /* 3: and first moments */
+  CJ = CH + 3,    /* 6: and inertia */
+  N2 = CJ + 6,    /* 3: and twice the momentum */
+  K = N2 + 3,     /* 9: and moment for an angular velocity added to what moves, by columns */
+  VO = K + 9,     /* 3: velocity of the origin for the observer */
+  VL = VO + 3,    /* 3: of the point of the link before that is there */
+  FL = VL + 3,    /* 3: momentum of all behind the node for its unit velocity */
+  FA = FL + 3,    /* 3: and angular momentum, about the common point */
+  GA = FA + 3,    /* 3: effort of the node for an angular velocity added to what moves */
+  SC = GA + 3,    /* 3: unit velocity of the node, at the common point */
+  YA = SC + 3,    /* 3: rate of its axis */
+  Y2L = YA + 3,   /* 3: second rate of its motion, at the common point */
+  Y2A = Y2L + 3,  /* 3 */
+  YSL = Y2A + 3,  /* 3: twice its rate, less that of the own joint */
+  YSA = YSL + 3,  /* 3 */
+  DQL = YSA + 3,  /* 3: change of the wrench with the position of the node */
+  DQA = DQL + 3,  /* 3 */
+  DVL = DQA + 3,  /* 3: and with its velocity */
+  DVA = DVL + 3,  /* 3 */
+  GB = DVA + 3,   /* 3: spin of the rotor for a unit velocity */
+  TAU = GB + 3,   /* effort */
+  MBS_WORK_ROWS
+};
+
+typedef struct {
+  const mbs_tree *m;
+  int n, s;
+  double *w;       /* rows */
+  double *record;  /* factors: 16 for each node */
+  V *lanes;        /* 7 for each node */
+  double *square;  /* size x size, where v has another order than the tree */
+} work;
+
+static work space_of(const mbs_tree *m, double *w) {
+  work k = {m, m->size, m->stride, mbs_aligned(w), 0, 0, 0};
+  k.record = k.w + (size_t)MBS_WORK_ROWS * (size_t)k.s;
+  k.lanes = (V *)(k.record + 16 * (size_t)k.n);
+  k.square = (double *)(k.lanes + 7 * (size_t)k.n);
+  return k;
+}
+
+/* Access: lanes and single numbers, of the work space and of the table. */
+#define AT(row) (k.w + (size_t)(row) * (size_t)k.s)
+#define TABLE(row) (k.m->numbers + (size_t)(row) * (size_t)k.s)
+INLINE V lane(const double *x) { return *(const V *)x; }
+INLINE void put_lane(double *x, V value) { *(V *)x = value; }
+INLINE V3 lane3(const double *x, size_t s) {
+  return (V3){lane(x), lane(x + s), lane(x + 2 * s)};
+}
+INLINE void put_lane3(double *x, size_t s, V3 a) {
+  put_lane(x, a.x);
+  put_lane(x + s, a.y);
+  put_lane(x + 2 * s, a.z);
+}
+INLINE D3 one3(const double *x, size_t s) { return (D3){x[0], x[s], x[2 * s]}; }
+INLINE void put_one3(double *x, size_t s, D3 a) {
+  x[0] = a.x;
+  x[s] = a.y;
+  x[2 * s] = a.z;
+}
+#define L1(row) lane(AT(row) + j)
+#define L3(row) lane3(AT(row) + j, (size_t)k.s)
+#define PUT1(row, value) put_lane(AT(row) + j, value)
+#define PUT3(row, value) put_lane3(AT(row) + j, (size_t)k.s, value)
+#define TL1(row) lane(TABLE(row) + j)
+#define TL3(row) lane3(TABLE(row) + j, (size_t)k.s)
+#define O3(row, node) one3(AT(row) + (node), (size_t)k.s)
+#define PUT_O3(row, node, value) put_one3(AT(row) + (node), (size_t)k.s, value)
+#define EVERY_LANE for (int j = 0; j < k.n; j += MBS_LANES)
+
+/* Rows that go from node to node leave the lanes after the last one as they are: make them zero. */
+static void clear_ends(work k, int row, int rows) {
+  for (int r = row; r < row + rows; ++r)
+    for (int j = k.n; j < k.s; ++j) AT(r)[j] = 0;
+}
+
+/* Joints of several velocities: pose in the link before. */
+static void several(work k, const double *q) {
+  const int *joint = k.m->joints;
+  for (int c = 0; c < k.m->many; ++c, joint += 3) {
+    const int first = joint[0], count = joint[1], last = first + count - 1;
+    const double *at = q + joint[2] + (count == 6 ? 3 : 0);
+    const double unit = 1 / sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2] + at[3] * at[3]);
+    const double w = at[0] * unit, x = at[1] * unit, y = at[2] * unit, z = at[3] * unit;
+    const D3 Q[3] = {{w * w + x * x - y * y - z * z, 2 * (x * y + w * z), 2 * (x * z - w * y)},
+                     {2 * (x * y - w * z), w * w - x * x + y * y - z * z, 2 * (y * z + w * x)},
+                     {2 * (x * z + w * y), 2 * (y * z - w * x), w * w - x * x - y * y + z * z}};
+    D3 C[3], t = one3(TABLE(MBS_T) + last, (size_t)k.s);
+    for (int a = 0; a < 3; ++a) C[a] = one3(TABLE(MBS_C + 3 * a) + last, (size_t)k.s);
+    if (count == 6)
+      t = plus(t, combine(C[0], q[joint[2]], C[1], q[joint[2] + 1], C[2], q[joint[2] + 2]));
+    for (int node = first; node <= last; ++node) {
+      for (int a = 0; a < 3; ++a)
+        PUT_O3(E + 3 * a, node, combine(C[0], Q[a].x, C[1], Q[a].y, C[2], Q[a].z));
+      PUT_O3(T, node, t);
+    }
+  }
+}
+
+/* Axes and origins of all links, and the motions of all nodes. */
+static void poses(work k, const double *q) {
+  const mbs_tree *m = k.m;
+  double *x = AT(X);
+  for (int j = 0; j < k.n; ++j) x[j] = m->q_at[j] < 0 ? 0 : q[m->q_at[j]];
+  clear_ends(k, X, 1);
+  EVERY_LANE {
+    V sine, cosine;
+    mbs_sincos_wide(TL1(MBS_TURN) * L1(X), &sine, &cosine);
+    const V3 c0 = TL3(MBS_C), c1 = TL3(MBS_C + 3), c2 = TL3(MBS_C + 6);
+    PUT3(E, more(times(cosine, c0), sine, c1));
+    PUT3(E + 3, more(times(cosine, c1), -sine, c0));
+    PUT3(E + 6, c2);
+    PUT3(T, more(TL3(MBS_T), TL1(MBS_SLIDE) * L1(X), c2));
+  }
+  several(k, q);
+  D3 r0 = {1, 0, 0}, r1 = {0, 1, 0}, r2 = {0, 0, 1}, p = {0, 0, 0};
+  for (int j = 0, held = -1; j < k.n; ++j) {
+    const int i = m->link[j];
+    const D3 t = O3(T, j), e0 = O3(E, j), e1 = O3(E + 3, j), e2 = O3(E + 6, j);
+    D3 d;
+    if (i < 0) {
+      r0 = e0, r1 = e1, r2 = e2, d = t, p = (D3){0, 0, 0};
+    } else {
+      if (i != held) r0 = O3(R, i), r1 = O3(R + 3, i), r2 = O3(R + 6, i), p = O3(P, i);
+      const D3 c0 = r0, c1 = r1, c2 = r2;
+      d = combine(c0, t.x, c1, t.y, c2, t.z);
+      p = plus(p, d);
+      r0 = combine(c0, e0.x, c1, e0.y, c2, e0.z);
+      r1 = combine(c0, e1.x, c1, e1.y, c2, e1.z);
+      r2 = combine(c0, e2.x, c1, e2.y, c2, e2.z);
+    }
+    held = j;
+    PUT_O3(R, j, r0);
+    PUT_O3(R + 3, j, r1);
+    PUT_O3(R + 6, j, r2);
+    PUT_O3(D, j, d);
+    PUT_O3(P, j, p);
+  }
+  clear_ends(k, R, 15); /* R, D, P */
+  EVERY_LANE {
+    const V3 z = L3(R + 6);
+    PUT3(SL, times(TL1(MBS_SLIDE), z));
+    PUT3(SA, times(TL1(MBS_TURN), z));
+  }
+  const int *joint = m->joints;
+  for (int c = 0; c < m->many; ++c, joint += 3)
+    for (int h = 0; h < joint[1]; ++h) {
+      const int node = joint[0] + h;
+      const D3 axis = O3(R + 3 * (h % 3), node), zero = {0, 0, 0};
+      const int slides = joint[1] == 6 && h < 3;
+      PUT_O3(SL, node, slides ? axis : zero);
+      PUT_O3(SA, node, slides ? zero : axis);
+    }
+}
+
+/* First moments and inertia of all bodies in the axes of the base. */
+static void bodies(work k) {
+  EVERY_LANE {
+    const V3 r0 = L3(R), r1 = L3(R + 3), r2 = L3(R + 6), h = TL3(MBS_H);
+    PUT3(HB, combine(r0, h.x, r1, h.y, r2, h.z));
+    const V xx = TL1(MBS_J), xy = TL1(MBS_J + 1), xz = TL1(MBS_J + 2), yy = TL1(MBS_J + 3),
+            yz = TL1(MBS_J + 4), zz = TL1(MBS_J + 5);
+    const V3 a = combine(r0, xx, r1, xy, r2, xz), b = combine(r0, xy, r1, yy, r2, yz),
+             c = combine(r0, xz, r1, yz, r2, zz);
+    PUT1(JB, a.x * r0.x + b.x * r1.x + c.x * r2.x);
+    PUT1(JB + 1, a.x * r0.y + b.x * r1.y + c.x * r2.y);
+    PUT1(JB + 2, a.x * r0.z + b.x * r1.z + c.x * r2.z);
+    PUT1(JB + 3, a.y * r0.y + b.y * r1.y + c.y * r2.y);
+    PUT1(JB + 4, a.y * r0.z + b.y * r1.z + c.y * r2.z);
+    PUT1(JB + 5, a.z * r0.z + b.z * r1.z + c.z * r2.z);
+  }
+}
+
+/* An inertia matrix xx xy xz yy yz zz times a vector. */
+#define INERTIA_TIMES(J, a)                                                                   \
+  {(J)[0] * (a).x + (J)[1] * (a).y + (J)[2] * (a).z, (J)[1] * (a).x + (J)[3] * (a).y + (J)[4] * (a).z, \
+   (J)[2] * (a).x + (J)[4] * (a).y + (J)[5] * (a).z}
+#define LANES6(name, row) \
+  const V name[6] = {L1(row), L1((row) + 1), L1((row) + 2), L1((row) + 3), L1((row) + 4), L1((row) + 5)}
+
+/* Sums along the branches: row(node) = row(node before) + ADD(node), and of the link before. */
+static void along_branches(work k, int row, int of_link_before, D3 base) {
+  const mbs_tree *m = k.m;
+  D3 x = base;
+  for (int j = 0, held = -1; j < k.n; ++j) {
+    const int i = m->link[j], b = m->before[j];
+    if (b != held) x = b < 0 ? base : O3(row, b);
+    PUT_O3(of_link_before, j, i == b ? x : i < 0 ? base : O3(row, i));
+    x = plus(x, O3(ADD, j));
+    PUT_O3(row, j, x);
+    held = j;
+  }
+  clear_ends(k, row, 3);
+  clear_ends(k, of_link_before, 3);
+}
+
+/* What the last node of a joint of several velocities has is what its link has. */
+static void share(work k, int row) {
+  const int *joint = k.m->joints;
+  for (int c = 0; c < k.m->many; ++c, joint += 3) {
+    const D3 x = O3(row, joint[0] + joint[1] - 1);
+    for (int h = 0; h < joint[1] - 1; ++h) PUT_O3(row, joint[0] + h, x);
+  }
+}
+
+/* The sum over the nodes of a joint of a row times the velocities. */
+static D3 of_joint(work k, int row, const int *joint) {
+  D3 total = {0, 0, 0};
+  for (int h = 0; h < joint[1]; ++h)
+    total = more(total, AT(QD)[joint[0] + h], O3(row, joint[0] + h));
+  return total;
+}
+
+/* Velocities and accelerations of all links; `a` may be null, for zeros. */
+static void motions(work k, const double *v, const double *a) {
+  const mbs_tree *m = k.m;
+  double *qd = AT(QD), *qdd = AT(QDD);
+  for (int j = 0; j < k.n; ++j) qd[j] = v[m->v_at[j]];
+  for (int j = 0; j < k.n; ++j) qdd[j] = a ? a[m->v_at[j]] : 0;
+  clear_ends(k, QD, 2);
+  EVERY_LANE PUT3(ADD, times(L1(QD), L3(SA)));
+  along_branches(k, W, WL, (D3){0, 0, 0});
+  share(k, W);
+  EVERY_LANE {
+    const V3 sa = L3(SA);
+    PUT3(ADD, plus_cross(times(L1(QDD), sa), L3(WL), times(L1(QD), sa)));
+  }
+  along_branches(k, WD, WDL, (D3){0, 0, 0});
+  EVERY_LANE {
+    const V3 sl = L3(SL), d = times(TL1(MBS_FIRST), L3(D)), w = L3(WL);
+    const V3 carried = plus_cross(times(2 * L1(QD), sl), w, d);
+    PUT3(ADD, plus_cross(plus_cross(times(L1(QDD), sl), L3(WDL), d), w, carried));
+  }
+  const int *joint = m->joints;
+  for (int c = 0; c < m->many; ++c, joint += 3)
+    if (joint[1] == 6) { /* the velocities of a free joint are along axes that it turns */
+      const int last = joint[0] + 5;
+      const D3 turned = cross(of_joint(k, SA, joint), of_joint(k, SL, joint));
+      PUT_O3(ADD, last, plus(O3(ADD, last), turned));
+    }
+  const double *g = m->gravity;
+  along_branches(k, VD, VDL, (D3){-g[0], -g[1], -g[2]});
+}
+
+/* Spins of rotors for unit velocities, in the axes of the base. */
+static void spins(work k) {
+  if (!k.m->rotors) return;
+  for (int r = 0; r < 3; ++r) memset(AT(GB + r), 0, (size_t)k.s * sizeof(double));
+  for (int r = 0; r < k.m->rotors; ++r) {
+    const int node = k.m->rotor[2 * r], c = k.m->rotor[2 * r + 1];
+    const D3 g = one3(TABLE(MBS_SPIN) + node, (size_t)k.s);
+    PUT_O3(GB, node, combine(O3(R, c), g.x, O3(R + 3, c), g.y, O3(R + 6, c), g.z));
+  }
+}
+
+/* The wrenches of all bodies, then of all that is behind each node. */
+static void wrenches(work k) {
+  const mbs_tree *m = k.m;
+  EVERY_LANE {
+    const V3 w = L3(W), wd = L3(WD), vd = L3(VD), h = L3(HB);
+    LANES6(J, JB);
+    const V3 Jw = INERTIA_TIMES(J, w), Jwd = INERTIA_TIMES(J, wd);
+    PUT3(F, plus_cross(plus_cross(times(TL1(MBS_MASS), vd), wd, h), w, cross(w, h)));
+    PUT3(M, plus_cross(plus_cross(Jwd, w, Jw), h, vd));
+  }
+  for (int r = 0; r < m->rotors; ++r) {
+    const int node = m->rotor[2 * r], c = m->rotor[2 * r + 1];
+    const D3 g = O3(GB, node), turning = cross(O3(W, c), times(AT(QD)[node], g));
+    PUT_O3(M, c, plus(O3(M, c), more(turning, AT(QDD)[node], g)));
+  }
+  D3 f = {0, 0, 0}, mo = {0, 0, 0};
+  for (int j = k.n - 1, held = -1; j >= 0; --j) {
+    const int b = m->before[j];
+    D3 here = O3(F, j), there = O3(M, j);
+    if (held == j) { /* from the only node behind it, or the first of several */
+      here = plus(here, f), there = plus(there, mo);
+      PUT_O3(F, j, here);
+      PUT_O3(M, j, there);
+    }
+    if (b < 0) continue;
+    if (m->link[j] == b) there = plus_cross(there, O3(D, j), here);
+    if (b == j - 1) {
+      f = here, mo = there, held = b;
+    } else {
+      PUT_O3(F, b, plus(O3(F, b), here));
+      PUT_O3(M, b, plus(O3(M, b), there));
+    }
+  }
+}
+
+/* Efforts of all nodes; what bodies and rotors need, and what the joints need themselves. */
+static void efforts(work k) {
+  const mbs_tree *m = k.m;
+  EVERY_LANE {
+    V tau = dot(L3(SL), L3(F)) + dot(L3(SA), L3(M));
+    tau += TL1(MBS_IA) * L1(QDD) + TL1(MBS_FV) * L1(QD);
+    tau += TL1(MBS_STIFFNESS) * (L1(X) - TL1(MBS_REST));
+    PUT1(TAU, tau);
+  }
+  double *tau = AT(TAU);
+  for (int r = 0; r < m->rotors; ++r) {
+    const int node = m->rotor[2 * r], c = m->rotor[2 * r + 1];
+    tau[node] += dot(O3(GB, node), O3(WD, c));
+  }
+  for (int r = 0; r < m->rubbing; ++r) {
+    const int node = m->rub[r];
+    const double v = AT(QD)[node], width = TABLE(MBS_WIDTH)[node];
+    tau[node] += TABLE(MBS_FS)[node] * (width == 0 ? (v > 0) - (v < 0) : tanh(v / width));
+  }
+  const int *joint = m->joints;
+  for (int c = 0; c < m->many; ++c, joint += 3)
+    if (joint[1] == 6) { /* rotors of a free joint, whose axes turn: Ia (a + w x v) */
+      const double *v = AT(QD) + joint[0];
+      const D3 turned = cross(((D3){v[3], v[4], v[5]}), ((D3){v[0], v[1], v[2]}));
+      tau[joint[0]] += TABLE(MBS_IA)[joint[0]] * turned.x;
+      tau[joint[0] + 1] += TABLE(MBS_IA)[joint[0] + 1] * turned.y;
+      tau[joint[0] + 2] += TABLE(MBS_IA)[joint[0] + 2] * turned.z;
+    }
+}
+
+static void inverse(work k, const double *q, const double *v, const double *a) {
+  poses(k, q);
+  bodies(k);
+  spins(k);
+  motions(k, v, a);
+  wrenches(k);
+  efforts(k);
+}
+
+void mbs_tree_idm(const mbs_tree *m, const double *q, const double *v, const double *a, double *tau,
+                  double *w) {
+  const work k = space_of(m, w);
+  inverse(k, q, v, a);
+  if (tau)
+    for (int j = 0; j < k.n; ++j) tau[m->v_at[j]] = AT(TAU)[j];
+}
+
+/* Mass, first moments and inertia of all that is behind each node. */
+static void composites(work k) {
+  const mbs_tree *m = k.m;
+  EVERY_LANE {
+    PUT1(CM, TL1(MBS_MASS));
+    PUT3(CH, L3(HB));
+    for (int r = 0; r < 6; ++r) PUT1(CJ + r, L1(JB + r));
+  }
+  double *mass = AT(CM), *J[6];
+  for (int r = 0; r < 6; ++r) J[r] = AT(CJ + r);
+  double sum = 0, I[6] = {0};
+  D3 h = {0, 0, 0};
+  for (int j = k.n - 1, held = -1; j >= 0; --j) {
+    const int b = m->before[j];
+    if (held == j) {
+      mass[j] = sum += mass[j];
+      h = plus(O3(CH, j), h);
+      PUT_O3(CH, j, h);
+      for (int r = 0; r < 6; ++r) J[r][j] = I[r] += J[r][j];
+    } else {
+      sum = mass[j], h = O3(CH, j);
+      for (int r = 0; r < 6; ++r) I[r] = J[r][j];
+    }
+    if (b < 0) continue;
+    if (m->link[j] == b) {
+      const D3 d = O3(D, j), e = more(h, 0.5 * sum, d);
+      const double xx = d.x * e.x, yy = d.y * e.y, zz = d.z * e.z;
+      h = more(h, sum, d);
+      I[0] += 2 * (yy + zz);
+      I[1] -= d.x * e.y + d.y * e.x;
+      I[2] -= d.x * e.z + d.z * e.x;
+      I[3] += 2 * (xx + zz);
+      I[4] -= d.y * e.z + d.z * e.y;
+      I[5] += 2 * (xx + yy);
+    }
+    if (b == j - 1) {
+      held = b;
+    } else {
+      mass[b] += sum;
+      PUT_O3(CH, b, plus(O3(CH, b), h));
+      for (int r = 0; r < 6; ++r) J[r][b] += I[r];
+    }
+  }
+}
+
+/* Momenta of all that is behind each node for its unit velocity, and unit velocities, about the
+ * common point; TAU is the inertia that the node moves. */
+static void momenta(work k) {
+  EVERY_LANE {
+    const V3 sl = L3(SL), sa = L3(SA), h = L3(CH), p = L3(P);
+    LANES6(J, CJ);
+    const V3 Jsa = INERTIA_TIMES(J, sa);
+    const V3 f = plus_cross(times(L1(CM), sl), sa, h), l = plus_cross(Jsa, h, sl);
+    PUT1(TAU, dot(sl, f) + dot(sa, l) + TL1(MBS_IA));
+    PUT3(FL, f);
+    PUT3(FA, plus_cross(l, p, f));
+    PUT3(SC, plus_cross(sl, p, sa));
+  }
+  for (int r = 0; r < k.m->rotors; ++r) {
+    const int node = k.m->rotor[2 * r], own = k.m->rotor[2 * r + 1] == node;
+    const D3 g = O3(GB, node);
+    PUT_O3(FA, node, plus(O3(FA, node), g));
+    if (own) AT(TAU)[node] += 2 * dot(g, O3(SA, node));
+  }
+}
+
+/* Lanes in a column of a matrix: all of them where there is room, else those before the end. */
+INLINE void put_column(double *x, const double *end, V value) {
+  if (__builtin_expect(x + MBS_LANES <= end, 1))
+    *(U *)x = (U)value;
+  else if (x < end)
+    memcpy(x, &value, (size_t)(end - x) * sizeof(double));
+}
+INLINE V any_lane(const double *x) { return (V)(*(const U *)x); }
+INLINE V3 any_lane3(const double *x, size_t s) {
+  return (V3){any_lane(x), any_lane(x + s), any_lane(x + 2 * s)};
+}
+#define N3(row) any_lane3(AT(row) + i, (size_t)k.s)
+INLINE V3 all3(D3 a) { return (V3){mbs_all(a.x), mbs_all(a.y), mbs_all(a.z)}; }
+#define ALL3(row, node) all3(O3(row, node))
+INLINE void zeros(double *x, int count) {
+  for (int j = 0; j < count; ++j) x[j] = 0;
+}
+
+/* A matrix in the order of the tree brought to that of v. */
+static void reorder(work k, double *x) {
+  if (k.m->in_order || !x) return;
+  const size_t n = (size_t)k.n;
+  memcpy(k.square, x, n * n * sizeof(double));
+  for (size_t c = 0; c < n; ++c)
+    for (size_t r = 0; r < n; ++r)
+      x[(size_t)k.m->v_at[r] + n * (size_t)k.m->v_at[c]] = k.square[r + n * c];
+}
+
+/* The inertia matrix, column by column from its top: what lanes write beyond a run of nodes is
+ * written again by what follows. */
+static void inertia(work k, double *A) {
+  const mbs_tree *m = k.m;
+  const double *end = A + (size_t)k.n * (size_t)k.n;
+  for (int c = 0; c < k.n; ++c, A += k.n) {
+    const V3 fl = ALL3(FL, c), fa = ALL3(FA, c), sl = ALL3(SC, c), sa = ALL3(SA, c);
+    int done = 0;
+    for (int r = m->runs_from[c]; r < m->runs_from[c + 1]; ++r) {
+      const int from = m->runs[2 * r], to = m->runs[2 * r + 1];
+      zeros(A + done, from - done);
+      for (int i = from; i < to; i += MBS_LANES)
+        put_column(A + i, end, dot(fl, N3(SC)) + dot(fa, N3(SA)));
+      done = to;
+    }
+    zeros(A + done, m->first[c] - done);
+    for (int i = m->first[c]; i < m->end[c]; i += MBS_LANES)
+      put_column(A + i, end, dot(N3(FL), sl) + dot(N3(FA), sa));
+    A[c] = AT(TAU)[c];
+    zeros(A + m->end[c], k.n - m->end[c]);
+  }
+}
+
+void mbs_tree_inertia(const mbs_tree *m, const double *q, double *A, double *w) {
+  const work k = space_of(m, w);
+  if (!A) return;
+  poses(k, q);
+  bodies(k);
+  spins(k);
+  composites(k);
+  momenta(k);
+  inertia(k, A);
+  reorder(k, A);
+}
+
+/* Velocities of all links for an observer who follows the first link of their tree. */
+static void observed(work k) {
+  const mbs_tree *m = k.m;
+  EVERY_LANE {
+    const V3 carried = plus_cross(times(L1(QD), L3(SL)), L3(WL), times(TL1(MBS_FIRST), L3(D)));
+    PUT3(ADD, times(TL1(MBS_INNER), carried));
+  }
+  along_branches(k, VO, VL, (D3){0, 0, 0});
+  share(k, VO);
+  EVERY_LANE PUT3(VL, more(L3(VO), -L1(QD), L3(SL)));
+  const int *joint = m->joints;
+  for (int c = 0; c < m->many; ++c, joint += 3) {
+    const D3 behind = minus(O3(VO, joint[0]), of_joint(k, SL, joint));
+    for (int h = 0; h < joint[1]; ++h) PUT_O3(VL, joint[0] + h, behind);
+  }
+}
+
+/* Twice the momentum of all that is behind each node, and the matrix K that gives the moment which
+ * an angular velocity s adds: 2 (tr(N) - N) s, where N is the integral of velocity times place. */
+static void moving_composites(work k) {
+  const mbs_tree *m = k.m;
+  EVERY_LANE {
+    const V3 w = L3(W), v = L3(VO), h = L3(HB);
+    LANES6(J, JB);
+    const V mass = TL1(MBS_MASS), trace = J[0] + J[3] + J[5];
+    const V3 n = times(mbs_all(2), plus_cross(times(mass, v), w, h)), v2 = times(mbs_all(2), v);
+    const V vh = dot(v2, h);
+    /* column c: 2 w x J_c - trace w x e_c + 2 (v . h) e_c - 2 v h_c */
+    const V3 w2 = times(mbs_all(2), w);
+    V3 x = cross(w2, ((V3){J[0], J[1], J[2]})), y = cross(w2, ((V3){J[1], J[3], J[4]})),
+       z = cross(w2, ((V3){J[2], J[4], J[5]}));
+    x = more(x, -h.x, v2), y = more(y, -h.y, v2), z = more(z, -h.z, v2);
+    x.x += vh, x.y -= trace * w.z, x.z += trace * w.y;
+    y.y += vh, y.x += trace * w.z, y.z -= trace * w.x;
+    z.z += vh, z.x -= trace * w.y, z.y += trace * w.x;
+    PUT3(N2, n);
+    PUT3(K, x);
+    PUT3(K + 3, y);
+    PUT3(K + 6, z);
+  }
+  for (int r = 0; r < m->rotors; ++r) { /* K - spin x */
+    const int node = m->rotor[2 * r], c = m->rotor[2 * r + 1];
+    const D3 s = times(AT(QD)[node], O3(GB, node));
+    AT(K + 1)[c] -= s.z, AT(K + 2)[c] += s.y;
+    AT(K + 3)[c] += s.z, AT(K + 5)[c] -= s.x;
+    AT(K + 6)[c] -= s.y, AT(K + 7)[c] += s.x;
+  }
+  for (int j = k.n - 1; j >= 0; --j) {
+    const int b = m->before[j];
+    if (b < 0) continue;
+    const D3 n = O3(N2, j);
+    D3 x = O3(K, j), y = O3(K + 3, j), z = O3(K + 6, j);
+    if (m->link[j] == b) { /* about the origin of the link before: (n . d) - n d' */
+      const D3 d = O3(D, j);
+      const double nd = dot(n, d);
+      x = more(x, -d.x, n), y = more(y, -d.y, n), z = more(z, -d.z, n);
+      x.x += nd, y.y += nd, z.z += nd;
+    }
+    PUT_O3(N2, b, plus(O3(N2, b), n));
+    PUT_O3(K, b, plus(O3(K, b), x));
+    PUT_O3(K + 3, b, plus(O3(K + 3, b), y));
+    PUT_O3(K + 6, b, plus(O3(K + 6, b), z));
+  }
+}
+
+/* What a node changes of the wrench behind it, and how its effort changes with other nodes. */
+static void changes(work k) {
+  const mbs_tree *m = k.m;
+  EVERY_LANE {
+    const V3 sl = L3(SL), sa = L3(SA), wl = L3(WL), w = L3(W), wdl = L3(WDL), vl = L3(VL), p = L3(P);
+    const V3 d = L3(D), h = L3(CH), n = L3(N2), k0 = L3(K), k1 = L3(K + 3), k2 = L3(K + 6);
+    const V mass = L1(CM);
+    LANES6(J, CJ);
+    /* acceleration of the point of the link before, less w x v: that of a twist */
+    const V3 swing = cross(wl, d);
+    const V3 al = plus_cross(plus_cross(L3(VDL), wdl, d), wl, minus(swing, vl));
+    /* rates of the unit velocity S of the node: y = v x S, y2 = a x S + v x y, v of the link before */
+    const V3 yl = plus_cross(cross(wl, sl), vl, sa), ya = cross(wl, sa);
+    const V3 y2l = plus_cross(plus_cross(plus_cross(cross(wdl, sl), al, sa), wl, yl), vl, ya);
+    const V3 y2a = plus_cross(cross(wdl, sa), wl, ya);
+    const V3 ysl = plus_cross(plus_cross(yl, w, sl), L3(VO), sa), ysa = plus_cross(ya, w, sa);
+    PUT3(YA, ya);
+    PUT3(Y2L, plus_cross(y2l, p, y2a));
+    PUT3(Y2A, y2a);
+    PUT3(YSL, plus_cross(ysl, p, ysa));
+    PUT3(YSA, ysa);
+    /* effort for an angular velocity of all behind: K' sa + n x sl */
+    PUT3(GA, plus_cross(((V3){dot(k0, sa), dot(k1, sa), dot(k2, sa)}), n, sl));
+    /* change with the position: I y2 + K y + S x f */
+    const V3 Jy2 = INERTIA_TIMES(J, y2a), Jys = INERTIA_TIMES(J, ysa);
+    const V3 f = L3(F);
+    const V3 ql = plus_cross(plus_cross(plus_cross(times(mass, y2l), y2a, h), ya, n), sa, f);
+    const V3 qa = plus_cross(plus_cross(plus_cross(plus(Jy2, combine(k0, ya.x, k1, ya.y, k2, ya.z)), h,
+                                                   y2l), sa, L3(M)), sl, f);
+    PUT3(DQL, ql);
+    PUT3(DQA, plus_cross(qa, p, ql));
+    /* and with the velocity: I ys + K sa */
+    const V3 ul = plus_cross(plus_cross(times(mass, ysl), ysa, h), sa, n);
+    const V3 ua = plus_cross(plus(Jys, combine(k0, sa.x, k1, sa.y, k2, sa.z)), h, ysl);
+    PUT3(DVL, ul);
+    PUT3(DVA, plus_cross(ua, p, ul));
+  }
+  for (int r = 0; r < m->rotors; ++r) {
+    const int node = m->rotor[2 * r], c = m->rotor[2 * r + 1];
+    const D3 turning = cross(O3(W, c), O3(GB, node));
+    PUT_O3(GA, node, plus(O3(GA, node), turning));
+    PUT_O3(DVA, node, plus(O3(DVA, node), turning));
+  }
+}
+
+/* The derivatives, column by column from its top as `inertia`; a matrix that is null is left out:
+ * its columns go to one and the same place. */
+static void pairs(work k, double *dq, double *dv, double *A) {
+  const mbs_tree *m = k.m;
+  const size_t n = (size_t)k.n;
+  const size_t step_q = dq ? n : 0, step_v = dv ? n : 0, step_a = A ? n : 0;
+  if (!dq) dq = AT(E);
+  if (!dv) dv = AT(E + 1);
+  if (!A) A = AT(E + 2);
+  const double *end_q = dq + (step_q ? n * n : n), *end_v = dv + (step_v ? n * n : n),
+               *end_a = A + (step_a ? n * n : n);
+  for (int c = 0; c < k.n; ++c, dq += step_q, dv += step_v, A += step_a) {
+    const V3 ql = ALL3(DQL, c), qa = ALL3(DQA, c), ul = ALL3(DVL, c), ua = ALL3(DVA, c);
+    const V3 fl = ALL3(FL, c), fa = ALL3(FA, c);
+    int done = 0;
+    for (int r = m->runs_from[c]; r < m->runs_from[c + 1]; ++r) {
+      const int from = m->runs[2 * r], to = m->runs[2 * r + 1];
+      zeros(dq + done, from - done);
+      zeros(dv + done, from - done);
+      zeros(A + done, from - done);
+      for (int i = from; i < to; i += MBS_LANES) {
+        const V3 sl = N3(SC), sa = N3(SA);
+        put_column(dq + i, end_q, dot(ql, sl) + dot(qa, sa));
+        put_column(dv + i, end_v, dot(ul, sl) + dot(ua, sa));
+        put_column(A + i, end_a, dot(fl, sl) + dot(fa, sa));
+      }
+      done = to;
+    }
+    const int first = m->first[c], end = m->end[c];
+    zeros(dq + done, first - done);
+    zeros(dv + done, first - done);
+    zeros(A + done, first - done);
+    const V3 sl = ALL3(SC, c), sa = ALL3(SA, c), ya = ALL3(YA, c);
+    const V3 y2l = ALL3(Y2L, c), y2a = ALL3(Y2A, c), ysl = ALL3(YSL, c), ysa = ALL3(YSA, c);
+    for (int i = first; i < end; i += MBS_LANES) {
+      const V3 l = N3(FL), a = N3(FA), g = N3(GA);
+      put_column(dq + i, end_q, dot(l, y2l) + dot(a, y2a) + dot(g, ya));
+      put_column(dv + i, end_v, dot(l, ysl) + dot(a, ysa) + dot(g, sa));
+      put_column(A + i, end_a, dot(l, sl) + dot(a, sa));
+    }
+    zeros(dq + end, k.n - end);
+    zeros(dv + end, k.n - end);
+    zeros(A + end, k.n - end);
+    /* what the joint needs itself */
+    const double v = AT(QD)[c], Fs = TABLE(MBS_FS)[c], width = TABLE(MBS_WIDTH)[c];
+    dq[c] += TABLE(MBS_STIFFNESS)[c];
+    dv[c] += TABLE(MBS_FV)[c];
+    if (Fs != 0 && width != 0) {
+      const double t = tanh(v / width);
+      dv[c] += Fs * (1 - t * t) / width;
+    }
+    A[c] = AT(TAU)[c];
+  }
+}
+
+/* What `pairs` leaves out of the derivatives by velocities: rotors that spin with their own link,
+ * and those of free joints, whose axes turn: Ia (a + w x v). */
+static void turning_rotors(work k, double *dv) {
+  const mbs_tree *m = k.m;
+  const size_t n = (size_t)k.n;
+  for (int r = 0; r < m->rotors; ++r) {
+    const int node = m->rotor[2 * r];
+    if (m->rotor[2 * r + 1] == node)
+      dv[(size_t)node * (n + 1)] += dot(O3(SA, node), cross(O3(W, node), O3(GB, node)));
+  }
+  const int *joint = m->joints;
+  for (int c = 0; c < m->many; ++c, joint += 3)
+    if (joint[1] == 6)
+      for (int x = 0; x < 3; ++x) {
+        const int y = (x + 1) % 3, z = (x + 2) % 3;
+        const size_t first = (size_t)joint[0];
+        const double Ia = TABLE(MBS_IA)[joint[0] + x], *v = AT(QD) + first;
+        double *row = dv + first + (size_t)x + n * first; /* of the elements of w x v */
+        row[n * (size_t)z] += Ia * v[3 + y];
+        row[n * (size_t)y] -= Ia * v[3 + z];
+        row[n * (size_t)(3 + y)] += Ia * v[z];
+        row[n * (size_t)(3 + z)] -= Ia * v[y];
+      }
+}
+
+/* Derivatives of the efforts in the order of the tree; what `inverse` found is in the work space. */
+static void slopes(work k, double *dq, double *dv, double *A) {
+  observed(k);
+  composites(k);
+  moving_composites(k);
+  momenta(k);
+  changes(k);
+  pairs(k, dq, dv, A);
+  if (dv) turning_rotors(k, dv);
+}
+
+void mbs_tree_idm_derivatives(const mbs_tree *m, const double *q, const double *v, const double *a,
+                              double *dq, double *dv, double *A, double *tau, double *w) {
+  const work k = space_of(m, w);
+  inverse(k, q, v, a);
+  if (tau)
+    for (int j = 0; j < k.n; ++j) tau[m->v_at[j]] = AT(TAU)[j];
+  slopes(k, dq, dv, A);
+  reorder(k, dq);
+  reorder(k, dv);
+  reorder(k, A);
+}
+
+/* What a solution needs of each node. */
+enum { RS = 0, RU = 6, RD = 12, RP = 13 }; /* motion, U / D, 1 / D, origin */
+
+/* An inertia matrix of six rows: force M al + N wd, moment N' al + J wd; N by rows. */
+typedef struct {
+  double M[6], J[6];
+  D3 N[3];
+} articulated;
+
+INLINE D3 times_one(const double *J, D3 a) { return (D3)INERTIA_TIMES(J, a); }
+
+/* The same inertia about a point that is d behind. */
+INLINE void shift(articulated *I, D3 d) {
+  const double *M = I->M;
+  const D3 *N = I->N;
+  const D3 before[3] = {{N[0].x, N[1].x, N[2].x}, {N[0].y, N[1].y, N[2].y}, {N[0].z, N[1].z, N[2].z}};
+  I->N[0] = plus_cross(I->N[0], d, ((D3){M[0], M[1], M[2]}));
+  I->N[1] = plus_cross(I->N[1], d, ((D3){M[1], M[3], M[4]}));
+  I->N[2] = plus_cross(I->N[2], d, ((D3){M[2], M[4], M[5]}));
+  const D3 x = cross(d, ((D3){N[0].x, N[1].x, N[2].x})), y = cross(d, ((D3){N[0].y, N[1].y, N[2].y})),
+           z = cross(d, ((D3){N[0].z, N[1].z, N[2].z}));
+  const D3 u = cross(d, before[0]), v = cross(d, before[1]), t = cross(d, before[2]);
+  I->J[0] += x.x + u.x;
+  I->J[1] += y.x + u.y;
+  I->J[2] += z.x + u.z;
+  I->J[3] += y.y + v.y;
+  I->J[4] += z.y + v.z;
+  I->J[5] += z.z + t.z;
+}
+
+/* The inertia less what the free motion of a node takes: I - U U' / D, given U and U / D. */
+INLINE void release(articulated *I, D3 l, D3 a, D3 lr, D3 ar) {
+  I->M[0] -= l.x * lr.x, I->M[1] -= l.x * lr.y, I->M[2] -= l.x * lr.z;
+  I->M[3] -= l.y * lr.y, I->M[4] -= l.y * lr.z, I->M[5] -= l.z * lr.z;
+  I->N[0] = more(I->N[0], -l.x, ar);
+  I->N[1] = more(I->N[1], -l.y, ar);
+  I->N[2] = more(I->N[2], -l.z, ar);
+  I->J[0] -= a.x * ar.x, I->J[1] -= a.x * ar.y, I->J[2] -= a.x * ar.z;
+  I->J[3] -= a.y * ar.y, I->J[4] -= a.y * ar.z, I->J[5] -= a.z * ar.z;
+}
+
+/* Rows of the work space that `inverse` and `slopes` no longer need: sums at forks. */
+enum { AM = E, AJ = CJ, AN = K };
+
+INLINE void load(work k, articulated *I, int j) {
+  for (int r = 0; r < 6; ++r) I->M[r] = AT(AM + r)[j], I->J[r] = AT(AJ + r)[j];
+  for (int r = 0; r < 3; ++r) I->N[r] = O3(AN + 3 * r, j);
+}
+
+/* The articulated inertia of each node as far as a solution needs it. */
+static void factorise(work k) {
+  const mbs_tree *m = k.m;
+  EVERY_LANE {
+    const V zero = mbs_all(0), mass = TL1(MBS_MASS);
+    const V3 h = L3(HB);
+    for (int r = 0; r < 6; ++r) PUT1(AM + r, r == 0 || r == 3 || r == 5 ? mass : zero);
+    for (int r = 0; r < 6; ++r) PUT1(AJ + r, L1(JB + r));
+    PUT3(AN, ((V3){zero, h.z, -h.y})); /* wd x h */
+    PUT3(AN + 3, ((V3){-h.z, zero, h.x}));
+    PUT3(AN + 6, ((V3){h.y, -h.x, zero}));
+  }
+  articulated I;
+  memset(&I, 0, sizeof I);
+  for (int j = k.n - 1, held = -1; j >= 0; --j) {
+    const int b = m->before[j];
+    if (held == j) {
+      articulated own;
+      load(k, &own, j);
+      for (int r = 0; r < 6; ++r) I.M[r] += own.M[r], I.J[r] += own.J[r];
+      for (int r = 0; r < 3; ++r) I.N[r] = plus(I.N[r], own.N[r]);
+    } else {
+      load(k, &I, j);
+    }
+    const D3 sl = O3(SL, j), sa = O3(SA, j);
+    D3 l, a;
+    if (TABLE(MBS_TURN)[j] != 0) {
+      l = (D3){dot(I.N[0], sa), dot(I.N[1], sa), dot(I.N[2], sa)};
+      a = times_one(I.J, sa);
+    } else {
+      l = plus(times_one(I.M, sl), ((D3){dot(I.N[0], sa), dot(I.N[1], sa), dot(I.N[2], sa)}));
+      a = plus(times_one(I.J, sa), combine(I.N[0], sl.x, I.N[1], sl.y, I.N[2], sl.z));
+    }
+    double inertia = dot(sl, l) + dot(sa, a) + TABLE(MBS_IA)[j];
+    if (m->rotors) { /* U + spin; the rotor of a joint on its own link feels the joint too */
+      const D3 g = O3(GB, j);
+      a = plus(a, g);
+      inertia += 2 * TABLE(MBS_OWN)[j] * dot(g, sa);
+    }
+    const double ratio = 1 / inertia;
+    const D3 lr = times(ratio, l), ar = times(ratio, a), d = times(TABLE(MBS_FIRST)[j], O3(D, j));
+    double *record = k.record + 16 * (size_t)j;
+    put_one3(record + RS, 1, sl);
+    put_one3(record + RS + 3, 1, sa);
+    put_one3(record + RU, 1, lr);
+    put_one3(record + RU + 3, 1, ar);
+    put_one3(record + RP, 1, d);
+    record[RD] = ratio;
+    if (b < 0) continue;
+    release(&I, l, a, lr, ar);
+    if (m->link[j] == b) shift(&I, d);
+    if (b == j - 1) {
+      held = b;
+    } else {
+      for (int r = 0; r < 6; ++r) AT(AM + r)[b] += I.M[r], AT(AJ + r)[b] += I.J[r];
+      for (int r = 0; r < 3; ++r) PUT_O3(AN + 3 * r, b, plus(O3(AN + 3 * r, b), I.N[r]));
+    }
+  }
+}
+
+/* Solutions of A a = right by the factors, in place: of one column, and of lanes of columns. Nodes
+ * from `count` on have zeros to the right, and are not wanted. `sums` are six for each node. */
+#define SOLVE(NAME, T, S, ALL)                                                                  static void NAME(work k, S *x, int count, S *sums) {                                            const int *before = k.m->before;                                                              const S zero = ALL(0);                                                                        for (int j = 0; j < 6 * count; ++j) sums[j] = zero;                                           for (int j = count - 1; j >= 0; --j) {                                                          const double *r = k.record + 16 * (size_t)j;                                                  const S *f = sums + 6 * (size_t)j;                                                            const int b = before[j];                                                                      const S u = x[j] - (f[0] * r[0] + f[1] * r[1] + f[2] * r[2]) -                                            (f[3] * r[3] + f[4] * r[4] + f[5] * r[5]);                                        x[j] = u;                                                                                     if (b < 0) continue;                                                                          S *to = sums + 6 * (size_t)b;                                                                 const S fx = f[0] + u * r[6], fy = f[1] + u * r[7], fz = f[2] + u * r[8];                     to[0] += fx;                                                                                  to[1] += fy;                                                                                  to[2] += fz;                                                                                  to[3] += f[3] + u * r[9] + fz * r[14] - fy * r[15];                                           to[4] += f[4] + u * r[10] + fx * r[15] - fz * r[13];                                          to[5] += f[5] + u * r[11] + fy * r[13] - fx * r[14];                                        }                                                                                             for (int j = 0; j < count; ++j) {                                                               const double *r = k.record + 16 * (size_t)j;                                                  const int b = before[j];                                                                      const S *i = sums + 6 * (size_t)(b < 0 ? 0 : b);                                              S a[6] = {zero, zero, zero, zero, zero, zero};                                                if (b >= 0) {                                                                                   a[0] = i[0] + i[4] * r[15] - i[5] * r[14];                                                    a[1] = i[1] + i[5] * r[13] - i[3] * r[15];                                                    a[2] = i[2] + i[3] * r[14] - i[4] * r[13];                                                    a[3] = i[3];                                                                                  a[4] = i[4];                                                                                  a[5] = i[5];                                                                                }                                                                                             const S value = x[j] * r[12] - (a[0] * r[6] + a[1] * r[7] + a[2] * r[8]) -                                    (a[3] * r[9] + a[4] * r[10] + a[5] * r[11]);                                  x[j] = value;                                                                                 for (int h = 0; h < 6; ++h) sums[6 * (size_t)j + h] = a[h] + value * r[h];                  }                                                                                           }
+#define AS_IT_IS(x) (x)
+SOLVE(solve, D3, double, AS_IT_IS)
+SOLVE(solve_lanes, V3, V, mbs_all)
+
+/* The accelerations, in the order of the tree, in the row QDD; `inverse` was without any. */
+static void accelerations(work k, const double *tau) {
+  double *a = AT(QDD);
+  for (int j = 0; j < k.n; ++j) a[j] = tau[k.m->v_at[j]] - AT(TAU)[j];
+  factorise(k);
+  solve(k, a, k.n, (double *)k.lanes);
+}
+
+void mbs_tree_ddm(const mbs_tree *m, const double *q, const double *v, const double *tau, double *a,
+                  double *w) {
+  const work k = space_of(m, w);
+  inverse(k, q, v, 0);
+  accelerations(k, tau);
+  if (a)
+    for (int j = 0; j < k.n; ++j) a[m->v_at[j]] = AT(QDD)[j];
+}
+
+/* Columns of a matrix side by side in lanes, with the opposite sign; and back by mbs_columns. */
+static void to_lanes(V *rows, int count, int columns, const double *from, size_t step) {
+  double *x = (double *)rows;
+  int first = 0;
+#if defined(MBS_PAIR)
+  if (columns == MBS_LANES)
+    for (; first + MBS_LANES <= count; first += MBS_LANES) {
+      V square[MBS_LANES];
+      MBS_UNROLLED for (int l = 0; l < MBS_LANES; ++l)
+        square[l] = -(V)(*(const U *)(from + step * (size_t)l + first));
+      mbs_transpose(square);
+      MBS_UNROLLED for (int r = 0; r < MBS_LANES; ++r) rows[first + r] = square[r];
+    }
+#endif
+  for (int r = first; r < count; ++r)
+    for (int l = 0; l < MBS_LANES; ++l)
+      x[(size_t)r * MBS_LANES + (size_t)l] = l < columns ? -from[step * (size_t)l + (size_t)r] : 0;
+}
+
+static void from_lanes(const V *rows, int count, int columns, double *to, size_t step) {
+  double *column[MBS_LANES];
+  for (int l = 0; l < MBS_LANES; ++l) column[l] = to + step * (size_t)(l < columns ? l : 0);
+  mbs_columns(rows, count, columns, column);
+}
+
+/* - A^-1 times a matrix, in place. */
+static void solve_matrix(work k, double *x) {
+  const size_t n = (size_t)k.n;
+  V *rows = k.lanes + 6 * n;
+  for (int c = 0; c < k.n; c += MBS_LANES) {
+    const int columns = k.n - c < MBS_LANES ? k.n - c : MBS_LANES;
+    to_lanes(rows, k.n, columns, x + n * (size_t)c, n);
+    solve_lanes(k, rows, k.n, k.lanes);
+    from_lanes(rows, k.n, columns, x + n * (size_t)c, n);
+  }
+}
+
+/* A^-1: its upper triangle needs no node behind the column's; the lower one is the same. */
+static void inverse_matrix(work k, double *x) {
+  const size_t n = (size_t)k.n;
+  V *rows = k.lanes + 6 * n;
+  for (int c = 0; c < k.n; c += MBS_LANES) {
+    const int columns = k.n - c < MBS_LANES ? k.n - c : MBS_LANES, count = c + columns;
+    memset(rows, 0, (size_t)count * sizeof(V));
+    for (int l = 0; l < columns; ++l) ((double *)(rows + c + l))[l] = 1;
+    solve_lanes(k, rows, count, k.lanes);
+    from_lanes(rows, count, columns, x + n * (size_t)c, n);
+  }
+  for (size_t c = 0; c < n; ++c)
+    for (size_t r = c + 1; r < n; ++r) x[r + n * c] = x[c + n * r];
+}
+
+void mbs_tree_ddm_derivatives(const mbs_tree *m, const double *q, const double *v,
+                              const double *tau, double *dq, double *dv, double *dtau, double *a,
+                              double *w) {
+  const work k = space_of(m, w);
+  inverse(k, q, v, 0);
+  accelerations(k, tau);
+  const double *found = AT(QDD);
+  double *given = AT(TAU); /* in the order of v */
+  for (int j = 0; j < k.n; ++j) given[m->v_at[j]] = found[j];
+  if (a) memcpy(a, given, (size_t)k.n * sizeof(double));
+  if (dq || dv) {
+    motions(k, v, given);
+    wrenches(k);
+    slopes(k, dq, dv, 0);
+    if (dq) solve_matrix(k, dq);
+    if (dv) solve_matrix(k, dv);
+  }
+  if (dtau) inverse_matrix(k, dtau);
+  reorder(k, dq);
+  reorder(k, dv);
+  reorder(k, dtau);
+}
+
+void mbs_tree_pivots(const mbs_tree *m, const double *q, double *free_, double *locked, double *w) {
+  const work k = space_of(m, w);
+  poses(k, q);
+  bodies(k);
+  spins(k);
+  composites(k);
+  momenta(k);
+  if (locked)
+    for (int j = 0; j < k.n; ++j) locked[m->v_at[j]] = AT(TAU)[j];
+  factorise(k);
+  if (free_)
+    for (int j = 0; j < k.n; ++j) free_[m->v_at[j]] = 1 / k.record[16 * (size_t)j + RD];
+}
+
+void mbs_tree_by_positions(const mbs_tree *m, const double *q, const double *along, double *by_q) {
+  const size_t n = (size_t)m->size;
+  for (int j = 0; j < m->size; ++j)
+    if (m->q_at[j] >= 0)
+      memcpy(by_q + n * (size_t)m->q_at[j], along + n * (size_t)m->v_at[j], n * sizeof(double));
+  const int *joint = m->joints;
+  for (int c = 0; c < m->many; ++c, joint += 3) {
+    const int count = joint[1], at = joint[2] + (count == 6 ? 3 : 0);
+    const double *e = q + at;
+    const double square = e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3];
+    const double w = e[0], x = e[1], y = e[2], z = e[3];
+    /* velocities for the elements of the quaternion: 2 / |e|^2 (-e, w - e x)' */
+    const double by[4][3] = {{-x, -y, -z}, {w, z, -y}, {-z, w, x}, {y, -x, w}};
+    for (int h = 0; h < 4; ++h) {
+      double *to = by_q + n * (size_t)(at + h);
+      const double *turn[3];
+      for (int r = 0; r < 3; ++r) turn[r] = along + n * (size_t)m->v_at[joint[0] + count - 3 + r];
+      for (size_t i = 0; i < n; ++i)
+        to[i] = 2 / square * (by[h][0] * turn[0][i] + by[h][1] * turn[1][i] + by[h][2] * turn[2][i]);
+    }
+    if (count != 6) continue;
+    const D3 Q[3] = {{w * w + x * x - y * y - z * z, 2 * (x * y + w * z), 2 * (x * z - w * y)},
+                     {2 * (x * y - w * z), w * w - x * x + y * y - z * z, 2 * (y * z + w * x)},
+                     {2 * (x * z + w * y), 2 * (y * z - w * x), w * w - x * x - y * y + z * z}};
+    for (int h = 0; h < 3; ++h) { /* velocities for the elements of the place: rows of Q */
+      double *to = by_q + n * (size_t)(joint[2] + h), row[3];
+      for (int r = 0; r < 3; ++r) row[r] = (h == 0 ? Q[r].x : h == 1 ? Q[r].y : Q[r].z) / square;
+      for (size_t i = 0; i < n; ++i) {
+        double sum = 0;
+        for (int r = 0; r < 3; ++r) sum += row[r] * along[n * (size_t)m->v_at[joint[0] + r] + i];
+        to[i] = sum;
+      }
+    }
+  }
+}

@@ -715,16 +715,24 @@ static void pairs(work k, double *dq, double *dv, double *A) {
   }
 }
 
-/* What `pairs` leaves out of the derivatives by velocities: rotors that spin with their own link,
- * and those of free joints, whose axes turn: Ia (a + w x v). */
-static void turning_rotors(work k, double *dv) {
+/* What `pairs` leaves to do about rotors. One that spins with its own link turns it too; one on the
+ * link before does not feel its own joint, which `changes` gave to it as to all nodes before. Those
+ * of a free joint have axes that turn: Ia (a + w x v). */
+static void turning_rotors(work k, double *dq, double *dv) {
   const mbs_tree *m = k.m;
   const size_t n = (size_t)k.n;
   for (int r = 0; r < m->rotors; ++r) {
-    const int node = m->rotor[2 * r];
-    if (m->rotor[2 * r + 1] == node)
-      dv[(size_t)node * (n + 1)] += dot(O3(SA, node), cross(O3(W, node), O3(GB, node)));
+    const int node = m->rotor[2 * r], c = m->rotor[2 * r + 1];
+    const size_t at = (size_t)node * (n + 1);
+    const D3 g = O3(GB, node), turning = cross(O3(W, c), g), sa = O3(SA, node);
+    if (c == node) {
+      if (dv) dv[at] += dot(sa, turning);
+    } else {
+      if (dq) dq[at] -= dot(g, O3(Y2A, node)) + dot(turning, O3(YA, node));
+      if (dv) dv[at] -= dot(g, O3(YSA, node)) + dot(turning, sa);
+    }
   }
+  if (!dv) return;
   const int *joint = m->joints;
   for (int c = 0; c < m->many; ++c, joint += 3)
     if (joint[1] == 6)
@@ -748,7 +756,7 @@ static void slopes(work k, double *dq, double *dv, double *A) {
   momenta(k);
   changes(k);
   pairs(k, dq, dv, A);
-  if (dv) turning_rotors(k, dv);
+  turning_rotors(k, dq, dv);
 }
 
 void mbs_tree_idm_derivatives(const mbs_tree *m, const double *q, const double *v, const double *a,

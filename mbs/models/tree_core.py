@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import casadi
@@ -61,24 +62,48 @@ def tree_core(system: System) -> TreeCore:
         CompilerError: there is no compiler, or it refused the code.
     """
     require_system(system)
-    _require_known(system)
     names = ("idm", "inertia", "ddm", "idm_derivatives", "ddm_derivatives")
     return TreeCore(*(core_function(system, name) for name in names))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class CoreLibrary:
+    """The machine code of a tree.
+
+    Attributes:
+        path: of the shared library, whose functions have CasADi's calling convention.
+        shapes: by name, Functions that have their inputs and outputs, and no content.
+    """
+
+    path: Path
+    shapes: Mapping[str, Function]
+
+
+def core_library(system: System) -> CoreLibrary:
+    """The library of all models of a tree."""
+
+    def build() -> CoreLibrary:
+        _require_known(system)
+        table, parameters = _table(system), len(system.parameters)
+        path = tree_library(table, parameters)
+        return CoreLibrary(path, tree_functions(table, parameters))
+
+    library: CoreLibrary = system.cached("tree core library", build)
+    return library
+
+
 def core_function(system: System, name: str) -> Function:
     """One function of the core: "idm", "inertia" and so on."""
-    function: Function = system.cached(("tree core", name), lambda: _function(system, name))
+
+    def build() -> Function:
+        path = core_library(system).path
+        code = casadi.external(name, str(path))
+        result: Any = with_array_calls(code, path, ModelFunction(code, system).like)
+        result._source = (functools.partial(core_function, name=name), (system,))
+        return result  # type: ignore[no-any-return]
+
+    function: Function = system.cached(("tree core", name), build)
     return function
-
-
-def _function(system: System, name: str) -> Function:
-    library = system.cached("tree core library", lambda: tree_library(_table(system), len(system.parameters)))
-    code = casadi.external(name, str(library))
-    model = ModelFunction(code, system)
-    result: Any = with_array_calls(code, library, model.like)
-    result._source = (functools.partial(core_function, name=name), (system,))
-    return result
 
 
 def _require_known(system: System) -> None:

@@ -22,7 +22,7 @@ from mbs.native.tree_core import (
     ROWS,
     TreeTable,
     dependent_numbers,
-    stride_of,
+    place_of,
     tree_functions,
     tree_library,
 )
@@ -152,13 +152,10 @@ def _table(system: System) -> TreeTable:
     links = system.tree.links
     order = _depth_first(links)
     lists = _lists(links, order)
-    size = system.nv
-    stride = stride_of(size)
-    numbers = [0.0] * (36 * stride + 8)
+    numbers = [0.0] * place_of(0, -(-system.nv // 8) * 8) + [0.0] * 3
     dependent: dict[int, SX] = {}
 
-    def put(row: int, node: int, value: SX) -> None:
-        at = row * stride + node
+    def put(at: int, value: SX) -> None:
         if value.is_constant():
             numbers[at] = float(value)
         else:
@@ -168,11 +165,11 @@ def _table(system: System) -> TreeTable:
     for j in order:
         link = links[j]
         first, last = last, last + link.motion.nv
-        _put_link(put, link, j, first)
+        _put_link(lambda row, node, value: put(place_of(row, node), value), link, j, first)
     for k, value in enumerate(elements(system.tree.gravity)):
-        put(36, k, value)
+        put(len(numbers) - 3 + k, value)
     return TreeTable(
-        size=size,
+        size=system.nv,
         positions=system.nq,
         lists=lists,
         numbers=numbers,

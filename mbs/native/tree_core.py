@@ -42,7 +42,7 @@ ROWS = {
 }
 """The first row of each quantity, as tree_core.h has them."""
 
-_ROW_COUNT = 36
+ROW_COUNT = 36
 _LIST_NAMES = (
     *("before", "link", "end", "first", "q_at", "v_at", "runs_from", "runs"),
     *("joints", "rotor", "rub"),
@@ -58,6 +58,11 @@ def stride_of(size: int) -> int:
     return 8 * (eights if eights % 2 else eights + 1)
 
 
+def place_of(row: int, node: int) -> int:
+    """Where a number of a node stands: eight nodes side by side, their rows one after the other."""
+    return node // 8 * (8 * ROW_COUNT) + 8 * row + node % 8
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class TreeTable:
     """A mechanism as numbers; the fields are those of tree_core.h.
@@ -66,7 +71,7 @@ class TreeTable:
         size: velocities.
         positions: elements of q.
         lists: indices by the names of their lists.
-        numbers: the table, row by row, then gravity; elements that follow from parameters are NaN.
+        numbers: the table, see `place_of`, then gravity; elements that follow from parameters are NaN.
         places: where these are.
         dependent: ``numbers(p)``, their values; None without parameters.
     """
@@ -179,7 +184,7 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
         f"{table.size}, {table.stride}, {table.positions}, {int(table.in_order)},"
         f" {len(table.lists['joints']) // 3}, {len(table.lists['rotor']) // 2},"
         f" {len(table.lists['rub'])}, {', '.join(_LIST_NAMES)},"
-        f" numbers + {_ROW_COUNT * table.stride}, numbers}};",
+        f" numbers + {len(table.numbers) - 3}, numbers}};",
     ]
     work = f"MBS_TREE_WORK({table.size}, {table.stride}, {int(table.in_order)})"
     before = 0
@@ -208,7 +213,7 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
             f"  for (int k = 0; k < {values}; ++k) table[places[k]] = values[k];",
             "  *own = mechanism;",
             "  own->numbers = table;",
-            f"  own->gravity = table + {_ROW_COUNT * table.stride};",
+            f"  own->gravity = table + {len(table.numbers) - 3};",
             f"  *w += {before};",
             "  return own;",
             "}",

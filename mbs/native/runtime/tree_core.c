@@ -92,8 +92,7 @@ enum {
   VL = VO + 3,    /* 3: of the point of the link before that is there */
   FL = VL + 3,    /* 3: momentum of all behind the node for its unit velocity */
   FA = FL + 3,    /* 3: and angular momentum, about the common point */
-  GA = FA + 3,    /* 3: effort of the node for an angular velocity added to what moves */
-  SC = GA + 3,    /* 3: unit velocity of the node, at the common point */
+  SC = FA + 3,    /* 3: unit velocity of the node, at the common point */
   YA = SC + 3,    /* 3: rate of its axis */
   Y2L = YA + 3,   /* 3: second rate of its motion, at the common point */
   Y2A = Y2L + 3,  /* 3 */
@@ -108,56 +107,71 @@ enum {
   MBS_WORK_ROWS
 };
 
+/* Of what pairs of nodes need: */
+enum {
+  PF = 0,      /* 6: momenta FL and FA */
+  PG = 6,      /* 3: effort for an angular velocity added to all that moves with the node */
+  PS = 9,      /* 6: unit velocities SC and SA */
+  SPARE = 15,  /* columns that nobody wants */
+  PAIR_ROWS = 16
+};
+
 typedef struct {
   const mbs_tree *m;
   int n, s;
-  double *w;       /* rows */
+  double *w;       /* cells */
+  double *rows;    /* what pairs of nodes need, each row without a gap */
   double *record;  /* factors: 16 for each node */
-  V *lanes;        /* 7 for each node */
+  V *lanes;        /* 14 for each node */
   double *square;  /* size x size, where v has another order than the tree */
 } work;
 
 static work space_of(const mbs_tree *m, double *w) {
-  work k = {m, m->size, m->stride, mbs_aligned(w), 0, 0, 0};
-  k.record = k.w + (size_t)MBS_WORK_ROWS * (size_t)k.s;
+  work k = {m, m->size, m->stride, mbs_aligned(w), 0, 0, 0, 0};
+  k.rows = k.w + (size_t)((k.n + 7) / 8) * 8 * MBS_WORK_ROWS;
+  k.record = k.rows + PAIR_ROWS * (size_t)k.s;
   k.lanes = (V *)(k.record + 16 * (size_t)k.n);
-  k.square = (double *)(k.lanes + 7 * (size_t)k.n);
+  k.square = (double *)(k.lanes + 14 * (size_t)k.n);
   return k;
 }
 
-/* Access: lanes and single numbers, of the work space and of the table. */
-#define AT(row) (k.w + (size_t)(row) * (size_t)k.s)
-#define TABLE(row) (k.m->numbers + (size_t)(row) * (size_t)k.s)
+/* Access: lanes and single numbers, of the work space and of the table. Eight nodes stand side by
+ * side, their rows one after the other. */
+INLINE size_t start_of(int node, size_t rows) {
+  return ((size_t)node >> 3) * (8 * rows) + ((size_t)node & 7);
+}
+#define CELL(row, node) k.w[start_of(node, MBS_WORK_ROWS) + 8 * (row)]
+#define FACT(row, node) k.m->numbers[start_of(node, MBS_ROWS) + 8 * (row)]
+#define PAIR(row) (k.rows + (row) * (size_t)k.s)
 INLINE V lane(const double *x) { return *(const V *)x; }
-INLINE void put_lane(double *x, V value) { *(V *)x = value; }
-INLINE V3 lane3(const double *x, size_t s) {
-  return (V3){lane(x), lane(x + s), lane(x + 2 * s)};
-}
+INLINE V3 lane3(const double *x) { return (V3){lane(x), lane(x + 8), lane(x + 16)}; }
 INLINE void put_lane3(double *x, size_t s, V3 a) {
-  put_lane(x, a.x);
-  put_lane(x + s, a.y);
-  put_lane(x + 2 * s, a.z);
+  *(V *)x = a.x;
+  *(V *)(x + s) = a.y;
+  *(V *)(x + 2 * s) = a.z;
 }
-INLINE D3 one3(const double *x, size_t s) { return (D3){x[0], x[s], x[2 * s]}; }
+INLINE D3 one3(const double *x) { return (D3){x[0], x[8], x[16]}; }
 INLINE void put_one3(double *x, size_t s, D3 a) {
   x[0] = a.x;
   x[s] = a.y;
   x[2 * s] = a.z;
 }
-#define L1(row) lane(AT(row) + j)
-#define L3(row) lane3(AT(row) + j, (size_t)k.s)
-#define PUT1(row, value) put_lane(AT(row) + j, value)
-#define PUT3(row, value) put_lane3(AT(row) + j, (size_t)k.s, value)
-#define TL1(row) lane(TABLE(row) + j)
-#define TL3(row) lane3(TABLE(row) + j, (size_t)k.s)
-#define O3(row, node) one3(AT(row) + (node), (size_t)k.s)
-#define PUT_O3(row, node, value) put_one3(AT(row) + (node), (size_t)k.s, value)
+#define L1(row) lane(&CELL(row, j))
+#define L3(row) lane3(&CELL(row, j))
+#define PUT1(row, value) (*(V *)&CELL(row, j) = (value))
+#define PUT3(row, value) put_lane3(&CELL(row, j), 8, value)
+#define PUT_PAIR3(row, value) put_lane3(PAIR(row) + j, (size_t)k.s, value)
+#define TL1(row) lane(&FACT(row, j))
+#define TL3(row) lane3(&FACT(row, j))
+#define O3(row, node) one3(&CELL(row, node))
+#define T3(row, node) one3(&FACT(row, node))
+#define PUT_O3(row, node, value) put_one3(&CELL(row, node), 8, value)
 #define EVERY_LANE for (int j = 0; j < k.n; j += MBS_LANES)
 
 /* Rows that go from node to node leave the lanes after the last one as they are: make them zero. */
 static void clear_ends(work k, int row, int rows) {
-  for (int r = row; r < row + rows; ++r)
-    for (int j = k.n; j < k.s; ++j) AT(r)[j] = 0;
+  for (int j = k.n; j % 8; ++j)
+    for (int r = row; r < row + rows; ++r) CELL(r, j) = 0;
 }
 
 /* Joints of several velocities: pose in the link before. */
@@ -171,8 +185,8 @@ static void several(work k, const double *q) {
     const D3 Q[3] = {{w * w + x * x - y * y - z * z, 2 * (x * y + w * z), 2 * (x * z - w * y)},
                      {2 * (x * y - w * z), w * w - x * x + y * y - z * z, 2 * (y * z + w * x)},
                      {2 * (x * z + w * y), 2 * (y * z - w * x), w * w - x * x - y * y + z * z}};
-    D3 C[3], t = one3(TABLE(MBS_T) + last, (size_t)k.s);
-    for (int a = 0; a < 3; ++a) C[a] = one3(TABLE(MBS_C + 3 * a) + last, (size_t)k.s);
+    D3 C[3], t = T3(MBS_T, last);
+    for (int a = 0; a < 3; ++a) C[a] = T3(MBS_C + 3 * a, last);
     if (count == 6)
       t = plus(t, combine(C[0], q[joint[2]], C[1], q[joint[2] + 1], C[2], q[joint[2] + 2]));
     for (int node = first; node <= last; ++node) {
@@ -186,8 +200,7 @@ static void several(work k, const double *q) {
 /* Axes and origins of all links, and the motions of all nodes. */
 static void poses(work k, const double *q) {
   const mbs_tree *m = k.m;
-  double *x = AT(X);
-  for (int j = 0; j < k.n; ++j) x[j] = m->q_at[j] < 0 ? 0 : q[m->q_at[j]];
+  for (int j = 0; j < k.n; ++j) CELL(X, j) = m->q_at[j] < 0 ? 0 : q[m->q_at[j]];
   clear_ends(k, X, 1);
   EVERY_LANE {
     V sine, cosine;
@@ -293,16 +306,15 @@ static void share(work k, int row) {
 static D3 of_joint(work k, int row, const int *joint) {
   D3 total = {0, 0, 0};
   for (int h = 0; h < joint[1]; ++h)
-    total = more(total, AT(QD)[joint[0] + h], O3(row, joint[0] + h));
+    total = more(total, CELL(QD, joint[0] + h), O3(row, joint[0] + h));
   return total;
 }
 
 /* Velocities and accelerations of all links; `a` may be null, for zeros. */
 static void motions(work k, const double *v, const double *a) {
   const mbs_tree *m = k.m;
-  double *qd = AT(QD), *qdd = AT(QDD);
-  for (int j = 0; j < k.n; ++j) qd[j] = v[m->v_at[j]];
-  for (int j = 0; j < k.n; ++j) qdd[j] = a ? a[m->v_at[j]] : 0;
+  for (int j = 0; j < k.n; ++j) CELL(QD, j) = v[m->v_at[j]];
+  for (int j = 0; j < k.n; ++j) CELL(QDD, j) = a ? a[m->v_at[j]] : 0;
   clear_ends(k, QD, 2);
   EVERY_LANE PUT3(ADD, times(L1(QD), L3(SA)));
   along_branches(k, W, WL, (D3){0, 0, 0});
@@ -331,10 +343,10 @@ static void motions(work k, const double *v, const double *a) {
 /* Spins of rotors for unit velocities, in the axes of the base. */
 static void spins(work k) {
   if (!k.m->rotors) return;
-  for (int r = 0; r < 3; ++r) memset(AT(GB + r), 0, (size_t)k.s * sizeof(double));
+  EVERY_LANE PUT3(GB, ((V3){mbs_all(0), mbs_all(0), mbs_all(0)}));
   for (int r = 0; r < k.m->rotors; ++r) {
     const int node = k.m->rotor[2 * r], c = k.m->rotor[2 * r + 1];
-    const D3 g = one3(TABLE(MBS_SPIN) + node, (size_t)k.s);
+    const D3 g = T3(MBS_SPIN, node);
     PUT_O3(GB, node, combine(O3(R, c), g.x, O3(R + 3, c), g.y, O3(R + 6, c), g.z));
   }
 }
@@ -351,8 +363,8 @@ static void wrenches(work k) {
   }
   for (int r = 0; r < m->rotors; ++r) {
     const int node = m->rotor[2 * r], c = m->rotor[2 * r + 1];
-    const D3 g = O3(GB, node), turning = cross(O3(W, c), times(AT(QD)[node], g));
-    PUT_O3(M, c, plus(O3(M, c), more(turning, AT(QDD)[node], g)));
+    const D3 g = O3(GB, node), turning = cross(O3(W, c), times(CELL(QD, node), g));
+    PUT_O3(M, c, plus(O3(M, c), more(turning, CELL(QDD, node), g)));
   }
   D3 f = {0, 0, 0}, mo = {0, 0, 0};
   for (int j = k.n - 1, held = -1; j >= 0; --j) {
@@ -383,24 +395,26 @@ static void efforts(work k) {
     tau += TL1(MBS_STIFFNESS) * (L1(X) - TL1(MBS_REST));
     PUT1(TAU, tau);
   }
-  double *tau = AT(TAU);
   for (int r = 0; r < m->rotors; ++r) {
     const int node = m->rotor[2 * r], c = m->rotor[2 * r + 1];
-    tau[node] += dot(O3(GB, node), O3(WD, c));
+    CELL(TAU, node) += dot(O3(GB, node), O3(WD, c));
   }
   for (int r = 0; r < m->rubbing; ++r) {
     const int node = m->rub[r];
-    const double v = AT(QD)[node], width = TABLE(MBS_WIDTH)[node];
-    tau[node] += TABLE(MBS_FS)[node] * (width == 0 ? (v > 0) - (v < 0) : tanh(v / width));
+    const double v = CELL(QD, node), width = FACT(MBS_WIDTH, node);
+    CELL(TAU, node) += FACT(MBS_FS, node) * (width == 0 ? (v > 0) - (v < 0) : tanh(v / width));
   }
   const int *joint = m->joints;
   for (int c = 0; c < m->many; ++c, joint += 3)
     if (joint[1] == 6) { /* rotors of a free joint, whose axes turn: Ia (a + w x v) */
-      const double *v = AT(QD) + joint[0];
+      const int first = joint[0];
+      double v[6], Ia[3];
+      for (int h = 0; h < 6; ++h) v[h] = CELL(QD, first + h);
+      for (int h = 0; h < 3; ++h) Ia[h] = FACT(MBS_IA, first + h);
       const D3 turned = cross(((D3){v[3], v[4], v[5]}), ((D3){v[0], v[1], v[2]}));
-      tau[joint[0]] += TABLE(MBS_IA)[joint[0]] * turned.x;
-      tau[joint[0] + 1] += TABLE(MBS_IA)[joint[0] + 1] * turned.y;
-      tau[joint[0] + 2] += TABLE(MBS_IA)[joint[0] + 2] * turned.z;
+      CELL(TAU, first) += Ia[0] * turned.x;
+      CELL(TAU, first + 1) += Ia[1] * turned.y;
+      CELL(TAU, first + 2) += Ia[2] * turned.z;
     }
 }
 
@@ -418,7 +432,7 @@ void mbs_tree_idm(const mbs_tree *m, const double *q, const double *v, const dou
   const work k = space_of(m, w);
   inverse(k, q, v, a);
   if (tau)
-    for (int j = 0; j < k.n; ++j) tau[m->v_at[j]] = AT(TAU)[j];
+    for (int j = 0; j < k.n; ++j) tau[m->v_at[j]] = CELL(TAU, j);
 }
 
 /* Mass, first moments and inertia of all that is behind each node. */
@@ -429,20 +443,18 @@ static void composites(work k) {
     PUT3(CH, L3(HB));
     for (int r = 0; r < 6; ++r) PUT1(CJ + r, L1(JB + r));
   }
-  double *mass = AT(CM), *J[6];
-  for (int r = 0; r < 6; ++r) J[r] = AT(CJ + r);
   double sum = 0, I[6] = {0};
   D3 h = {0, 0, 0};
   for (int j = k.n - 1, held = -1; j >= 0; --j) {
     const int b = m->before[j];
     if (held == j) {
-      mass[j] = sum += mass[j];
+      CELL(CM, j) = sum += CELL(CM, j);
       h = plus(O3(CH, j), h);
       PUT_O3(CH, j, h);
-      for (int r = 0; r < 6; ++r) J[r][j] = I[r] += J[r][j];
+      for (int r = 0; r < 6; ++r) CELL(CJ + r, j) = I[r] += CELL(CJ + r, j);
     } else {
-      sum = mass[j], h = O3(CH, j);
-      for (int r = 0; r < 6; ++r) I[r] = J[r][j];
+      sum = CELL(CM, j), h = O3(CH, j);
+      for (int r = 0; r < 6; ++r) I[r] = CELL(CJ + r, j);
     }
     if (b < 0) continue;
     if (m->link[j] == b) {
@@ -459,9 +471,9 @@ static void composites(work k) {
     if (b == j - 1) {
       held = b;
     } else {
-      mass[b] += sum;
+      CELL(CM, b) += sum;
       PUT_O3(CH, b, plus(O3(CH, b), h));
-      for (int r = 0; r < 6; ++r) J[r][b] += I[r];
+      for (int r = 0; r < 6; ++r) CELL(CJ + r, b) += I[r];
     }
   }
 }
@@ -475,15 +487,22 @@ static void momenta(work k) {
     const V3 Jsa = INERTIA_TIMES(J, sa);
     const V3 f = plus_cross(times(L1(CM), sl), sa, h), l = plus_cross(Jsa, h, sl);
     PUT1(TAU, dot(sl, f) + dot(sa, l) + TL1(MBS_IA));
+    const V3 fa = plus_cross(l, p, f), sc = plus_cross(sl, p, sa);
     PUT3(FL, f);
-    PUT3(FA, plus_cross(l, p, f));
-    PUT3(SC, plus_cross(sl, p, sa));
+    PUT3(FA, fa);
+    PUT3(SC, sc);
+    PUT_PAIR3(PF, f);
+    PUT_PAIR3(PF + 3, fa);
+    PUT_PAIR3(PS, sc);
+    PUT_PAIR3(PS + 3, sa);
   }
   for (int r = 0; r < k.m->rotors; ++r) {
     const int node = k.m->rotor[2 * r], own = k.m->rotor[2 * r + 1] == node;
     const D3 g = O3(GB, node);
-    PUT_O3(FA, node, plus(O3(FA, node), g));
-    if (own) AT(TAU)[node] += 2 * dot(g, O3(SA, node));
+    const D3 fa = plus(O3(FA, node), g);
+    PUT_O3(FA, node, fa);
+    put_one3(PAIR(PF + 3) + node, (size_t)k.s, fa);
+    if (own) CELL(TAU, node) += 2 * dot(g, O3(SA, node));
   }
 }
 
@@ -498,7 +517,7 @@ INLINE V any_lane(const double *x) { return (V)(*(const U *)x); }
 INLINE V3 any_lane3(const double *x, size_t s) {
   return (V3){any_lane(x), any_lane(x + s), any_lane(x + 2 * s)};
 }
-#define N3(row) any_lane3(AT(row) + i, (size_t)k.s)
+#define N3(row) any_lane3(PAIR(row) + i, (size_t)k.s)
 INLINE V3 all3(D3 a) { return (V3){mbs_all(a.x), mbs_all(a.y), mbs_all(a.z)}; }
 #define ALL3(row, node) all3(O3(row, node))
 INLINE void zeros(double *x, int count) {
@@ -527,13 +546,13 @@ static void inertia(work k, double *A) {
       const int from = m->runs[2 * r], to = m->runs[2 * r + 1];
       zeros(A + done, from - done);
       for (int i = from; i < to; i += MBS_LANES)
-        put_column(A + i, end, dot(fl, N3(SC)) + dot(fa, N3(SA)));
+        put_column(A + i, end, dot(fl, N3(PS)) + dot(fa, N3(PS + 3)));
       done = to;
     }
     zeros(A + done, m->first[c] - done);
     for (int i = m->first[c]; i < m->end[c]; i += MBS_LANES)
-      put_column(A + i, end, dot(N3(FL), sl) + dot(N3(FA), sa));
-    A[c] = AT(TAU)[c];
+      put_column(A + i, end, dot(N3(PF), sl) + dot(N3(PF + 3), sa));
+    A[c] = CELL(TAU, c);
     zeros(A + m->end[c], k.n - m->end[c]);
   }
 }
@@ -592,10 +611,10 @@ static void moving_composites(work k) {
   }
   for (int r = 0; r < m->rotors; ++r) { /* K - spin x */
     const int node = m->rotor[2 * r], c = m->rotor[2 * r + 1];
-    const D3 s = times(AT(QD)[node], O3(GB, node));
-    AT(K + 1)[c] -= s.z, AT(K + 2)[c] += s.y;
-    AT(K + 3)[c] += s.z, AT(K + 5)[c] -= s.x;
-    AT(K + 6)[c] -= s.y, AT(K + 7)[c] += s.x;
+    const D3 s = times(CELL(QD, node), O3(GB, node));
+    CELL(K + 1, c) -= s.z, CELL(K + 2, c) += s.y;
+    CELL(K + 3, c) += s.z, CELL(K + 5, c) -= s.x;
+    CELL(K + 6, c) -= s.y, CELL(K + 7, c) += s.x;
   }
   for (int j = k.n - 1; j >= 0; --j) {
     const int b = m->before[j];
@@ -637,7 +656,7 @@ static void changes(work k) {
     PUT3(YSL, plus_cross(ysl, p, ysa));
     PUT3(YSA, ysa);
     /* effort for an angular velocity of all behind: K' sa + n x sl */
-    PUT3(GA, plus_cross(((V3){dot(k0, sa), dot(k1, sa), dot(k2, sa)}), n, sl));
+    PUT_PAIR3(PG, plus_cross(((V3){dot(k0, sa), dot(k1, sa), dot(k2, sa)}), n, sl));
     /* change with the position: I y2 + K y + S x f */
     const V3 Jy2 = INERTIA_TIMES(J, y2a), Jys = INERTIA_TIMES(J, ysa);
     const V3 f = L3(F);
@@ -655,7 +674,8 @@ static void changes(work k) {
   for (int r = 0; r < m->rotors; ++r) {
     const int node = m->rotor[2 * r], c = m->rotor[2 * r + 1];
     const D3 turning = cross(O3(W, c), O3(GB, node));
-    PUT_O3(GA, node, plus(O3(GA, node), turning));
+    for (int r3 = 0; r3 < 3; ++r3)
+      PAIR(PG + r3)[node] += r3 == 0 ? turning.x : r3 == 1 ? turning.y : turning.z;
     PUT_O3(DVA, node, plus(O3(DVA, node), turning));
   }
 }
@@ -666,9 +686,9 @@ static void pairs(work k, double *dq, double *dv, double *A) {
   const mbs_tree *m = k.m;
   const size_t n = (size_t)k.n;
   const size_t step_q = dq ? n : 0, step_v = dv ? n : 0, step_a = A ? n : 0;
-  if (!dq) dq = AT(E);
-  if (!dv) dv = AT(E + 1);
-  if (!A) A = AT(E + 2);
+  if (!dq) dq = PAIR(SPARE);
+  if (!dv) dv = PAIR(SPARE);
+  if (!A) A = PAIR(SPARE);
   const double *end_q = dq + (step_q ? n * n : n), *end_v = dv + (step_v ? n * n : n),
                *end_a = A + (step_a ? n * n : n);
   for (int c = 0; c < k.n; ++c, dq += step_q, dv += step_v, A += step_a) {
@@ -681,7 +701,7 @@ static void pairs(work k, double *dq, double *dv, double *A) {
       zeros(dv + done, from - done);
       zeros(A + done, from - done);
       for (int i = from; i < to; i += MBS_LANES) {
-        const V3 sl = N3(SC), sa = N3(SA);
+        const V3 sl = N3(PS), sa = N3(PS + 3);
         put_column(dq + i, end_q, dot(ql, sl) + dot(qa, sa));
         put_column(dv + i, end_v, dot(ul, sl) + dot(ua, sa));
         put_column(A + i, end_a, dot(fl, sl) + dot(fa, sa));
@@ -695,7 +715,7 @@ static void pairs(work k, double *dq, double *dv, double *A) {
     const V3 sl = ALL3(SC, c), sa = ALL3(SA, c), ya = ALL3(YA, c);
     const V3 y2l = ALL3(Y2L, c), y2a = ALL3(Y2A, c), ysl = ALL3(YSL, c), ysa = ALL3(YSA, c);
     for (int i = first; i < end; i += MBS_LANES) {
-      const V3 l = N3(FL), a = N3(FA), g = N3(GA);
+      const V3 l = N3(PF), a = N3(PF + 3), g = N3(PG);
       put_column(dq + i, end_q, dot(l, y2l) + dot(a, y2a) + dot(g, ya));
       put_column(dv + i, end_v, dot(l, ysl) + dot(a, ysa) + dot(g, sa));
       put_column(A + i, end_a, dot(l, sl) + dot(a, sa));
@@ -704,14 +724,14 @@ static void pairs(work k, double *dq, double *dv, double *A) {
     zeros(dv + end, k.n - end);
     zeros(A + end, k.n - end);
     /* what the joint needs itself */
-    const double v = AT(QD)[c], Fs = TABLE(MBS_FS)[c], width = TABLE(MBS_WIDTH)[c];
-    dq[c] += TABLE(MBS_STIFFNESS)[c];
-    dv[c] += TABLE(MBS_FV)[c];
+    const double v = CELL(QD, c), Fs = FACT(MBS_FS, c), width = FACT(MBS_WIDTH, c);
+    dq[c] += FACT(MBS_STIFFNESS, c);
+    dv[c] += FACT(MBS_FV, c);
     if (Fs != 0 && width != 0) {
       const double t = tanh(v / width);
       dv[c] += Fs * (1 - t * t) / width;
     }
-    A[c] = AT(TAU)[c];
+    A[c] = CELL(TAU, c);
   }
 }
 
@@ -739,7 +759,9 @@ static void turning_rotors(work k, double *dq, double *dv) {
       for (int x = 0; x < 3; ++x) {
         const int y = (x + 1) % 3, z = (x + 2) % 3;
         const size_t first = (size_t)joint[0];
-        const double Ia = TABLE(MBS_IA)[joint[0] + x], *v = AT(QD) + first;
+        const double Ia = FACT(MBS_IA, joint[0] + x);
+        double v[6];
+        for (int h = 0; h < 6; ++h) v[h] = CELL(QD, joint[0] + h);
         double *row = dv + first + (size_t)x + n * first; /* of the elements of w x v */
         row[n * (size_t)z] += Ia * v[3 + y];
         row[n * (size_t)y] -= Ia * v[3 + z];
@@ -764,7 +786,7 @@ void mbs_tree_idm_derivatives(const mbs_tree *m, const double *q, const double *
   const work k = space_of(m, w);
   inverse(k, q, v, a);
   if (tau)
-    for (int j = 0; j < k.n; ++j) tau[m->v_at[j]] = AT(TAU)[j];
+    for (int j = 0; j < k.n; ++j) tau[m->v_at[j]] = CELL(TAU, j);
   slopes(k, dq, dv, A);
   reorder(k, dq);
   reorder(k, dv);
@@ -816,7 +838,7 @@ INLINE void release(articulated *I, D3 l, D3 a, D3 lr, D3 ar) {
 enum { AM = E, AJ = CJ, AN = K };
 
 INLINE void load(work k, articulated *I, int j) {
-  for (int r = 0; r < 6; ++r) I->M[r] = AT(AM + r)[j], I->J[r] = AT(AJ + r)[j];
+  for (int r = 0; r < 6; ++r) I->M[r] = CELL(AM + r, j), I->J[r] = CELL(AJ + r, j);
   for (int r = 0; r < 3; ++r) I->N[r] = O3(AN + 3 * r, j);
 }
 
@@ -846,21 +868,21 @@ static void factorise(work k) {
     }
     const D3 sl = O3(SL, j), sa = O3(SA, j);
     D3 l, a;
-    if (TABLE(MBS_TURN)[j] != 0) {
+    if (FACT(MBS_TURN, j) != 0) {
       l = (D3){dot(I.N[0], sa), dot(I.N[1], sa), dot(I.N[2], sa)};
       a = times_one(I.J, sa);
     } else {
       l = plus(times_one(I.M, sl), ((D3){dot(I.N[0], sa), dot(I.N[1], sa), dot(I.N[2], sa)}));
       a = plus(times_one(I.J, sa), combine(I.N[0], sl.x, I.N[1], sl.y, I.N[2], sl.z));
     }
-    double inertia = dot(sl, l) + dot(sa, a) + TABLE(MBS_IA)[j];
+    double inertia = dot(sl, l) + dot(sa, a) + FACT(MBS_IA, j);
     if (m->rotors) { /* U + spin; the rotor of a joint on its own link feels the joint too */
       const D3 g = O3(GB, j);
       a = plus(a, g);
-      inertia += 2 * TABLE(MBS_OWN)[j] * dot(g, sa);
+      inertia += 2 * FACT(MBS_OWN, j) * dot(g, sa);
     }
     const double ratio = 1 / inertia;
-    const D3 lr = times(ratio, l), ar = times(ratio, a), d = times(TABLE(MBS_FIRST)[j], O3(D, j));
+    const D3 lr = times(ratio, l), ar = times(ratio, a), d = times(FACT(MBS_FIRST, j), O3(D, j));
     double *record = k.record + 16 * (size_t)j;
     put_one3(record + RS, 1, sl);
     put_one3(record + RS + 3, 1, sa);
@@ -874,7 +896,7 @@ static void factorise(work k) {
     if (b == j - 1) {
       held = b;
     } else {
-      for (int r = 0; r < 6; ++r) AT(AM + r)[b] += I.M[r], AT(AJ + r)[b] += I.J[r];
+      for (int r = 0; r < 6; ++r) CELL(AM + r, b) += I.M[r], CELL(AJ + r, b) += I.J[r];
       for (int r = 0; r < 3; ++r) PUT_O3(AN + 3 * r, b, plus(O3(AN + 3 * r, b), I.N[r]));
     }
   }
@@ -887,10 +909,10 @@ static void factorise(work k) {
 SOLVE(solve, D3, double, AS_IT_IS)
 SOLVE(solve_lanes, V3, V, mbs_all)
 
-/* The accelerations, in the order of the tree, in the row QDD; `inverse` was without any. */
+/* The accelerations, in the order of the tree, in the spare row; `inverse` was without any. */
 static void accelerations(work k, const double *tau) {
-  double *a = AT(QDD);
-  for (int j = 0; j < k.n; ++j) a[j] = tau[k.m->v_at[j]] - AT(TAU)[j];
+  double *a = PAIR(SPARE);
+  for (int j = 0; j < k.n; ++j) a[j] = tau[k.m->v_at[j]] - CELL(TAU, j);
   factorise(k);
   solve(k, a, k.n, (double *)k.lanes);
 }
@@ -901,7 +923,7 @@ void mbs_tree_ddm(const mbs_tree *m, const double *q, const double *v, const dou
   inverse(k, q, v, 0);
   accelerations(k, tau);
   if (a)
-    for (int j = 0; j < k.n; ++j) a[m->v_at[j]] = AT(QDD)[j];
+    for (int j = 0; j < k.n; ++j) a[m->v_at[j]] = PAIR(SPARE)[j];
 }
 
 /* Columns of a matrix side by side in lanes, with the opposite sign; and back by mbs_columns. */
@@ -962,8 +984,8 @@ void mbs_tree_ddm_derivatives(const mbs_tree *m, const double *q, const double *
   const work k = space_of(m, w);
   inverse(k, q, v, 0);
   accelerations(k, tau);
-  const double *found = AT(QDD);
-  double *given = AT(TAU); /* in the order of v */
+  const double *found = PAIR(SPARE);
+  double *given = PAIR(PF); /* in the order of v */
   for (int j = 0; j < k.n; ++j) given[m->v_at[j]] = found[j];
   if (a) memcpy(a, given, (size_t)k.n * sizeof(double));
   if (dq || dv) {
@@ -987,7 +1009,7 @@ void mbs_tree_pivots(const mbs_tree *m, const double *q, double *free_, double *
   composites(k);
   momenta(k);
   if (locked)
-    for (int j = 0; j < k.n; ++j) locked[m->v_at[j]] = AT(TAU)[j];
+    for (int j = 0; j < k.n; ++j) locked[m->v_at[j]] = CELL(TAU, j);
   factorise(k);
   if (free_)
     for (int j = 0; j < k.n; ++j) free_[m->v_at[j]] = 1 / k.record[16 * (size_t)j + RD];

@@ -7,7 +7,7 @@
 #ifndef MBS_TREE_CORE_H
 #define MBS_TREE_CORE_H
 
-/* Rows of the table of numbers, `stride` doubles each. */
+/* Rows of the table of numbers: of eight nodes side by side all rows, then of the next eight. */
 enum {
   MBS_C = 0,          /* 9: axes of the link at zero position in those of the link before, by columns */
   MBS_T = 9,          /* 3: its origin there [m] */
@@ -31,7 +31,7 @@ enum {
 
 typedef struct {
   int size;      /* velocities */
-  int stride;    /* doubles from row to row: 8 more than they need at least, an odd multiple of 8 */
+  int stride;    /* 8 more than the size at least, an odd multiple of 8 */
   int positions; /* elements of q */
   int in_order;  /* whether v has the order of the tree */
   int many;      /* joints of several velocities */
@@ -54,7 +54,7 @@ typedef struct {
 
 /* Doubles of work space of any of the models. */
 #define MBS_TREE_WORK(size, stride, in_order) \
-  (160 * (stride) + 72 * (size) + ((in_order) ? 0 : (size) * (size)) + 8)
+  ((143 * 8) * (((size) + 7) / 8) + 16 * (stride) + 128 * (size) + ((in_order) ? 0 : (size) * (size)) + 8)
 
 /* tau: efforts for accelerations a. */
 void mbs_tree_idm(const mbs_tree *m, const double *q, const double *v, const double *a, double *tau,

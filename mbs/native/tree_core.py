@@ -49,15 +49,6 @@ _LIST_NAMES = (
 )
 
 
-def stride_of(size: int) -> int:
-    """Doubles from row to row: eight at least behind the last, an odd multiple of eight.
-
-    Rows that are a power of two apart would meet in one set of the cache.
-    """
-    eights = (size + 7) // 8 + 1
-    return 8 * (eights if eights % 2 else eights + 1)
-
-
 def place_of(row: int, node: int) -> int:
     """Where a number of a node stands: eight nodes side by side, their rows one after the other."""
     return node // 8 * (8 * ROW_COUNT) + 8 * row + node % 8
@@ -82,11 +73,6 @@ class TreeTable:
     numbers: Sequence[float]
     places: Sequence[int] = ()
     dependent: Function | None = None
-
-    @property
-    def stride(self) -> int:
-        """Doubles from row to row."""
-        return stride_of(self.size)
 
     @property
     def in_order(self) -> bool:
@@ -181,12 +167,12 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
         "static const double numbers[] __attribute__((aligned(64))) = {"
         f"{_wrapped(map(_number, table.numbers))}}};",
         "static const mbs_tree mechanism = {"
-        f"{table.size}, {table.stride}, {table.positions}, {int(table.in_order)},"
+        f"{table.size}, {table.positions}, {int(table.in_order)},"
         f" {len(table.lists['joints']) // 3}, {len(table.lists['rotor']) // 2},"
         f" {len(table.lists['rub'])}, {', '.join(_LIST_NAMES)},"
         f" numbers + {len(table.numbers) - 3}, numbers}};",
     ]
-    work = f"MBS_TREE_WORK({table.size}, {table.stride}, {int(table.in_order)})"
+    work = f"MBS_TREE_WORK({table.size}, {int(table.in_order)})"
     before = 0
     if dependent is None:
         head += [

@@ -92,7 +92,8 @@ enum {
   VL = VO + 3,    /* 3: of the point of the link before that is there */
   FL = VL + 3,    /* 3: momentum of all behind the node for its unit velocity */
   FA = FL + 3,    /* 3: and angular momentum, about the common point */
-  SC = FA + 3,    /* 3: unit velocity of the node, at the common point */
+  GA = FA + 3,    /* 3: effort of the node for an angular velocity added to what moves */
+  SC = GA + 3,    /* 3: unit velocity of the node, at the common point */
   YA = SC + 3,    /* 3: rate of its axis */
   Y2L = YA + 3,   /* 3: second rate of its motion, at the common point */
   Y2A = Y2L + 3,  /* 3 */
@@ -107,31 +108,23 @@ enum {
   MBS_WORK_ROWS
 };
 
-/* Of what pairs of nodes need: */
-enum {
-  PF = 0,      /* 6: momenta FL and FA */
-  PG = 6,      /* 3: effort for an angular velocity added to all that moves with the node */
-  PS = 9,      /* 6: unit velocities SC and SA */
-  SPARE = 15,  /* columns that nobody wants */
-  PAIR_ROWS = 16
-};
-
 typedef struct {
   const mbs_tree *m;
-  int n, s;
+  int n;
   double *w;       /* cells */
-  double *rows;    /* what pairs of nodes need, each row without a gap */
   double *record;  /* factors: 16 for each node */
   V *lanes;        /* 14 for each node */
+  double *column;  /* one that nobody wants, or a right side */
   double *square;  /* size x size, where v has another order than the tree */
 } work;
 
 static work space_of(const mbs_tree *m, double *w) {
-  work k = {m, m->size, m->stride, mbs_aligned(w), 0, 0, 0, 0};
-  k.rows = k.w + (size_t)((k.n + 7) / 8) * 8 * MBS_WORK_ROWS;
-  k.record = k.rows + PAIR_ROWS * (size_t)k.s;
+  work k = {m, m->size, mbs_aligned(w), 0, 0, 0, 0};
+  const size_t whole = ((size_t)k.n + 7) / 8 * 8;
+  k.record = k.w + whole * MBS_WORK_ROWS;
   k.lanes = (V *)(k.record + 16 * (size_t)k.n);
-  k.square = (double *)(k.lanes + 14 * (size_t)k.n);
+  k.column = (double *)(k.lanes + 14 * (size_t)k.n);
+  k.square = k.column + whole;
   return k;
 }
 
@@ -142,7 +135,6 @@ INLINE size_t start_of(int node, size_t rows) {
 }
 #define CELL(row, node) k.w[start_of(node, MBS_WORK_ROWS) + 8 * (row)]
 #define FACT(row, node) k.m->numbers[start_of(node, MBS_ROWS) + 8 * (row)]
-#define PAIR(row) (k.rows + (row) * (size_t)k.s)
 INLINE V lane(const double *x) { return *(const V *)x; }
 INLINE V3 lane3(const double *x) { return (V3){lane(x), lane(x + 8), lane(x + 16)}; }
 INLINE void put_lane3(double *x, size_t s, V3 a) {
@@ -160,7 +152,6 @@ INLINE void put_one3(double *x, size_t s, D3 a) {
 #define L3(row) lane3(&CELL(row, j))
 #define PUT1(row, value) (*(V *)&CELL(row, j) = (value))
 #define PUT3(row, value) put_lane3(&CELL(row, j), 8, value)
-#define PUT_PAIR3(row, value) put_lane3(PAIR(row) + j, (size_t)k.s, value)
 #define TL1(row) lane(&FACT(row, j))
 #define TL3(row) lane3(&FACT(row, j))
 #define O3(row, node) one3(&CELL(row, node))
@@ -491,33 +482,27 @@ static void momenta(work k) {
     PUT3(FL, f);
     PUT3(FA, fa);
     PUT3(SC, sc);
-    PUT_PAIR3(PF, f);
-    PUT_PAIR3(PF + 3, fa);
-    PUT_PAIR3(PS, sc);
-    PUT_PAIR3(PS + 3, sa);
   }
   for (int r = 0; r < k.m->rotors; ++r) {
     const int node = k.m->rotor[2 * r], own = k.m->rotor[2 * r + 1] == node;
     const D3 g = O3(GB, node);
-    const D3 fa = plus(O3(FA, node), g);
-    PUT_O3(FA, node, fa);
-    put_one3(PAIR(PF + 3) + node, (size_t)k.s, fa);
+    PUT_O3(FA, node, plus(O3(FA, node), g));
     if (own) CELL(TAU, node) += 2 * dot(g, O3(SA, node));
   }
 }
 
-/* Lanes in a column of a matrix: all of them where there is room, else those before the end. */
-INLINE void put_column(double *x, const double *end, V value) {
-  if (__builtin_expect(x + MBS_LANES <= end, 1))
+/* Lanes of a column of a matrix, from a node up to another one. */
+INLINE void put_column(double *x, int from, int to, V value) {
+#if MBS_LANES == 8
+  const unsigned mask = (0xffu << (from > 0 ? from : 0)) & (0xffu >> (to < 8 ? 8 - to : 0));
+  _mm512_mask_storeu_pd(x, (__mmask8)mask, (__m512d)value);
+#else
+  if (__builtin_expect(from <= 0 && to >= MBS_LANES, 1))
     *(U *)x = (U)value;
-  else if (x < end)
-    memcpy(x, &value, (size_t)(end - x) * sizeof(double));
+  else
+    for (int l = from > 0 ? from : 0; l < to && l < MBS_LANES; ++l) x[l] = value[l];
+#endif
 }
-INLINE V any_lane(const double *x) { return (V)(*(const U *)x); }
-INLINE V3 any_lane3(const double *x, size_t s) {
-  return (V3){any_lane(x), any_lane(x + s), any_lane(x + 2 * s)};
-}
-#define N3(row) any_lane3(PAIR(row) + i, (size_t)k.s)
 INLINE V3 all3(D3 a) { return (V3){mbs_all(a.x), mbs_all(a.y), mbs_all(a.z)}; }
 #define ALL3(row, node) all3(O3(row, node))
 INLINE void zeros(double *x, int count) {
@@ -534,26 +519,26 @@ static void reorder(work k, double *x) {
       x[(size_t)k.m->v_at[r] + n * (size_t)k.m->v_at[c]] = k.square[r + n * c];
 }
 
-/* The inertia matrix, column by column from its top: what lanes write beyond a run of nodes is
- * written again by what follows. */
+/* The lanes that hold the nodes from one up to another. */
+#define LANES_OF(from, to) for (int j = (from) & -MBS_LANES; j < (to); j += MBS_LANES)
+
+/* The inertia matrix, column by column: the links before, then the joint and all behind it. */
 static void inertia(work k, double *A) {
   const mbs_tree *m = k.m;
-  const double *end = A + (size_t)k.n * (size_t)k.n;
   for (int c = 0; c < k.n; ++c, A += k.n) {
     const V3 fl = ALL3(FL, c), fa = ALL3(FA, c), sl = ALL3(SC, c), sa = ALL3(SA, c);
     int done = 0;
     for (int r = m->runs_from[c]; r < m->runs_from[c + 1]; ++r) {
       const int from = m->runs[2 * r], to = m->runs[2 * r + 1];
       zeros(A + done, from - done);
-      for (int i = from; i < to; i += MBS_LANES)
-        put_column(A + i, end, dot(fl, N3(PS)) + dot(fa, N3(PS + 3)));
+      LANES_OF(from, to) put_column(A + j, from - j, to - j, dot(fl, L3(SC)) + dot(fa, L3(SA)));
       done = to;
     }
     zeros(A + done, m->first[c] - done);
-    for (int i = m->first[c]; i < m->end[c]; i += MBS_LANES)
-      put_column(A + i, end, dot(N3(PF), sl) + dot(N3(PF + 3), sa));
+    const int first = m->first[c], end = m->end[c];
+    LANES_OF(first, end) put_column(A + j, first - j, end - j, dot(L3(FL), sl) + dot(L3(FA), sa));
     A[c] = CELL(TAU, c);
-    zeros(A + m->end[c], k.n - m->end[c]);
+    zeros(A + end, k.n - end);
   }
 }
 
@@ -656,7 +641,7 @@ static void changes(work k) {
     PUT3(YSL, plus_cross(ysl, p, ysa));
     PUT3(YSA, ysa);
     /* effort for an angular velocity of all behind: K' sa + n x sl */
-    PUT_PAIR3(PG, plus_cross(((V3){dot(k0, sa), dot(k1, sa), dot(k2, sa)}), n, sl));
+    PUT3(GA, plus_cross(((V3){dot(k0, sa), dot(k1, sa), dot(k2, sa)}), n, sl));
     /* change with the position: I y2 + K y + S x f */
     const V3 Jy2 = INERTIA_TIMES(J, y2a), Jys = INERTIA_TIMES(J, ysa);
     const V3 f = L3(F);
@@ -674,8 +659,7 @@ static void changes(work k) {
   for (int r = 0; r < m->rotors; ++r) {
     const int node = m->rotor[2 * r], c = m->rotor[2 * r + 1];
     const D3 turning = cross(O3(W, c), O3(GB, node));
-    for (int r3 = 0; r3 < 3; ++r3)
-      PAIR(PG + r3)[node] += r3 == 0 ? turning.x : r3 == 1 ? turning.y : turning.z;
+    PUT_O3(GA, node, plus(O3(GA, node), turning));
     PUT_O3(DVA, node, plus(O3(DVA, node), turning));
   }
 }
@@ -686,11 +670,9 @@ static void pairs(work k, double *dq, double *dv, double *A) {
   const mbs_tree *m = k.m;
   const size_t n = (size_t)k.n;
   const size_t step_q = dq ? n : 0, step_v = dv ? n : 0, step_a = A ? n : 0;
-  if (!dq) dq = PAIR(SPARE);
-  if (!dv) dv = PAIR(SPARE);
-  if (!A) A = PAIR(SPARE);
-  const double *end_q = dq + (step_q ? n * n : n), *end_v = dv + (step_v ? n * n : n),
-               *end_a = A + (step_a ? n * n : n);
+  if (!dq) dq = k.column;
+  if (!dv) dv = k.column;
+  if (!A) A = k.column;
   for (int c = 0; c < k.n; ++c, dq += step_q, dv += step_v, A += step_a) {
     const V3 ql = ALL3(DQL, c), qa = ALL3(DQA, c), ul = ALL3(DVL, c), ua = ALL3(DVA, c);
     const V3 fl = ALL3(FL, c), fa = ALL3(FA, c);
@@ -700,11 +682,11 @@ static void pairs(work k, double *dq, double *dv, double *A) {
       zeros(dq + done, from - done);
       zeros(dv + done, from - done);
       zeros(A + done, from - done);
-      for (int i = from; i < to; i += MBS_LANES) {
-        const V3 sl = N3(PS), sa = N3(PS + 3);
-        put_column(dq + i, end_q, dot(ql, sl) + dot(qa, sa));
-        put_column(dv + i, end_v, dot(ul, sl) + dot(ua, sa));
-        put_column(A + i, end_a, dot(fl, sl) + dot(fa, sa));
+      LANES_OF(from, to) {
+        const V3 sl = L3(SC), sa = L3(SA);
+        put_column(dq + j, from - j, to - j, dot(ql, sl) + dot(qa, sa));
+        put_column(dv + j, from - j, to - j, dot(ul, sl) + dot(ua, sa));
+        put_column(A + j, from - j, to - j, dot(fl, sl) + dot(fa, sa));
       }
       done = to;
     }
@@ -714,11 +696,11 @@ static void pairs(work k, double *dq, double *dv, double *A) {
     zeros(A + done, first - done);
     const V3 sl = ALL3(SC, c), sa = ALL3(SA, c), ya = ALL3(YA, c);
     const V3 y2l = ALL3(Y2L, c), y2a = ALL3(Y2A, c), ysl = ALL3(YSL, c), ysa = ALL3(YSA, c);
-    for (int i = first; i < end; i += MBS_LANES) {
-      const V3 l = N3(PF), a = N3(PF + 3), g = N3(PG);
-      put_column(dq + i, end_q, dot(l, y2l) + dot(a, y2a) + dot(g, ya));
-      put_column(dv + i, end_v, dot(l, ysl) + dot(a, ysa) + dot(g, sa));
-      put_column(A + i, end_a, dot(l, sl) + dot(a, sa));
+    LANES_OF(first, end) {
+      const V3 l = L3(FL), a = L3(FA), g = L3(GA);
+      put_column(dq + j, first - j, end - j, dot(l, y2l) + dot(a, y2a) + dot(g, ya));
+      put_column(dv + j, first - j, end - j, dot(l, ysl) + dot(a, ysa) + dot(g, sa));
+      put_column(A + j, first - j, end - j, dot(l, sl) + dot(a, sa));
     }
     zeros(dq + end, k.n - end);
     zeros(dv + end, k.n - end);
@@ -902,19 +884,80 @@ static void factorise(work k) {
   }
 }
 
-/* Solutions of A a = right by the factors, in place: of one column, and of lanes of columns. Nodes
- * from `count` on have zeros to the right, and are not wanted. `sums` are six for each node. */
-#define SOLVE(NAME, T, S, ALL)                                                                  static void NAME(work k, S *x, int count, S *sums) {                                            const int *before = k.m->before;                                                              const S zero = ALL(0);                                                                        for (int j = 0; j < 6 * count; ++j) sums[j] = zero;                                           for (int j = count - 1; j >= 0; --j) {                                                          const double *r = k.record + 16 * (size_t)j;                                                  const S *f = sums + 6 * (size_t)j;                                                            const int b = before[j];                                                                      const S u = x[j] - (f[0] * r[0] + f[1] * r[1] + f[2] * r[2]) -                                            (f[3] * r[3] + f[4] * r[4] + f[5] * r[5]);                                        x[j] = u;                                                                                     if (b < 0) continue;                                                                          S *to = sums + 6 * (size_t)b;                                                                 const S fx = f[0] + u * r[6], fy = f[1] + u * r[7], fz = f[2] + u * r[8];                     to[0] += fx;                                                                                  to[1] += fy;                                                                                  to[2] += fz;                                                                                  to[3] += f[3] + u * r[9] + fz * r[14] - fy * r[15];                                           to[4] += f[4] + u * r[10] + fx * r[15] - fz * r[13];                                          to[5] += f[5] + u * r[11] + fy * r[13] - fx * r[14];                                        }                                                                                             for (int j = 0; j < count; ++j) {                                                               const double *r = k.record + 16 * (size_t)j;                                                  const int b = before[j];                                                                      const S *i = sums + 6 * (size_t)(b < 0 ? 0 : b);                                              S a[6] = {zero, zero, zero, zero, zero, zero};                                                if (b >= 0) {                                                                                   a[0] = i[0] + i[4] * r[15] - i[5] * r[14];                                                    a[1] = i[1] + i[5] * r[13] - i[3] * r[15];                                                    a[2] = i[2] + i[3] * r[14] - i[4] * r[13];                                                    a[3] = i[3];                                                                                  a[4] = i[4];                                                                                  a[5] = i[5];                                                                                }                                                                                             const S value = x[j] * r[12] - (a[0] * r[6] + a[1] * r[7] + a[2] * r[8]) -                                    (a[3] * r[9] + a[4] * r[10] + a[5] * r[11]);                                  x[j] = value;                                                                                 for (int h = 0; h < 6; ++h) sums[6 * (size_t)j + h] = a[h] + value * r[h];                  }                                                                                           }
+/* Solutions of A a = right by the factors, in place, of W columns or of W groups of them in lanes:
+ * two groups at once, for one alone waits for its own results. Nodes from `count` on have zeros to
+ * the right, and are not wanted. `sums` are six for each node. */
+#define EACH(W) _Pragma("GCC unroll 2") for (int h = 0; h < W; ++h)
+#define SOLVE(NAME, S, ALL, W)                                                                \
+  static void NAME(work k, S(*x)[W], int count, S(*sums)[6][W]) {                             \
+    const int *before = k.m->before;                                                          \
+    const S zero = ALL(0);                                                                    \
+    for (int j = 0; j < count; ++j)                                                           \
+      for (int c = 0; c < 6; ++c) EACH(W) sums[j][c][h] = zero;                               \
+    for (int j = count - 1; j >= 0; --j) {                                                    \
+      const double *r = k.record + 16 * (size_t)j;                                            \
+      S(*f)[W] = sums[j];                                                                     \
+      const int b = before[j], turns = FACT(MBS_TURN, j) != 0;                                \
+      S u[W];                                                                                 \
+      EACH(W) u[h] = x[j][h] - f[3][h] * r[3] - (f[4][h] * r[4] + f[5][h] * r[5]);            \
+      if (!turns) EACH(W) u[h] = u[h] - f[0][h] * r[0] - (f[1][h] * r[1] + f[2][h] * r[2]);   \
+      EACH(W) x[j][h] = u[h];                                                                 \
+      if (b < 0) continue;                                                                    \
+      S(*to)[W] = sums[b];                                                                    \
+      EACH(W) {                                                                               \
+        const S fx = f[0][h] + u[h] * r[6], fy = f[1][h] + u[h] * r[7],                       \
+                fz = f[2][h] + u[h] * r[8];                                                   \
+        to[0][h] += fx;                                                                       \
+        to[1][h] += fy;                                                                       \
+        to[2][h] += fz;                                                                       \
+        to[3][h] += f[3][h] + u[h] * r[9] + fz * r[14] - fy * r[15];                          \
+        to[4][h] += f[4][h] + u[h] * r[10] + fx * r[15] - fz * r[13];                         \
+        to[5][h] += f[5][h] + u[h] * r[11] + fy * r[13] - fx * r[14];                         \
+      }                                                                                       \
+    }                                                                                         \
+    for (int j = 0; j < count; ++j) {                                                         \
+      const double *r = k.record + 16 * (size_t)j;                                            \
+      const int b = before[j], turns = FACT(MBS_TURN, j) != 0;                                \
+      S(*from)[W] = sums[b < 0 ? j : b], (*to)[W] = sums[j];                                  \
+      if (b < 0) /* the base rests */                                                         \
+        for (int c = 0; c < 6; ++c) EACH(W) to[c][h] = zero;                                  \
+      S a[6][W];                                                                              \
+      EACH(W) {                                                                               \
+        const S wx = from[3][h], wy = from[4][h], wz = from[5][h];                            \
+        a[0][h] = from[0][h] + wy * r[15] - wz * r[14];                                       \
+        a[1][h] = from[1][h] + wz * r[13] - wx * r[15];                                       \
+        a[2][h] = from[2][h] + wx * r[14] - wy * r[13];                                       \
+        a[3][h] = wx;                                                                         \
+        a[4][h] = wy;                                                                         \
+        a[5][h] = wz;                                                                         \
+        const S value = x[j][h] * r[12] - (wx * r[9] + wy * r[10] + wz * r[11]) -             \
+                        (a[0][h] * r[6] + a[1][h] * r[7] + a[2][h] * r[8]);                   \
+        x[j][h] = value;                                                                      \
+        to[0][h] = a[0][h];                                                                   \
+        to[1][h] = a[1][h];                                                                   \
+        to[2][h] = a[2][h];                                                                   \
+        to[3][h] = wx + value * r[3];                                                         \
+        to[4][h] = wy + value * r[4];                                                         \
+        to[5][h] = wz + value * r[5];                                                         \
+      }                                                                                       \
+      if (!turns)                                                                             \
+        for (int c = 0; c < 3; ++c) EACH(W) to[c][h] += x[j][h] * r[c];                       \
+    }                                                                                         \
+  }
 #define AS_IT_IS(x) (x)
-SOLVE(solve, D3, double, AS_IT_IS)
-SOLVE(solve_lanes, V3, V, mbs_all)
+SOLVE(solve_one, double, AS_IT_IS, 1)
+SOLVE(solve_lanes, V, mbs_all, 2)
+
+static void solve(work k, double *x) {
+  solve_one(k, (double(*)[1])x, k.n, (double(*)[6][1])k.lanes);
+}
 
 /* The accelerations, in the order of the tree, in the spare row; `inverse` was without any. */
 static void accelerations(work k, const double *tau) {
-  double *a = PAIR(SPARE);
+  double *a = k.column;
   for (int j = 0; j < k.n; ++j) a[j] = tau[k.m->v_at[j]] - CELL(TAU, j);
   factorise(k);
-  solve(k, a, k.n, (double *)k.lanes);
+  solve(k, a);
 }
 
 void mbs_tree_ddm(const mbs_tree *m, const double *q, const double *v, const double *tau, double *a,
@@ -923,56 +966,78 @@ void mbs_tree_ddm(const mbs_tree *m, const double *q, const double *v, const dou
   inverse(k, q, v, 0);
   accelerations(k, tau);
   if (a)
-    for (int j = 0; j < k.n; ++j) a[m->v_at[j]] = PAIR(SPARE)[j];
+    for (int j = 0; j < k.n; ++j) a[m->v_at[j]] = k.column[j];
 }
 
-/* Columns of a matrix side by side in lanes, with the opposite sign; and back by mbs_columns. */
-static void to_lanes(V *rows, int count, int columns, const double *from, size_t step) {
-  double *x = (double *)rows;
+/* Columns of a matrix side by side in lanes, every second vector, with the opposite sign; and back.
+ * Squares of rows, of which the last overlaps the one before it. */
+static void to_lanes(V (*rows)[2], int h, int count, int columns, const double *from, size_t step) {
   int first = 0;
 #if defined(MBS_PAIR)
-  if (columns == MBS_LANES)
-    for (; first + MBS_LANES <= count; first += MBS_LANES) {
-      V square[MBS_LANES];
-      MBS_UNROLLED for (int l = 0; l < MBS_LANES; ++l)
-        square[l] = -(V)(*(const U *)(from + step * (size_t)l + first));
-      mbs_transpose(square);
-      MBS_UNROLLED for (int r = 0; r < MBS_LANES; ++r) rows[first + r] = square[r];
-    }
+  while (count >= MBS_LANES && first < count) {
+    if (first > count - MBS_LANES) first = count - MBS_LANES;
+    V square[MBS_LANES];
+    MBS_UNROLLED for (int l = 0; l < MBS_LANES; ++l)
+      square[l] = l < columns ? -(V)(*(const U *)(from + step * (size_t)l + first)) : mbs_all(0);
+    mbs_transpose(square);
+    MBS_UNROLLED for (int r = 0; r < MBS_LANES; ++r) rows[first + r][h] = square[r];
+    first += MBS_LANES;
+  }
 #endif
   for (int r = first; r < count; ++r)
     for (int l = 0; l < MBS_LANES; ++l)
-      x[(size_t)r * MBS_LANES + (size_t)l] = l < columns ? -from[step * (size_t)l + (size_t)r] : 0;
+      rows[r][h][l] = l < columns ? -from[step * (size_t)l + (size_t)r] : 0;
 }
 
-static void from_lanes(const V *rows, int count, int columns, double *to, size_t step) {
-  double *column[MBS_LANES];
-  for (int l = 0; l < MBS_LANES; ++l) column[l] = to + step * (size_t)(l < columns ? l : 0);
-  mbs_columns(rows, count, columns, column);
+static void from_lanes(V (*rows)[2], int h, int count, int columns, double *to, size_t step) {
+  int first = 0;
+#if defined(MBS_PAIR)
+  while (count >= MBS_LANES && first < count) {
+    if (first > count - MBS_LANES) first = count - MBS_LANES;
+    V square[MBS_LANES];
+    MBS_UNROLLED for (int r = 0; r < MBS_LANES; ++r) square[r] = rows[first + r][h];
+    mbs_transpose(square);
+    MBS_UNROLLED for (int l = 0; l < MBS_LANES; ++l)
+      if (l < columns) *(U *)(to + step * (size_t)l + first) = (U)square[l];
+    first += MBS_LANES;
+  }
+#endif
+  for (int l = 0; l < columns; ++l)
+    for (int r = first; r < count; ++r) to[step * (size_t)l + (size_t)r] = rows[r][h][l];
 }
 
-/* - A^-1 times a matrix, in place. */
-static void solve_matrix(work k, double *x) {
+INLINE int least(int a, int b) { return a < b ? a : b; }
+
+/* - A^-1 times matrices, in place; one of them may be null. */
+static void solve_matrices(work k, double *dq, double *dv) {
   const size_t n = (size_t)k.n;
-  V *rows = k.lanes + 6 * n;
-  for (int c = 0; c < k.n; c += MBS_LANES) {
-    const int columns = k.n - c < MBS_LANES ? k.n - c : MBS_LANES;
-    to_lanes(rows, k.n, columns, x + n * (size_t)c, n);
-    solve_lanes(k, rows, k.n, k.lanes);
-    from_lanes(rows, k.n, columns, x + n * (size_t)c, n);
+  V(*rows)[2] = (V(*)[2])(k.lanes + 12 * n);
+  double *both[2] = {dq ? dq : dv, dv ? dv : dq};
+  /* two groups of columns: of both matrices, or one behind the other of the only one */
+  const int step = dq && dv ? MBS_LANES : 2 * MBS_LANES;
+  for (int c = 0; c < k.n; c += step) {
+    const int at[2] = {c, dq && dv ? c : least(c + MBS_LANES, k.n)};
+    for (int h = 0; h < 2; ++h)
+      to_lanes(rows, h, k.n, least(k.n - at[h], MBS_LANES), both[h] + n * (size_t)at[h], n);
+    solve_lanes(k, rows, k.n, (V(*)[6][2])k.lanes);
+    for (int h = 0; h < 2; ++h)
+      from_lanes(rows, h, k.n, least(k.n - at[h], MBS_LANES), both[h] + n * (size_t)at[h], n);
   }
 }
 
 /* A^-1: its upper triangle needs no node behind the column's; the lower one is the same. */
 static void inverse_matrix(work k, double *x) {
   const size_t n = (size_t)k.n;
-  V *rows = k.lanes + 6 * n;
-  for (int c = 0; c < k.n; c += MBS_LANES) {
-    const int columns = k.n - c < MBS_LANES ? k.n - c : MBS_LANES, count = c + columns;
-    memset(rows, 0, (size_t)count * sizeof(V));
-    for (int l = 0; l < columns; ++l) ((double *)(rows + c + l))[l] = 1;
-    solve_lanes(k, rows, count, k.lanes);
-    from_lanes(rows, count, columns, x + n * (size_t)c, n);
+  V(*rows)[2] = (V(*)[2])(k.lanes + 12 * n);
+  for (int c = 0; c < k.n; c += 2 * MBS_LANES) {
+    const int count = least(c + 2 * MBS_LANES, k.n);
+    memset(rows, 0, (size_t)count * sizeof *rows);
+    for (int r = c; r < count; ++r) rows[r][(r - c) / MBS_LANES][(r - c) % MBS_LANES] = 1;
+    solve_lanes(k, rows, count, (V(*)[6][2])k.lanes);
+    for (int h = 0; h < 2; ++h) {
+      const int first = least(c + h * MBS_LANES, k.n);
+      from_lanes(rows, h, count, least(k.n - first, MBS_LANES), x + n * (size_t)first, n);
+    }
   }
   for (size_t c = 0; c < n; ++c)
     for (size_t r = c + 1; r < n; ++r) x[r + n * c] = x[c + n * r];
@@ -984,16 +1049,15 @@ void mbs_tree_ddm_derivatives(const mbs_tree *m, const double *q, const double *
   const work k = space_of(m, w);
   inverse(k, q, v, 0);
   accelerations(k, tau);
-  const double *found = PAIR(SPARE);
-  double *given = PAIR(PF); /* in the order of v */
+  const double *found = k.column;
+  double *given = (double *)k.lanes; /* in the order of v */
   for (int j = 0; j < k.n; ++j) given[m->v_at[j]] = found[j];
   if (a) memcpy(a, given, (size_t)k.n * sizeof(double));
   if (dq || dv) {
     motions(k, v, given);
     wrenches(k);
     slopes(k, dq, dv, 0);
-    if (dq) solve_matrix(k, dq);
-    if (dv) solve_matrix(k, dv);
+    solve_matrices(k, dq, dv);
   }
   if (dtau) inverse_matrix(k, dtau);
   reorder(k, dq);

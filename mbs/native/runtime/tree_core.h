@@ -31,7 +31,6 @@ enum {
 
 typedef struct {
   int size;      /* velocities */
-  int stride;    /* 8 more than the size at least, an odd multiple of 8 */
   int positions; /* elements of q */
   int in_order;  /* whether v has the order of the tree */
   int many;      /* joints of several velocities */
@@ -53,8 +52,8 @@ typedef struct {
 } mbs_tree;
 
 /* Doubles of work space of any of the models. */
-#define MBS_TREE_WORK(size, stride, in_order) \
-  ((143 * 8) * (((size) + 7) / 8) + 16 * (stride) + 128 * (size) + ((in_order) ? 0 : (size) * (size)) + 8)
+#define MBS_TREE_WORK(size, in_order) \
+  (144 * (((size) + 7) / 8 * 8) + 128 * (size) + ((in_order) ? 0 : (size) * (size)) + 8)
 
 /* tau: efforts for accelerations a. */
 void mbs_tree_idm(const mbs_tree *m, const double *q, const double *v, const double *a, double *tau,

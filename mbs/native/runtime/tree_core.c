@@ -1091,7 +1091,7 @@ void mbs_tree_by_positions(const mbs_tree *m, const double *q, const double *alo
     const double square = e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3];
     const double w = e[0], x = e[1], y = e[2], z = e[3];
     /* velocities for the elements of the quaternion: 2 / |e|^2 (-e, w - e x)' */
-    const double by[4][3] = {{-x, -y, -z}, {w, z, -y}, {-z, w, x}, {y, -x, w}};
+    const double by[4][3] = {{-x, -y, -z}, {w, -z, y}, {z, w, -x}, {-y, x, w}};
     for (int h = 0; h < 4; ++h) {
       double *to = by_q + n * (size_t)(at + h);
       const double *turn[3];

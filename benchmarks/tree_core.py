@@ -3,10 +3,10 @@
     python benchmarks/tree_core.py [--robots chain6,chain30] [--quick] [--output table.md]
 
 Every model is a loop of C++ over 64 random states, as in benchmarks/dynamics.py; a time is the best
-of many blocks of 0.15 ms. "core" is `mbs.models.tree_core`, "lines" are the models of
-`mbs.models` by `mbs.native.compiled(f, fast=True)` where they have up to 60,000 operations. Values are
-compared with pinocchio's before anything is timed. Processor seconds and the largest memory are
-those of the compiler, from an empty cache.
+of many blocks of 0.15 ms. "core" is `mbs.models.tree_core`, "lines" are the straight lines of
+`mbs.native.compiled(f, fast=True)`, where there are up to 60,000 operations. Values are compared
+with pinocchio's before anything is timed. Seconds of the processor and the largest memory are those
+of the compiler, from an empty cache.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,8 @@ import numpy as np
 from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.model_function import ModelFunction, require_system
-from mbs.assembly.tree import Link, quaternion_slices
+from mbs.assembly.model_function import ModelFunction, default_in, require_system
+from mbs.assembly.tree import Link
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
 from mbs.native.array_calls import with_array_calls
@@ -31,39 +31,72 @@ from mbs.spatial import elements
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TreeCore:
-    """The models of an open tree as machine code that loops over its links.
+    """The dynamic models of an open tree as machine code that loops over its links.
 
     Each is a casadi.Function with the inputs and outputs of the builder of its name. Called with
     numpy arrays it returns numpy arrays, as `mbs.native.compiled` does.
 
     Attributes:
-        idm: as `inverse_dynamics`.
-        inertia_matrix: as `inertia_matrix`.
-        ddm: as `direct_dynamics`.
-        idm_derivatives: as `inverse_dynamics_derivatives`.
-        ddm_derivatives: as `direct_dynamics_derivatives`.
+        system: the tree.
     """
 
-    idm: Function
-    inertia_matrix: Function
-    ddm: Function
-    idm_derivatives: Function
-    ddm_derivatives: Function
+    system: System
+
+    @property
+    def idm(self) -> Function:
+        """``idm(q, v, a) -> tau``; see `inverse_dynamics`."""
+        return core_function(self.system, "idm")
+
+    @property
+    def inertia_matrix(self) -> Function:
+        """``inertia(q) -> A``; see `inertia_matrix`. It cannot be differentiated."""
+        return core_function(self.system, "inertia")
+
+    @property
+    def ddm(self) -> Function:
+        """``ddm(q, v, tau) -> a``; see `direct_dynamics`."""
+        return core_function(self.system, "ddm")
+
+    @property
+    def idm_derivatives(self) -> Function:
+        """``idm_derivatives(q, v, a) -> dtau_dq, dtau_dv, dtau_da, tau``.
+
+        See `inverse_dynamics_derivatives`. It cannot be differentiated.
+        """
+        return core_function(self.system, "idm_derivatives")
+
+    @property
+    def ddm_derivatives(self) -> Function:
+        """``ddm_derivatives(q, v, tau) -> da_dq, da_dv, da_dtau, a``.
+
+        See `direct_dynamics_derivatives`. It cannot be differentiated.
+        """
+        return core_function(self.system, "ddm_derivatives")
 
 
 def tree_core(system: System) -> TreeCore:
-    """The five dynamic models of an open tree, of any size, without equations written out.
+    """The five dynamic models of an open tree of any size, no equation written out.
+
+    One C file, compiled once and kept, loops over the links; the mechanism is a table of numbers,
+    which a short Function of the parameters completes at every call. Rotors, friction and springs
+    of the joints are included. Derivatives are those of the core: CasADi differentiates idm and
+    ddm once with respect to q, v and a or tau. With respect to parameters it gets NaN.
+    Quaternions are brought to unit length first.
+
+    Source: Khalil & Creusot 1997, eq. 15-20; Walker & Orin 1982; Featherstone 1983; Singh, Russell
+    & Wensing 2022; Carpentier & Mansard 2018.
 
     Args:
-        system: an open tree.
+        system: an open tree of revolute, prismatic, spherical and free motions.
 
     Raises:
-        ModelError: the system has loops, or components with equations of their own.
+        ModelError: the system has loops, or components with equations of their own; or, of ddm, a
+            joint moves no inertia.
         CompilerError: there is no compiler, or it refused the code.
     """
     require_system(system)
-    names = ("idm", "inertia", "ddm", "idm_derivatives", "ddm_derivatives")
-    return TreeCore(*(core_function(system, name) for name in names))
+    core_library(system)
+    return TreeCore(system)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,18 +117,27 @@ def core_library(system: System) -> CoreLibrary:
 
     def build() -> CoreLibrary:
         _require_known(system)
-        table, parameters = _table(system), len(system.parameters)
-        path = tree_library(table, parameters)
-        return CoreLibrary(path, tree_functions(table, parameters))
+        table, default = _table(system), default_in(system, 1)[1:]
+        return CoreLibrary(
+            tree_library(table, len(system.parameters), default),
+            tree_functions(table, len(system.parameters), default),
+        )
 
     library: CoreLibrary = system.cached("tree core library", build)
     return library
 
 
 def core_function(system: System, name: str) -> Function:
-    """One function of the core: "idm", "inertia" and so on."""
+    """One function of the core by its name in C, such as "idm".
+
+    Args:
+        system: an open tree.
+        name: one of `CoreLibrary.shapes`.
+    """
 
     def build() -> Function:
+        if name.startswith("ddm"):
+            _require_inertia(system)
         path = core_library(system).path
         code = casadi.external(name, str(path))
         result: Any = with_array_calls(code, path, ModelFunction(code, system).like)
@@ -179,35 +221,37 @@ def _table(system: System) -> TreeTable:
 
 
 _ONE = SX(1)
+_UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
-def _put_link(put: Any, link: Link, j: int, first: int) -> None:
+def _put_link(put: Callable[[int, int, SX], None], link: Link, j: int, first: int) -> None:
     """The numbers of the nodes of a link, the first of which is given."""
-    last = first + link.motion.nv - 1
+    last, rotor = first + link.motion.nv - 1, link.rotor
     pose, body = link.pose(), link.inertia
-    for row, value in (("C", pose.R), ("T", pose.p), ("h", body.ms), ("mass", body.m)):
+    tensor = casadi.vertcat(*(body.J[r, c] for r, c in _UPPER))
+    fixed = (("C", pose.R), ("T", pose.p), ("mass", body.m), ("h", body.ms), ("J", tensor))
+    for name, value in fixed:
         for k, element in enumerate(elements(SX(value))):
-            put(ROWS[row] + k, last, element)
-    for k, (row, column) in enumerate(((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))):
-        put(ROWS["J"] + k, last, body.J[row, column])
-    put(ROWS["first"], first, _ONE)
-    rotor = link.rotor
+            put(ROWS[name] + k, last, element)
+    # what a joint itself needs, the same for all of its velocities
+    each = {name: getattr(link, name) for name in ("Ia", "Fv", "stiffness", "rest", "Fs")}
+    each["width"] = link.Fs_width
+    if rotor is not None:
+        each["Ia"] = link.Ia + rotor.seen_at_joint
+    each |= {name: _ONE for name, motion in _KINDS.items() if link.motion is motion}
+    if link.antecedent >= 0:
+        each["inner"] = _ONE
     for node in range(first, last + 1):
-        if link.motion is Motion.REVOLUTE:
-            put(ROWS["turn"], node, _ONE)
-        if link.motion is Motion.PRISMATIC:
-            put(ROWS["slide"], node, _ONE)
-        if link.antecedent >= 0:
-            put(ROWS["inner"], node, _ONE)
-        put(ROWS["Ia"], node, link.Ia if rotor is None else link.Ia + rotor.seen_at_joint)
-        for name in ("Fv", "stiffness", "rest", "Fs"):
-            put(ROWS[name], node, getattr(link, name))
-        put(ROWS["width"], node, link.Fs_width)
+        for name, value in each.items():
+            put(ROWS[name], node, value)
+    put(ROWS["first"], first, _ONE)
     if rotor is not None and rotor.carrier >= 0:
         for k, element in enumerate(elements(rotor.momentum)):
             put(ROWS["spin"] + k, first, element)
-        if rotor.carrier == j:
-            put(ROWS["own"], first, _ONE)
+        put(ROWS["own"], first, SX(int(rotor.carrier == j)))
+
+
+_KINDS = {"turn": Motion.REVOLUTE, "slide": Motion.PRISMATIC}
 
 
 def _lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:
@@ -265,29 +309,20 @@ _NO_INERTIA = 1e-30
 """Stands for an inertia of zero where one divides [kg m^2 or kg]; no body has so little."""
 
 
-def require_core_inertia(system: System) -> None:
-    """Refuse a tree in which some velocity moves no inertia; as `require_inertia`, by the core.
-
-    Raises:
-        ModelError: which velocity, and what to give mass to.
-    """
-
-    def check() -> bool:
-        if any(p.default is None for p in system.parameters):
-            return True
-        rng = np.random.default_rng(_SEED)
-        q = np.array(system.configuration) + rng.uniform(-1.0, 1.0, system.nq)
-        for part in quaternion_slices(system.tree):
-            q[part] /= np.linalg.norm(q[part])
-        p = [np.array(system.p_default)] if system.parameters else []
-        free, locked = core_function(system, "pivots")(q, *p)
-        moves = np.abs(free) > _VANISHING * np.maximum(np.abs(locked), _NO_INERTIA)
-        if not moves.all():
-            name = system.speeds[int(np.max(np.flatnonzero(~moves)))].name
-            raise ModelError(
-                f"{system.name}: {name} can move without moving any inertia, so its acceleration"
-                " is not determined; give mass to what it carries, or a rotor inertia Ia"
-            )
-        return True
-
-    system.cached("core has inertia", check)
+def _require_inertia(system: System) -> None:
+    """Refuse a tree in which some velocity moves no inertia, as `direct_dynamics` does."""
+    if any(p.default is None for p in system.parameters):
+        return
+    pivots = casadi.external("pivots", str(core_library(system).path))
+    rng = np.random.default_rng(_SEED)
+    q = np.array(system.configuration) + rng.uniform(-1.0, 1.0, system.nq)
+    p = [system.p_default] if system.parameters else []
+    free, locked = (np.array(x).ravel() for x in pivots(q, *p))
+    # The inertia of files may be negative: what counts is whether anything is there.
+    moves = np.abs(free) > _VANISHING * np.maximum(np.abs(locked), _NO_INERTIA)
+    if not moves.all():
+        name = system.speeds[int(np.max(np.flatnonzero(~moves)))].name
+        raise ModelError(
+            f"{system.name}: {name} can move without moving any inertia, so its acceleration"
+            " is not determined; give mass to what it carries, or a rotor inertia Ia"
+        )

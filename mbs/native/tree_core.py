@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
+import casadi
 from casadi import DM, MX, SX, Function
 
 from mbs.native.compiled import generated
@@ -62,7 +63,7 @@ class TreeTable:
         size: velocities.
         positions: elements of q.
         lists: indices by the names of their lists.
-        numbers: the table, see `place_of`, then gravity; elements that follow from parameters are NaN.
+        numbers: the table, see `place_of`, then gravity; NaN where they follow from parameters.
         places: where these are.
         dependent: ``numbers(p)``, their values; None without parameters.
     """
@@ -85,12 +86,15 @@ class TreeTable:
         return list(self.lists["q_at"]) == list(self.lists["v_at"])
 
 
-def tree_functions(table: TreeTable, parameters: int) -> dict[str, Function]:
+def tree_functions(
+    table: TreeTable, parameters: int, default: Sequence[float] = ()
+) -> dict[str, Function]:
     """Functions that have the names and shapes of the core's, and no content.
 
     Args:
         table: of the mechanism.
         parameters: how many there are.
+        default: CasADi's default of all of them, when there are some.
     """
     n, nq = table.size, table.positions
     sizes = {"q": (nq, 1), "v": (n, 1), "a": (n, 1), "tau": (n, 1), "p": (parameters, 1)}
@@ -117,23 +121,28 @@ def tree_functions(table: TreeTable, parameters: int) -> dict[str, Function]:
             [("jac_a_q", (n, nq)), ("jac_a_v", matrix), ("jac_a_tau", matrix)],
         ),
     }
-    if parameters:
-        del shapes["jac_idm"], shapes["jac_ddm"]
     result = {}
     for name, (inputs, outputs) in shapes.items():
-        every = [*inputs, *(["p"] if parameters else [])]
+        every = [*inputs]
+        if parameters:  # the last input; but for the Jacobian, whose last is the output
+            every.insert(3 if name.startswith("jac_") else len(every), "p")
+        if parameters and name.startswith("jac_"):
+            outputs = [*outputs, (f"{outputs[0][0][:-1]}p", (n, parameters))]
         symbols = [MX.sym(x, *sizes[x.removeprefix("out_")]) for x in every]
         values = [MX(DM.zeros(*shape)) for _, shape in outputs]
-        result[name] = Function(name, symbols, values, every, [x for x, _ in outputs])
+        names = every, [x for x, _ in outputs]
+        options = {"default_in": [default[0] if x == "p" else 0.0 for x in every]}
+        result[name] = Function(name, symbols, values, *names, options)
     return result
 
 
-def tree_library(table: TreeTable, parameters: int) -> Path:
+def tree_library(table: TreeTable, parameters: int, default: Sequence[float] = ()) -> Path:
     """The library of all models of a mechanism, in CasADi's calling convention.
 
     Args:
         table: of the mechanism.
         parameters: how many it has.
+        default: CasADi's default of all of them, when there are some.
 
     Raises:
         CompilerError: there is no compiler, or it refused the code.
@@ -143,7 +152,7 @@ def tree_library(table: TreeTable, parameters: int) -> Path:
     files = {name: runtime.joinpath(name).read_text("utf-8") for name in own}
     # the core is kept by its text, that of its headers, compiler and flags: "native" needs more
     files["lanes.h"] += f"/* {processor()} */\n"
-    files["mechanism.c"] = _source(table, tree_functions(table, parameters))
+    files["mechanism.c"] = _source(table, tree_functions(table, parameters, default))
     if table.dependent is not None:
         files["dependent.c"] = generated([table.dependent])
     return cached_library(files, FAST_FLAGS, common=["tree_core.c"])
@@ -205,6 +214,7 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
             "}",
         ]
     square = table.size * table.size
+    by_parameters = table.size * functions["jac_idm"].size1_in("p") if table.dependent else 0
     lines = list(head)
     for name, function in functions.items():
         extra = 0 if table.plain else square
@@ -215,7 +225,7 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
             "  mbs_tree own;",
             "  (void)iw; (void)mem;",
             f"  const mbs_tree *m = at({_parameter(function)}, &own, &w);",
-            *_call(name, table.plain, own),
+            *_call(name, table.plain, own, by_parameters if name.startswith("jac_") else 0),
             "  return 0;",
             "}",
             function_table(function, f"{work} + {before + own}"),
@@ -228,8 +238,14 @@ def _parameter(function: Function) -> str:
     return f"arg[{names.index('p')}]" if "p" in names else "0"
 
 
-def _call(name: str, plain: bool, square: int) -> list[str]:
-    """What a function does: the inputs and outputs of the core are those of CasADi."""
+def _call(name: str, plain: bool, square: int, by_parameters: int) -> list[str]:
+    """What a function does: the inputs and outputs of the core are those of CasADi.
+
+    Derivatives by parameters, which the core does not have, are NaN.
+    """
+    if by_parameters:
+        nan = f"  if (res[3]) for (int k = 0; k < {by_parameters}; ++k) res[3][k] = NAN;"
+        return [nan, *_call(name, plain, square, 0)]
     match name:
         case "idm" | "ddm":
             return [f"  mbs_tree_{name}(m, arg[0], arg[1], arg[2], res[0], w);"]
@@ -270,10 +286,5 @@ def _wrapped(words: map[str]) -> str:
 
 def dependent_numbers(values: Sequence[SX], p: SX) -> Function:
     """``numbers(p)``: the numbers of a table that follow from parameters."""
-    return Function("dependent_numbers", [p], [SX.zeros(0, 1) if not values else _column(values)])
-
-
-def _column(values: Sequence[SX]) -> SX:
-    import casadi
-
-    return SX(casadi.densify(casadi.vertcat(*values)))
+    column = casadi.densify(casadi.vertcat(*values))
+    return Function("dependent_numbers", [p], [column], ["p"], ["numbers"], {"cse": True})

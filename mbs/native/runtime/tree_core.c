@@ -118,9 +118,11 @@ typedef struct {
   double *square;  /* size x size, where v has another order than the tree */
 } work;
 
+_Static_assert(MBS_WORK_ROWS < 144, "MBS_TREE_WORK counts 143 rows and a column");
+
 static work space_of(const mbs_tree *m, double *w) {
   work k = {m, m->size, mbs_aligned(w), 0, 0, 0, 0};
-  const size_t whole = ((size_t)k.n + 7) / 8 * 8;
+  const size_t whole = ((size_t)k.n + 7) / 8 * 8; /* MBS_TREE_WORK counts all this */
   k.record = k.w + whole * MBS_WORK_ROWS;
   k.lanes = (V *)(k.record + 16 * (size_t)k.n);
   k.column = (double *)(k.lanes + 14 * (size_t)k.n);
@@ -519,6 +521,17 @@ static void reorder(work k, double *x) {
       x[(size_t)k.m->v_at[r] + n * (size_t)k.m->v_at[c]] = k.square[r + n * c];
 }
 
+/* A block of the inertia matrix within a joint made symmetric to the last bit. */
+static void mirror(work k, double *A) {
+  const size_t n = (size_t)k.n;
+  const int *joint = k.m->joints;
+  for (int c = 0; c < k.m->many; ++c, joint += 3) {
+    double *block = A + (size_t)joint[0] * (n + 1);
+    for (size_t x = 0; x < (size_t)joint[1]; ++x)
+      for (size_t y = x + 1; y < (size_t)joint[1]; ++y) block[x + n * y] = block[y + n * x];
+  }
+}
+
 /* The lanes that hold the nodes from one up to another. */
 #define LANES_OF(from, to) for (int j = (from) & -MBS_LANES; j < (to); j += MBS_LANES)
 
@@ -551,6 +564,7 @@ void mbs_tree_inertia(const mbs_tree *m, const double *q, double *A, double *w) 
   composites(k);
   momenta(k);
   inertia(k, A);
+  mirror(k, A);
   reorder(k, A);
 }
 
@@ -760,6 +774,7 @@ static void slopes(work k, double *dq, double *dv, double *A) {
   momenta(k);
   changes(k);
   pairs(k, dq, dv, A);
+  if (A) mirror(k, A);
   turning_rotors(k, dq, dv);
 }
 

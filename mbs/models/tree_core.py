@@ -254,9 +254,14 @@ def _put_link(put: Callable[[int, int, SX], None], link: Link, j: int, first: in
 _KINDS = {"turn": Motion.REVOLUTE, "slide": Motion.PRISMATIC}
 
 
+_KIND = {Motion.REVOLUTE: 0, Motion.PRISMATIC: 1, Motion.SPHERICAL: 2, Motion.FREE: 2}
+"""The kind of the first motion about an axis, as tree_core.h counts them; of free joints slides come
+first, and are counted behind."""
+
+
 def _lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:
     """The indices of the nodes of a tree."""
-    names = ("before", "link", "end", "first", "q_at", "v_at", "runs_from", "runs")
+    names = ("before", "link", "end", "first", "last", "kind", "q_at", "v_at", "runs_from", "runs")
     result: dict[str, list[int]] = {name: [] for name in (*names, "joints", "rotor", "rub")}
     first, last = dict[int, int](), {-1: -1}
     ancestry: dict[int, list[int]] = {-1: []}
@@ -270,6 +275,8 @@ def _lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:
             result["before"].append(size - 1 if h else last[i])
             result["link"].append(last[i])
             result["first"].append(first[j])
+            result["last"].append(last[j])
+            result["kind"].append(_KIND[link.motion] + (h + 3) % count)
             result["q_at"].append(link.q.start if count == 1 else -1)
             result["v_at"].append(link.v.start + h)
             result["runs_from"].append(len(result["runs"]) // 2)

@@ -45,7 +45,7 @@ ROWS = {
 
 ROW_COUNT = 36
 _LIST_NAMES = (
-    *("before", "link", "end", "first", "q_at", "v_at", "runs_from", "runs"),
+    *("before", "link", "end", "first", "last", "kind", "q_at", "v_at", "runs_from", "runs"),
     *("joints", "rotor", "rub"),
 )
 

@@ -78,8 +78,7 @@ enum {
   WDL = WD + 3,   /* 3: of the link before */
   VD = WDL + 3,   /* 3: acceleration of the origin of the link, minus gravity */
   VDL = VD + 3,   /* 3: of the link before */
-  ADD = VDL + 3,  /* 3: what a node adds */
-  HB = ADD + 3,   /* 3: first moments */
+  HB = VDL + 3,   /* 3: first moments */
   JB = HB + 3,    /* 6: inertia */
   F = JB + 6,     /* 3: force, of the body, then of all behind the node */
   M = F + 3,      /* 3: and moment */
@@ -112,6 +111,7 @@ typedef struct {
   const mbs_tree *m;
   int n;
   double *w;       /* cells */
+  struct chain *nodes; /* what goes from link to link: of the base, then of each node */
   double *record;  /* factors: 16 for each node */
   V *lanes;        /* 14 for each node */
   double *column;  /* one that nobody wants, or a right side */
@@ -121,9 +121,10 @@ typedef struct {
 _Static_assert(MBS_WORK_ROWS < 144, "MBS_TREE_WORK counts 143 rows and a column");
 
 static work space_of(const mbs_tree *m, double *w) {
-  work k = {m, m->size, mbs_aligned(w), 0, 0, 0, 0};
+  work k = {m, m->size, mbs_aligned(w), 0, 0, 0, 0, 0};
   const size_t whole = ((size_t)k.n + 7) / 8 * 8; /* MBS_TREE_WORK counts all this */
-  k.record = k.w + whole * MBS_WORK_ROWS;
+  k.nodes = (struct chain *)(k.w + whole * MBS_WORK_ROWS);
+  k.record = k.w + whole * (MBS_WORK_ROWS + 32) + 32;
   k.lanes = (V *)(k.record + 16 * (size_t)k.n);
   k.column = (double *)(k.lanes + 14 * (size_t)k.n);
   k.square = k.column + whole;
@@ -190,46 +191,106 @@ static void several(work k, const double *q) {
   }
 }
 
-/* Axes and origins of all links, and the motions of all nodes. */
-static void poses(work k, const double *q) {
+/* What goes from link to link is in vectors of four, the fourth of which is zero. */
+typedef double Q __attribute__((vector_size(32), may_alias));
+INLINE Q turn_round(Q a) { return (Q){a[1], a[2], a[0], a[3]}; }
+INLINE Q crossed(Q a, Q b) { return turn_round(a * turn_round(b) - turn_round(a) * b); }
+
+/* Of each node, from the second on; the first is the base. */
+struct chain {
+  Q r0, r1, r2, d;      /* axes of the link, its origin from that of the link before */
+  Q w, wd, vd, vo;      /* motion of the link: see W, WD, VD and VO */
+};
+typedef struct chain chain;
+
+/* Poses of all links and, where they move, their velocities and accelerations. */
+INLINE void from_link_to_link(work k, int moves) {
   const mbs_tree *m = k.m;
-  for (int j = 0; j < k.n; ++j) CELL(X, j) = m->q_at[j] < 0 ? 0 : q[m->q_at[j]];
-  clear_ends(k, X, 1);
-  EVERY_LANE {
-    V sine, cosine;
-    mbs_sincos_wide(TL1(MBS_TURN) * L1(X), &sine, &cosine);
-    const V3 c0 = TL3(MBS_C), c1 = TL3(MBS_C + 3), c2 = TL3(MBS_C + 6);
-    PUT3(E, more(times(cosine, c0), sine, c1));
-    PUT3(E + 3, more(times(cosine, c1), -sine, c0));
-    PUT3(E + 6, c2);
-    PUT3(T, more(TL3(MBS_T), TL1(MBS_SLIDE) * L1(X), c2));
-  }
-  several(k, q);
-  D3 r0 = {1, 0, 0}, r1 = {0, 1, 0}, r2 = {0, 0, 1}, p = {0, 0, 0};
-  for (int j = 0, held = -1; j < k.n; ++j) {
-    const int i = m->link[j];
-    const D3 t = O3(T, j), e0 = O3(E, j), e1 = O3(E + 3, j), e2 = O3(E + 6, j);
-    D3 d;
-    if (i < 0) {
-      r0 = e0, r1 = e1, r2 = e2, d = t, p = (D3){0, 0, 0};
-    } else {
-      if (i != held) r0 = O3(R, i), r1 = O3(R + 3, i), r2 = O3(R + 6, i), p = O3(P, i);
-      const D3 c0 = r0, c1 = r1, c2 = r2;
-      d = combine(c0, t.x, c1, t.y, c2, t.z);
-      p = plus(p, d);
-      r0 = combine(c0, e0.x, c1, e0.y, c2, e0.z);
-      r1 = combine(c0, e1.x, c1, e1.y, c2, e1.z);
-      r2 = combine(c0, e2.x, c1, e2.y, c2, e2.z);
+  const double *g = m->gravity;
+  chain *const nodes = k.nodes;
+  const Q zero = {0, 0, 0, 0};
+  nodes[0] = (chain){{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, zero,
+                     zero, zero, {-g[0], -g[1], -g[2], 0}, zero};
+  Q r0 = zero, r1 = zero, r2 = zero, d = zero, w = zero, wd = zero, vd = zero, vo = zero;
+  Q wl = zero, angular = zero, linear = zero; /* of the link before; of the joint so far */
+  int held = -2;
+  for (int j = 0; j < k.n; held = j++) {
+    const int b = m->before[j], kind = m->kind[j];
+    if (m->link[j] == b) {
+      if (b != held) {
+        const chain *before = nodes + 1 + b;
+        r0 = before->r0, r1 = before->r1, r2 = before->r2;
+        if (moves) w = before->w, wd = before->wd, vd = before->vd, vo = before->vo;
+      }
+      const Q c0 = r0, c1 = r1, c2 = r2;
+      d = c0 * CELL(T, j) + c1 * CELL(T + 1, j) + c2 * CELL(T + 2, j);
+      r0 = c0 * CELL(E, j) + c1 * CELL(E + 1, j) + c2 * CELL(E + 2, j);
+      r1 = c0 * CELL(E + 3, j) + c1 * CELL(E + 4, j) + c2 * CELL(E + 5, j);
+      r2 = c0 * CELL(E + 6, j) + c1 * CELL(E + 7, j) + c2 * CELL(E + 8, j);
+      if (moves) {
+        const Q swing = crossed(w, d);
+        wl = w, angular = zero, linear = zero;
+        vd += crossed(wd, d) + crossed(w, swing);
+        vo += swing;
+        if (b < 0) vo = zero;
+      }
     }
-    held = j;
-    PUT_O3(R, j, r0);
-    PUT_O3(R + 3, j, r1);
-    PUT_O3(R + 6, j, r2);
-    PUT_O3(D, j, d);
-    PUT_O3(P, j, p);
+    chain *const node = nodes + 1 + j;
+    node->r0 = r0, node->r1 = r1, node->r2 = r2, node->d = d;
+    if (!moves) continue;
+    const double v = CELL(QD, j), a = CELL(QDD, j);
+    if (kind == MBS_REVOLUTE) {
+      const Q s = r2 * v;
+      wd += r2 * a + crossed(wl, s);
+      w += s;
+    } else {
+      const int h = kind == MBS_PRISMATIC ? 2 : (kind - MBS_SEVERAL) % 3;
+      const Q axis = h == 0 ? r0 : h == 1 ? r1 : r2, s = axis * v;
+      if (kind == MBS_PRISMATIC || kind >= MBS_SEVERAL + 3) {
+        vd += axis * a + 2 * crossed(wl, s);
+        linear += s;
+        if (m->link[j] >= 0) vo += s;
+      } else {
+        wd += axis * a + crossed(wl, s);
+        w += s;
+        angular += s;
+        /* the velocities of a free joint are along axes that it turns */
+        if (h == 2) vd += crossed(angular, linear);
+      }
+    }
+    node->w = w, node->wd = wd, node->vd = vd, node->vo = vo;
   }
-  clear_ends(k, R, 15); /* R, D, P */
+}
+
+static void poses_alone(work k) { from_link_to_link(k, 0); }
+static void poses_and_motions(work k) { from_link_to_link(k, 1); }
+
+/* Eight numbers of each lane's node, three, a gap, three and a gap, to six rows. */
+INLINE void to_rows(work k, int j, const double *const *from, int row, int other) {
+#if defined(MBS_PAIR) && MBS_LANES == 8
+  V square[8];
+  MBS_UNROLLED for (int l = 0; l < 8; ++l) square[l] = lane(from[l]);
+  mbs_transpose(square);
+  MBS_UNROLLED for (int r = 0; r < 3; ++r) PUT1(row + r, square[r]);
+  MBS_UNROLLED for (int r = 0; r < 3; ++r) PUT1(other + r, square[4 + r]);
+#else
+  for (int l = 0; l < MBS_LANES; ++l)
+    for (int r = 0; r < 3; ++r) CELL(row + r, j + l) = from[l][r], CELL(other + r, j + l) = from[l][4 + r];
+#endif
+}
+
+/* The poses of all links in lanes, and the motions of all nodes. */
+static void poses_in_lanes(work k) {
+  const mbs_tree *m = k.m;
+  for (int j = k.n; j % MBS_LANES; ++j) k.nodes[1 + j] = k.nodes[0];
   EVERY_LANE {
+    const double *from[MBS_LANES], *rest[MBS_LANES];
+    for (int l = 0; l < MBS_LANES; ++l) {
+      from[l] = (const double *)&k.nodes[1 + j + l].r0;
+      rest[l] = (const double *)&k.nodes[1 + j + l].r2;
+    }
+    to_rows(k, j, from, R, R + 3);
+    to_rows(k, j, rest, R + 6, D);
     const V3 z = L3(R + 6);
     PUT3(SL, times(TL1(MBS_SLIDE), z));
     PUT3(SA, times(TL1(MBS_TURN), z));
@@ -243,6 +304,61 @@ static void poses(work k, const double *q) {
       PUT_O3(SL, node, slides ? axis : zero);
       PUT_O3(SA, node, slides ? zero : axis);
     }
+}
+
+/* The motions of all links in lanes; all nodes of a joint have that of its link. */
+static void motions_in_lanes(work k) {
+  EVERY_LANE {
+    const double *from[MBS_LANES], *rest[MBS_LANES];
+    for (int l = 0; l < MBS_LANES; ++l) {
+      const chain *node = k.nodes + 1 + (j + l < k.n ? k.m->last[j + l] : -1);
+      from[l] = (const double *)&node->w;
+      rest[l] = (const double *)&node->vd;
+    }
+    to_rows(k, j, from, W, WD);
+    to_rows(k, j, rest, VD, VO);
+  }
+}
+
+/* Rows of a column of numbers in the order of v; null is zeros. */
+INLINE void gather(work k, int row, const double *from) {
+  for (int j = 0; j < k.n; ++j) CELL(row, j) = from ? from[k.m->v_at[j]] : 0;
+}
+
+/* Poses in the links before, from positions. */
+static void pose_joints(work k, const double *q) {
+  const mbs_tree *m = k.m;
+  for (int j = 0; j < k.n; ++j) CELL(X, j) = m->q_at[j] < 0 ? 0 : q[m->q_at[j]];
+  clear_ends(k, X, 3); /* X, QD, QDD */
+  EVERY_LANE {
+    V sine, cosine;
+    mbs_sincos_wide(TL1(MBS_TURN) * L1(X), &sine, &cosine);
+    const V3 c0 = TL3(MBS_C), c1 = TL3(MBS_C + 3), c2 = TL3(MBS_C + 6);
+    PUT3(E, more(times(cosine, c0), sine, c1));
+    PUT3(E + 3, more(times(cosine, c1), -sine, c0));
+    PUT3(E + 6, c2);
+    PUT3(T, more(TL3(MBS_T), TL1(MBS_SLIDE) * L1(X), c2));
+  }
+  several(k, q);
+}
+
+/* Origins of all links from that of the first link of their tree. */
+static void places(work k) {
+  const mbs_tree *m = k.m;
+  D3 p = {0, 0, 0};
+  for (int j = 0, held = -1; j < k.n; held = j++) {
+    const int b = m->before[j];
+    if (b != held || b < 0) p = b < 0 ? (D3){0, 0, 0} : O3(P, b);
+    if (b >= 0 && m->link[j] == b) p = plus(p, O3(D, j));
+    PUT_O3(P, j, p);
+  }
+  clear_ends(k, P, 3);
+}
+
+static void poses(work k, const double *q) {
+  pose_joints(k, q);
+  poses_alone(k);
+  poses_in_lanes(k);
 }
 
 /* First moments and inertia of all bodies in the axes of the base. */
@@ -269,69 +385,6 @@ static void bodies(work k) {
    (J)[2] * (a).x + (J)[4] * (a).y + (J)[5] * (a).z}
 #define LANES6(name, row) \
   const V name[6] = {L1(row), L1((row) + 1), L1((row) + 2), L1((row) + 3), L1((row) + 4), L1((row) + 5)}
-
-/* Sums along the branches: row(node) = row(node before) + ADD(node), and of the link before. */
-static void along_branches(work k, int row, int of_link_before, D3 base) {
-  const mbs_tree *m = k.m;
-  D3 x = base;
-  for (int j = 0, held = -1; j < k.n; ++j) {
-    const int i = m->link[j], b = m->before[j];
-    if (b != held) x = b < 0 ? base : O3(row, b);
-    PUT_O3(of_link_before, j, i == b ? x : i < 0 ? base : O3(row, i));
-    x = plus(x, O3(ADD, j));
-    PUT_O3(row, j, x);
-    held = j;
-  }
-  clear_ends(k, row, 3);
-  clear_ends(k, of_link_before, 3);
-}
-
-/* What the last node of a joint of several velocities has is what its link has. */
-static void share(work k, int row) {
-  const int *joint = k.m->joints;
-  for (int c = 0; c < k.m->many; ++c, joint += 3) {
-    const D3 x = O3(row, joint[0] + joint[1] - 1);
-    for (int h = 0; h < joint[1] - 1; ++h) PUT_O3(row, joint[0] + h, x);
-  }
-}
-
-/* The sum over the nodes of a joint of a row times the velocities. */
-static D3 of_joint(work k, int row, const int *joint) {
-  D3 total = {0, 0, 0};
-  for (int h = 0; h < joint[1]; ++h)
-    total = more(total, CELL(QD, joint[0] + h), O3(row, joint[0] + h));
-  return total;
-}
-
-/* Velocities and accelerations of all links; `a` may be null, for zeros. */
-static void motions(work k, const double *v, const double *a) {
-  const mbs_tree *m = k.m;
-  for (int j = 0; j < k.n; ++j) CELL(QD, j) = v[m->v_at[j]];
-  for (int j = 0; j < k.n; ++j) CELL(QDD, j) = a ? a[m->v_at[j]] : 0;
-  clear_ends(k, QD, 2);
-  EVERY_LANE PUT3(ADD, times(L1(QD), L3(SA)));
-  along_branches(k, W, WL, (D3){0, 0, 0});
-  share(k, W);
-  EVERY_LANE {
-    const V3 sa = L3(SA);
-    PUT3(ADD, plus_cross(times(L1(QDD), sa), L3(WL), times(L1(QD), sa)));
-  }
-  along_branches(k, WD, WDL, (D3){0, 0, 0});
-  EVERY_LANE {
-    const V3 sl = L3(SL), d = times(TL1(MBS_FIRST), L3(D)), w = L3(WL);
-    const V3 carried = plus_cross(times(2 * L1(QD), sl), w, d);
-    PUT3(ADD, plus_cross(plus_cross(times(L1(QDD), sl), L3(WDL), d), w, carried));
-  }
-  const int *joint = m->joints;
-  for (int c = 0; c < m->many; ++c, joint += 3)
-    if (joint[1] == 6) { /* the velocities of a free joint are along axes that it turns */
-      const int last = joint[0] + 5;
-      const D3 turned = cross(of_joint(k, SA, joint), of_joint(k, SL, joint));
-      PUT_O3(ADD, last, plus(O3(ADD, last), turned));
-    }
-  const double *g = m->gravity;
-  along_branches(k, VD, VDL, (D3){-g[0], -g[1], -g[2]});
-}
 
 /* Spins of rotors for unit velocities, in the axes of the base. */
 static void spins(work k) {
@@ -411,11 +464,16 @@ static void efforts(work k) {
     }
 }
 
+/* Accelerations `a` may be null, for zeros. */
 static void inverse(work k, const double *q, const double *v, const double *a) {
-  poses(k, q);
+  gather(k, QD, v);
+  gather(k, QDD, a);
+  pose_joints(k, q);
+  poses_and_motions(k);
+  poses_in_lanes(k);
+  motions_in_lanes(k);
   bodies(k);
   spins(k);
-  motions(k, v, a);
   wrenches(k);
   efforts(k);
 }
@@ -559,6 +617,7 @@ void mbs_tree_inertia(const mbs_tree *m, const double *q, double *A, double *w) 
   const work k = space_of(m, w);
   if (!A) return;
   poses(k, q);
+  places(k);
   bodies(k);
   spins(k);
   composites(k);
@@ -568,21 +627,37 @@ void mbs_tree_inertia(const mbs_tree *m, const double *q, double *A, double *w) 
   reorder(k, A);
 }
 
-/* Velocities of all links for an observer who follows the first link of their tree. */
-static void observed(work k) {
+/* The sum over the nodes of a joint of a row times the velocities. */
+static D3 of_joint(work k, int row, const int *joint) {
+  D3 total = {0, 0, 0};
+  for (int h = 0; h < joint[1]; ++h)
+    total = more(total, CELL(QD, joint[0] + h), O3(row, joint[0] + h));
+  return total;
+}
+
+/* Motions of the links before, and places in the tree. Velocities are those that an observer sees
+ * who follows the first link of the tree, whose origin is the common point. */
+static void links_before(work k) {
   const mbs_tree *m = k.m;
   EVERY_LANE {
-    const V3 carried = plus_cross(times(L1(QD), L3(SL)), L3(WL), times(TL1(MBS_FIRST), L3(D)));
-    PUT3(ADD, times(TL1(MBS_INNER), carried));
+    const double *from[MBS_LANES], *rest[MBS_LANES];
+    for (int l = 0; l < MBS_LANES; ++l) {
+      const chain *node = k.nodes + 1 + (j + l < k.n ? m->link[j + l] : -1);
+      from[l] = (const double *)&node->w;
+      rest[l] = (const double *)&node->vd;
+    }
+    to_rows(k, j, from, WL, WDL);
+    to_rows(k, j, rest, VDL, VL);
+    /* the point of the link before that is at the origin */
+    const V inner = TL1(MBS_INNER), v = inner * L1(QD) - L1(QD);
+    PUT3(VL, more(plus_cross(times(inner, L3(VL)), L3(WL), L3(D)), v, L3(SL)));
   }
-  along_branches(k, VO, VL, (D3){0, 0, 0});
-  share(k, VO);
-  EVERY_LANE PUT3(VL, more(L3(VO), -L1(QD), L3(SL)));
   const int *joint = m->joints;
-  for (int c = 0; c < m->many; ++c, joint += 3) {
-    const D3 behind = minus(O3(VO, joint[0]), of_joint(k, SL, joint));
-    for (int h = 0; h < joint[1]; ++h) PUT_O3(VL, joint[0] + h, behind);
-  }
+  for (int c = 0; c < m->many; ++c, joint += 3)
+    if (m->link[joint[0]] < 0) {
+      const D3 behind = times(-1, of_joint(k, SL, joint));
+      for (int h = 0; h < joint[1]; ++h) PUT_O3(VL, joint[0] + h, behind);
+    }
 }
 
 /* Twice the momentum of all that is behind each node, and the matrix K that gives the moment which
@@ -615,21 +690,34 @@ static void moving_composites(work k) {
     CELL(K + 3, c) += s.z, CELL(K + 5, c) -= s.x;
     CELL(K + 6, c) -= s.y, CELL(K + 7, c) += s.x;
   }
-  for (int j = k.n - 1; j >= 0; --j) {
+  D3 n = {0, 0, 0}, x = n, y = n, z = n;
+  for (int j = k.n - 1, held = -1; j >= 0; --j) {
     const int b = m->before[j];
+    if (held == j) {
+      n = plus(n, O3(N2, j)), x = plus(x, O3(K, j)), y = plus(y, O3(K + 3, j));
+      z = plus(z, O3(K + 6, j));
+      PUT_O3(N2, j, n);
+      PUT_O3(K, j, x);
+      PUT_O3(K + 3, j, y);
+      PUT_O3(K + 6, j, z);
+    } else {
+      n = O3(N2, j), x = O3(K, j), y = O3(K + 3, j), z = O3(K + 6, j);
+    }
     if (b < 0) continue;
-    const D3 n = O3(N2, j);
-    D3 x = O3(K, j), y = O3(K + 3, j), z = O3(K + 6, j);
     if (m->link[j] == b) { /* about the origin of the link before: (n . d) - n d' */
       const D3 d = O3(D, j);
       const double nd = dot(n, d);
       x = more(x, -d.x, n), y = more(y, -d.y, n), z = more(z, -d.z, n);
       x.x += nd, y.y += nd, z.z += nd;
     }
-    PUT_O3(N2, b, plus(O3(N2, b), n));
-    PUT_O3(K, b, plus(O3(K, b), x));
-    PUT_O3(K + 3, b, plus(O3(K + 3, b), y));
-    PUT_O3(K + 6, b, plus(O3(K + 6, b), z));
+    if (b == j - 1) {
+      held = b;
+    } else {
+      PUT_O3(N2, b, plus(O3(N2, b), n));
+      PUT_O3(K, b, plus(O3(K, b), x));
+      PUT_O3(K + 3, b, plus(O3(K + 3, b), y));
+      PUT_O3(K + 6, b, plus(O3(K + 6, b), z));
+    }
   }
 }
 
@@ -768,7 +856,8 @@ static void turning_rotors(work k, double *dq, double *dv) {
 
 /* Derivatives of the efforts in the order of the tree; what `inverse` found is in the work space. */
 static void slopes(work k, double *dq, double *dv, double *A) {
-  observed(k);
+  links_before(k);
+  places(k);
   composites(k);
   moving_composites(k);
   momenta(k);
@@ -831,8 +920,8 @@ INLINE void release(articulated *I, D3 l, D3 a, D3 lr, D3 ar) {
   I->J[3] -= a.y * ar.y, I->J[4] -= a.y * ar.z, I->J[5] -= a.z * ar.z;
 }
 
-/* Rows of the work space that `inverse` and `slopes` no longer need: sums at forks. */
-enum { AM = E, AJ = CJ, AN = K };
+/* Rows of the work space that `inverse` has left free, and `slopes` overwrites: sums at forks. */
+enum { AM = DQL, AJ = CJ, AN = K };
 
 INLINE void load(work k, articulated *I, int j) {
   for (int r = 0; r < 6; ++r) I->M[r] = CELL(AM + r, j), I->J[r] = CELL(AJ + r, j);
@@ -1069,7 +1158,9 @@ void mbs_tree_ddm_derivatives(const mbs_tree *m, const double *q, const double *
   for (int j = 0; j < k.n; ++j) given[m->v_at[j]] = found[j];
   if (a) memcpy(a, given, (size_t)k.n * sizeof(double));
   if (dq || dv) {
-    motions(k, v, given);
+    gather(k, QDD, given);
+    poses_and_motions(k);
+    motions_in_lanes(k);
     wrenches(k);
     slopes(k, dq, dv, 0);
     solve_matrices(k, dq, dv);
@@ -1083,6 +1174,7 @@ void mbs_tree_ddm_derivatives(const mbs_tree *m, const double *q, const double *
 void mbs_tree_pivots(const mbs_tree *m, const double *q, double *free_, double *locked, double *w) {
   const work k = space_of(m, w);
   poses(k, q);
+  places(k);
   bodies(k);
   spins(k);
   composites(k);

@@ -29,6 +29,10 @@ enum {
   MBS_ROWS = 36
 };
 
+/* Kinds of motion of a node: along and about z; about x, y and z of a joint of several velocities,
+ * of which MBS_SEVERAL + 0, 1, 2 turn and MBS_SEVERAL + 3, 4, 5 slide. */
+enum { MBS_REVOLUTE, MBS_PRISMATIC, MBS_SEVERAL };
+
 typedef struct {
   int size;      /* velocities */
   int positions; /* elements of q */
@@ -40,6 +44,8 @@ typedef struct {
   const int *link;      /* the last node of the link before, or -1 */
   const int *end;       /* after the last node of the subtree */
   const int *first;     /* the first node of its joint */
+  const int *last;      /* and the last one */
+  const int *kind;      /* of its motion, see below */
   const int *q_at;      /* where the position stands, -1 for a joint of several velocities */
   const int *v_at;      /* where the velocity stands */
   const int *runs_from; /* size + 1: where the runs of nodes of the links before begin in */
@@ -53,7 +59,7 @@ typedef struct {
 
 /* Doubles of work space of any of the models. */
 #define MBS_TREE_WORK(size, in_order) \
-  (144 * (((size) + 7) / 8 * 8) + 128 * (size) + ((in_order) ? 0 : (size) * (size)) + 8)
+  (176 * (((size) + 7) / 8 * 8) + 128 * (size) + ((in_order) ? 0 : (size) * (size)) + 40)
 
 /* tau: efforts for accelerations a. */
 void mbs_tree_idm(const mbs_tree *m, const double *q, const double *v, const double *a, double *tau,

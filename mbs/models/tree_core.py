@@ -255,8 +255,8 @@ _KINDS = {"turn": Motion.REVOLUTE, "slide": Motion.PRISMATIC}
 
 
 _KIND = {Motion.REVOLUTE: 0, Motion.PRISMATIC: 1, Motion.SPHERICAL: 2, Motion.FREE: 2}
-"""The kind of the first motion about an axis, as tree_core.h counts them; of free joints slides come
-first, and are counted behind."""
+"""The kind of the first motion about an axis, as tree_core.h counts; the slides of free joints come
+first, and are counted last."""
 
 
 def _lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:

@@ -294,6 +294,9 @@ def _lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:
         i = links[j].antecedent
         if i >= 0:
             end[i] = max(end[i], end[j])
+    before = result["before"]
+    ahead = {b for k, b in enumerate(before) if b != k - 1}
+    result["fork"] = [int(k in ahead) for k in range(size)]
     result["end"] = [end[j] + 1 for j in order for _ in range(links[j].motion.nv)]
     return result
 

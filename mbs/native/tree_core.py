@@ -45,8 +45,8 @@ ROWS = {
 
 ROW_COUNT = 36
 _LIST_NAMES = (
-    *("before", "link", "end", "first", "last", "kind", "q_at", "v_at", "runs_from", "runs"),
-    *("joints", "rotor", "rub"),
+    *("before", "link", "end", "first", "last", "kind", "fork", "q_at", "v_at"),
+    *("runs_from", "runs", "joints", "rotor", "rub"),
 )
 
 

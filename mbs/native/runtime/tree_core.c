@@ -113,7 +113,7 @@ typedef struct {
   double *w;       /* cells */
   struct chain *nodes; /* what goes from link to link: of the base, then of each node */
   double *record;  /* factors: 16 for each node */
-  V *lanes;        /* 14 for each node */
+  V *lanes;        /* 14 of eight numbers for each node */
   double *column;  /* one that nobody wants, or a right side */
   double *square;  /* size x size, where v has another order than the tree */
 } work;
@@ -126,7 +126,7 @@ static work space_of(const mbs_tree *m, double *w) {
   k.nodes = (struct chain *)(k.w + whole * MBS_WORK_ROWS);
   k.record = k.w + whole * (MBS_WORK_ROWS + 32) + 32;
   k.lanes = (V *)(k.record + 16 * (size_t)k.n);
-  k.column = (double *)(k.lanes + 14 * (size_t)k.n);
+  k.column = (double *)k.lanes + 14 * 8 * (size_t)k.n;
   k.square = k.column + whole;
   return k;
 }
@@ -882,109 +882,109 @@ void mbs_tree_idm_derivatives(const mbs_tree *m, const double *q, const double *
 /* What a solution needs of each node. */
 enum { RS = 0, RU = 6, RD = 12, RP = 13 }; /* motion, U / D, 1 / D, origin */
 
-/* An inertia matrix of six rows: force M al + N wd, moment N' al + J wd; N by rows. */
+/* A matrix of three columns. */
 typedef struct {
-  double M[6], J[6];
-  D3 N[3];
+  Q x, y, z;
+} columns;
+
+INLINE columns sum(columns a, columns b) { return (columns){a.x + b.x, a.y + b.y, a.z + b.z}; }
+INLINE columns less(columns A, Q a, Q b) { /* A - a b' */
+  return (columns){A.x - a * b[0], A.y - a * b[1], A.z - a * b[2]};
+}
+INLINE Q product(columns A, Q a) { return A.x * a[0] + A.y * a[1] + A.z * a[2]; }
+INLINE columns crossed_columns(Q d, columns A) {
+  return (columns){crossed(d, A.x), crossed(d, A.y), crossed(d, A.z)};
+}
+INLINE columns transposed(columns A) {
+#if defined(MBS_PAIR)
+  const Q none = {0, 0, 0, 0};
+  const Q even = __builtin_shufflevector(A.x, A.y, 0, 4, 2, 6), odd = __builtin_shufflevector(A.x, A.y, 1, 5, 3, 7);
+  const Q last = __builtin_shufflevector(A.z, none, 0, 4, 2, 6), next = __builtin_shufflevector(A.z, none, 1, 5, 3, 7);
+  return (columns){__builtin_shufflevector(even, last, 0, 1, 4, 5),
+                   __builtin_shufflevector(odd, next, 0, 1, 4, 5),
+                   __builtin_shufflevector(even, last, 2, 3, 6, 7)};
+#else
+  return (columns){{A.x[0], A.y[0], A.z[0], 0}, {A.x[1], A.y[1], A.z[1], 0}, {A.x[2], A.y[2], A.z[2], 0}};
+#endif
+}
+
+/* An inertia matrix of six rows: force M al + N wd, moment N' al + J wd. */
+typedef struct {
+  columns M, N, J;
 } articulated;
 
-INLINE D3 times_one(const double *J, D3 a) { return (D3)INERTIA_TIMES(J, a); }
+INLINE void add(articulated *I, const articulated *other) {
+  I->M = sum(I->M, other->M), I->N = sum(I->N, other->N), I->J = sum(I->J, other->J);
+}
+
+/* The inertia with that of a body. */
+INLINE void add_body(work k, articulated *I, int j) {
+  const Q x = {1, 0, 0, 0}, y = {0, 1, 0, 0}, z = {0, 0, 1, 0};
+  const double m = FACT(MBS_MASS, j), hx = CELL(HB, j), hy = CELL(HB + 1, j), hz = CELL(HB + 2, j);
+  I->M = sum(I->M, (columns){m * x, m * y, m * z});
+  I->N = sum(I->N, (columns){hy * z - hz * y, hz * x - hx * z, hx * y - hy * x}); /* wd x h */
+  I->J.x += CELL(JB, j) * x + CELL(JB + 1, j) * y + CELL(JB + 2, j) * z;
+  I->J.y += CELL(JB + 1, j) * x + CELL(JB + 3, j) * y + CELL(JB + 4, j) * z;
+  I->J.z += CELL(JB + 2, j) * x + CELL(JB + 4, j) * y + CELL(JB + 5, j) * z;
+}
 
 /* The same inertia about a point that is d behind. */
-INLINE void shift(articulated *I, D3 d) {
-  const double *M = I->M;
-  const D3 *N = I->N;
-  const D3 before[3] = {{N[0].x, N[1].x, N[2].x}, {N[0].y, N[1].y, N[2].y}, {N[0].z, N[1].z, N[2].z}};
-  I->N[0] = plus_cross(I->N[0], d, ((D3){M[0], M[1], M[2]}));
-  I->N[1] = plus_cross(I->N[1], d, ((D3){M[1], M[3], M[4]}));
-  I->N[2] = plus_cross(I->N[2], d, ((D3){M[2], M[4], M[5]}));
-  const D3 x = cross(d, ((D3){N[0].x, N[1].x, N[2].x})), y = cross(d, ((D3){N[0].y, N[1].y, N[2].y})),
-           z = cross(d, ((D3){N[0].z, N[1].z, N[2].z}));
-  const D3 u = cross(d, before[0]), v = cross(d, before[1]), t = cross(d, before[2]);
-  I->J[0] += x.x + u.x;
-  I->J[1] += y.x + u.y;
-  I->J[2] += z.x + u.z;
-  I->J[3] += y.y + v.y;
-  I->J[4] += z.y + v.z;
-  I->J[5] += z.z + t.z;
+INLINE void shift(articulated *I, Q d) {
+  const columns M = I->M, before = transposed(crossed_columns(d, I->N));
+  I->N.x += M.z * d[1] - M.y * d[2];
+  I->N.y += M.x * d[2] - M.z * d[0];
+  I->N.z += M.y * d[0] - M.x * d[1];
+  I->J = sum(sum(I->J, before), crossed_columns(d, I->N));
 }
 
-/* The inertia less what the free motion of a node takes: I - U U' / D, given U and U / D. */
-INLINE void release(articulated *I, D3 l, D3 a, D3 lr, D3 ar) {
-  I->M[0] -= l.x * lr.x, I->M[1] -= l.x * lr.y, I->M[2] -= l.x * lr.z;
-  I->M[3] -= l.y * lr.y, I->M[4] -= l.y * lr.z, I->M[5] -= l.z * lr.z;
-  I->N[0] = more(I->N[0], -l.x, ar);
-  I->N[1] = more(I->N[1], -l.y, ar);
-  I->N[2] = more(I->N[2], -l.z, ar);
-  I->J[0] -= a.x * ar.x, I->J[1] -= a.x * ar.y, I->J[2] -= a.x * ar.z;
-  I->J[3] -= a.y * ar.y, I->J[4] -= a.y * ar.z, I->J[5] -= a.z * ar.z;
-}
-
-/* Rows of the work space that `inverse` has left free, and `slopes` overwrites: sums at forks. */
-enum { AM = DQL, AJ = CJ, AN = K };
-
-INLINE void load(work k, articulated *I, int j) {
-  for (int r = 0; r < 6; ++r) I->M[r] = CELL(AM + r, j), I->J[r] = CELL(AJ + r, j);
-  for (int r = 0; r < 3; ++r) I->N[r] = O3(AN + 3 * r, j);
-}
+INLINE double sum3(Q a) { return a[0] + a[1] + a[2]; }
 
 /* The articulated inertia of each node as far as a solution needs it. */
 static void factorise(work k) {
   const mbs_tree *m = k.m;
-  EVERY_LANE {
-    const V zero = mbs_all(0), mass = TL1(MBS_MASS);
-    const V3 h = L3(HB);
-    for (int r = 0; r < 6; ++r) PUT1(AM + r, r == 0 || r == 3 || r == 5 ? mass : zero);
-    for (int r = 0; r < 6; ++r) PUT1(AJ + r, L1(JB + r));
-    PUT3(AN, ((V3){zero, h.z, -h.y})); /* wd x h */
-    PUT3(AN + 3, ((V3){-h.z, zero, h.x}));
-    PUT3(AN + 6, ((V3){h.y, -h.x, zero}));
-  }
-  articulated I;
+  const Q zero = {0, 0, 0, 0};
+  articulated *forks = (articulated *)k.lanes, I;
   memset(&I, 0, sizeof I);
+  for (int j = 0; j < k.n; ++j)
+    if (m->fork[j]) memset(forks + j, 0, sizeof I);
   for (int j = k.n - 1, held = -1; j >= 0; --j) {
-    const int b = m->before[j];
-    if (held == j) {
-      articulated own;
-      load(k, &own, j);
-      for (int r = 0; r < 6; ++r) I.M[r] += own.M[r], I.J[r] += own.J[r];
-      for (int r = 0; r < 3; ++r) I.N[r] = plus(I.N[r], own.N[r]);
+    const int b = m->before[j], kind = m->kind[j];
+    if (held != j) memset(&I, 0, sizeof I);
+    if (m->fork[j]) add(&I, forks + j);
+    if (m->last[j] == j) add_body(k, &I, j);
+    const chain *node = k.nodes + 1 + j;
+    Q sl = zero, sa = node->r2, l, a;
+    if (kind == MBS_REVOLUTE) {
+      l = product(I.N, sa);
+      a = product(I.J, sa);
     } else {
-      load(k, &I, j);
+      sl = (Q){CELL(SL, j), CELL(SL + 1, j), CELL(SL + 2, j), 0};
+      sa = (Q){CELL(SA, j), CELL(SA + 1, j), CELL(SA + 2, j), 0};
+      l = product(I.N, sa) + product(I.M, sl);
+      a = product(I.J, sa) + (Q){sum3(I.N.x * sl), sum3(I.N.y * sl), sum3(I.N.z * sl), 0};
     }
-    const D3 sl = O3(SL, j), sa = O3(SA, j);
-    D3 l, a;
-    if (FACT(MBS_TURN, j) != 0) {
-      l = (D3){dot(I.N[0], sa), dot(I.N[1], sa), dot(I.N[2], sa)};
-      a = times_one(I.J, sa);
-    } else {
-      l = plus(times_one(I.M, sl), ((D3){dot(I.N[0], sa), dot(I.N[1], sa), dot(I.N[2], sa)}));
-      a = plus(times_one(I.J, sa), combine(I.N[0], sl.x, I.N[1], sl.y, I.N[2], sl.z));
-    }
-    double inertia = dot(sl, l) + dot(sa, a) + FACT(MBS_IA, j);
+    double inertia = sum3(sl * l + sa * a) + FACT(MBS_IA, j);
     if (m->rotors) { /* U + spin; the rotor of a joint on its own link feels the joint too */
-      const D3 g = O3(GB, j);
-      a = plus(a, g);
-      inertia += 2 * FACT(MBS_OWN, j) * dot(g, sa);
+      const Q g = {CELL(GB, j), CELL(GB + 1, j), CELL(GB + 2, j), 0};
+      a += g;
+      inertia += 2 * FACT(MBS_OWN, j) * sum3(g * sa);
     }
     const double ratio = 1 / inertia;
-    const D3 lr = times(ratio, l), ar = times(ratio, a), d = times(FACT(MBS_FIRST, j), O3(D, j));
+    const Q lr = ratio * l, ar = ratio * a, d = m->first[j] == j ? node->d : zero;
     double *record = k.record + 16 * (size_t)j;
-    put_one3(record + RS, 1, sl);
-    put_one3(record + RS + 3, 1, sa);
-    put_one3(record + RU, 1, lr);
-    put_one3(record + RU + 3, 1, ar);
-    put_one3(record + RP, 1, d);
+    memcpy(record + RS, &sl, 3 * sizeof(double));
+    memcpy(record + RS + 3, &sa, 3 * sizeof(double));
+    memcpy(record + RU, &lr, 3 * sizeof(double));
+    memcpy(record + RU + 3, &ar, 3 * sizeof(double));
+    memcpy(record + RP, &d, 3 * sizeof(double));
     record[RD] = ratio;
     if (b < 0) continue;
-    release(&I, l, a, lr, ar);
+    I.M = less(I.M, l, lr), I.N = less(I.N, l, ar), I.J = less(I.J, a, ar);
     if (m->link[j] == b) shift(&I, d);
-    if (b == j - 1) {
+    if (b == j - 1)
       held = b;
-    } else {
-      for (int r = 0; r < 6; ++r) CELL(AM + r, b) += I.M[r], CELL(AJ + r, b) += I.J[r];
-      for (int r = 0; r < 3; ++r) PUT_O3(AN + 3 * r, b, plus(O3(AN + 3 * r, b), I.N[r]));
-    }
+    else
+      add(forks + b, &I);
   }
 }
 

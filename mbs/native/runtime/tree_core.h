@@ -45,7 +45,8 @@ typedef struct {
   const int *end;       /* after the last node of the subtree */
   const int *first;     /* the first node of its joint */
   const int *last;      /* and the last one */
-  const int *kind;      /* of its motion, see below */
+  const int *kind;      /* of its motion, see above */
+  const int *fork;      /* whether something behind it is not at the next node */
   const int *q_at;      /* where the position stands, -1 for a joint of several velocities */
   const int *v_at;      /* where the velocity stands */
   const int *runs_from; /* size + 1: where the runs of nodes of the links before begin in */

@@ -990,62 +990,72 @@ static void factorise(work k) {
 
 /* Solutions of A a = right by the factors, in place, of W columns or of W groups of them in lanes:
  * two groups at once, for one alone waits for its own results. Nodes from `count` on have zeros to
- * the right, and are not wanted. `sums` are six for each node. */
+ * the right, and are not wanted. Wrenches and accelerations pass from node to node in f; what
+ * forks in the tree need of them is in `at`, six for each node. */
 #define EACH(W) _Pragma("GCC unroll 2") for (int h = 0; h < W; ++h)
+#define SIX(W, TO, OP, FROM)                                                                  \
+  EACH(W) {                                                                                   \
+    TO[0][h] OP FROM[0][h], TO[1][h] OP FROM[1][h], TO[2][h] OP FROM[2][h];                   \
+    TO[3][h] OP FROM[3][h], TO[4][h] OP FROM[4][h], TO[5][h] OP FROM[5][h];                   \
+  }
 #define SOLVE(NAME, S, ALL, W)                                                                \
-  static void NAME(work k, S(*x)[W], int count, S(*sums)[6][W]) {                             \
-    const int *before = k.m->before;                                                          \
+  static void NAME(work k, S(*x)[W], int count, S(*at)[6][W]) {                               \
+    const int *before = k.m->before, *kind = k.m->kind, *fork = k.m->fork;                    \
     const S zero = ALL(0);                                                                    \
+    S f[6][W], none[6][W];                                                                    \
+    EACH(W) none[0][h] = none[1][h] = none[2][h] = none[3][h] = none[4][h] = none[5][h] = zero; \
+    SIX(W, f, =, none)                                                                        \
     for (int j = 0; j < count; ++j)                                                           \
-      for (int c = 0; c < 6; ++c) EACH(W) sums[j][c][h] = zero;                               \
-    for (int j = count - 1; j >= 0; --j) {                                                    \
+      if (fork[j]) SIX(W, at[j], =, none)                                                     \
+    for (int j = count - 1, held = -1; j >= 0; --j) {                                         \
       const double *r = k.record + 16 * (size_t)j;                                            \
-      S(*f)[W] = sums[j];                                                                     \
-      const int b = before[j], turns = FACT(MBS_TURN, j) != 0;                                \
-      S u[W];                                                                                 \
-      EACH(W) u[h] = x[j][h] - f[3][h] * r[3] - (f[4][h] * r[4] + f[5][h] * r[5]);            \
-      if (!turns) EACH(W) u[h] = u[h] - f[0][h] * r[0] - (f[1][h] * r[1] + f[2][h] * r[2]);   \
-      EACH(W) x[j][h] = u[h];                                                                 \
-      if (b < 0) continue;                                                                    \
-      S(*to)[W] = sums[b];                                                                    \
+      const int b = before[j];                                                                \
+      if (held != j) SIX(W, f, =, none)                                                       \
+      if (fork[j]) SIX(W, f, +=, at[j])                                                       \
       EACH(W) {                                                                               \
-        const S fx = f[0][h] + u[h] * r[6], fy = f[1][h] + u[h] * r[7],                       \
-                fz = f[2][h] + u[h] * r[8];                                                   \
-        to[0][h] += fx;                                                                       \
-        to[1][h] += fy;                                                                       \
-        to[2][h] += fz;                                                                       \
-        to[3][h] += f[3][h] + u[h] * r[9] + fz * r[14] - fy * r[15];                          \
-        to[4][h] += f[4][h] + u[h] * r[10] + fx * r[15] - fz * r[13];                         \
-        to[5][h] += f[5][h] + u[h] * r[11] + fy * r[13] - fx * r[14];                         \
+        S u = x[j][h] - f[3][h] * r[3] - (f[4][h] * r[4] + f[5][h] * r[5]);                   \
+        if (kind[j] != MBS_REVOLUTE)                                                          \
+          u = u - f[0][h] * r[0] - (f[1][h] * r[1] + f[2][h] * r[2]);                         \
+        x[j][h] = u;                                                                          \
+        const S fx = f[0][h] + u * r[6], fy = f[1][h] + u * r[7], fz = f[2][h] + u * r[8];    \
+        f[0][h] = fx;                                                                         \
+        f[1][h] = fy;                                                                         \
+        f[2][h] = fz;                                                                         \
+        f[3][h] += u * r[9] + fz * r[14] - fy * r[15];                                        \
+        f[4][h] += u * r[10] + fx * r[15] - fz * r[13];                                       \
+        f[5][h] += u * r[11] + fy * r[13] - fx * r[14];                                       \
       }                                                                                       \
+      if (b == j - 1)                                                                         \
+        held = b;                                                                             \
+      else if (b >= 0)                                                                        \
+        SIX(W, at[b], +=, f)                                                                  \
     }                                                                                         \
     for (int j = 0; j < count; ++j) {                                                         \
       const double *r = k.record + 16 * (size_t)j;                                            \
-      const int b = before[j], turns = FACT(MBS_TURN, j) != 0;                                \
-      S(*from)[W] = sums[b < 0 ? j : b], (*to)[W] = sums[j];                                  \
-      if (b < 0) /* the base rests */                                                         \
-        for (int c = 0; c < 6; ++c) EACH(W) to[c][h] = zero;                                  \
-      S a[6][W];                                                                              \
-      EACH(W) {                                                                               \
-        const S wx = from[3][h], wy = from[4][h], wz = from[5][h];                            \
-        a[0][h] = from[0][h] + wy * r[15] - wz * r[14];                                       \
-        a[1][h] = from[1][h] + wz * r[13] - wx * r[15];                                       \
-        a[2][h] = from[2][h] + wx * r[14] - wy * r[13];                                       \
-        a[3][h] = wx;                                                                         \
-        a[4][h] = wy;                                                                         \
-        a[5][h] = wz;                                                                         \
-        const S value = x[j][h] * r[12] - (wx * r[9] + wy * r[10] + wz * r[11]) -             \
-                        (a[0][h] * r[6] + a[1][h] * r[7] + a[2][h] * r[8]);                   \
-        x[j][h] = value;                                                                      \
-        to[0][h] = a[0][h];                                                                   \
-        to[1][h] = a[1][h];                                                                   \
-        to[2][h] = a[2][h];                                                                   \
-        to[3][h] = wx + value * r[3];                                                         \
-        to[4][h] = wy + value * r[4];                                                         \
-        to[5][h] = wz + value * r[5];                                                         \
+      const int b = before[j];                                                                \
+      if (b < 0) {                                                                            \
+        SIX(W, f, =, none)                                                                    \
+      } else if (b != j - 1) {                                                                \
+        SIX(W, f, =, at[b])                                                                   \
       }                                                                                       \
-      if (!turns)                                                                             \
-        for (int c = 0; c < 3; ++c) EACH(W) to[c][h] += x[j][h] * r[c];                       \
+      EACH(W) {                                                                               \
+        const S wx = f[3][h], wy = f[4][h], wz = f[5][h];                                     \
+        f[0][h] += wy * r[15] - wz * r[14];                                                   \
+        f[1][h] += wz * r[13] - wx * r[15];                                                   \
+        f[2][h] += wx * r[14] - wy * r[13];                                                   \
+        const S value = x[j][h] * r[12] - (wx * r[9] + wy * r[10] + wz * r[11]) -             \
+                        (f[0][h] * r[6] + f[1][h] * r[7] + f[2][h] * r[8]);                   \
+        x[j][h] = value;                                                                      \
+        f[3][h] = wx + value * r[3];                                                          \
+        f[4][h] = wy + value * r[4];                                                          \
+        f[5][h] = wz + value * r[5];                                                          \
+        if (kind[j] != MBS_REVOLUTE) {                                                        \
+          f[0][h] += value * r[0];                                                            \
+          f[1][h] += value * r[1];                                                            \
+          f[2][h] += value * r[2];                                                            \
+        }                                                                                     \
+      }                                                                                       \
+      if (fork[j]) SIX(W, at[j], =, f)                                                        \
     }                                                                                         \
   }
 #define AS_IT_IS(x) (x)

@@ -209,7 +209,8 @@ def _choose(kind: str, name: str, answers: Sequence[str]) -> str:
 
 
 def _table(name: str, pattern: Sparsity) -> str:
-    numbers = [int(k) for k in pattern.compress()]
+    dense = pattern.is_dense()
+    numbers = [*pattern.shape, 1] if dense else [int(k) for k in pattern.compress()]
     values = ", ".join(map(str, numbers))
     return f"static const casadi_int {name}[{len(numbers)}] = {{{values}}};"
 

@@ -164,8 +164,8 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
     head = [
         "#include <math.h>",
         "#include <string.h>",
+        "#include <stdint.h>",
         '#include "tree_core.h"',
-        '#include "lanes.h"',
         "#define casadi_int long long int",
         "#ifdef _WIN32",
         "#define EXPORT __declspec(dllexport)",
@@ -176,7 +176,7 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
         "static const double numbers[] __attribute__((aligned(64))) = {"
         f"{_wrapped(map(_number, table.numbers))}}};",
         "static const mbs_tree mechanism = {"
-        f"{table.size}, {table.positions}, {int(table.in_order)},"
+        f"{table.size}, {table.positions}, {int(table.in_order)}, {int(table.in_order and table.plain)},"
         f" {len(table.lists['joints']) // 3}, {len(table.lists['rotor']) // 2},"
         f" {len(table.lists['rub'])}, {', '.join(_LIST_NAMES)},"
         f" numbers + {len(table.numbers) - 3}, numbers}};",
@@ -199,7 +199,8 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
             _integers("places", table.places),
             f"int {name}(const double **, double **, casadi_int *, double *, int);",
             "static const mbs_tree *at(const double *p, mbs_tree *own, double **w) {",
-            f"  double *table = mbs_aligned(*w), *values = table + {count};",
+            "  double *table = (double *)(((uintptr_t)*w + 63) & ~(uintptr_t)63);",
+            f"  double *values = table + {count};",
             f"  const double *arg[{pointers[0]}] = {{p}};",
             f"  double *res[{pointers[1]}] = {{values}};",
             f"  casadi_int iw[{integers}];",

@@ -198,8 +198,9 @@ INLINE Q crossed(Q a, Q b) { return turn_round(a * turn_round(b) - turn_round(a)
 
 /* Of each node, from the second on; the first is the base. */
 struct chain {
-  Q r0, r1, r2, d;      /* axes of the link, its origin from that of the link before */
-  Q w, wd, vd, vo;      /* motion of the link: see W, WD, VD and VO */
+  Q r0, r1, r2;     /* axes of the link */
+  Q w, wd, vd;      /* its motion: see W, WD and VD */
+  Q d, vo;          /* its origin from that of the link before, and its velocity: see VO */
 };
 typedef struct chain chain;
 
@@ -209,8 +210,8 @@ INLINE void from_link_to_link(work k, int moves) {
   const double *g = m->gravity;
   chain *const nodes = k.nodes;
   const Q zero = {0, 0, 0, 0};
-  nodes[0] = (chain){{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, zero,
-                     zero, zero, {-g[0], -g[1], -g[2], 0}, zero};
+  nodes[0] = (chain){{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, zero, zero,
+                     {-g[0], -g[1], -g[2], 0}, zero, zero};
   Q r0 = zero, r1 = zero, r2 = zero, d = zero, w = zero, wd = zero, vd = zero, vo = zero;
   Q wl = zero, angular = zero, linear = zero; /* of the link before; of the joint so far */
   int held = -2;
@@ -265,32 +266,35 @@ INLINE void from_link_to_link(work k, int moves) {
 static void poses_alone(work k) { from_link_to_link(k, 0); }
 static void poses_and_motions(work k) { from_link_to_link(k, 1); }
 
-/* Eight numbers of each lane's node, three, a gap, three and a gap, to six rows. */
-INLINE void to_rows(work k, int j, const double *const *from, int row, int other) {
+/* Two vectors of each lane's node to six rows. */
+INLINE void to_rows(work k, int j, const double *const *from, int at, int row, int other) {
 #if defined(MBS_PAIR) && MBS_LANES == 8
   V square[8];
-  MBS_UNROLLED for (int l = 0; l < 8; ++l) square[l] = lane(from[l]);
+  MBS_UNROLLED for (int l = 0; l < 8; ++l) square[l] = lane(from[l] + at);
   mbs_transpose(square);
   MBS_UNROLLED for (int r = 0; r < 3; ++r) PUT1(row + r, square[r]);
   MBS_UNROLLED for (int r = 0; r < 3; ++r) PUT1(other + r, square[4 + r]);
 #else
   for (int l = 0; l < MBS_LANES; ++l)
-    for (int r = 0; r < 3; ++r) CELL(row + r, j + l) = from[l][r], CELL(other + r, j + l) = from[l][4 + r];
+    for (int r = 0; r < 3; ++r) {
+      CELL(row + r, j + l) = from[l][at + r];
+      CELL(other + r, j + l) = from[l][at + 4 + r];
+    }
 #endif
 }
 
-/* The poses of all links in lanes, and the motions of all nodes. */
-static void poses_in_lanes(work k) {
+/* Poses of all links in lanes and, where they move, their motions, which all nodes of a joint have
+ * in common; and the unit motions of all nodes. */
+INLINE void in_lanes(work k, int moves) {
   const mbs_tree *m = k.m;
   for (int j = k.n; j % MBS_LANES; ++j) k.nodes[1 + j] = k.nodes[0];
   EVERY_LANE {
-    const double *from[MBS_LANES], *rest[MBS_LANES];
-    for (int l = 0; l < MBS_LANES; ++l) {
-      from[l] = (const double *)&k.nodes[1 + j + l].r0;
-      rest[l] = (const double *)&k.nodes[1 + j + l].r2;
-    }
-    to_rows(k, j, from, R, R + 3);
-    to_rows(k, j, rest, R + 6, D);
+    const double *from[MBS_LANES];
+    for (int l = 0; l < MBS_LANES; ++l)
+      from[l] = (const double *)(k.nodes + 1 + (j + l < k.n ? m->last[j + l] : j + l));
+    to_rows(k, j, from, 0, R, R + 3);
+    to_rows(k, j, from, 8, R + 6, W);
+    if (moves) to_rows(k, j, from, 16, WD, VD);
     const V3 z = L3(R + 6);
     PUT3(SL, times(TL1(MBS_SLIDE), z));
     PUT3(SA, times(TL1(MBS_TURN), z));
@@ -306,29 +310,21 @@ static void poses_in_lanes(work k) {
     }
 }
 
-/* The motions of all links in lanes; all nodes of a joint have that of its link. */
-static void motions_in_lanes(work k) {
-  EVERY_LANE {
-    const double *from[MBS_LANES], *rest[MBS_LANES];
-    for (int l = 0; l < MBS_LANES; ++l) {
-      const chain *node = k.nodes + 1 + (j + l < k.n ? k.m->last[j + l] : -1);
-      from[l] = (const double *)&node->w;
-      rest[l] = (const double *)&node->vd;
-    }
-    to_rows(k, j, from, W, WD);
-    to_rows(k, j, rest, VD, VO);
-  }
-}
-
-/* Rows of a column of numbers in the order of v; null is zeros. */
+/* A column of numbers in the order of v brought to a row; null is zeros. */
 INLINE void gather(work k, int row, const double *from) {
-  for (int j = 0; j < k.n; ++j) CELL(row, j) = from ? from[k.m->v_at[j]] : 0;
+  int j = 0;
+  if (k.m->in_order && from)
+    for (; j + MBS_LANES <= k.n; j += MBS_LANES) PUT1(row, (V)(*(const U *)(from + j)));
+  for (; j < k.n; ++j) CELL(row, j) = from ? from[k.m->v_at[j]] : 0;
 }
 
 /* Poses in the links before, from positions. */
 static void pose_joints(work k, const double *q) {
   const mbs_tree *m = k.m;
-  for (int j = 0; j < k.n; ++j) CELL(X, j) = m->q_at[j] < 0 ? 0 : q[m->q_at[j]];
+  if (m->plain)
+    gather(k, X, q);
+  else
+    for (int j = 0; j < k.n; ++j) CELL(X, j) = m->q_at[j] < 0 ? 0 : q[m->q_at[j]];
   clear_ends(k, X, 3); /* X, QD, QDD */
   EVERY_LANE {
     V sine, cosine;
@@ -342,9 +338,16 @@ static void pose_joints(work k, const double *q) {
   several(k, q);
 }
 
-/* Origins of all links from that of the first link of their tree. */
+/* Origins of all links from those of the links before and from that of the first link of their
+ * tree, and, where they move, velocities for an observer. */
 static void places(work k) {
   const mbs_tree *m = k.m;
+  EVERY_LANE {
+    const double *from[MBS_LANES];
+    for (int l = 0; l < MBS_LANES; ++l)
+      from[l] = (const double *)&k.nodes[1 + (j + l < k.n ? m->last[j + l] : j + l)].d;
+    to_rows(k, j, from, 0, D, VO);
+  }
   D3 p = {0, 0, 0};
   for (int j = 0, held = -1; j < k.n; held = j++) {
     const int b = m->before[j];
@@ -358,7 +361,7 @@ static void places(work k) {
 static void poses(work k, const double *q) {
   pose_joints(k, q);
   poses_alone(k);
-  poses_in_lanes(k);
+  in_lanes(k, 0);
 }
 
 /* First moments and inertia of all bodies in the axes of the base. */
@@ -422,7 +425,10 @@ static void wrenches(work k) {
       PUT_O3(M, j, there);
     }
     if (b < 0) continue;
-    if (m->link[j] == b) there = plus_cross(there, O3(D, j), here);
+    if (m->link[j] == b) {
+      const double *d = (const double *)&k.nodes[1 + j].d;
+      there = plus_cross(there, ((D3){d[0], d[1], d[2]}), here);
+    }
     if (b == j - 1) {
       f = here, mo = there, held = b;
     } else {
@@ -470,8 +476,7 @@ static void inverse(work k, const double *q, const double *v, const double *a) {
   gather(k, QDD, a);
   pose_joints(k, q);
   poses_and_motions(k);
-  poses_in_lanes(k);
-  motions_in_lanes(k);
+  in_lanes(k, 1);
   bodies(k);
   spins(k);
   wrenches(k);
@@ -640,14 +645,12 @@ static D3 of_joint(work k, int row, const int *joint) {
 static void links_before(work k) {
   const mbs_tree *m = k.m;
   EVERY_LANE {
-    const double *from[MBS_LANES], *rest[MBS_LANES];
-    for (int l = 0; l < MBS_LANES; ++l) {
-      const chain *node = k.nodes + 1 + (j + l < k.n ? m->link[j + l] : -1);
-      from[l] = (const double *)&node->w;
-      rest[l] = (const double *)&node->vd;
-    }
-    to_rows(k, j, from, WL, WDL);
-    to_rows(k, j, rest, VDL, VL);
+    const double *from[MBS_LANES];
+    for (int l = 0; l < MBS_LANES; ++l)
+      from[l] = (const double *)&k.nodes[1 + (j + l < k.n ? m->link[j + l] : -1)].r2;
+    to_rows(k, j, from, 0, WDL, WL); /* of r2, which WDL does not keep, and w */
+    to_rows(k, j, from, 8, WDL, VDL);
+    to_rows(k, j, from, 16, VL, VL); /* of d, likewise, and vo */
     /* the point of the link before that is at the origin */
     const V inner = TL1(MBS_INNER), v = inner * L1(QD) - L1(QD);
     PUT3(VL, more(plus_cross(times(inner, L3(VL)), L3(WL), L3(D)), v, L3(SL)));
@@ -856,8 +859,8 @@ static void turning_rotors(work k, double *dq, double *dv) {
 
 /* Derivatives of the efforts in the order of the tree; what `inverse` found is in the work space. */
 static void slopes(work k, double *dq, double *dv, double *A) {
-  links_before(k);
   places(k);
+  links_before(k);
   composites(k);
   moving_composites(k);
   momenta(k);
@@ -1170,7 +1173,7 @@ void mbs_tree_ddm_derivatives(const mbs_tree *m, const double *q, const double *
   if (dq || dv) {
     gather(k, QDD, given);
     poses_and_motions(k);
-    motions_in_lanes(k);
+    in_lanes(k, 1);
     wrenches(k);
     slopes(k, dq, dv, 0);
     solve_matrices(k, dq, dv);

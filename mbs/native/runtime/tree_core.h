@@ -37,6 +37,7 @@ typedef struct {
   int size;      /* velocities */
   int positions; /* elements of q */
   int in_order;  /* whether v has the order of the tree */
+  int plain;     /* whether q has it too, element by element */
   int many;      /* joints of several velocities */
   int rotors;    /* joints with a rotor that spins */
   int rubbing;   /* velocities with Coulomb friction */

@@ -82,8 +82,8 @@ class TreeTable:
 
     @property
     def plain(self) -> bool:
-        """Whether velocities are the rates of positions, element by element."""
-        return list(self.lists["q_at"]) == list(self.lists["v_at"])
+        """Whether q has this order too, element by element."""
+        return self.in_order and list(self.lists["q_at"]) == list(self.lists["v_at"])
 
 
 def tree_functions(
@@ -176,7 +176,7 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
         "static const double numbers[] __attribute__((aligned(64))) = {"
         f"{_wrapped(map(_number, table.numbers))}}};",
         "static const mbs_tree mechanism = {"
-        f"{table.size}, {table.positions}, {int(table.in_order)}, {int(table.in_order and table.plain)},"
+        f"{table.size}, {table.positions}, {int(table.in_order)}, {int(table.plain)},"
         f" {len(table.lists['joints']) // 3}, {len(table.lists['rotor']) // 2},"
         f" {len(table.lists['rub'])}, {', '.join(_LIST_NAMES)},"
         f" numbers + {len(table.numbers) - 3}, numbers}};",

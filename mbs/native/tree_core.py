@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
+from itertools import accumulate
 from pathlib import Path
 
 import casadi
-from casadi import DM, MX, SX, Function
+from casadi import DM, MX, SX, Function, Sparsity
 
 from mbs.native.compiled import generated
 from mbs.native.compiler import cached_library
@@ -86,6 +87,70 @@ class TreeTable:
         return self.in_order and list(self.lists["q_at"]) == list(self.lists["v_at"])
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class JacobianPattern:
+    """What need not be zero of the Jacobians of a model.
+
+    Attributes:
+        by_v: of that by velocities.
+        by_q: of that by positions.
+        coupled: whether all joints of a tree that stands on the base are coupled, not only those
+            on one branch.
+    """
+
+    by_v: Sparsity
+    by_q: Sparsity
+    coupled: bool
+
+    @property
+    def is_dense(self) -> bool:
+        """Whether nothing is zero."""
+        return bool(self.by_v.is_dense())
+
+
+def nodes_of_positions(table: TreeTable) -> list[int]:
+    """For every element of q a node of its joint."""
+    nodes = [0] * table.positions
+    for node, at in enumerate(table.lists["q_at"]):
+        if at >= 0:
+            nodes[at] = node
+    joints = table.lists["joints"]
+    for first, count, at in zip(joints[::3], joints[1::3], joints[2::3], strict=True):
+        nodes[at : at + count + 1] = [first] * (count + 1)
+    return nodes
+
+
+def jacobian_pattern(table: TreeTable, model: str) -> JacobianPattern:
+    """The pattern of the Jacobians of "idm" or "ddm"; dense where v has another order."""
+    n, coupled = table.size, model == "ddm"
+    rows = [_rows(table, node, coupled) if table.in_order else range(n) for node in range(n)]
+    by_v, by_q = (
+        _sparsity(n, [rows[node] for node in nodes])
+        for nodes in (range(n), nodes_of_positions(table))
+    )
+    return JacobianPattern(by_v, by_q, coupled)
+
+
+def _rows(table: TreeTable, node: int, coupled: bool) -> Sequence[int]:
+    """The nodes whose efforts, or accelerations, a node can change; as mbs_tree_pack has them."""
+    lists = table.lists
+    if coupled:
+        while lists["link"][node] >= 0:
+            node = lists["link"][node]
+        return range(lists["first"][node], lists["end"][node])
+    before = list[int]()
+    for run in range(lists["runs_from"][node], lists["runs_from"][node + 1]):
+        before += range(lists["runs"][2 * run], lists["runs"][2 * run + 1])
+    return [*before, *range(lists["first"][node], lists["end"][node])]
+
+
+def _sparsity(size: int, columns: Sequence[Sequence[int]]) -> Sparsity:
+    ends = list(accumulate(map(len, columns), initial=0))
+    if ends[-1] == size * len(columns):
+        return Sparsity.dense(size, len(columns))
+    return Sparsity(size, len(columns), ends, [row for rows in columns for row in rows])
+
+
 def tree_functions(
     table: TreeTable, parameters: int, default: Sequence[float] = ()
 ) -> dict[str, Function]:
@@ -97,39 +162,32 @@ def tree_functions(
         default: CasADi's default of all of them, when there are some.
     """
     n, nq = table.size, table.positions
-    sizes = {"q": (nq, 1), "v": (n, 1), "a": (n, 1), "tau": (n, 1), "p": (parameters, 1)}
-    matrix = (n, n)
-    shapes = {
-        "idm": ("qva", [("tau", (n, 1))]),
-        "inertia": ("q", [("A", matrix)]),
-        "ddm": (("q", "v", "tau"), [("a", (n, 1))]),
-        "idm_derivatives": (
-            "qva",
-            [*((f"dtau_d{x}", matrix) for x in "qva"), ("tau", (n, 1))],
-        ),
-        "ddm_derivatives": (
-            ("q", "v", "tau"),
-            [*((f"da_d{x}", matrix) for x in ("q", "v", "tau")), ("a", (n, 1))],
-        ),
-        "pivots": ("q", [("free", (n, 1)), ("locked", (n, 1))]),
-        "jac_idm": (
-            ("q", "v", "a", "out_tau"),
-            [("jac_tau_q", (n, nq)), ("jac_tau_v", matrix), ("jac_tau_a", matrix)],
-        ),
-        "jac_ddm": (
-            ("q", "v", "tau", "out_a"),
-            [("jac_a_q", (n, nq)), ("jac_a_v", matrix), ("jac_a_tau", matrix)],
-        ),
+    sizes = {"q": nq, "v": n, "a": n, "tau": n, "p": parameters}
+    column, square = Sparsity.dense(n, 1), Sparsity.dense(n, n)
+    idm, ddm = ("q", "v", "a"), ("q", "v", "tau")
+    shapes: dict[str, tuple[Sequence[str], list[tuple[str, Sparsity]]]] = {
+        "idm": (idm, [("tau", column)]),
+        "inertia": (("q",), [("A", square)]),
+        "ddm": (ddm, [("a", column)]),
+        "idm_derivatives": (idm, [*((f"dtau_d{x}", square) for x in idm), ("tau", column)]),
+        "ddm_derivatives": (ddm, [*((f"da_d{x}", square) for x in ddm), ("a", column)]),
+        "pivots": (("q",), [("free", column), ("locked", column)]),
     }
+    for model, inputs, output in (("idm", idm, "tau"), ("ddm", ddm, "a")):
+        pattern = jacobian_pattern(table, model)
+        patterns = dict(zip(inputs, (pattern.by_q, pattern.by_v, pattern.by_v), strict=True))
+        if parameters:
+            patterns["p"] = Sparsity.dense(n, parameters)
+        outputs = [(f"jac_{output}_{x}", patterns[x]) for x in patterns]
+        shapes[f"jac_{model}"] = (inputs, outputs)
     result = {}
     for name, (inputs, outputs) in shapes.items():
-        every = [*inputs]
-        if parameters:  # the last input; but for the Jacobian, whose last is the output
-            every.insert(3 if name.startswith("jac_") else len(every), "p")
-        if parameters and name.startswith("jac_"):
-            outputs = [*outputs, (f"{outputs[0][0][:-1]}p", (n, parameters))]
-        symbols = [MX.sym(x, *sizes[x.removeprefix("out_")]) for x in every]
-        values = [MX(DM.zeros(*shape)) for _, shape in outputs]
+        every = [*inputs, *(["p"] if parameters else [])]
+        symbols = [MX.sym(x, sizes[x]) for x in every]
+        if name.startswith("jac_"):  # CasADi gives the output of the model too
+            every.append(f"out_{outputs[0][0].split('_')[1]}")
+            symbols.append(MX.sym("output", n))
+        values = [MX(DM.ones(pattern)) for _, pattern in outputs]
         names = every, [x for x, _ in outputs]
         options = {"default_in": [default[0] if x == "p" else 0.0 for x in every]}
         result[name] = Function(name, symbols, values, *names, options)
@@ -214,19 +272,18 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
             "  return own;",
             "}",
         ]
-    square = table.size * table.size
-    by_parameters = table.size * functions["jac_idm"].size1_in("p") if table.dependent else 0
+    head.append(_integers("nodes_of_v", range(table.size)))
+    head.append(_integers("nodes_of_q", nodes_of_positions(table)))
     lines = list(head)
     for name, function in functions.items():
-        extra = 0 if table.plain else square
-        own = extra if name.startswith("jac_") else 0
+        body, own = _call(name, table, function)
         lines += [
             f"EXPORT int {name}(const double **arg, double **res, casadi_int *iw, double *w, int"
             " mem) {",
             "  mbs_tree own;",
             "  (void)iw; (void)mem;",
             f"  const mbs_tree *m = at({_parameter(function)}, &own, &w);",
-            *_call(name, table.plain, own, by_parameters if name.startswith("jac_") else 0),
+            *body,
             "  return 0;",
             "}",
             function_table(function, f"{work} + {before + own}"),
@@ -239,34 +296,56 @@ def _parameter(function: Function) -> str:
     return f"arg[{names.index('p')}]" if "p" in names else "0"
 
 
-def _call(name: str, plain: bool, square: int, by_parameters: int) -> list[str]:
-    """What a function does: the inputs and outputs of the core are those of CasADi.
+def _call(name: str, table: TreeTable, function: Function) -> tuple[list[str], int]:
+    """What a function does, and doubles of work space; inputs and outputs are those of CasADi."""
+    match name:
+        case "inertia":
+            return ["  mbs_tree_inertia(m, arg[0], res[0], w);"], 0
+        case "pivots":
+            return ["  mbs_tree_pivots(m, arg[0], res[0], res[1], w);"], 0
+        case "jac_idm" | "jac_ddm":
+            return _jacobian(name.removeprefix("jac_"), table, function)
+    results = ", ".join(f"res[{k}]" for k in range(function.n_out()))
+    return [f"  mbs_tree_{name}(m, arg[0], arg[1], arg[2], {results}, w);"], 0
+
+
+def _jacobian(model: str, table: TreeTable, function: Function) -> tuple[list[str], int]:
+    """Derivatives by positions, of those along the velocities; what a tree lets be zero left out.
 
     Derivatives by parameters, which the core does not have, are NaN.
     """
-    if by_parameters:
-        nan = f"  if (res[3]) for (int k = 0; k < {by_parameters}; ++k) res[3][k] = NAN;"
-        return [nan, *_call(name, plain, square, 0)]
-    match name:
-        case "idm" | "ddm":
-            return [f"  mbs_tree_{name}(m, arg[0], arg[1], arg[2], res[0], w);"]
-        case "inertia":
-            return ["  mbs_tree_inertia(m, arg[0], res[0], w);"]
-        case "pivots":
-            return ["  mbs_tree_pivots(m, arg[0], res[0], res[1], w);"]
-        case "jac_idm" | "jac_ddm":
-            model = f"{name.removeprefix('jac_')}_derivatives"
-            if plain:
-                results = "res[0], res[1], res[2], 0, w"
-                return [f"  mbs_tree_{model}(m, arg[0], arg[1], arg[2], {results});"]
-            return [
-                "  double *along = res[0] ? w : 0;",
-                f"  w += {square};",
-                f"  mbs_tree_{model}(m, arg[0], arg[1], arg[2], along, res[1], res[2], 0, w);",
-                "  if (along) mbs_tree_by_positions(m, arg[0], along, res[0]);",
-            ]
-    results = "res[0], res[1], res[2], res[3], w"
-    return [f"  mbs_tree_{name}(m, arg[0], arg[1], arg[2], {results});"]
+    lines = []
+    if "p" in function.name_in():
+        count = function.nnz_out(3)
+        value = "0" if table.dependent is None else "NAN"
+        lines.append(f"  if (res[3]) for (int k = 0; k < {count}; ++k) res[3][k] = {value};")
+    call = f"  mbs_tree_{model}_derivatives(m, arg[0], arg[1], arg[2],"
+    pattern = jacobian_pattern(table, model)
+    if pattern.is_dense and table.plain:
+        return [*lines, f"{call} res[0], res[1], res[2], 0, w);"], 0
+    n, nq = table.size, table.positions
+    squares = 1 if pattern.is_dense else 3
+    square = n * n
+    lines += [f"  double *full = w, *by_q = w + {squares * square};", f"  w = by_q + {n * nq};"]
+    if pattern.is_dense:
+        lines += [
+            f"{call} res[0] ? full : 0, res[1], res[2], 0, w);",
+            "  if (res[0]) mbs_tree_by_positions(m, arg[0], full, res[0]);",
+        ]
+    else:
+        parts = ", ".join(f"res[{k}] ? full + {k * square} : 0" for k in range(3))
+        coupled = int(pattern.coupled)
+        lines += [
+            f"{call} {parts}, 0, w);",
+            "  if (res[0]) mbs_tree_by_positions(m, arg[0], full, by_q);",
+            f"  if (res[0]) mbs_tree_pack(m, nodes_of_q, {nq}, {coupled}, by_q, res[0]);",
+            *(
+                f"  if (res[{k}]) mbs_tree_pack(m, nodes_of_v, {n}, {coupled},"
+                f" full + {k * square}, res[{k}]);"
+                for k in (1, 2)
+            ),
+        ]
+    return lines, squares * square + n * nq
 
 
 def _integers(name: str, values: Sequence[int]) -> str:

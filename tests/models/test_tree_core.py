@@ -211,6 +211,25 @@ def test_casadi_differentiates_once_by_the_core(name, model):
         close(Function("product", x, [product])(q, v, a), expected)
 
 
+def test_jacobians_have_the_zeros_of_the_tree():
+    system = TREES["driven3"]()
+    core = tree_core(system)
+    q, v, a = random_state(system, np.random.default_rng(6))
+    assert core.idm.jacobian().nnz_out(1) < system.nv**2
+    for model in ("idm", "ddm"):
+        J = getattr(core, model).jacobian()(q, v, a, 0)
+        full = getattr(core, f"{model}_derivatives")(q, v, a)
+        close(J[1], full[1], 1e-15)
+        close(J[2], full[2], 1e-15)
+        # what is left out is zero, and what is kept is not
+        kept = np.array(casadi.DM(J[2].sparsity(), 1)) > 0
+        assert (full[2][~kept] == 0).all()
+        assert (full[2] != 0).sum() > 0.8 * kept.sum()
+    assert core.idm.jacobian().nnz_out(1) < core.ddm.jacobian().nnz_out(1) < system.nv**2
+    chain = random_tree(2, n=9, kinds=("revolute",), serial=True).mechanism.assemble()
+    assert tree_core(chain).idm.jacobian().nnz_out(0) == 81
+
+
 def test_derivatives_that_the_core_does_not_have_are_refused_or_show():
     system = rubbing()
     core = tree_core(system)

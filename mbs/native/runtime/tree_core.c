@@ -1234,3 +1234,22 @@ void mbs_tree_by_positions(const mbs_tree *m, const double *q, const double *alo
     }
   }
 }
+
+static double *pack_run(const double *column, int from, int to, double *packed) {
+  memcpy(packed, column + from, (size_t)(to - from) * sizeof(double));
+  return packed + (to - from);
+}
+
+void mbs_tree_pack(const mbs_tree *m, const int *nodes, int columns, int coupled,
+                   const double *dense, double *packed) {
+  for (int c = 0; c < columns; ++c, dense += m->size) {
+    int node = nodes[c];
+    if (coupled) {
+      while (m->link[node] >= 0) node = m->link[node];
+    } else {
+      for (int r = m->runs_from[node]; r < m->runs_from[node + 1]; ++r)
+        packed = pack_run(dense, m->runs[2 * r], m->runs[2 * r + 1], packed);
+    }
+    packed = pack_run(dense, m->first[node], m->end[node], packed);
+  }
+}

@@ -84,5 +84,10 @@ void mbs_tree_ddm_derivatives(const mbs_tree *m, const double *q, const double *
 void mbs_tree_pivots(const mbs_tree *m, const double *q, double *free_, double *locked, double *w);
 /* Derivatives by q of those along the velocities: rows of `along` times the velocities of q. */
 void mbs_tree_by_positions(const mbs_tree *m, const double *q, const double *along, double *by_q);
+/* The elements of columns that need not be zero, one after the other; m must be in order. Column c is
+ * of node nodes[c]: its rows are the nodes before and behind it or, where all joints of a tree are
+ * coupled, all of its tree. */
+void mbs_tree_pack(const mbs_tree *m, const int *nodes, int columns, int coupled,
+                   const double *dense, double *packed);
 
 #endif

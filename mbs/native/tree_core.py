@@ -173,13 +173,13 @@ def tree_functions(
         "ddm_derivatives": (ddm, [*((f"da_d{x}", square) for x in ddm), ("a", column)]),
         "pivots": (("q",), [("free", column), ("locked", column)]),
     }
-    for model, inputs, output in (("idm", idm, "tau"), ("ddm", ddm, "a")):
+    for model, given, output in (("idm", idm, "tau"), ("ddm", ddm, "a")):
         pattern = jacobian_pattern(table, model)
-        patterns = dict(zip(inputs, (pattern.by_q, pattern.by_v, pattern.by_v), strict=True))
+        patterns = dict(zip(given, (pattern.by_q, pattern.by_v, pattern.by_v), strict=True))
         if parameters:
             patterns["p"] = Sparsity.dense(n, parameters)
         outputs = [(f"jac_{output}_{x}", patterns[x]) for x in patterns]
-        shapes[f"jac_{model}"] = (inputs, outputs)
+        shapes[f"jac_{model}"] = (given, outputs)
     result = {}
     for name, (inputs, outputs) in shapes.items():
         every = [*inputs, *(["p"] if parameters else [])]

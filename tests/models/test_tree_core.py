@@ -51,13 +51,15 @@ def unordered():
 
 
 def floating():
-    """A free body with rotor inertia on its velocities, an arm on it, and a body of its own."""
+    """A free body with rotor inertia, an arm on it from which another body moves freely, and
+    a body of its own."""
     m = Mechanism("floating", gravity=(0, 0, -9.81))
     bodies = [
-        m.add(Body(n, mass=1.5, com=(0.1, 0.2, 0.3), inertia=(0.2, 0.25, 0.3))) for n in "abc"
+        m.add(Body(n, mass=1.5, com=(0.1, 0.2, 0.3), inertia=(0.2, 0.25, 0.3))) for n in "abcd"
     ]
     m.connect(m.world.at(0.3, 0.1, 0.2), Free("base", Ia=0.3, Fv=0.1), bodies[0])
     m.connect(bodies[0].at(0.2, 0, 0.1), Revolute("j", axis=(1, 2, 3)), bodies[1])
+    m.connect(bodies[1].at(0.1, 0.3, 0), Free("inner", Ia=0.2), bodies[3])
     m.connect(m.world, Free("other"), bodies[2])
     return m.assemble()
 

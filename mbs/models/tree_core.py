@@ -244,7 +244,6 @@ def _put_link(put: Callable[[int, int, SX], None], link: Link, j: int, first: in
     for node in range(first, last + 1):
         for name, value in each.items():
             put(ROWS[name], node, value)
-    put(ROWS["first"], first, _ONE)
     if rotor is not None and rotor.carrier >= 0:
         for k, element in enumerate(elements(rotor.momentum)):
             put(ROWS["spin"] + k, first, element)

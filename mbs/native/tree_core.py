@@ -20,31 +20,14 @@ from mbs.native.compiler import cached_library
 from mbs.native.kernel import FAST_FLAGS, function_table, processor
 
 ROWS = {
-    name: first
-    for first, *names in (
-        (0, "C"),
-        (9, "T"),
-        (12, "mass"),
-        (13, "h"),
-        (16, "J"),
-        (22, "turn"),
-        (23, "slide"),
-        (24, "first"),
-        (25, "inner"),
-        (26, "Ia"),
-        (27, "Fv"),
-        (28, "stiffness"),
-        (29, "rest"),
-        (30, "Fs"),
-        (31, "width"),
-        (32, "spin"),
-        (35, "own"),
-    )
-    for name in names
+    **{"C": 0, "T": 9, "mass": 12, "h": 13, "J": 16, "turn": 22, "slide": 23, "inner": 24},
+    **{"Ia": 25, "Fv": 26, "stiffness": 27, "rest": 28, "Fs": 29, "width": 30},
+    **{"spin": 31, "own": 34},
 }
 """The first row of each quantity, as tree_core.h has them."""
 
-ROW_COUNT = 36
+ROW_COUNT = 35
+"""MBS_ROWS of tree_core.h."""
 _LIST_NAMES = (
     *("before", "link", "end", "first", "last", "kind", "fork", "q_at", "v_at"),
     *("runs_from", "runs", "joints", "rotor", "rub"),

@@ -96,7 +96,7 @@ enum {
   YA = SC + 3,    /* 3: rate of its axis */
   Y2L = YA + 3,   /* 3: second rate of its motion, at the common point */
   Y2A = Y2L + 3,  /* 3 */
-  YSL = Y2A + 3,  /* 3: twice its rate, less that of the own joint */
+  YSL = Y2A + 3,  /* 3: rates of its motion with the link before and with its own, together */
   YSA = YSL + 3,  /* 3 */
   DQL = YSA + 3,  /* 3: change of the wrench with the position of the node */
   DQA = DQL + 3,  /* 3 */

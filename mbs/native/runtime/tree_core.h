@@ -9,24 +9,23 @@
 
 /* Rows of the table of numbers: of eight nodes side by side all rows, then of the next eight. */
 enum {
-  MBS_C = 0,          /* 9: axes of the link at zero position in those of the link before, by columns */
+  MBS_C = 0,          /* 9: axes of the link at zero in those of the link before, by columns */
   MBS_T = 9,          /* 3: its origin there [m] */
   MBS_MASS = 12,      /* 1: of what is fixed on the link; zero but at the last node of a joint */
   MBS_H = 13,         /* 3: first moments about its origin, in its axes */
   MBS_J = 16,         /* 6: inertia xx xy xz yy yz zz, likewise */
   MBS_TURN = 22,      /* 1: one for a revolute joint, else zero */
   MBS_SLIDE = 23,     /* 1: one for a prismatic joint, else zero */
-  MBS_FIRST = 24,     /* 1: one at the first node of a joint, else zero */
-  MBS_INNER = 25,     /* 1: zero where the joint is on the base, else one */
-  MBS_IA = 26,        /* 1: inertia of rotors seen at the joint */
-  MBS_FV = 27,        /* 1: viscous friction */
-  MBS_STIFFNESS = 28, /* 1: of the spring, which is at rest at */
-  MBS_REST = 29,      /* 1 */
-  MBS_FS = 30,        /* 1: Coulomb friction, whose sign changes over the velocity */
-  MBS_WIDTH = 31,     /* 1: zero for a step */
-  MBS_SPIN = 32,      /* 3: angular momentum of a rotor for a unit velocity, in axes of its carrier */
-  MBS_OWN = 35,       /* 1: one where this rotor is on the link of the joint itself, else zero */
-  MBS_ROWS = 36
+  MBS_INNER = 24,     /* 1: zero where the joint is on the base, else one */
+  MBS_IA = 25,        /* 1: inertia of rotors seen at the joint */
+  MBS_FV = 26,        /* 1: viscous friction */
+  MBS_STIFFNESS = 27, /* 1: of the spring, which is at rest at */
+  MBS_REST = 28,      /* 1 */
+  MBS_FS = 29,        /* 1: Coulomb friction, whose sign changes over the velocity */
+  MBS_WIDTH = 30,     /* 1: zero for a step */
+  MBS_SPIN = 31,      /* 3: angular momentum of a rotor for a unit velocity, in axes of its carrier */
+  MBS_OWN = 34,       /* 1: one where this rotor is on the link of the joint itself, else zero */
+  MBS_ROWS = 35
 };
 
 /* Kinds of motion of a node: along and about z; about x, y and z of a joint of several velocities,

@@ -215,15 +215,16 @@ def frictionless(name: str, folder: Path) -> System:
     """A robot by its name, without friction, which pinocchio's algorithms do not have.
 
     Args:
-        name: of the catalogue, or a key of `LINKS`.
+        name: of the catalogue, a key of `LINKS`, or "chain" and a number.
         folder: for its URDF.
     """
     if name in CATALOGUE:
         system = mbs.load(name).assemble()
     else:
         file = folder / f"{name}.urdf"
-        file.write_text(urdf(name, LINKS[name]()), encoding="utf-8")
+        links = LINKS[name]() if name in LINKS else chain(int(name.removeprefix("chain")))
+        file.write_text(urdf(name, links), encoding="utf-8")
         system = mbs.load(file).assemble()
     none = casadi.SX(0)
-    links = tuple(replace(link, Fv=none, Fs=none) for link in system.tree.links)
-    return replace(system, tree=replace(system.tree, links=links), _cache={})
+    free = tuple(replace(link, Fv=none, Fs=none) for link in system.tree.links)
+    return replace(system, tree=replace(system.tree, links=free), _cache={})

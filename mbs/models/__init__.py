@@ -29,6 +29,7 @@ from mbs.models.loop_kinematics import acceleration_closure, velocity_closure
 from mbs.models.measurements import measurements
 from mbs.models.singularities import singularities
 from mbs.models.symbols import devices
+from mbs.models.tree_core import TreeCore, tree_core
 from mbs.models.validity import validity, validity_rows
 
 __all__ = [
@@ -38,6 +39,7 @@ __all__ = [
     "Limits",
     "LinearModel",
     "Linearisation",
+    "TreeCore",
     "acceleration_closure",
     "actuation_matrix",
     "actuation_null_space",
@@ -70,6 +72,7 @@ __all__ = [
     "measurements",
     "singularities",
     "transform",
+    "tree_core",
     "validity",
     "validity_rows",
     "velocity_closure",

@@ -170,12 +170,12 @@ def _inputs(graph: Graph, mapped: Mapped) -> list[str]:
 # What CasADi asks a compiled function about itself: names, shapes, defaults, work space.
 
 
-def function_table(function: Function, work: int) -> str:
+def function_table(function: Function, work: int | str) -> str:
     """C text of the functions beside `name` through which CasADi's `external` learns its shape.
 
     Args:
         function: described; its text declares EXPORT and casadi_int.
-        work: doubles of work space that the code needs.
+        work: doubles of work space that the code needs, a number or C text.
     """
     name, n_in, n_out = function.name(), function.n_in(), function.n_out()
     shape = "const casadi_int *"
@@ -209,12 +209,13 @@ def _choose(kind: str, name: str, answers: Sequence[str]) -> str:
 
 
 def _table(name: str, pattern: Sparsity) -> str:
-    numbers = [int(k) for k in pattern.compress()]
+    dense = pattern.is_dense()
+    numbers = [*pattern.shape, 1] if dense else [int(k) for k in pattern.compress()]
     values = ", ".join(map(str, numbers))
     return f"static const casadi_int {name}[{len(numbers)}] = {{{values}}};"
 
 
-def _work(name: str, n_in: int, n_out: int, work: int) -> str:
+def _work(name: str, n_in: int, n_out: int, work: int | str) -> str:
     sizes = {"arg": n_in, "res": n_out, "iw": 0, "w": work}
     pointers = ", ".join(f"casadi_int *{kind}" for kind in sizes)
     sets = " ".join(f"if ({kind}) *{kind} = {size};" for kind, size in sizes.items())

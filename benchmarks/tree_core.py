@@ -1,0 +1,180 @@
+"""The tree core beside straight lines and pinocchio's C++ library, in one process and in turns.
+
+    python benchmarks/tree_core.py [--robots chain6,chain30] [--quick] [--output table.md]
+
+Every model is a loop of C++ over 64 random states, as in benchmarks/dynamics.py; a time is the best
+of many blocks of 0.15 ms. "core" is `mbs.models.tree_core`, "lines" are the straight lines of
+`mbs.native.compiled(f, fast=True)`, where there are up to 60,000 operations. Values are compared
+with pinocchio's before anything is timed. Seconds of the processor and the largest memory are those
+of the compiler, from an empty cache.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import resource
+import sys
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import casadi
+import numpy as np
+from dynamics import BUILDERS, INPUTS
+from pinocchio_twin import to_twin, twin
+from robots import frictionless
+from timing import ALGORITHMS, STATES, Array, Contender, InLibrary, Peer, best_times, harness
+
+from mbs.assembly import System
+from mbs.assembly.tree import quaternion_slices
+from mbs.models.tree_core import core_library
+from mbs.native.kernel import kernel_library
+
+ROBOTS = ("chain6", "chain12", "chain30", "chain60", "chain100", "chain300", "humanoid")
+NAMES = ("idm", "inertia", "ddm", "idm_derivatives", "ddm_derivatives")
+MANY = 60_000
+"""Operations beyond which straight lines are left out: compiling them takes a minute and more."""
+LARGEST = {"A": 100, "DDM": 100, "dIDM": 40, "dDDM": 40}
+"""Velocities beyond which the straight lines of a model are not even derived."""
+
+
+@dataclass
+class Row:
+    """One model of one robot."""
+
+    robot: str
+    model: str
+    times: dict[str, float] = field(default_factory=dict)
+    error: float = float("nan")
+    lines: str = ""
+
+
+def main() -> None:
+    """Measure and write."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--robots", default=",".join(ROBOTS))
+    parser.add_argument("--models", default=",".join(ALGORITHMS))
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--core-alone", action="store_true", help="no straight lines")
+    parser.add_argument("--output")
+    arguments = parser.parse_args()
+    loops = harness()
+    text = ""
+    for name in arguments.robots.split(","):
+        with tempfile.TemporaryDirectory() as folder:
+            os.environ["MBS_CACHE_DIR"] = folder  # so that compiling is measured
+            text += report(*measure(name, loops, Path(folder), arguments))
+        if arguments.output:
+            Path(arguments.output).write_text(text, encoding="utf-8")
+    print(text)
+
+
+def measure(
+    name: str, loops: Any, folder: Path, arguments: argparse.Namespace
+) -> tuple[list[Row], str]:
+    """The rows of a robot, and what compiling the core took."""
+    system = frictionless(name, folder)
+    library, first = _compiled(lambda: core_library(system).path)
+    library.unlink()
+    library, again = _compiled(lambda: core_library(system).path)
+    note = f"{first}, and where it is in the cache {again}"
+    model, file = twin(system), folder / f"{name}.txt"
+    model.saveToText(str(file))
+    states = _states(system)
+    rows, contenders = [], dict[Any, Contender]()
+    for algorithm in arguments.models.split(","):
+        row = Row(name, algorithm)
+        rows.append(row)
+        inputs = [states[x] for x in INPUTS[algorithm]]
+        shape = core_library(system).shapes[NAMES[ALGORITHMS.index(algorithm)]]
+        core = InLibrary(loops, library, shape, inputs)
+        there = [to_twin(system, states["q"]), *inputs[1:]]
+        peer = Peer(loops, file, algorithm, there, core.value(0).size)
+        row.error = _difference(core, peer)
+        contenders[algorithm, "core"], contenders[algorithm, "pinocchio"] = core, peer
+        if not arguments.core_alone:
+            lines = _lines(row, system, loops, inputs)
+            if lines is not None:
+                contenders[algorithm, "lines"] = lines
+        print(name, algorithm, f"differs by {row.error:.0e}", row.lines, file=sys.stderr)
+    for (algorithm, who), best in best_times(contenders, 40 if arguments.quick else 200).items():
+        next(row for row in rows if row.model == algorithm).times[who] = best
+    return rows, f"{name}: compiling the core takes {note}\n"
+
+
+def _lines(row: Row, system: System, loops: Any, inputs: list[Array]) -> Contender | None:
+    """Straight lines, compiled; None when they are too many."""
+    if system.nv > LARGEST.get(row.model, system.nv):
+        return None
+    function = BUILDERS[row.model](system)
+    size = function.n_instructions() if function.is_a("SXFunction") else 0
+    if size > MANY:
+        row.lines = f"{size} operations"
+        return None
+    library, note = _compiled(lambda: _required(function))
+    row.lines = note
+    return InLibrary(loops, library, function, inputs)
+
+
+def _required(function: casadi.Function) -> Path:
+    library = kernel_library([function])
+    assert library is not None
+    return library
+
+
+def _compiled(build: Callable[[], Path]) -> tuple[Path, str]:
+    """What a process of its own builds, and what its compiler took."""
+    fork = multiprocessing.get_context("fork")
+    ours, theirs = fork.Pipe()
+
+    def work() -> None:
+        path = build()
+        used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        theirs.send((path, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024))
+
+    process = fork.Process(target=work)
+    process.start()
+    path, seconds, memory = ours.recv()
+    process.join()
+    return path, f"{seconds:.1f} s, {memory:.0f} MB"
+
+
+def _states(system: System) -> Mapping[str, Array]:
+    """Random q, v and a (or efforts), one row a state; quaternions have unit length."""
+    rng = np.random.default_rng(0)
+    q = rng.uniform(-2, 2, (STATES, system.nq))
+    for part in quaternion_slices(system.tree):
+        q[:, part] /= np.linalg.norm(q[:, part], axis=1, keepdims=True)
+    return {"q": q, **{name: rng.uniform(-2, 2, (STATES, system.nv)) for name in "va"}}
+
+
+def _difference(a: Contender, b: Contender) -> float:
+    """The largest difference over some states, relative to the largest element."""
+    worst = 0.0
+    for state in range(0, STATES, 8):
+        x, y = a.value(state), b.value(state)
+        worst = max(worst, float(np.max(np.abs(x - y)) / np.max(np.abs(y))))
+    return worst
+
+
+def report(rows: list[Row], note: str) -> str:
+    """The rows as Markdown."""
+    lines = ["| robot | model | core ns | pinocchio | lines | differs by | compiling lines |"]
+    lines.append("|---|---|---|---|---|---|---|")
+    for row in rows:
+        core = row.times["core"]
+        other = (
+            f"{row.times[who] / core:.2f}" if who in row.times else "-"
+            for who in ("pinocchio", "lines")
+        )
+        cells = [row.robot, row.model, f"{core:.0f}", *other, f"{row.error:.0e}", row.lines]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join([*lines, "", note, ""])
+
+
+if __name__ == "__main__":
+    main()

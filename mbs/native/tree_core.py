@@ -1,0 +1,353 @@
+"""Libraries of the tree core: one C file for all mechanisms, and a table of numbers for each.
+
+The core, runtime/tree_core.c, is compiled once and kept. What is compiled for a mechanism are its
+numbers, the functions by which CasADi calls the core, and a short Function of the parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from itertools import accumulate
+from pathlib import Path
+
+import casadi
+from casadi import DM, MX, SX, Function, Sparsity
+
+from mbs.native.compiled import generated
+from mbs.native.compiler import cached_library
+from mbs.native.kernel import FAST_FLAGS, function_table, processor
+
+ROWS = {
+    **{"C": 0, "T": 9, "mass": 12, "h": 13, "J": 16, "turn": 22, "slide": 23, "inner": 24},
+    **{"Ia": 25, "Fv": 26, "stiffness": 27, "rest": 28, "Fs": 29, "width": 30},
+    **{"spin": 31, "own": 34},
+}
+"""The first row of each quantity, as tree_core.h has them."""
+
+ROW_COUNT = 35
+"""MBS_ROWS of tree_core.h."""
+_LIST_NAMES = (
+    *("before", "link", "end", "first", "last", "kind", "fork", "q_at", "v_at"),
+    *("runs_from", "runs", "joints", "rotor", "rub"),
+)
+
+
+def place_of(row: int, node: int) -> int:
+    """Where a number of a node stands: eight nodes side by side, their rows one after the other."""
+    return node // 8 * (8 * ROW_COUNT) + 8 * row + node % 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TreeTable:
+    """A mechanism as numbers; the fields are those of tree_core.h.
+
+    Attributes:
+        size: velocities.
+        positions: elements of q.
+        lists: indices by the names of their lists.
+        numbers: the table, see `place_of`, then gravity; NaN where they follow from parameters.
+        places: where these are.
+        dependent: ``numbers(p)``, their values; None without parameters.
+    """
+
+    size: int
+    positions: int
+    lists: Mapping[str, Sequence[int]]
+    numbers: Sequence[float]
+    places: Sequence[int] = ()
+    dependent: Function | None = None
+
+    @property
+    def in_order(self) -> bool:
+        """Whether v has the order of the tree."""
+        return list(self.lists["v_at"]) == list(range(self.size))
+
+    @property
+    def plain(self) -> bool:
+        """Whether q has this order too, element by element."""
+        return self.in_order and list(self.lists["q_at"]) == list(self.lists["v_at"])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JacobianPattern:
+    """What need not be zero of the Jacobians of a model.
+
+    Attributes:
+        by_v: of that by velocities.
+        by_q: of that by positions.
+        coupled: whether all joints of a tree that stands on the base are coupled, not only those
+            on one branch.
+    """
+
+    by_v: Sparsity
+    by_q: Sparsity
+    coupled: bool
+
+    @property
+    def is_dense(self) -> bool:
+        """Whether nothing is zero."""
+        return bool(self.by_v.is_dense())
+
+
+def nodes_of_positions(table: TreeTable) -> list[int]:
+    """For every element of q a node of its joint."""
+    nodes = [0] * table.positions
+    for node, at in enumerate(table.lists["q_at"]):
+        if at >= 0:
+            nodes[at] = node
+    joints = table.lists["joints"]
+    for first, count, at in zip(joints[::3], joints[1::3], joints[2::3], strict=True):
+        nodes[at : at + count + 1] = [first] * (count + 1)
+    return nodes
+
+
+def jacobian_pattern(table: TreeTable, model: str) -> JacobianPattern:
+    """The pattern of the Jacobians of "idm" or "ddm"; dense where v has another order."""
+    n, coupled = table.size, model == "ddm"
+    rows = [_rows(table, node, coupled) if table.in_order else range(n) for node in range(n)]
+    by_v, by_q = (
+        _sparsity(n, [rows[node] for node in nodes])
+        for nodes in (range(n), nodes_of_positions(table))
+    )
+    return JacobianPattern(by_v, by_q, coupled)
+
+
+def _rows(table: TreeTable, node: int, coupled: bool) -> Sequence[int]:
+    """The nodes whose efforts, or accelerations, a node can change; as mbs_tree_pack has them."""
+    lists = table.lists
+    if coupled:
+        while lists["link"][node] >= 0:
+            node = lists["link"][node]
+        return range(lists["first"][node], lists["end"][node])
+    before = list[int]()
+    for run in range(lists["runs_from"][node], lists["runs_from"][node + 1]):
+        before += range(lists["runs"][2 * run], lists["runs"][2 * run + 1])
+    return [*before, *range(lists["first"][node], lists["end"][node])]
+
+
+def _sparsity(size: int, columns: Sequence[Sequence[int]]) -> Sparsity:
+    ends = list(accumulate(map(len, columns), initial=0))
+    if ends[-1] == size * len(columns):
+        return Sparsity.dense(size, len(columns))
+    return Sparsity(size, len(columns), ends, [row for rows in columns for row in rows])
+
+
+def tree_functions(
+    table: TreeTable, parameters: int, default: Sequence[float] = ()
+) -> dict[str, Function]:
+    """Functions that have the names and shapes of the core's, and no content.
+
+    Args:
+        table: of the mechanism.
+        parameters: how many there are.
+        default: CasADi's default of all of them, when there are some.
+    """
+    n, nq = table.size, table.positions
+    sizes = {"q": nq, "v": n, "a": n, "tau": n, "p": parameters}
+    column, square = Sparsity.dense(n, 1), Sparsity.dense(n, n)
+    idm, ddm = ("q", "v", "a"), ("q", "v", "tau")
+    shapes: dict[str, tuple[Sequence[str], list[tuple[str, Sparsity]]]] = {
+        "idm": (idm, [("tau", column)]),
+        "inertia": (("q",), [("A", square)]),
+        "ddm": (ddm, [("a", column)]),
+        "idm_derivatives": (idm, [*((f"dtau_d{x}", square) for x in idm), ("tau", column)]),
+        "ddm_derivatives": (ddm, [*((f"da_d{x}", square) for x in ddm), ("a", column)]),
+        "pivots": (("q",), [("free", column), ("locked", column)]),
+    }
+    for model, given, output in (("idm", idm, "tau"), ("ddm", ddm, "a")):
+        pattern = jacobian_pattern(table, model)
+        patterns = dict(zip(given, (pattern.by_q, pattern.by_v, pattern.by_v), strict=True))
+        if parameters:
+            patterns["p"] = Sparsity.dense(n, parameters)
+        outputs = [(f"jac_{output}_{x}", patterns[x]) for x in patterns]
+        shapes[f"jac_{model}"] = (given, outputs)
+    result = {}
+    for name, (inputs, outputs) in shapes.items():
+        every = [*inputs, *(["p"] if parameters else [])]
+        symbols = [MX.sym(x, sizes[x]) for x in every]
+        if name.startswith("jac_"):  # CasADi gives the output of the model too
+            every.append(f"out_{outputs[0][0].split('_')[1]}")
+            symbols.append(MX.sym("output", n))
+        values = [MX(DM.ones(pattern)) for _, pattern in outputs]
+        names = every, [x for x, _ in outputs]
+        options = {"default_in": [default[0] if x == "p" else 0.0 for x in every]}
+        result[name] = Function(name, symbols, values, *names, options)
+    return result
+
+
+def tree_library(table: TreeTable, parameters: int, default: Sequence[float] = ()) -> Path:
+    """The library of all models of a mechanism, in CasADi's calling convention.
+
+    Args:
+        table: of the mechanism.
+        parameters: how many it has.
+        default: CasADi's default of all of them, when there are some.
+
+    Raises:
+        CompilerError: there is no compiler, or it refused the code.
+    """
+    runtime = resources.files("mbs.native").joinpath("runtime")
+    own = ("tree_core.c", "tree_core.h", "sincos.h", "lanes.h")
+    files = {name: runtime.joinpath(name).read_text("utf-8") for name in own}
+    # the core is kept by its text, that of its headers, compiler and flags: "native" needs more
+    files["lanes.h"] += f"/* {processor()} */\n"
+    files["mechanism.c"] = _source(table, tree_functions(table, parameters, default))
+    if table.dependent is not None:
+        files["dependent.c"] = generated([table.dependent])
+    return cached_library(files, FAST_FLAGS, common=["tree_core.c"])
+
+
+def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
+    """C text of the numbers of a mechanism and of the functions that CasADi calls."""
+    dependent = table.dependent
+    head = [
+        "#include <math.h>",
+        "#include <string.h>",
+        "#include <stdint.h>",
+        '#include "tree_core.h"',
+        "#define casadi_int long long int",
+        "#ifdef _WIN32",
+        "#define EXPORT __declspec(dllexport)",
+        "#else",
+        '#define EXPORT __attribute__((visibility("default")))',
+        "#endif",
+        *(_integers(name, table.lists[name]) for name in _LIST_NAMES),
+        "static const double numbers[] __attribute__((aligned(64))) = {"
+        f"{_wrapped(map(_number, table.numbers))}}};",
+        "static const mbs_tree mechanism = {"
+        f"{table.size}, {table.positions}, {int(table.in_order)}, {int(table.plain)},"
+        f" {len(table.lists['joints']) // 3}, {len(table.lists['rotor']) // 2},"
+        f" {len(table.lists['rub'])}, {', '.join(_LIST_NAMES)},"
+        f" numbers + {len(table.numbers) - 3}, numbers}};",
+    ]
+    work = f"MBS_TREE_WORK({table.size}, {int(table.in_order)})"
+    before = 0
+    if dependent is None:
+        head += [
+            "static const mbs_tree *at(const double *p, mbs_tree *own, double **w)",
+            "{ (void)p; (void)own; (void)w; return &mechanism; }",
+        ]
+    else:
+        count = len(table.numbers)
+        values, scratch = len(table.places), int(dependent.sz_w())
+        integers = max(int(dependent.sz_iw()), 1)
+        pointers = int(dependent.sz_arg()), int(dependent.sz_res())
+        before = count + values + scratch + 16
+        name = dependent.name()
+        head += [
+            _integers("places", table.places),
+            f"int {name}(const double **, double **, casadi_int *, double *, int);",
+            "static const mbs_tree *at(const double *p, mbs_tree *own, double **w) {",
+            "  double *table = (double *)(((uintptr_t)*w + 63) & ~(uintptr_t)63);",
+            f"  double *values = table + {count};",
+            f"  const double *arg[{pointers[0]}] = {{p}};",
+            f"  double *res[{pointers[1]}] = {{values}};",
+            f"  casadi_int iw[{integers}];",
+            f"  {name}(arg, res, iw, values + {values}, 0);",
+            "  memcpy(table, numbers, sizeof numbers);",
+            f"  for (int k = 0; k < {values}; ++k) table[places[k]] = values[k];",
+            "  *own = mechanism;",
+            "  own->numbers = table;",
+            f"  own->gravity = table + {len(table.numbers) - 3};",
+            f"  *w += {before};",
+            "  return own;",
+            "}",
+        ]
+    head.append(_integers("nodes_of_v", range(table.size)))
+    head.append(_integers("nodes_of_q", nodes_of_positions(table)))
+    lines = list(head)
+    for name, function in functions.items():
+        body, own = _call(name, table, function)
+        lines += [
+            f"EXPORT int {name}(const double **arg, double **res, casadi_int *iw, double *w, int"
+            " mem) {",
+            "  mbs_tree own;",
+            "  (void)iw; (void)mem;",
+            f"  const mbs_tree *m = at({_parameter(function)}, &own, &w);",
+            *body,
+            "  return 0;",
+            "}",
+            function_table(function, f"{work} + {before + own}"),
+        ]
+    return "\n".join([*lines, ""])
+
+
+def _parameter(function: Function) -> str:
+    names = function.name_in()
+    return f"arg[{names.index('p')}]" if "p" in names else "0"
+
+
+def _call(name: str, table: TreeTable, function: Function) -> tuple[list[str], int]:
+    """What a function does, and doubles of work space; inputs and outputs are those of CasADi."""
+    match name:
+        case "inertia":
+            return ["  mbs_tree_inertia(m, arg[0], res[0], w);"], 0
+        case "pivots":
+            return ["  mbs_tree_pivots(m, arg[0], res[0], res[1], w);"], 0
+        case "jac_idm" | "jac_ddm":
+            return _jacobian(name.removeprefix("jac_"), table, function)
+    results = ", ".join(f"res[{k}]" for k in range(function.n_out()))
+    return [f"  mbs_tree_{name}(m, arg[0], arg[1], arg[2], {results}, w);"], 0
+
+
+def _jacobian(model: str, table: TreeTable, function: Function) -> tuple[list[str], int]:
+    """Derivatives by positions, of those along the velocities; what a tree lets be zero left out.
+
+    Derivatives by parameters, which the core does not have, are NaN.
+    """
+    lines = []
+    if "p" in function.name_in():
+        count = function.nnz_out(3)
+        value = "0" if table.dependent is None else "NAN"
+        lines.append(f"  if (res[3]) for (int k = 0; k < {count}; ++k) res[3][k] = {value};")
+    call = f"  mbs_tree_{model}_derivatives(m, arg[0], arg[1], arg[2],"
+    pattern = jacobian_pattern(table, model)
+    if pattern.is_dense and table.plain:
+        return [*lines, f"{call} res[0], res[1], res[2], 0, w);"], 0
+    n, nq = table.size, table.positions
+    squares = 1 if pattern.is_dense else 3
+    square = n * n
+    lines += [f"  double *full = w, *by_q = w + {squares * square};", f"  w = by_q + {n * nq};"]
+    if pattern.is_dense:
+        lines += [
+            f"{call} res[0] ? full : 0, res[1], res[2], 0, w);",
+            "  if (res[0]) mbs_tree_by_positions(m, arg[0], full, res[0]);",
+        ]
+    else:
+        parts = ", ".join(f"res[{k}] ? full + {k * square} : 0" for k in range(3))
+        coupled = int(pattern.coupled)
+        lines += [
+            f"{call} {parts}, 0, w);",
+            "  if (res[0]) mbs_tree_by_positions(m, arg[0], full, by_q);",
+            f"  if (res[0]) mbs_tree_pack(m, nodes_of_q, {nq}, {coupled}, by_q, res[0]);",
+            *(
+                f"  if (res[{k}]) mbs_tree_pack(m, nodes_of_v, {n}, {coupled},"
+                f" full + {k * square}, res[{k}]);"
+                for k in (1, 2)
+            ),
+        ]
+    return lines, squares * square + n * nq
+
+
+def _integers(name: str, values: Sequence[int]) -> str:
+    return f"static const int {name}[] = {{{_wrapped(map(str, values or [0]))}}};"
+
+
+def _number(value: float) -> str:
+    if value != value:
+        return "NAN"
+    return "0" if value == 0 else repr(float(value))
+
+
+def _wrapped(words: map[str]) -> str:
+    """Words with commas, some on each line."""
+    every = list(words)
+    return ",\n".join(", ".join(every[k : k + 12]) for k in range(0, len(every), 12))
+
+
+def dependent_numbers(values: Sequence[SX], p: SX) -> Function:
+    """``numbers(p)``: the numbers of a table that follow from parameters."""
+    column = casadi.densify(casadi.vertcat(*values))
+    return Function("dependent_numbers", [p], [column], ["p"], ["numbers"], {"cse": True})

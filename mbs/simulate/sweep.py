@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.assembly import System
+from mbs.assembly.system import packed, unpacked
 from mbs.errors import ExportError, Interrupted, MbsError, ModelError, SolverError
 from mbs.files import check_archive, path_of, write_text
 from mbs.numbers import doubles
@@ -494,8 +495,9 @@ def sweep(
         duration: [s]; needed for a system.
         folder: where results are kept; one that lasts as long as the answer when left out.
         executor: any executor of `concurrent.futures`, also that of a cluster; this process when
-            left out. Executors of processes need the path of an FMU that all of them can read; the
-            results are sent back and written here.
+            left out. Executors of processes take a system, which is prepared once in each, or the
+            path of an FMU that all of them can read; options are sent as pickles. Results are sent
+            back and written here.
         quiet: no progress bar.
         **options: further arguments of `run` or `fmu`, the same for all cases.
 
@@ -578,6 +580,15 @@ class _Run:
 
     system: System
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A process that has simulated a case has what the next one needs."""
+
+        def content() -> tuple[str, tuple[bytes, list[str], str]]:
+            found = packed(self.system)
+            return hashlib.sha256(repr(found).encode()).hexdigest(), found
+
+        return _run_of, self.system.cached("packed", content)
+
     def __call__(self, case: Case, options: Mapping[str, Any]) -> Result:
         given = _arguments(self.system, case)
         inputs = {f"{name}.tau": x for name, x in given.pop("tau", {}).items()}
@@ -586,6 +597,21 @@ class _Run:
         laws = {name: merged.pop(name) for name in _LAWS if name in merged}
         simulator = Simulator(self.system, list(inputs), **laws)
         return simulator(quiet=True, inputs=inputs, **merged)
+
+
+_SENT: dict[str, _Run] = {}
+"""The last few systems that were sent to this process, by their content."""
+_MOST_SENT = 4
+"""How many: the studies that a cluster works on in turn."""
+
+
+def _run_of(digest: str, content: tuple[bytes, list[str], str]) -> _Run:
+    """What was sent to this process, with what earlier cases prepared."""
+    found = _SENT.pop(digest, None) or _Run(unpacked(*content))
+    _SENT[digest] = found
+    while len(_SENT) > _MOST_SENT:
+        del _SENT[next(iter(_SENT))]
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -669,12 +695,8 @@ def _check_executor(model: object, executor: object, options: Mapping[str, Any])
             f"sweep: executor is {quoted(executor)}; give one of concurrent.futures, such as"
             " ThreadPoolExecutor(2)"
         )
-    if isinstance(model, System) and not isinstance(executor, ThreadPoolExecutor):
-        raise ModelError(
-            "sweep: a System stays in its process; write it by mbs.export.fmu and give the path of"
-            " the FMU, or use a ThreadPoolExecutor"
-        )
-    if isinstance(executor, ProcessPoolExecutor):
+    travels = isinstance(model, System) and not isinstance(executor, ThreadPoolExecutor)
+    if travels or isinstance(executor, ProcessPoolExecutor):
         try:
             pickle.dumps(dict(options))
         except Exception as error:

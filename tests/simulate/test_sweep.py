@@ -9,6 +9,7 @@ import threading
 import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -146,9 +147,29 @@ def test_grids(system, grid, message):
         mbs.simulate.sweep(system, grid, 0.1, **OPTIONS)
 
 
-def test_a_system_is_not_sent_to_processes(system):
-    with ProcessPoolExecutor(1) as executor, pytest.raises(ModelError, match="path of the FMU"):
-        mbs.simulate.sweep(system, GRID, 0.1, executor=executor, **OPTIONS)
+def prepared_cases():
+    """How many systems this process has, and how many state equations each."""
+    home = inspect.getmodule(mbs.simulate.sweep)
+    return [len(run.system._cache["recent", "state equations"]) for run in home._SENT.values()]
+
+
+def test_processes_simulate_a_system_and_prepare_it_once():
+    system = pendulum()
+    grid = {"L": [0.4, 0.6], "q1.tau": [0.0, 1.0, 2.0]}
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
+        spread = mbs.simulate.sweep(system, grid, 0.5, executor=executor, **OPTIONS)
+        assert executor.submit(prepared_cases).result() == [1]
+    alone = mbs.simulate.sweep(system, grid, 0.5, **OPTIONS)
+    assert not spread.failures
+    for k in range(6):
+        assert np.array_equal(spread[k].values, alone[k].values)
+
+
+def test_a_law_that_a_module_does_not_define_is_not_sent_to_processes(system):
+    with ProcessPoolExecutor(1) as executor, pytest.raises(ModelError, match="cannot be sent to"):
+        mbs.simulate.sweep(
+            system, GRID, 0.1, executor=executor, tau=lambda t, q, v: {"q1": t}, **OPTIONS
+        )
 
 
 @pytest.mark.parametrize(("name", "meant"), [("K", "L"), ("q1", "q1.q"), ("q1.p", "q1.q")])

@@ -182,6 +182,9 @@ def require_closed(
 # The start of a motion: positions that close the loops, and velocities that keep them closed.
 
 
+_FITS, _SLOW = 1e-6, 1e-9
+"""Part of velocities, and a velocity [rad/s or m/s], by which they may differ from those asked for:
+what does not fit differs by about its own size, what fits by rounding."""
 _REFINEMENTS = 3
 """Solutions added up: the second takes the error of the first away, the third shows no change."""
 
@@ -254,15 +257,13 @@ def smallest_velocity(system: System, J: Vector, v0: Values) -> tuple[Vector, st
     named = v0 is None or isinstance(v0, Mapping)
     rows = [k for k, name in enumerate(names) if not named or name in (v0 or {})]
     v = _refine(J, rows, target[rows])
-    # what does not fit differs by about its own size, what fits by rounding
-    lengths = np.linalg.norm(J, axis=1) * np.linalg.norm(v)
-    closed = np.all(np.abs(J @ v) <= 1e-6 * lengths)
-    if closed and np.allclose(v[rows], target[rows], rtol=1e-6, atol=1e-9):
+    closed = np.all(np.abs(J @ v) <= _FITS * np.linalg.norm(J, axis=1) * np.linalg.norm(v))
+    if closed and np.allclose(v[rows], target[rows], rtol=_FITS, atol=_SLOW):
         return v, ""
     # rows that are nearly dependent: what they leave free decides
     free = null_space(J)
     near: Vector = free @ np.linalg.lstsq(free[rows], target[rows], rcond=None)[0]
-    if np.allclose(near[rows], target[rows], rtol=1e-6, atol=1e-9):
+    if np.allclose(near[rows], target[rows], rtol=_FITS, atol=_SLOW):
         return v, ""
     return near, ", ".join(f"{names[k]} = {target[k]:g}" for k in rows)
 

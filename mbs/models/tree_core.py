@@ -17,6 +17,7 @@ from mbs.assembly.model_function import ModelFunction, default_in, require_syste
 from mbs.assembly.tree import Link
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
+from mbs.native import compiled
 from mbs.native.array_calls import with_array_calls
 from mbs.native.tree_core import (
     ROWS,
@@ -140,7 +141,8 @@ def core_function(system: System, name: str) -> Function:
             _require_inertia(system)
         path = core_library(system).path
         code = casadi.external(name, str(path))
-        result: Any = with_array_calls(code, path, ModelFunction(code, system).like)
+        like, plain = ModelFunction(code, system).like, functools.partial(compiled, derivatives=0)
+        result: Any = with_array_calls(code, path, like, plain)
         result._source = (functools.partial(core_function, name=name), (system,))
         return result  # type: ignore[no-any-return]
 

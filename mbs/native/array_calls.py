@@ -186,16 +186,17 @@ def with_array_calls(
         function: one that nobody else holds.
         library: has its code; None when it is interpreted.
         like: the method of a model that gives another Function its checks and defaults.
-        code_of: gives what determines whether a model takes its inputs as a Function of this kind.
+        code_of: gives what determines whether a model takes its inputs as a Function of this kind;
+            a model that asks something of its inputs takes no short way without it.
     """
     result: Any = function if like is None else like(function)
     result.__class__ = _class_with_arrays(type(result))
     result._arrays = _decline
     if library is not None:
         valid = None if like is None else result.valid()
-        if valid is None or code_of is None:
+        if valid is None:
             result._arrays = array_builtin(function, library, like is not None) or _decline
-        else:
+        elif code_of is not None:  # without it calls go the model's way, which asks them
             result._arrays = _guarded(result, function, library, valid, code_of)
     result._last = None if like is None else default_of_last(function, like.__self__)
     result._inputs = function.n_in()

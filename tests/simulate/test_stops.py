@@ -185,7 +185,7 @@ def test_a_failed_case_of_a_study_keeps_its_rows(system, tmp_path):
 
 
 def test_control_c_in_a_study_hands_over_the_cases(system, monkeypatch):
-    run, counted = mbs.simulate.run, []
+    run, counted = mbs.simulate.Simulator.__call__, []
 
     def pressed(*arguments, **options):
         counted.append(1)
@@ -195,7 +195,7 @@ def test_control_c_in_a_study_hands_over_the_cases(system, monkeypatch):
         stop.result = run(*arguments, **{**options, "duration": 0.1})
         raise stop
 
-    monkeypatch.setitem(mbs.simulate.sweep.__globals__, "run", pressed)
+    monkeypatch.setattr(mbs.simulate.Simulator, "__call__", pressed)
     with pytest.raises(KeyboardInterrupt) as caught:
         mbs.simulate.sweep(system, {"x.v": [0.0, 1.0, 2.0, 3.0]}, 0.5, **QUIET)
     study = caught.value.result

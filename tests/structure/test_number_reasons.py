@@ -110,18 +110,22 @@ def in_paragraphs(lines: list[str], comments: Mapping[int, bool]) -> set[int]:
 
 def unexplained(text: str, *, paragraphs: bool = False) -> list[int]:
     """Lines with a number that was chosen and no reason beside it."""
-    tree, comments = ast.parse(text), comments_of(text)
-    explained = with_docstring_below(tree) | told_by_docstring(tree) | in_comments(tree, comments)
-    explained |= in_paragraphs(text.splitlines(), comments) if paragraphs else set()
-    # the unit of what is printed stands in the text
-    for node in ast.walk(tree):
-        explained.update(lines_of(node) if isinstance(node, ast.JoinedStr) else ())
+    tree = ast.parse(text)
     chosen = {
         node.lineno
         for node in ast.walk(tree)
         if isinstance(node, ast.Constant) and isinstance(node.value, float)
         if node.value not in PLAIN
     }
+    chosen -= with_docstring_below(tree) | told_by_docstring(tree) if chosen else set()
+    if not chosen:  # most files
+        return []
+    comments = comments_of(text)
+    explained = in_comments(tree, comments)
+    explained |= in_paragraphs(text.splitlines(), comments) if paragraphs else set()
+    # the unit of what is printed stands in the text
+    for node in ast.walk(tree):
+        explained.update(lines_of(node) if isinstance(node, ast.JoinedStr) else ())
     return sorted(chosen - explained)
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import hashlib
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -156,10 +157,10 @@ def write_record(key: str, text: str, order: int, fast: bool) -> Path | None:
         fast: of which kind their code is.
     """
     record = cache_dir() / f"{key}{_SUFFIX}"
-    content = f"{order} {int(fast)}\n{text}".encode()
+    content = f"{_digest(text)} {order} {int(fast)}\n{text}".encode()
     try:
         os.fspath(record).encode()  # it stands in C text
-        if record.exists() and record.stat().st_size == len(content):
+        if record.exists() and record.read_bytes() == content:
             return record
         with tempfile.TemporaryDirectory(dir=record.parent, prefix=BUILD) as folder:
             written = Path(folder) / record.name
@@ -168,6 +169,10 @@ def write_record(key: str, text: str, order: int, fast: bool) -> Path | None:
     except (OSError, ValueError):
         return None
     return record
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 @functools.lru_cache(maxsize=1)  # one derivative is often followed by another
@@ -179,8 +184,10 @@ def read_record(record: Path) -> tuple[casadi.Function, int, bool]:
     """
     try:
         options, _, text = record.read_text("utf-8").partition("\n")
-        order, fast = map(int, options.split())
-        return casadi.Function.deserialize(text), order, bool(fast)
+        digest, order, fast = options.split()
+        if digest != _digest(text):
+            raise ValueError(f"{record} is damaged")
+        return casadi.Function.deserialize(text), int(order), bool(int(fast))
     except (OSError, ValueError, RuntimeError) as error:
         raise CompilerError(
             f"the derivatives of a compiled Function cannot be made: {record} has gone or is"

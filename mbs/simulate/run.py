@@ -1157,14 +1157,16 @@ def _on_disk(system: System, laws: Any, derive: Callable[[], FullState]) -> Full
     name = hashlib.sha256(content.encode()).hexdigest()
     file = cache_dir() / f"equations-{name}.pickle"
     try:
-        found = pickle.loads(file.read_bytes())
-        if isinstance(found, FullState):
+        digest, text = file.read_bytes().split(b"\n", 1)
+        if digest == hashlib.sha256(text).hexdigest().encode():
+            found: FullState = pickle.loads(text)
             return found
     except Exception:  # it is not there, or damaged
         pass
     made = derive()
     with suppress(Exception):  # a full disk, or a Function without text: the next one derives too
-        write_bytes(pickle.dumps(replace(made, prepared={})), file)
+        text = pickle.dumps(replace(made, prepared={}))
+        write_bytes(hashlib.sha256(text).hexdigest().encode() + b"\n" + text, file)
     return made
 
 

@@ -148,11 +148,14 @@ def test_a_record_that_has_gone_is_an_error(cache, capfd):
     )
 
 
-def test_a_record_that_is_damaged_is_an_error(cache, capfd):
+@pytest.mark.parametrize("flipped", [False, True])
+def test_a_record_that_is_damaged_is_an_error(flipped, cache, capfd):
     f = compiled(example())
     (record,) = cache.glob("*.function")
     content = record.read_bytes()
-    record.write_bytes(content[:40])
+    at = len(content) - 60  # a digit within the graph
+    damaged = content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :]
+    record.write_bytes(damaged if flipped else content[:40])
     with pytest.raises(RuntimeError):
         f.jacobian()
     assert "has gone or is damaged" in capfd.readouterr().err

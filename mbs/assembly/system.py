@@ -46,7 +46,11 @@ if TYPE_CHECKING:
 # Pickles of what holds SX: graphs travel as one Function, all else as it is.
 
 
-def packed(state: Any) -> tuple[bytes, list[str], str]:
+Packed = tuple[bytes, tuple[str, ...], str]
+"""What `packed` gives: equal for equal content."""
+
+
+def packed(state: Any) -> Packed:
     """Any object made of plain data, Functions and SX: its bytes, names of symbols, and graphs.
 
     Args:
@@ -58,11 +62,11 @@ def packed(state: Any) -> tuple[bytes, list[str], str]:
     graphs = pickler.graphs
     # one symbol at least: without any, numbers would come back as DM
     symbols = casadi.symvar(casadi.veccat(SX.sym("any"), *graphs))
-    names = [symbol.name() for symbol in symbols]
+    names = tuple(symbol.name() for symbol in symbols)
     return buffer.getvalue(), names, Function("graphs", symbols, graphs).serialize()
 
 
-def unpacked(data: bytes, names: list[str], graphs: str) -> Any:
+def unpacked(data: bytes, names: Sequence[str], graphs: str) -> Any:
     """What was packed, all that `packed` gave; symbols have their names and are new."""
     found = Function.deserialize(graphs).call([SX.sym(name) for name in names])
     return _Unpickler(io.BytesIO(data), found).load()
@@ -396,6 +400,15 @@ class System:
             if key not in self._cache:
                 self._cache[key] = build()
             return self._cache[key]
+
+    def content(self) -> Packed:
+        """All of it, packed: what a system is known by beyond this process.
+
+        What was sent to another process has the same: equal texts may be one object or two, which
+        pickles show, and once unpacked they are as they stay.
+        """
+        found: Packed = self.cached("content", lambda: packed(unpacked(*packed(self))))
+        return found
 
     def recent(self, kind: str, key: Any, build: Callable[[], Any], most: int) -> Any:
         """What `build` made under this key, of the last few of a kind that were asked for.

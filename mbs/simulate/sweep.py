@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import inspect
 import itertools
@@ -15,7 +16,7 @@ import weakref
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, as_completed
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, overload
 
@@ -23,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.system import packed, unpacked
+from mbs.assembly.system import unpacked
 from mbs.errors import ExportError, Interrupted, MbsError, ModelError, SolverError
 from mbs.files import check_archive, path_of, write_text
 from mbs.numbers import doubles
@@ -202,9 +203,8 @@ def study_of(
 
 
 def _system(system: System) -> tuple[str, bytes]:
-    """Its name, and all that it holds; numbers inside expressions are written to six digits."""
-    values = [getattr(system, part.name) for part in fields(system) if part.name[0] != "_"]
-    return system.name, _ADDRESS.sub("", repr(values)).encode()
+    """Its name, and all that it holds, to the last digit."""
+    return system.name, repr(system.content()).encode()
 
 
 def _fmu(path: object) -> tuple[str, bytes]:
@@ -582,12 +582,7 @@ class _Run:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A process that has simulated a case has what the next one needs."""
-
-        def content() -> tuple[str, tuple[bytes, list[str], str]]:
-            found = packed(self.system)
-            return hashlib.sha256(repr(found).encode()).hexdigest(), found
-
-        return _run_of, self.system.cached("packed", content)
+        return _run_of, self.system.content()
 
     def __call__(self, case: Case, options: Mapping[str, Any]) -> Result:
         given = _arguments(self.system, case)
@@ -599,19 +594,10 @@ class _Run:
         return simulator(quiet=True, inputs=inputs, **merged)
 
 
-_SENT: dict[str, _Run] = {}
-"""The last few systems that were sent to this process, by their content."""
-_MOST_SENT = 4
-"""How many: the studies that a cluster works on in turn."""
-
-
-def _run_of(digest: str, content: tuple[bytes, list[str], str]) -> _Run:
+@functools.lru_cache(maxsize=4)  # the studies that a cluster works on in turn
+def _run_of(data: bytes, names: tuple[str, ...], graphs: str) -> _Run:
     """What was sent to this process, with what earlier cases prepared."""
-    found = _SENT.pop(digest, None) or _Run(unpacked(*content))
-    _SENT[digest] = found
-    while len(_SENT) > _MOST_SENT:
-        del _SENT[next(iter(_SENT))]
-    return found
+    return _Run(unpacked(data, names, graphs))
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 import inspect
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -19,11 +20,11 @@ from mbs.errors import ExportError, ModelError, SolverError
 from mbs.result import Result
 
 
-def pendulum(m=2.0):
+def pendulum(m=2.0, gravity=9.81):
     return mbs.load(
         {
             "name": "pendulum",
-            "gravity": [0, -9.81, 0],
+            "gravity": [0, -gravity, 0],
             "parameters": {"L": 0.5, "m": m},
             "frame": [{"antecedent": 0, "joint": "revolute"}],
             "body": [{"frame": 1, "YY": "m*L^2", "ZZ": "m*L^2", "MX": "m*L", "M": "m"}],
@@ -147,10 +148,9 @@ def test_grids(system, grid, message):
         mbs.simulate.sweep(system, grid, 0.1, **OPTIONS)
 
 
-def prepared_cases():
-    """How many systems this process has, and how many state equations each."""
-    home = inspect.getmodule(mbs.simulate.sweep)
-    return [len(run.system._cache["recent", "state equations"]) for run in home._SENT.values()]
+def prepared_state_equations(run):
+    """How many state equations a process has of what was sent to it."""
+    return len(run.system._cache["recent", "state equations"])
 
 
 def test_processes_simulate_a_system_and_prepare_it_once():
@@ -158,7 +158,8 @@ def test_processes_simulate_a_system_and_prepare_it_once():
     grid = {"L": [0.4, 0.6], "q1.tau": [0.0, 1.0, 2.0]}
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
         spread = mbs.simulate.sweep(system, grid, 0.5, executor=executor, **OPTIONS)
-        assert executor.submit(prepared_cases).result() == [1]
+        sent = inspect.getmodule(mbs.simulate.sweep)._Run(system)
+        assert executor.submit(prepared_state_equations, sent).result() == 1
     alone = mbs.simulate.sweep(system, grid, 0.5, **OPTIONS)
     assert not spread.failures
     for k in range(6):
@@ -194,6 +195,11 @@ def test_a_folder_is_for_one_model_with_its_numbers(tmp_path):
     assert not mbs.simulate.sweep(pendulum(), *arguments, folder=tmp_path / "a", **OPTIONS).failures
     with pytest.raises(ModelError, match="holds another study"):
         mbs.simulate.sweep(pendulum(2.5), *arguments, folder=tmp_path / "a", **OPTIONS)
+    last_digit = pendulum(gravity=9.810000000000002)
+    with pytest.raises(ModelError, match="holds another study"):
+        mbs.simulate.sweep(last_digit, *arguments, folder=tmp_path / "a", **OPTIONS)
+    sent = pickle.loads(pickle.dumps(pendulum()))
+    assert not mbs.simulate.sweep(sent, *arguments, folder=tmp_path / "a", **OPTIONS).failures
     (tmp_path / "a" / "study.json").unlink()  # whose results these are is not known any more
     with pytest.raises(ModelError, match="holds another study"):
         mbs.simulate.sweep(pendulum(), *arguments, folder=tmp_path / "a", **OPTIONS)

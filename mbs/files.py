@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
 import secrets
 import zipfile
@@ -69,6 +70,28 @@ def write_bytes(content: bytes, path: PathLike) -> None:
     """
     with whole_file(path) as scratch:
         scratch.write_bytes(content)
+
+
+def write_sealed(content: bytes, path: PathLike) -> None:
+    """Write a file that begins with a hash of its content, for `read_sealed`.
+
+    Raises:
+        ExportError: the file cannot be written.
+    """
+    write_bytes(hashlib.sha256(content).hexdigest().encode() + b"\n" + content, path)
+
+
+def read_sealed(path: PathLike) -> bytes:
+    """What `write_sealed` wrote.
+
+    Raises:
+        OSError: there is no such file, or it cannot be read.
+        ValueError: it is damaged.
+    """
+    seal, _, content = path_of(path).read_bytes().partition(b"\n")
+    if seal != hashlib.sha256(content).hexdigest().encode():
+        raise ValueError(f"{os.fspath(path)} is damaged")
+    return content
 
 
 def write_text(text: str, path: PathLike) -> None:

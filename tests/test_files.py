@@ -4,7 +4,7 @@ import stat
 import pytest
 
 from mbs.errors import ExportError
-from mbs.files import path_of, whole_file, write_bytes, write_text
+from mbs.files import path_of, read_sealed, whole_file, write_bytes, write_sealed, write_text
 
 
 def test_text_is_written_as_it_is(tmp_path):
@@ -56,3 +56,16 @@ def test_places_that_are_refused(tmp_path, path, message):
 def test_what_is_no_path(path):
     with pytest.raises(ExportError, match="is not a path"):
         path_of(path)
+
+
+def test_what_is_sealed_is_read_back_whole_or_not_at_all(tmp_path):
+    path = tmp_path / "sealed"
+    content = b"first\nsecond\x00\n"
+    write_sealed(content, path)
+    assert read_sealed(path) == content
+    for damaged in (b"", path.read_bytes()[:-1], path.read_bytes().replace(b"first", b"fIrst")):
+        path.write_bytes(damaged)
+        with pytest.raises(ValueError, match="sealed is damaged"):
+            read_sealed(path)
+    with pytest.raises(OSError, match="No such file"):
+        read_sealed(tmp_path / "none")

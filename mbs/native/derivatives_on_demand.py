@@ -11,18 +11,18 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import hashlib
 import os
-import tempfile
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
 
 import casadi
 
-from mbs.errors import CompilerError
-from mbs.native.compiler import BUILD, cache_dir
+from mbs.errors import CompilerError, ExportError
+from mbs.files import read_sealed, write_sealed
+from mbs.native.compiler import cache_dir
 
 _SUFFIX = ".function"
 
@@ -157,22 +157,16 @@ def write_record(key: str, text: str, order: int, fast: bool) -> Path | None:
         fast: of which kind their code is.
     """
     record = cache_dir() / f"{key}{_SUFFIX}"
-    content = f"{_digest(text)} {order} {int(fast)}\n{text}".encode()
+    content = f"{order} {int(fast)}\n{text}".encode()
+    with suppress(OSError, ValueError):
+        if read_sealed(record) == content:
+            return record
     try:
         os.fspath(record).encode()  # it stands in C text
-        if record.exists() and record.read_bytes() == content:
-            return record
-        with tempfile.TemporaryDirectory(dir=record.parent, prefix=BUILD) as folder:
-            written = Path(folder) / record.name
-            written.write_bytes(content)
-            os.replace(written, record)
-    except (OSError, ValueError):
+        write_sealed(content, record)
+    except (ExportError, ValueError):
         return None
     return record
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 @functools.lru_cache(maxsize=1)  # one derivative is often followed by another
@@ -183,11 +177,9 @@ def read_record(record: Path) -> tuple[casadi.Function, int, bool]:
         CompilerError: the file has gone or is damaged.
     """
     try:
-        options, _, text = record.read_text("utf-8").partition("\n")
-        digest, order, fast = options.split()
-        if digest != _digest(text):
-            raise ValueError(f"{record} is damaged")
-        return casadi.Function.deserialize(text), int(order), bool(int(fast))
+        options, _, text = read_sealed(record).decode().partition("\n")
+        order, fast = map(int, options.split())
+        return casadi.Function.deserialize(text), order, bool(fast)
     except (OSError, ValueError, RuntimeError) as error:
         raise CompilerError(
             f"the derivatives of a compiled Function cannot be made: {record} has gone or is"

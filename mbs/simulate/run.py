@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
-from mbs.assembly.system import packed, unpacked
+from mbs.assembly.system import Packed, packed, unpacked
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.errors import Interrupted, ModelError, SolverError
-from mbs.files import write_bytes
+from mbs.files import read_sealed, write_sealed
 from mbs.loops.analysis import rows_at
 from mbs.loops.closure import least_upright, rolling_discs
 from mbs.loops.configuration import Values, start
@@ -1023,7 +1023,6 @@ class Simulator:
         self._outputs = None if outputs is None else tuple(outputs)
         columns = partial(_columns_of, system, self._outputs)
         self._columns: _Columns = system.recent("columns", self._outputs, columns, _KEPT)
-        self._key = self._key_of_laws()
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -1117,13 +1116,13 @@ class Simulator:
         defaults = [one.default for one in self._given]
         return list(by_name(self.system, "inputs", inputs, quantities, defaults))
 
-    def _key_of_laws(self) -> tuple[bytes | str, ...] | None:
+    @functools.cached_property
+    def _key(self) -> Packed | None:
         """What laws say, as text; None where they hold machine code, which has none."""
         try:
-            laws = packed((self._effort, self._inputs, tuple(self._motions), self._given))
+            return packed((self._effort, self._inputs, tuple(self._motions), self._given))
         except (RuntimeError, NotImplementedError):
             return None
-        return laws[0], *laws[1], laws[2]
 
     def _equations(self, system: System) -> FullState:
         """The state equation of the system, or of one that differs in its independent rows."""
@@ -1153,20 +1152,15 @@ def _on_disk(system: System, laws: Any, derive: Callable[[], FullState]) -> Full
     """
     if os.environ.get("MBS_KEEP_EQUATIONS", "1") == "0":
         return derive()
-    content = repr((packed(system), laws, casadi.CasadiMeta.version(), _sources()))
+    content = repr((system.content(), laws, casadi.CasadiMeta.version(), _sources()))
     name = hashlib.sha256(content.encode()).hexdigest()
     file = cache_dir() / f"equations-{name}.pickle"
-    try:
-        digest, text = file.read_bytes().split(b"\n", 1)
-        if digest == hashlib.sha256(text).hexdigest().encode():
-            found: FullState = pickle.loads(text)
-            return found
-    except Exception:  # it is not there, or damaged
-        pass
+    with suppress(Exception):  # it is not there, or damaged
+        found: FullState = pickle.loads(read_sealed(file))
+        return found
     made = derive()
     with suppress(Exception):  # a full disk, or a Function without text: the next one derives too
-        text = pickle.dumps(replace(made, prepared={}))
-        write_bytes(hashlib.sha256(text).hexdigest().encode() + b"\n" + text, file)
+        write_sealed(pickle.dumps(replace(made, prepared={})), file)
     return made
 
 
@@ -1184,7 +1178,6 @@ def _simulator_of(*state: Any) -> Simulator:
     system, (effort, inputs, motions), (given, outputs, method) = unpacked(*state)
     made = Simulator(system, [one.name for one in given], outputs, method=method)
     made._effort, made._inputs, made._motions = effort, inputs, list(motions)
-    made._key = made._key_of_laws()
     return made
 
 
@@ -1274,8 +1267,6 @@ def run(
             what was reached.
         Interrupted: control-C was pressed; a KeyboardInterrupt whose `result` has what was reached.
     """
-    require_system(system)
-    duration = positive(duration, "duration [s]", system.name)
     simulator = Simulator(system, tau=tau, motion=motion, u=u, method=method)
     return simulator(
         duration,

@@ -109,7 +109,7 @@ def measure(name: str, loops: Any, folder: Path, arguments: Any) -> list[Row]:
     model = twin(system)
     file = folder / f"{name}.txt"
     model.saveToText(str(file))
-    states = _states(system)
+    states = random_states(system)
     rows, contenders = [], {}
     others = generated_by_others(arguments.others, model, folder) if arguments.others else {}
     for algorithm in arguments.algorithms.split(","):
@@ -122,11 +122,11 @@ def measure(name: str, loops: Any, folder: Path, arguments: Any) -> list[Row]:
         there = [to_twin(system, states["q"]), *inputs[1:]]
         size = own.value(0).size
         peer = Peer(loops, file, algorithm, there, size)
-        row.error = _difference(own, peer)
+        row.error = difference_of(own, peer)
         contenders[algorithm, "mbs"], contenders[algorithm, "pinocchio"] = own, peer
         for other, (path, function) in others.get(algorithm, {}).items():
             contender = InLibrary(loops, path, function, inputs)
-            wrong = _difference(contender, peer)
+            wrong = difference_of(contender, peer)
             row.note += "" if wrong < AGREEMENT else f" {other} differs by {wrong:.0e};"
             contenders[algorithm, other] = contender
         _progress(row)
@@ -228,7 +228,7 @@ def _microseconds(call: Any) -> float:
     return min(timeit.repeat(call, number=number, repeat=7)) / number * 1e6
 
 
-def _difference(a: Contender, b: Contender) -> float:
+def difference_of(a: Contender, b: Contender) -> float:
     """The largest difference over some states, relative to the largest element."""
     worst = 0.0
     for state in range(0, STATES, 8):
@@ -237,7 +237,7 @@ def _difference(a: Contender, b: Contender) -> float:
     return worst
 
 
-def _states(system: System) -> dict[str, Array]:
+def random_states(system: System) -> dict[str, Array]:
     """Random q, v and a (or efforts), one row a state; quaternions have unit length."""
     rng = np.random.default_rng(0)
     q = rng.uniform(-2, 2, (STATES, system.nq))

@@ -17,20 +17,18 @@ import os
 import resource
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import casadi
-import numpy as np
-from dynamics import BUILDERS, INPUTS
+from dynamics import BUILDERS, INPUTS, difference_of, random_states
 from pinocchio_twin import to_twin, twin
 from robots import frictionless
-from timing import ALGORITHMS, STATES, Array, Contender, InLibrary, Peer, best_times, harness
+from timing import ALGORITHMS, Array, Contender, InLibrary, Peer, best_times, harness
 
 from mbs.assembly import System
-from mbs.assembly.tree import quaternion_slices
 from mbs.models.tree_core import core_library
 from mbs.native.kernel import kernel_library
 
@@ -84,7 +82,7 @@ def measure(
     note = f"{first}, and where it is in the cache {again}"
     model, file = twin(system), folder / f"{name}.txt"
     model.saveToText(str(file))
-    states = _states(system)
+    states = random_states(system)
     rows, contenders = [], dict[Any, Contender]()
     for algorithm in arguments.models.split(","):
         row = Row(name, algorithm)
@@ -94,7 +92,7 @@ def measure(
         core = InLibrary(loops, library, shape, inputs)
         there = [to_twin(system, states["q"]), *inputs[1:]]
         peer = Peer(loops, file, algorithm, there, core.value(0).size)
-        row.error = _difference(core, peer)
+        row.error = difference_of(core, peer)
         contenders[algorithm, "core"], contenders[algorithm, "pinocchio"] = core, peer
         if not arguments.core_alone:
             lines = _lines(row, system, loops, inputs)
@@ -141,24 +139,6 @@ def _compiled(build: Callable[[], Path]) -> tuple[Path, str]:
     path, seconds, memory = ours.recv()
     process.join()
     return path, f"{seconds:.1f} s, {memory:.0f} MB"
-
-
-def _states(system: System) -> Mapping[str, Array]:
-    """Random q, v and a (or efforts), one row a state; quaternions have unit length."""
-    rng = np.random.default_rng(0)
-    q = rng.uniform(-2, 2, (STATES, system.nq))
-    for part in quaternion_slices(system.tree):
-        q[:, part] /= np.linalg.norm(q[:, part], axis=1, keepdims=True)
-    return {"q": q, **{name: rng.uniform(-2, 2, (STATES, system.nv)) for name in "va"}}
-
-
-def _difference(a: Contender, b: Contender) -> float:
-    """The largest difference over some states, relative to the largest element."""
-    worst = 0.0
-    for state in range(0, STATES, 8):
-        x, y = a.value(state), b.value(state)
-        worst = max(worst, float(np.max(np.abs(x - y)) / np.max(np.abs(y))))
-    return worst
 
 
 def report(rows: list[Row], note: str) -> str:

@@ -618,15 +618,20 @@ static void inertia(work k, double *A) {
   }
 }
 
-void mbs_tree_inertia(const mbs_tree *m, const double *q, double *A, double *w) {
-  const work k = space_of(m, w);
-  if (!A) return;
+/* The momenta of composite bodies at unit velocities: columns of the inertia matrix follow. */
+static void composites_at(work k, const double *q) {
   poses(k, q);
   places(k);
   bodies(k);
   spins(k);
   composites(k);
   momenta(k);
+}
+
+void mbs_tree_inertia(const mbs_tree *m, const double *q, double *A, double *w) {
+  const work k = space_of(m, w);
+  if (!A) return;
+  composites_at(k, q);
   inertia(k, A);
   mirror(k, A);
   reorder(k, A);
@@ -1186,12 +1191,7 @@ void mbs_tree_ddm_derivatives(const mbs_tree *m, const double *q, const double *
 
 void mbs_tree_pivots(const mbs_tree *m, const double *q, double *free_, double *locked, double *w) {
   const work k = space_of(m, w);
-  poses(k, q);
-  places(k);
-  bodies(k);
-  spins(k);
-  composites(k);
-  momenta(k);
+  composites_at(k, q);
   if (locked)
     for (int j = 0; j < k.n; ++j) locked[m->v_at[j]] = CELL(TAU, j);
   factorise(k);

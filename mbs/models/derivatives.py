@@ -16,6 +16,7 @@ from mbs.assembly.model_function import (
     default_in,
     model_function,
     require_system,
+    signals_in,
 )
 from mbs.assembly.tree import normalised, position_rate, quaternion_slices
 from mbs.errors import ModelError
@@ -90,7 +91,7 @@ def implicit_formula(
         system: any.
         s: its symbols.
         tau: (m, 1) efforts.
-        names: what to differentiate with respect to, of "q", "v" and "p".
+        names: what to differentiate with respect to, of "q", "v", "z", "u" and "p".
 
     Returns:
         the factors of A, the accelerations, and for each name minus the derivative of the efforts
@@ -101,8 +102,7 @@ def implicit_formula(
     symbol = SX.sym("a", s.size)
     slopes, efforts = by(system, s, symbol)
     factor = factorize(slopes["a"], before)
-    if "p" in names:
-        slopes["p"] = casadi.jacobian(efforts, system.p)
+    slopes |= _by_symbols_of(system, efforts, names)
     H = casadi.substitute(efforts, symbol, SX.zeros(s.size))
     a = substitute(factor, tau - H, before)
     minus = casadi.substitute([-SX(slopes[name]) for name in names], [symbol], [a])
@@ -133,9 +133,13 @@ def accelerations_by_ad(
         "v": casadi.jacobian(a, s.v),
         "tau": casadi.jacobian(a, tau),
     }
-    if "p" in names:
-        blocks["p"] = casadi.jacobian(a, system.p)
-    return blocks, a
+    return blocks | _by_symbols_of(system, a, names), a
+
+
+def _by_symbols_of(system: System, value: SX, names: Collection[str]) -> Blocks:
+    """Derivatives by states and inputs of components and by parameters, those that are wanted."""
+    own = {"z": system.z, "u": system.u, "p": system.p}
+    return {name: casadi.jacobian(value, own[name]) for name in names if name in own}
 
 
 def _along_motion(system: System, s: ModelSymbols, value: SX) -> SX:
@@ -165,22 +169,22 @@ def solve_column(before: list[int]) -> Function:
     return Function("solve_column", [*factor, right], [substitute(factor, right, before)], *names)
 
 
-def staged_accelerations(system: System, names: Sequence[str]) -> tuple[list[MX], list[MX]]:
+def staged_accelerations(system: System, names: Sequence[str]) -> tuple[dict[str, MX], list[MX]]:
     """Derivatives of the accelerations of a tree.
 
     Args:
         system: its coordinates are those of the tree.
-        names: what to differentiate with respect to, of "q", "v", "tau" and "p".
+        names: what to differentiate with respect to, of "q", "v", "tau", "z", "u" and "p".
 
     Returns:
-        the inputs q, v, tau and, of a system with parameters, p; then the derivatives in the
-        order of the names, and the accelerations.
+        the inputs q, v, tau, then z and u where components need them, and p of a system with
+        parameters; then the derivatives in the order of the names, and the accelerations.
     """
     solve = solve_column(velocity_antecedents(system.tree))
     order = [name for name in names if name != "tau"]
     front = _front(system, order)
-    inputs = [MX.sym(front.name_in(k), front.size_in(k)) for k in range(front.n_in())]
-    ratios, inverse, a, *right = front.call(inputs)
+    inputs = {name: MX.sym(name, front.size_in(name)) for name in front.name_in()}
+    ratios, inverse, a, *right = front.call(list(inputs.values()))
     if "tau" in names:
         order, right = [*order, "tau"], [*right, MX(DM.eye(system.nv))]
     sides = casadi.densify(casadi.horzcat(*right))
@@ -198,10 +202,16 @@ def _front(system: System, names: Sequence[str]) -> Function:
     s = symbols_of(system, "tree")
     tau = SX.sym("tau", s.size)
     factor, a, sides = implicit_formula(system, s, tau, names)
-    inputs = [s.q, s.v, tau, *([system.p] if system.parameters else [])]
-    labels = ["q", "v", "tau", "p"][: len(inputs)]
-    results = ["ratios", "inverse", "a", *(f"minus_dtau_d{name}" for name in sides)]
-    return Function("front", inputs, [*factor, a, *sides.values()], labels, results, {"cse": True})
+    outputs: Named = [
+        *zip(("ratios", "inverse", "a"), (*factor, a), strict=True),
+        *((f"minus_dtau_d{name}", side) for name, side in sides.items()),
+    ]
+    inputs: Named = [("q", s.q), ("v", s.v), ("tau", tau)]
+    parameters = [("p", system.p)] if system.parameters else []
+    every = [*inputs, *signals_in(system, inputs, outputs), *parameters]
+    names_in, symbols = zip(*every, strict=True)
+    names_out, values = zip(*outputs, strict=True)
+    return Function("front", symbols, values, names_in, names_out, {"cse": True})
 
 
 _COMPARED = 6
@@ -233,18 +243,19 @@ def inverse_dynamics_derivatives(
         coordinates: of a closed system, "independent" for idm_derivatives(q, v_a, a_a) ->
             dtau_a_dq_a, dtau_a_dv_a, dtau_a_da_a, tau_a, or "tree"; whatever motors there are,
             tau_a is at the independent joints, `actuation_matrix` times that of the motors.
-        with_respect_to: which derivatives: of "q", "v", "a" and "p", the parameters.
+        with_respect_to: which derivatives: of "q", "v", "a", of "z" and "u", the states and inputs
+            of components, and of "p", the parameters.
 
     Returns:
-        Function of q (nq, 1), v and a (m, 1); matrices (m, m), with respect to p (m, number of
-        parameters), and tau (m, 1).
+        Function of q (nq, 1), v and a (m, 1); matrices (m, m), with respect to z, u and p of as
+        many columns as these have elements, and tau (m, 1).
 
     Raises:
         ModelError: an unknown word; derivatives with respect to p of a system without parameters
             or in independent coordinates; or the analytical method in these.
     """
     require_system(system)
-    names = _checked(system, coordinates, with_respect_to, ("q", "v", "a", "p"))
+    names = _checked(system, coordinates, with_respect_to, ("q", "v", "a", "z", "u", "p"))
     _check_method(system, coordinates, method, ("auto", "ad", "analytical"))
 
     def build(chosen: str) -> Function:
@@ -253,8 +264,7 @@ def inverse_dynamics_derivatives(
             label, a = s.input("a")
             by = efforts_by_ad if chosen == "ad" else efforts_by_recursion
             blocks, tau = by(system, s, a)
-            if "p" in names:
-                blocks["p"] = casadi.jacobian(tau, system.p)
+            blocks |= _by_symbols_of(system, tau, names)
             inputs: Named = [("q", s.q), ("v" + s.suffix, s.v), (label, a)]
             return inputs, _outputs("tau" + s.suffix, s, names, blocks, tau)
 
@@ -287,18 +297,19 @@ def direct_dynamics_derivatives(
             for the one that takes fewer operations.
         coordinates: "independent", where tau_a is as for `inverse_dynamics_derivatives`; "tree" is
             the same in an open chain.
-        with_respect_to: which derivatives: of "q", "v", "tau" and "p", the parameters.
+        with_respect_to: which derivatives: of "q", "v", "tau", of "z" and "u", the states and
+            inputs of components, and of "p", the parameters.
 
     Returns:
-        Function of q (nq, 1), v and tau (m, 1); matrices (m, m), with respect to p (m, number of
-        parameters), and a (m, 1).
+        Function of q (nq, 1), v and tau (m, 1); matrices (m, m), with respect to z, u and p of as
+        many columns as these have elements, and a (m, 1).
 
     Raises:
         ModelError: an unknown word; derivatives with respect to p of a system without parameters
             or with loops; tree coordinates of a closed system; or some joint moves no inertia.
     """
     require_system(system)
-    names = _checked(system, coordinates, with_respect_to, ("q", "v", "tau", "p"))
+    names = _checked(system, coordinates, with_respect_to, ("q", "v", "tau", "z", "u", "p"))
     if coordinates == "tree" and system.is_closed:
         raise ModelError(
             f"{system.name}: ddm_derivatives of a closed system are in its independent"
@@ -330,9 +341,9 @@ def direct_dynamics_derivatives(
 def _stage(system: System, names: tuple[str, ...]) -> Function:
     """The derivatives of accelerations of a large tree."""
     inputs, outputs = staged_accelerations(system, names)
-    labels = ["q", "v", "tau", "p"][: len(inputs)], [*(f"da_d{name}" for name in names), "a"]
-    options = {"default_in": default_in(system, 3)}
-    function = Function("ddm_derivatives", inputs, outputs, *labels, options)
+    labels = list(inputs), [*(f"da_d{name}" for name in names), "a"]
+    options = {"default_in": default_in(system, len(inputs.keys() - {"p"}))}
+    function = Function("ddm_derivatives", [*inputs.values()], outputs, *labels, options)
     return ModelFunction(function, system)
 
 
@@ -347,8 +358,16 @@ def _checked(
             raise ModelError(f"{system.name}: with_respect_to has {quoted(name)}; use {words}")
     if not given or len(set(given)) < len(given):
         raise ModelError(f"{system.name}: with_respect_to is {given!r}; name each input once")
-    if "p" in given and not system.parameters:
-        raise ModelError(f"{system.name}: it has no parameters; leave 'p' out of with_respect_to")
+    lacking = {
+        "z": (system.states, "states of components"),
+        "u": (system.inputs, "inputs of components"),
+        "p": (system.parameters, "parameters"),
+    }
+    for name, (found, words) in lacking.items():
+        if name in given and not found:
+            raise ModelError(
+                f"{system.name}: it has no {words}; leave {name!r} out of with_respect_to"
+            )
     if "p" in given and is_reduced(system, coordinates):
         raise ModelError(
             f"{system.name}: when a parameter changes, q no longer closes the loops; leave 'p' out"
@@ -394,7 +413,7 @@ def _choose(
 
 
 def _outputs(of: str, s: ModelSymbols, names: tuple[str, ...], blocks: Blocks, value: SX) -> Named:
-    labels = [name if name == "p" else name + s.suffix for name in names]
+    labels = [name if name in "zup" else name + s.suffix for name in names]
     pairs = zip(labels, names, strict=True)
     return [*((f"d{of}_d{label}", blocks[name]) for label, name in pairs), (of, value)]
 
@@ -455,7 +474,8 @@ def _check(system: System, ddm: Function) -> None:
             " use its direct model as it is"
         )
     wanted = ["q", "v", "tau", *(["p"] if system.parameters else [])]
-    if not isinstance(ddm, Function) or ddm.name_in() != wanted or ddm.size1_in(0) != system.nq:
+    own = isinstance(ddm, Function) and [name for name in ddm.name_in() if name not in "zu"]
+    if own != wanted or ddm.size1_in(0) != system.nq:
         raise ModelError(
             f"{system.name}: with_implicit_jacobian takes the direct model of the system; give"
             " mbs.models.direct_dynamics(system)"

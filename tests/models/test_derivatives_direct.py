@@ -114,7 +114,7 @@ def test_names_of_closed_systems():
         (lambda s: inverse_dynamics_derivatives(s, "analytical"), "has loops; use 'ad'"),
         (lambda s: direct_dynamics_derivatives(s, coordinates="tree"), "independent coordinates"),
         (lambda s: direct_dynamics_derivatives(s, "best"), "use one of 'auto', 'ad', 'implicit'"),
-        (lambda s: direct_dynamics_derivatives(s, with_respect_to="x"), "use q, v, tau, p"),
+        (lambda s: direct_dynamics_derivatives(s, with_respect_to="x"), "use q, v, tau, z, u, p"),
         (lambda s: mbs.models.with_implicit_jacobian(s, None), "for open chains"),
     ],
 )

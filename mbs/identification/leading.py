@@ -1,6 +1,8 @@
-"""How well the independent joints of a closed system lead the others, along a motion."""
+"""Models along a motion: of closed systems, how well the independent joints lead the others."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import casadi
 import numpy as np
@@ -155,6 +157,32 @@ def _near_configuration(system: System, q: MX) -> MX:
             turned = rows[k] - system.configuration[k]
             rows[k] = system.configuration[k] + casadi.atan2(casadi.sin(turned), casadi.cos(turned))
     return MX(casadi.vertcat(*rows))
+
+
+def of_motion(model: Any) -> Function:
+    """A model of positions, velocities and accelerations alone, parameters at their defaults.
+
+    Args:
+        model: of a system, whose inputs are the motion and, behind it, z, u and p.
+
+    Raises:
+        ModelError: it depends on states or inputs of components.
+    """
+    system: System = model.system
+    own = {name: model.name_in().index(name) for name in "zup" if name in model.name_in()}
+    if own.keys() & {"z", "u"}:
+        names = [name for name, _ in (*system.states, *system.inputs)]
+        raise ModelError(
+            f"{system.name}: its equations depend on states or inputs of components"
+            f" ({', '.join(names)}), which no record of a motion holds; identify the mechanism"
+            " without these components, and take their forces from the efforts"
+        )
+    if not own:
+        return Function(model)
+    motion = [MX.sym(model.name_in(k), model.size_in(k)) for k in range(own["p"])]
+    outputs = Function(model).call([*motion, DM(system.parameter_values())])
+    names = model.name_in()[: own["p"]]
+    return Function(model.name(), motion, outputs, names, model.name_out())
 
 
 def is_explicit(system: System) -> bool:

@@ -12,7 +12,12 @@ from casadi import DM, MX, SX, Function
 
 from mbs.errors import ModelError, SolverError
 from mbs.identification.estimate import Estimate, repetition
-from mbs.identification.leading import active_indices, configuration_of, is_explicit
+from mbs.identification.leading import (
+    active_indices,
+    configuration_of,
+    is_explicit,
+    of_motion,
+)
 from mbs.identification.observations import Observations, known_of, motion_of, require_visible
 from mbs.identification.record import Samples
 from mbs.identification.triangle import triangle, triangle_solved
@@ -438,8 +443,8 @@ def _efforts(regressor: Any, K: Array) -> Function:
     """(q_a, v_a, a_a) -> D K of the independent joints."""
     m = int(regressor.size1_in(1))
     q, v, a = (MX.sym(name, m) for name in "qva")
-    tau = casadi.mtimes(regressor(configuration_of(regressor.system, q), v, a), DM(K))
-    function = Function("efforts", [q, v, a], [tau])
+    D = of_motion(regressor)(configuration_of(regressor.system, q), v, a)
+    function = Function("efforts", [q, v, a], [casadi.mtimes(D, DM(K))])
     return function.expand() if is_explicit(regressor.system) else function
 
 

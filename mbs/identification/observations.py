@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from casadi import DM, Function
+from casadi import DM
 
 from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.identification.base_parameters import BaseParameters
-from mbs.identification.leading import positions, regular
+from mbs.identification.leading import of_motion, positions, regular
 from mbs.identification.record import ORDER, Samples, zero_phase
 from mbs.identification.regressors import (
     Column,
@@ -91,7 +91,8 @@ def known_of(regressor: Any, samples: Samples) -> Array:
         return np.zeros(samples.tau.shape)
     q, v, _ = motion_of(regressor, samples)
     laws = [column.symbol for column in regressor.columns if column.symbol]
-    known = known_efforts(system, "independent" if _is_reduced(regressor) else "tree", laws)
+    kind = "independent" if _is_reduced(regressor) else "tree"
+    known = of_motion(known_efforts(system, kind, laws))
     pairs = zip(q, v, strict=True)
     return np.array([DM(known(*state)).full()[:, 0] for state in pairs])
 
@@ -163,12 +164,14 @@ def evaluated(model: Any, samples: Samples) -> list[Array]:
         samples: of all joints, or of the independent ones.
 
     Raises:
-        ModelError: the samples have not the coordinates of the model.
+        ModelError: the samples have not the coordinates of the model, or it depends on states or
+            inputs of components.
     """
-    states = motion_of(model, samples)[: model.n_in()]
+    along = of_motion(model)  # measured positions close no loop exactly
+    states = motion_of(model, samples)[: along.n_in()]
     n = len(samples.time)
     size = min(_BATCH, n)
-    many = Function(model).map(size)  # measured positions close no loop exactly
+    many = along.map(size)
     found = [np.empty((n, *model.size_out(k))) for k in range(model.n_out())]
     for start in [*range(0, n - size, size), n - size]:
         rows = slice(start, start + size)

@@ -20,6 +20,7 @@ from mbs.identification.leading import (
     configuration_of,
     is_explicit,
     leads_of,
+    of_motion,
     positions,
     signed_leads,
 )
@@ -584,10 +585,10 @@ def instant(system: System, columns: Sequence[Column], limits: MotionLimits) -> 
     m = len(system.active)
     q_a, v_a, a_a = (MX.sym(name, m) for name in ("q_a", "v_a", "a_a"))
     q = configuration_of(system, q_a)
-    D = regressor(system, columns)(q, v_a, a_a)
+    D = of_motion(regressor(system, columns))(q, v_a, a_a)
     bounded = [*_efforts(system, limits, q, v_a, a_a), *(q[k] for k, _ in limits.passive)]
     for plane in limits.planes:
-        T = transform(system, plane.frame)(q)
+        T = of_motion(transform(system, plane.frame))(q)
         bounded.append(casadi.dot(DM(plane.unit_normal), (T @ DM([*plane.point, 1.0]))[:3]))
     if limits.leading:
         bounded.append(signed_leads(system)(q))
@@ -605,5 +606,5 @@ def _efforts(system: System, limits: MotionLimits, q: MX, v_a: MX, a_a: MX) -> l
             f"{system.name}: limits of efforts are given and its motors are not its independent"
             " joints, so that they share efforts in many ways; leave the limits of efforts out"
         )
-    tau = inverse_dynamics(system)(q, v_a, a_a)
+    tau = of_motion(inverse_dynamics(system))(q, v_a, a_a)
     return [tau[k] for k in range(len(limits.effort))]

@@ -5,9 +5,11 @@ from __future__ import annotations
 import io
 import math
 import pickle
+import sys
 import threading
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 import casadi
@@ -47,23 +49,16 @@ if TYPE_CHECKING:
 
 
 Packed = tuple[bytes, tuple[str, ...], str]
-"""What `packed` gives: equal for equal content."""
+"""Bytes, names of symbols, and graphs."""
 
 
 def packed(state: Any) -> Packed:
-    """Any object made of plain data, Functions and SX: its bytes, names of symbols, and graphs.
+    """Any object made of plain data, Functions and SX, as data alone.
 
     Args:
-        state: whatever `pickle` takes, SX among it.
+        state: what is to be packed; it may hold any number of SX.
     """
-    buffer = io.BytesIO()
-    pickler = _Pickler(buffer)
-    pickler.dump(state)
-    graphs = pickler.graphs
-    # one symbol at least: without any, numbers would come back as DM
-    symbols = casadi.symvar(casadi.veccat(SX.sym("any"), *graphs))
-    names = tuple(symbol.name() for symbol in symbols)
-    return buffer.getvalue(), names, Function("graphs", symbols, graphs).serialize()
+    return _pack(state)[0]
 
 
 def unpacked(data: bytes, names: Sequence[str], graphs: str) -> Any:
@@ -72,16 +67,52 @@ def unpacked(data: bytes, names: Sequence[str], graphs: str) -> Any:
     return _Unpickler(io.BytesIO(data), found).load()
 
 
+def content_of(state: Any) -> Packed | None:
+    """What an object is known by beyond this process, equal for equal content.
+
+    None where it holds a class or a function of a user: a pickle has its name alone, and what it
+    says may be another the next time. Some have no pickle, and machine code has no text.
+    """
+    try:
+        found, names_alone = _pack(state)
+        return None if names_alone else found
+    except (AttributeError, NotImplementedError, RuntimeError, TypeError, pickle.PicklingError):
+        return None
+
+
+def _pack(state: Any) -> tuple[Packed, bool]:
+    """An object as data, and whether there are names in it that stand for code of a user."""
+    buffer = io.BytesIO()
+    pickler = _Pickler(buffer)
+    pickler.dump(state)
+    graphs = pickler.graphs
+    # one symbol at least: without any, numbers would come back as DM
+    symbols = casadi.symvar(casadi.veccat(SX.sym("any"), *graphs))
+    names = tuple(symbol.name() for symbol in symbols)
+    text = Function("graphs", symbols, graphs).serialize()
+    return (buffer.getvalue(), names, text), pickler.names_alone
+
+
+_KNOWN = frozenset({"mbs", "casadi", "numpy", *sys.stdlib_module_names})
+"""Packages whose classes say the same wherever a version of them is installed."""
+
+
 class _Pickler(pickle.Pickler):
     def __init__(self, buffer: io.BytesIO) -> None:
         super().__init__(buffer, protocol=pickle.HIGHEST_PROTOCOL)
         self.graphs: list[SX] = []
+        self.names_alone = False
 
     def persistent_id(self, obj: Any) -> int | None:
         if not isinstance(obj, SX):
             return None
         self.graphs.append(obj)
         return len(self.graphs) - 1
+
+    def reducer_override(self, obj: Any) -> Any:
+        if isinstance(obj, (type, FunctionType)) and obj.__module__.split(".")[0] not in _KNOWN:
+            self.names_alone = True
+        return NotImplemented
 
 
 class _Unpickler(pickle.Unpickler):
@@ -271,8 +302,10 @@ class System:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle holds all of it but the models that were built, which are built anew."""
-        kept = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "_cache"}
-        return _unpickle, packed(kept)
+        return _unpickle, packed(self._described())
+
+    def _described(self) -> dict[str, Any]:
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "_cache"}
 
     def __repr__(self) -> str:
         kind = "closed" if self.is_closed else "open"
@@ -401,14 +434,16 @@ class System:
                 self._cache[key] = build()
             return self._cache[key]
 
-    def content(self) -> Packed:
-        """All of it, packed: what a system is known by beyond this process.
+    def content(self) -> Packed | None:
+        """What it is known by beyond this process; None where code of a user belongs to it."""
 
-        What was sent to another process has the same: equal texts may be one object or two, which
-        pickles show, and once unpacked they are as they stay.
-        """
-        found: Packed = self.cached("content", lambda: packed(unpacked(*packed(self))))
-        return found
+        def build() -> Packed | None:
+            found = content_of(self._described())
+            # equal texts may be one object or two, which pickles show; once unpacked they stay so
+            return found and packed(unpacked(*found))
+
+        content: Packed | None = self.cached("content", build)
+        return content
 
     def recent(self, kind: str, key: Any, build: Callable[[], Any], most: int) -> Any:
         """What `build` made under this key, of the last few of a kind that were asked for.

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
-from mbs.assembly.system import Packed, packed, unpacked
+from mbs.assembly.system import Packed, content_of, packed, unpacked
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.files import read_sealed, write_sealed
@@ -1118,11 +1118,18 @@ class Simulator:
 
     @functools.cached_property
     def _key(self) -> Packed | None:
-        """What laws say, as text; None where they hold machine code, which has none."""
-        try:
-            return packed((self._effort, self._inputs, tuple(self._motions), self._given))
-        except (RuntimeError, NotImplementedError):
-            return None
+        """What laws say; None where they hold machine code, which has no text."""
+        return content_of((self._effort, self._inputs, tuple(self._motions), self._given))
+
+    def content(self) -> bytes:
+        """What its motions follow from, as text that is the same in another process.
+
+        Code of a user is known by the equations that it makes.
+        """
+        known = self.system.content(), self._key
+        if None not in known:
+            return repr(known).encode()
+        return pickle.dumps(replace(self._equations(self.system), prepared={}))
 
     def _equations(self, system: System) -> FullState:
         """The state equation of the system, or of one that differs in its independent rows."""
@@ -1143,16 +1150,18 @@ class Simulator:
 def _on_disk(system: System, laws: Any, derive: Callable[[], FullState]) -> FullState:
     """The state equation that was derived from the same content, in whatever process.
 
-    What cannot be read is derived anew; MBS_KEEP_EQUATIONS=0 keeps nothing on disk.
+    What cannot be read is derived anew, and so is what code of a user takes part in, which no
+    text knows; MBS_KEEP_EQUATIONS=0 keeps nothing on disk.
 
     Args:
         system: open or closed.
         laws: what else it was derived from, as text.
         derive: makes it where it is not at hand.
     """
-    if os.environ.get("MBS_KEEP_EQUATIONS", "1") == "0":
+    own = system.content()
+    if own is None or os.environ.get("MBS_KEEP_EQUATIONS", "1") == "0":
         return derive()
-    content = repr((system.content(), laws, casadi.CasadiMeta.version(), _sources()))
+    content = repr((own, laws, casadi.CasadiMeta.version(), _sources()))
     name = hashlib.sha256(content.encode()).hexdigest()
     file = cache_dir() / f"equations-{name}.pickle"
     with suppress(Exception):  # it is not there, or damaged

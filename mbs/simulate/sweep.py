@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.system import unpacked
+from mbs.assembly.system import packed, unpacked
 from mbs.errors import ExportError, Interrupted, MbsError, ModelError, SolverError
 from mbs.files import check_archive, path_of, write_text
 from mbs.numbers import doubles
@@ -196,15 +196,21 @@ def study_of(
     Raises:
         ModelError: there is no such FMU.
     """
-    name, content = _system(model) if isinstance(model, System) else _fmu(model)
+    name, content = _system(model, options) if isinstance(model, System) else _fmu(model)
     described = {option: _describe(value) for option, value in sorted(options.items())}
     digest = hashlib.sha256(content).hexdigest()
     return {"model": name, "content": digest, "cases": list(cases), "options": described}
 
 
-def _system(system: System) -> tuple[str, bytes]:
-    """Its name, and all that it holds, to the last digit."""
-    return system.name, repr(system.content()).encode()
+_LAWS = ("tau", "motion", "u", "method")
+"""Options that are the same in all cases; what a case says of efforts and inputs is in their place,
+as numbers, so that no case has equations of its own."""
+
+
+def _system(system: System, options: Mapping[str, Any]) -> tuple[str, bytes]:
+    """Its name, and what its motions under these laws follow from, to the last digit."""
+    laws = {name: options[name] for name in _LAWS if name in options}
+    return system.name, Simulator(system, **laws).content()
 
 
 def _fmu(path: object) -> tuple[str, bytes]:
@@ -521,8 +527,9 @@ def sweep(
     simulate = _simulation(model, cases)
     if executor is not None:
         _check_executor(model, executor, options)
+    # a law that is called may change the working directory
+    kept = tempfile.mkdtemp(prefix="mbs-sweep-") if folder is None else path_of(folder).absolute()
     study = study_of(model, cases, options)
-    kept = tempfile.mkdtemp(prefix="mbs-sweep-") if folder is None else folder
     place = Folder.opened(kept, study)
     if folder is None:
         weakref.finalize(place, shutil.rmtree, kept, ignore_errors=True)
@@ -569,11 +576,6 @@ def _say(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}"
 
 
-_LAWS = ("tau", "motion", "u", "method")
-"""Options that are the same in all cases; what a case says of efforts and inputs is in their place,
-as numbers, so that no case has equations of its own."""
-
-
 @dataclass(frozen=True, slots=True)
 class _Run:
     """Simulation of a system."""
@@ -582,7 +584,7 @@ class _Run:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A process that has simulated a case has what the next one needs."""
-        return _run_of, self.system.content()
+        return _run_of, self.system.cached("packed", lambda: packed(self.system))
 
     def __call__(self, case: Case, options: Mapping[str, Any]) -> Result:
         given = _arguments(self.system, case)
@@ -689,6 +691,14 @@ def _check_executor(model: object, executor: object, options: Mapping[str, Any])
             raise ModelError(
                 f"sweep: the options cannot be sent to other processes ({error}); give numbers,"
                 " arrays and functions that a module defines"
+            ) from error
+    if travels and isinstance(model, System):
+        try:
+            packed(model)
+        except Exception as error:
+            raise ModelError(
+                f"sweep: {model.name} cannot be sent to other processes ({error}); define the"
+                " classes and functions of its components in a module"
             ) from error
 
 

@@ -202,3 +202,56 @@ def test_contacts_and_events_of_components_run_again_alike():
     assert first["z.v"].max() > 2.5  # it has bounced
     lower = swing(system, q0={"z": 0.3})
     assert lower["z.q"].max() < first["z.q"].max()
+
+
+PROGRAM = """
+import sys
+import mbs
+from mbs.components import Custom, HeightFieldContact, Mechanism, PointMass, Prismatic, custom
+
+drag, slope = float(sys.argv[1]), float(sys.argv[2])
+
+class Drag(Custom):
+    point = custom.frame()
+    def loads(self, at):
+        return {"point": custom.force(-drag * at.point.v)}
+
+def height(x, y):
+    return slope * x
+
+def local_class():
+    class Local(Drag):
+        pass
+    return Local
+
+def fall(cls):
+    m = Mechanism("fall", gravity=(0, 0, -9.81))
+    stone = m.add(PointMass("stone", mass=0.3))
+    m.connect(m.world, Prismatic("z", axis="z", actuated=False), stone)
+    m.add(cls("drag", stone))
+    m.add(HeightFieldContact("field", stone.at(1), m.world, height=height, stiffness=1e3))
+    return m.assemble()
+
+for cls in (Drag, local_class()):
+    end = mbs.simulate.run(fall(cls), 0.5, q0={"z": 0.3}, quiet=True)["z.v"][-1]
+    options = {"folder": sys.argv[3] + cls.__name__, "quiet": True}
+    try:
+        mbs.simulate.sweep(fall(cls), {"z.q": [0.3]}, 0.5, **options)
+        print(end)
+    except mbs.errors.ModelError as error:
+        print(end, "another study" in str(error))
+"""
+
+
+def test_code_of_a_user_is_never_taken_from_an_earlier_process(disk, tmp_path):
+    ends = []
+    for numbers in (("0.1", "0.05"), ("0.1", "0.05"), ("2.0", "0.05"), ("0.1", "0.15")):
+        folder = str(tmp_path / "study")
+        command = [sys.executable, "-c", PROGRAM, *numbers, folder]
+        done = subprocess.run(command, capture_output=True, check=True, text=True)
+        ends.append(done.stdout.split("\n")[:2])
+    assert ends[0][0] == ends[0][1]  # the class of a module and that of a function
+    assert ends[1] == ends[0]  # the study is resumed
+    for other in ends[2:]:
+        assert [line.split()[1] for line in other] == ["True", "True"]
+    assert len({float(end.split()[0]) for pair in ends for end in pair}) == 3

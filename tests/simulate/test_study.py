@@ -26,6 +26,19 @@ def test_functions_are_told_by_name_and_objects_without_their_address(system):
     def torque(t):
         return t
 
-    told = study_of(system, (), {"tau": {"a": torque}, "x": object()})["options"]
-    assert told["tau"].endswith("torque}")
-    assert told["x"] == "<object object>"
+    told = study_of(system, (), {"x": {"a": torque}, "y": object()})["options"]
+    assert told["x"].endswith("torque}")
+    assert told["y"] == "<object object>"
+
+
+def test_laws_are_told_by_what_they_say(system):
+    name = system.speeds[0].name
+
+    def study(factor):
+        def torque(t, q, v):
+            return {name: factor * t}
+
+        return study_of(system, (), {"tau": torque})
+
+    assert study(1.0) == study(1.0)
+    assert study(1.0)["content"] != study(1 + 1e-15)["content"]

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import mbs
+from mbs.components import Custom, PointMass, Prismatic, custom
 from mbs.errors import ExportError, ModelError, SolverError
 from mbs.result import Result
 
@@ -171,6 +172,24 @@ def test_a_law_that_a_module_does_not_define_is_not_sent_to_processes(system):
         mbs.simulate.sweep(
             system, GRID, 0.1, executor=executor, tau=lambda t, q, v: {"q1": t}, **OPTIONS
         )
+
+
+def test_a_class_that_a_module_does_not_define_is_not_sent_to_processes():
+    class Local(Custom):
+        point = custom.frame()
+
+        def loads(self, at):
+            return {"point": custom.force(-at.point.v)}
+
+    m = mbs.Mechanism("fall", gravity=(0, 0, -9.81))
+    stone = m.add(PointMass("stone", mass=0.3))
+    m.connect(m.world, Prismatic("z", axis="z", actuated=False), stone)
+    m.add(Local("drag", stone))
+    with (
+        ProcessPoolExecutor(1) as executor,
+        pytest.raises(ModelError, match=r"fall cannot be sent to .*Local.*in a module"),
+    ):
+        mbs.simulate.sweep(m.assemble(), {"z.q": [0.1]}, 0.1, executor=executor, **OPTIONS)
 
 
 @pytest.mark.parametrize(("name", "meant"), [("K", "L"), ("q1", "q1.q"), ("q1.p", "q1.q")])

@@ -1267,7 +1267,7 @@ def run(
             what was reached.
         Interrupted: control-C was pressed; a KeyboardInterrupt whose `result` has what was reached.
     """
-    simulator = Simulator(system, tau=tau, motion=motion, u=u, method=method)
+    simulator = _simulator(system, tau=tau, motion=motion, u=u, method=method)
     return simulator(
         duration,
         q0=q0,
@@ -1278,6 +1278,25 @@ def run(
         tolerance=tolerance,
         quiet=quiet,
     )
+
+
+def _simulator(system: System, *, method: str, **laws: Any) -> Simulator:
+    """What runs a motion under these laws; where they are numbers, the one of the last such run."""
+
+    def build() -> Simulator:
+        return Simulator(system, method=method, **laws)
+
+    require_system(system)
+    key = [method]
+    for name, law in laws.items():
+        if law is None:
+            continue
+        # a function may say something else in the next call
+        if type(law) is not dict or any(type(value) not in (int, float) for value in law.values()):
+            return build()
+        key.append(f"{name} {law}")  # every digit of the numbers, and the signs of zeros
+    found: Simulator = system.recent("simulators", tuple(key), build, _KEPT)
+    return found
 
 
 def _first_bias(system: System, x0: Array, inputs: Function | None, p: Array) -> Array:

@@ -1,12 +1,16 @@
 """The tree core beside straight lines and pinocchio's C++ library, in one process and in turns.
 
     python benchmarks/tree_core.py [--robots chain6,chain30] [--quick] [--output table.md]
+    python benchmarks/tree_core.py --compile [--robots chain30]
 
 Every model is a loop of C++ over 64 random states, as in benchmarks/dynamics.py; a time is the best
 of many blocks of 0.15 ms. "core" is `mbs.models.tree_core`, "lines" are the straight lines of
 `mbs.native.compiled(f, fast=True)`, where there are up to 60,000 operations. Values are compared
 with pinocchio's before anything is timed. Seconds of the processor and the largest memory are those
 of the compiler, from an empty cache.
+
+`--compile`: what `compiled(ddm, fast=True)` and its Jacobian take, by loops and by straight lines,
+each in a process of its own with an empty cache: seconds of the processor and the largest memory.
 """
 
 from __future__ import annotations
@@ -17,6 +21,7 @@ import os
 import resource
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -29,7 +34,9 @@ from robots import frictionless
 from timing import ALGORITHMS, Array, Contender, InLibrary, Peer, best_times, harness
 
 from mbs.assembly import System
+from mbs.models import direct_dynamics
 from mbs.models.tree_core import core_library
+from mbs.native import compiled
 from mbs.native.kernel import kernel_library
 
 ROBOTS = ("chain6", "chain12", "chain30", "chain60", "chain100", "chain300", "humanoid")
@@ -59,7 +66,12 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--core-alone", action="store_true", help="no straight lines")
     parser.add_argument("--output")
+    parser.add_argument("--compile", action="store_true", help="what compiled takes")
     arguments = parser.parse_args()
+    if arguments.compile:
+        for name in arguments.robots.split(","):
+            compiling(name)
+        return
     loops = harness()
     text = ""
     for name in arguments.robots.split(","):
@@ -139,6 +151,44 @@ def _compiled(build: Callable[[], Path]) -> tuple[Path, str]:
     path, seconds, memory = ours.recv()
     process.join()
     return path, f"{seconds:.1f} s, {memory:.0f} MB"
+
+
+LARGEST_COMPILED = {"value": 300, "jacobian": 30}
+"""Velocities beyond which straight lines are not compiled: they would take many minutes."""
+
+
+def compiling(name: str) -> None:
+    """Print what `compiled` takes for the direct model of a robot."""
+    with tempfile.TemporaryDirectory() as folder:
+        system = frictionless(name, Path(folder))
+    model = direct_dynamics(system)
+    for what, largest in LARGEST_COMPILED.items():
+        for loops in (True, False) if system.nv <= largest else (True,):
+            with tempfile.TemporaryDirectory() as folder:
+                os.environ["MBS_CACHE_DIR"] = folder
+                note = _used(model, what, loops)
+            print(name, what, "with loops" if loops else "straight lines", note, flush=True)
+
+
+def _used(model: casadi.Function, what: str, loops: bool) -> str:
+    """Seconds and memory of a process that compiles a model, and of its compilers."""
+    fork = multiprocessing.get_context("fork")
+    ours, theirs = fork.Pipe()
+
+    def work() -> None:
+        before = time.process_time()
+        f = compiled(model, fast=True, loops=loops)
+        if what == "jacobian":
+            f.jacobian()
+        own, cc = (resource.getrusage(k) for k in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+        seconds = time.process_time() - before + cc.ru_utime + cc.ru_stime
+        theirs.send(f"{seconds:.1f} s, {max(own.ru_maxrss, cc.ru_maxrss) / 1024:.0f} MB")
+
+    process = fork.Process(target=work)
+    process.start()
+    note: str = ours.recv()
+    process.join()
+    return note
 
 
 def report(rows: list[Row], note: str) -> str:

@@ -128,8 +128,19 @@ class ModelFunction(Function):
         system: System,
         annotate: Callable[[], Function] | None = None,
         check: ConfigurationCheck | None = None,
+        loops: Any = None,
     ) -> None:
+        """Take a Function for a model.
+
+        Args:
+            function: the equations.
+            system: the mechanism.
+            annotate: gives the Function with its intermediate quantities.
+            check: what is asked of a configuration.
+            loops: what `mbs.native.compiled` asks for code that loops over the links.
+        """
         Function.__init__(self, function)
+        self.loops = loops
         self._system = system
         self._annotate = annotate
         self._check_configuration = check
@@ -173,7 +184,7 @@ class ModelFunction(Function):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle holds the System too, so that names, defaults and checks go with it."""
-        return _unpickle, (self.serialize(), self._system, self._check_configuration)
+        return _unpickle, (self.serialize(), self._system, self._check_configuration, self.loops)
 
     def __deepcopy__(self, dummy: Any = None) -> ModelFunction:
         """Itself: a Function never changes."""
@@ -414,8 +425,10 @@ def _columns(value: DM | SX | MX | None, rows: int) -> NDArray[np.float64] | Non
     return full if full.shape[0] == rows else None
 
 
-def _unpickle(data: str, system: System, check: ConfigurationCheck | None) -> ModelFunction:
-    return ModelFunction(Function.deserialize(data), system, check=check)
+def _unpickle(
+    data: str, system: System, check: ConfigurationCheck | None, loops: Any
+) -> ModelFunction:
+    return ModelFunction(Function.deserialize(data), system, check=check, loops=loops)
 
 
 def model_function(
@@ -423,6 +436,7 @@ def model_function(
     key: tuple[Any, ...],
     build: Callable[[], tuple[Named, Named] | tuple[Named, Named, Named]],
     check: ConfigurationCheck | None = None,
+    loops: Any = None,
 ) -> Function:
     """The model of a system under this key, built the first time it is asked for.
 
@@ -433,6 +447,7 @@ def model_function(
             named scalars between them. When the system has parameters they become the last
             input p.
         check: what refuses positions q given in numbers.
+        loops: what `mbs.native.compiled` asks for code that loops over the links.
 
     Raises:
         ModelError: `system` is not a System.
@@ -451,7 +466,7 @@ def model_function(
             return Function(str(key[0]), [x for _, x in every], values, *names, options)
 
         annotate = (lambda: function([*outputs, *between[0]])) if between else None
-        return ModelFunction(function(outputs), system, annotate, check)
+        return ModelFunction(function(outputs), system, annotate, check, loops)
 
     function: Function = system.cached(key, make)
     return function

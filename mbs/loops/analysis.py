@@ -21,7 +21,7 @@ from mbs.loops.closing import Closing, closure_parameters, constraint_sizes, mec
 from mbs.loops.closure import row_groups
 from mbs.loops.configuration import closed_configuration
 from mbs.loops.velocity import constraint_jacobian
-from mbs.solvers.rank import independent_rows, null_space_of, rank
+from mbs.solvers.rank import dense, independent_rows, null_space_of, rank
 
 Matrix = NDArray[np.float64]
 
@@ -59,14 +59,16 @@ def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] 
     configurations = [configuration, *islice(nearby, _CONFIGURATIONS)]
     J = constraint_jacobian(system)
     rows, columns = _measures(system, p)
-    jacobians = [np.array(J(q, p)) for q in configurations]
+    jacobians = [dense(J(q, p)) for q in configurations]
     ranks = _ranks([m / rows * columns for m in jacobians])
     generic = max(ranks)
     configuration = configurations[ranks.index(generic)]
     regular = [m for m, found in zip(jacobians, ranks, strict=True) if found == generic]
     labels = _labels(system)
     positions = sum(len(rows) for rows, _ in labels)
-    held = max(_ranks([(m / rows * columns)[:positions] for m in regular])) if positions else 0
+    held = generic
+    if positions < len(rows):
+        held = max(_ranks([(m / rows * columns)[:positions] for m in regular])) if positions else 0
     kept = _kept_rows(regular, positions, held, generic - held)
     drive = _drive(system, chosen, regular, system.nv - generic)
     active = drive.active
@@ -117,9 +119,14 @@ def _measures(system: System, p: Matrix) -> tuple[Matrix, Matrix]:
 
 def _ranks(jacobians: Sequence[Matrix]) -> list[int]:
     """Rank of each, small values measured by the largest of all: a whole Jacobian may vanish."""
-    values = [np.linalg.svd(matrix, compute_uv=False) for matrix in jacobians]
+    values = [np.linalg.svd(_without_zeros(matrix), compute_uv=False) for matrix in jacobians]
     largest = max(float(np.max(row, initial=0.0)) for row in values)
     return [int(np.sum(row > _GAP * largest)) for row in values]
+
+
+def _without_zeros(matrix: Matrix) -> Matrix:
+    """The rows that hold something: of planar loops half of them, of which no rank depends."""
+    return matrix[matrix.any(axis=1)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +223,7 @@ def _drive(
         raise AssemblyError(
             f"{system.name}: the loops leave no motion (mobility 0); take a joint's constraint away"
         )
-    free = [null_space_of(J, mobility) for J in jacobians]
+    free = [null_space_of(_without_zeros(J), mobility) for J in jacobians]
     motors = tuple(k for k, speed in enumerate(system.speeds) if speed.actuated)
     first = tuple(dict.fromkeys([*chosen, *motors]))
     if len(_independent(free, (), first)) == len(first):

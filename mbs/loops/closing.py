@@ -16,7 +16,7 @@ from mbs.assembly.tree import norm_rows, quaternion_slices
 from mbs.errors import Unclosable
 from mbs.loops.closure import closure_rows, facing, position_rows, velocity_row_units
 from mbs.numbers import OnArrays, on_arrays
-from mbs.solvers.least_squares import gauss_newton
+from mbs.solvers.least_squares import MANY, Entries, gauss_newton
 
 # What rows of a closure are measured by: lengths by the size of the mechanism, cosines as such.
 #
@@ -155,6 +155,18 @@ class Closing:
         r, J = self._functions().equations(q, self.p)
         return r.ravel(), J[:, self.free] if self.locked else J
 
+    def _sparse_rows(self, q: Vector, free: Sequence[int]) -> tuple[Vector, Entries]:
+        """The same as `rows`, for many positions."""
+        functions = self._functions()
+        r, values = functions.elements(q, self.p)
+        number = np.full(self.system.nq, -1)
+        number[free] = np.arange(len(free))
+        rows, columns = functions.places
+        columns = number[columns]
+        kept = columns >= 0
+        entries = Entries(rows[kept], columns[kept], values.ravel()[kept], (r.size, len(free)))
+        return r.ravel(), entries
+
     @property
     def size(self) -> float:
         """The size of the mechanism [m]."""
@@ -173,8 +185,9 @@ class Closing:
         """The configuration that Gauss-Newton reaches from q (nq,)."""
         start, free = np.array(q, dtype=float), self.free
 
-        def residual(x: Vector) -> tuple[Vector, Vector]:
-            return self.rows(_replace(start, free, x))
+        def residual(x: Vector) -> tuple[Vector, Vector | Entries]:
+            at = _replace(start, free, x)
+            return self.rows(at) if len(free) < MANY else self._sparse_rows(at, free)
 
         def values(x: Vector) -> Vector:
             return self._functions().values(_replace(start, free, x), self.p)[0].ravel()
@@ -230,12 +243,16 @@ class ClosingFunctions(NamedTuple):
 
     Attributes:
         equations: ``(q, p) -> r, J``: all rows, and their derivative by q.
+        elements: ``(q, p) -> r, e``: of the derivative the elements that need not be zero.
+        places: their rows and columns.
         values: ``(q, p) -> r`` alone.
         facing: ``(q, p)``, positive where no axis is opposed.
         sizes: ``(p)``, the size of the mechanism and what each row is measured by.
     """
 
     equations: OnArrays
+    elements: OnArrays
+    places: NDArray[np.int64]
     values: OnArrays
     facing: OnArrays
     sizes: OnArrays
@@ -261,13 +278,19 @@ def _functions(system: System) -> ClosingFunctions:
     r = casadi.densify(casadi.vertcat(closure_rows(system, q), norm_rows(system.tree, q)))
     norms = norm_rows(system.tree, q)
     sizes = casadi.vertcat(row_sizes(system), SX.ones(norms.shape))
-    functions = (
-        Function("equations", [q, system.p], [r, casadi.jacobian(r, q)]),
-        Function("values", [q, system.p], [r]),
-        Function("facing", [q, system.p], [facing(system, q)]),
-        Function("sizes", [system.p], [mechanism_size(system), sizes]),
+    J = casadi.jacobian(r, q)
+
+    def arrays(name: str, inputs: list[SX], outputs: list[SX]) -> OnArrays:
+        return on_arrays(Function(name, inputs, outputs))
+
+    return ClosingFunctions(
+        equations=arrays("equations", [q, system.p], [r, J]),
+        elements=arrays("elements", [q, system.p], [r, casadi.densify(J.nz[:])]),
+        places=np.array(J.sparsity().get_triplet(), dtype=np.int64).reshape(2, -1),
+        values=arrays("values", [q, system.p], [r]),
+        facing=arrays("facing", [q, system.p], [facing(system, q)]),
+        sizes=arrays("sizes", [system.p], [mechanism_size(system), sizes]),
     )
-    return ClosingFunctions(*map(on_arrays, functions))
 
 
 def _replace(q: Vector, indices: Sequence[int], values: Vector) -> Vector:

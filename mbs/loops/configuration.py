@@ -210,26 +210,34 @@ def start(
         ModelError: a name is unknown, a quaternion is not of unit length, or the loops allow no
             motion with these velocities.
     """
+    q = start_position(system, q0, parameters)
+    return q, start_velocity(system, q, v0, parameters)
+
+
+def start_position(system: System, q0: Values, parameters: Mapping[str, float] | None) -> Vector:
+    """(nq,) the positions of `start`."""
     q = np.array(system.position(q0))
     if fault := plain_fault(system, q, None):
         raise ModelError(f"{system.name}: {fault}")
-    if not system.is_closed:
-        return q, np.array(system.velocity(v0))
-    if isinstance(q0, Mapping) or q0 is None:
-        q = solve(system, dict(q0 or {}), parameters=parameters)
-    else:
+    if system.is_closed and (isinstance(q0, Mapping) or q0 is None):
+        return solve(system, dict(q0 or {}), parameters=parameters)
+    if system.is_closed:
         require_closed(system, q, parameters)
-    return q, _tree_velocity(system, q, v0, parameters)
+    return q
 
 
-def _tree_velocity(
+def start_velocity(
     system: System, q: Vector, v0: Values, parameters: Mapping[str, float] | None
 ) -> Vector:
-    """The smallest velocities that keep the loops closed and give the joints named in v0 theirs.
+    """(nv,) the velocities of `start` at its positions q.
+
+    They are the smallest that keep the loops closed and give the joints named in v0 theirs.
 
     Raises:
         ModelError: no motion of the loops has these velocities.
     """
+    if not system.is_closed:
+        return np.array(system.velocity(v0))
     p = [system.parameter_values(parameters)] if system.parameters else []
     v, missed = smallest_velocity(system, np.array(closure_jacobian(system)(q, *p)), v0)
     if missed:

@@ -32,6 +32,7 @@ from mbs.models.symbols import (
     surroundings,
     symbols_of,
 )
+from mbs.models.tree_table import TreeLoops
 from mbs.operations.counts import cheapest
 from mbs.recursions.composite_body import (
     TreeFactor,
@@ -269,7 +270,8 @@ def inverse_dynamics_derivatives(
             return inputs, _outputs("tau" + s.suffix, s, names, blocks, tau)
 
         key = ("idm_derivatives", chosen, coordinates, names)
-        return model_function(system, key, symbols, configuration_check(system, coordinates))
+        check = configuration_check(system, coordinates)
+        return model_function(system, key, symbols, check, TreeLoops(system, "idm_derivatives"))
 
     candidates = ("ad",) if is_reduced(system, coordinates) else _compare(system, "analytical")
     return _choose(system, ("idm_derivatives", coordinates, names), method, build, candidates)
@@ -332,7 +334,8 @@ def direct_dynamics_derivatives(
         if chosen == "implicit" and not system.is_closed and system.nv >= _STAGED:
             staged: Function = system.cached(key, lambda: _stage(system, names))
             return staged
-        return model_function(system, key, symbols, configuration_check(system, coordinates))
+        check = configuration_check(system, coordinates)
+        return model_function(system, key, symbols, check, TreeLoops(system, "ddm_derivatives"))
 
     candidates = ("implicit",) if system.is_closed else _compare(system, "implicit")
     return _choose(system, ("ddm_derivatives", coordinates, names), method, build, candidates)
@@ -344,7 +347,7 @@ def _stage(system: System, names: tuple[str, ...]) -> Function:
     labels = list(inputs), [*(f"da_d{name}" for name in names), "a"]
     options = {"default_in": default_in(system, len(inputs.keys() - {"p"}))}
     function = Function("ddm_derivatives", [*inputs.values()], outputs, *labels, options)
-    return ModelFunction(function, system)
+    return ModelFunction(function, system, loops=TreeLoops(system, "ddm_derivatives"))
 
 
 def _checked(

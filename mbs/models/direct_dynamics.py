@@ -26,6 +26,7 @@ from mbs.models.symbols import (
     surroundings,
     symbols_of,
 )
+from mbs.models.tree_table import TreeLoops
 from mbs.operations.counts import cheapest
 from mbs.recursions.articulated_body import articulated_accelerations, inertia_pivots
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
@@ -62,9 +63,8 @@ def inertia_matrix(system: System, coordinates: str = "independent") -> Function
         A = s.reduced_matrix(tree_inertia(system.tree, s.poses))
         return [("q", s.q)], [("A" + s.suffix, A)]
 
-    return model_function(
-        system, ("inertia", coordinates), build, configuration_check(system, coordinates)
-    )
+    check, loops = configuration_check(system, coordinates), TreeLoops(system, "inertia")
+    return model_function(system, ("inertia", coordinates), build, check, loops)
 
 
 def direct_dynamics(
@@ -189,6 +189,7 @@ def _model(
         ("ddm", method, coordinates, f_ext, moving_base),
         build,
         configuration_check(system, coordinates),
+        None if f_ext or moving_base else TreeLoops(system, "ddm"),
     )
 
 

@@ -16,6 +16,7 @@ from mbs.models.symbols import (
     surroundings,
     symbols_of,
 )
+from mbs.models.tree_table import TreeLoops
 from mbs.recursions.force_elements import element_efforts
 from mbs.recursions.names import newton_euler_names
 from mbs.recursions.newton_euler import Dynamics, joint_efforts, newton_euler, spring_effort
@@ -66,6 +67,7 @@ def inverse_dynamics(
         ("idm", f_ext, moving_base, coordinates),
         build,
         configuration_check(system, coordinates),
+        None if f_ext or moving_base else TreeLoops(system, "idm"),
     )
 
 

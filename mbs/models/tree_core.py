@@ -3,31 +3,29 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import casadi
 import numpy as np
-from casadi import SX, Function
+from casadi import Function
 
 from mbs.assembly import System
-from mbs.assembly.model_function import ModelFunction, default_in, require_system
-from mbs.assembly.tree import Link
-from mbs.components.joints import Motion
+from mbs.assembly.model_function import ModelFunction, require_system
+from mbs.assembly.tree import normalised
 from mbs.errors import ModelError
+from mbs.models.direct_dynamics import direct_dynamics
+from mbs.models.inverse_dynamics import inverse_dynamics
+from mbs.models.tree_table import shapes_of, table_of, unknown_to_core
 from mbs.native import compiled
 from mbs.native.array_calls import with_array_calls
-from mbs.native.tree_core import (
-    ROWS,
-    TreeTable,
-    dependent_numbers,
-    place_of,
-    tree_functions,
-    tree_library,
-)
-from mbs.spatial import elements
+from mbs.native.compiler import cache_dir, cached_library
+from mbs.native.derivatives_on_demand import Derivative, Record, by_parameters, promise, source
+from mbs.native.kernel import FAST_FLAGS
+from mbs.native.tree_core import COMMON, tree_files
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,8 +79,8 @@ def tree_core(system: System) -> TreeCore:
     One C file, compiled once and kept, loops over the links; the mechanism is a table of numbers,
     which a short Function of the parameters completes at every call. Rotors, friction and springs
     of the joints are included. Derivatives are those of the core: CasADi differentiates idm and
-    ddm once with respect to q, v and a or tau. With respect to parameters it gets NaN.
-    Quaternions are brought to unit length first.
+    ddm once; with respect to parameters by the equations, which are built when that is first
+    asked for. Quaternions are brought to unit length first.
 
     Source: Khalil & Creusot 1997, eq. 15-20; Walker & Orin 1982; Featherstone 1983; Singh, Russell
     & Wensing 2022; Carpentier & Mansard 2018.
@@ -117,15 +115,41 @@ def core_library(system: System) -> CoreLibrary:
     """The library of all models of a tree."""
 
     def build() -> CoreLibrary:
-        _require_known(system)
-        table, default = _table(system), default_in(system, 1)[1:]
-        return CoreLibrary(
-            tree_library(table, len(system.parameters), default),
-            tree_functions(table, len(system.parameters), default),
-        )
+        if unknown := unknown_to_core(system):
+            raise ModelError(f"{system.name}: {unknown}")
+        table = table_of(system)
+        shapes = shapes_of(system, table)
+        files = tree_files(table, shapes)
+        if table.dependent is not None:
+            files["derivatives.c"] = _by_parameters(system, files)
+        return CoreLibrary(cached_library(files, FAST_FLAGS, common=COMMON), shapes)
 
     library: CoreLibrary = system.cached("tree core library", build)
     return library
+
+
+_BY_PARAMETERS = [by_parameters(name) for name in ("idm", "ddm")]
+
+
+def _by_parameters(system: System, files: Mapping[str, str]) -> str:
+    """C text that makes the derivatives by parameters from the equations, in this process alone.
+
+    Args:
+        system: the tree, which is kept for it as the library is, to the end of the process.
+        files: C text of its core, which the promise is known by.
+    """
+    digest = hashlib.sha256("\0".join(files.values()).encode()).hexdigest()
+    record = cache_dir() / f"{digest[:40]}.promised"
+
+    def equations(part: Derivative) -> Function:
+        ddm = part == _BY_PARAMETERS[1]
+        f = direct_dynamics(system) if ddm else inverse_dynamics(system)
+        q, *others = f.sx_in()
+        values = f.call([normalised(system.tree, q), *others])
+        return Function(f.name(), [q, *others], values, f.name_in(), f.name_out())
+
+    promise(record, Record(equations, _BY_PARAMETERS, fast=True))
+    return source(_BY_PARAMETERS, record)
 
 
 def core_function(system: System, name: str) -> Function:
@@ -148,165 +172,6 @@ def core_function(system: System, name: str) -> Function:
 
     function: Function = system.cached(("tree core", name), build)
     return function
-
-
-def _require_known(system: System) -> None:
-    if system.is_closed:
-        raise ModelError(
-            f"{system.name}: tree_core is for open trees and this system has loops or couplings;"
-            " use mbs.models.inverse_dynamics and direct_dynamics"
-        )
-    if not system.nv:
-        raise ModelError(f"{system.name}: nothing moves, so that tree_core has no models of it")
-    for part in system.parts:
-        element = part.element
-        if not element.drives and (element.acts or element.binds):
-            raise ModelError(
-                f"{system.name}: component {part.name} ({type(element).__name__}) has equations of"
-                " its own, which tree_core does not know; use mbs.models.inverse_dynamics and"
-                " direct_dynamics"
-            )
-    for j, link in enumerate(system.tree.links):
-        if link.rotor is not None and link.rotor.carrier not in (j, link.antecedent, -1):
-            raise ModelError(
-                f"{system.name}: the rotor of {link.name} is on neither of the links of the joint,"
-                " which tree_core does not know; use mbs.models.inverse_dynamics"
-            )
-
-
-# The table of a tree: its links depth-first, a node for every velocity.
-
-
-def _depth_first(links: Sequence[Link]) -> list[int]:
-    """The links in an order in which every subtree follows its joint without a gap."""
-    behind: list[list[int]] = [[] for _ in links]
-    waiting: list[int] = []
-    for j, link in enumerate(links):
-        (behind[link.antecedent] if link.antecedent >= 0 else waiting).append(j)
-    order: list[int] = []
-    waiting.reverse()
-    while waiting:
-        j = waiting.pop()
-        order.append(j)
-        waiting += reversed(behind[j])
-    return order
-
-
-def _table(system: System) -> TreeTable:
-    links = system.tree.links
-    order = _depth_first(links)
-    lists = _lists(links, order)
-    numbers = [0.0] * place_of(0, -(-system.nv // 8) * 8) + [0.0] * 3
-    dependent: dict[int, SX] = {}
-
-    def put(at: int, value: SX) -> None:
-        if value.is_constant():
-            numbers[at] = float(value)
-        else:
-            numbers[at], dependent[at] = float("nan"), value
-
-    last = 0
-    for j in order:
-        link = links[j]
-        first, last = last, last + link.motion.nv
-        _put_link(lambda row, node, value: put(place_of(row, node), value), link, j, first)
-    for k, value in enumerate(elements(system.tree.gravity)):
-        put(len(numbers) - 3 + k, value)
-    return TreeTable(
-        size=system.nv,
-        positions=system.nq,
-        lists=lists,
-        numbers=numbers,
-        places=list(dependent),
-        dependent=dependent_numbers(list(dependent.values()), system.p) if dependent else None,
-    )
-
-
-_ONE = SX(1)
-_UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-
-
-def _put_link(put: Callable[[int, int, SX], None], link: Link, j: int, first: int) -> None:
-    """The numbers of the nodes of a link, the first of which is given."""
-    last, rotor = first + link.motion.nv - 1, link.rotor
-    pose, body = link.pose(), link.inertia
-    tensor = casadi.vertcat(*(body.J[r, c] for r, c in _UPPER))
-    fixed = (("C", pose.R), ("T", pose.p), ("mass", body.m), ("h", body.ms), ("J", tensor))
-    for name, value in fixed:
-        for k, element in enumerate(elements(SX(value))):
-            put(ROWS[name] + k, last, element)
-    # what a joint itself needs, the same for all of its velocities
-    each = {name: getattr(link, name) for name in ("Ia", "Fv", "stiffness", "rest", "Fs")}
-    each["width"] = link.Fs_width
-    if rotor is not None:
-        each["Ia"] = link.Ia + rotor.seen_at_joint
-    each |= {name: _ONE for name, motion in _KINDS.items() if link.motion is motion}
-    if link.antecedent >= 0:
-        each["inner"] = _ONE
-    for node in range(first, last + 1):
-        for name, value in each.items():
-            put(ROWS[name], node, value)
-    if rotor is not None and rotor.carrier >= 0:
-        for k, element in enumerate(elements(rotor.momentum)):
-            put(ROWS["spin"] + k, first, element)
-        put(ROWS["own"], first, SX(int(rotor.carrier == j)))
-
-
-_KINDS = {"turn": Motion.REVOLUTE, "slide": Motion.PRISMATIC}
-
-
-_KIND = {Motion.REVOLUTE: 0, Motion.PRISMATIC: 1, Motion.SPHERICAL: 2, Motion.FREE: 2}
-"""The kind of the first motion about an axis, as tree_core.h counts; the slides of free joints come
-first, and are counted last."""
-
-
-def _lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:
-    """The indices of the nodes of a tree."""
-    names = ("before", "link", "end", "first", "last", "kind", "q_at", "v_at", "runs_from", "runs")
-    result: dict[str, list[int]] = {name: [] for name in (*names, "joints", "rotor", "rub")}
-    first, last = dict[int, int](), {-1: -1}
-    ancestry: dict[int, list[int]] = {-1: []}
-    size = 0
-    for j in order:
-        link, count = links[j], links[j].motion.nv
-        i = link.antecedent
-        first[j], last[j] = size, size + count - 1
-        ancestry[j] = _extended(ancestry[i], size, size + count)
-        for h in range(count):
-            result["before"].append(size - 1 if h else last[i])
-            result["link"].append(last[i])
-            result["first"].append(first[j])
-            result["last"].append(last[j])
-            result["kind"].append(_KIND[link.motion] + (h + 3) % count)
-            result["q_at"].append(link.q.start if count == 1 else -1)
-            result["v_at"].append(link.v.start + h)
-            result["runs_from"].append(len(result["runs"]) // 2)
-            result["runs"] += ancestry[i]
-            if not link.Fs.is_zero():
-                result["rub"].append(size)
-            size += 1
-        if count > 1:
-            result["joints"] += [first[j], count, link.q.start]
-        if link.rotor is not None and link.rotor.carrier >= 0:
-            result["rotor"] += [first[j], last[link.rotor.carrier]]
-    result["runs_from"].append(len(result["runs"]) // 2)
-    end = dict(last)
-    for j in reversed(order):
-        i = links[j].antecedent
-        if i >= 0:
-            end[i] = max(end[i], end[j])
-    before = result["before"]
-    ahead = {b for k, b in enumerate(before) if b != k - 1}
-    result["fork"] = [int(k in ahead) for k in range(size)]
-    result["end"] = [end[j] + 1 for j in order for _ in range(links[j].motion.nv)]
-    return result
-
-
-def _extended(runs: list[int], first: int, end: int) -> list[int]:
-    """Runs of nodes with another one behind them."""
-    if runs and runs[-1] == first:
-        return [*runs[:-1], end]
-    return [*runs, first, end]
 
 
 # A velocity that moves no inertia.

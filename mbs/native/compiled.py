@@ -1,9 +1,10 @@
 """A Function as machine code: equal to the interpreted one to the last bit, or faster."""
 
 import functools
+import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi
 
@@ -12,19 +13,39 @@ from mbs.native.array_calls import with_array_calls
 from mbs.native.compiler import cached_library, compiler_found, flags_for
 from mbs.native.derivatives_on_demand import (
     Derivative,
+    by_parameters,
     derivatives_of,
     fill,
     read_record,
     source,
     write_record,
 )
-from mbs.native.kernel import index_key, indexed_library, kernel_library
+from mbs.native.kernel import FAST_FLAGS, index_key, indexed_library, kernel_library
 from mbs.native.patterns import pattern_source, patterns_source
 from mbs.text import in_c_comment, quoted
 
 
+class LoopCode(NamedTuple):
+    """C text by which a model loops over its links, in place of equations written out.
+
+    Attributes:
+        files: file name to text, for `FAST_FLAGS`.
+        common: of the C files, those that many libraries have.
+        value: whether it has the Function itself.
+        jacobian: whether it has its Jacobian `jac_f`.
+        by_parameters: whether that calls `byp_f` for the derivatives by the last input, which the
+            text does not have.
+    """
+
+    files: Mapping[str, str]
+    common: tuple[str, ...]
+    value: bool
+    jacobian: bool
+    by_parameters: bool
+
+
 def compiled(
-    function: casadi.Function, *, derivatives: int = 1, fast: bool = False
+    function: casadi.Function, *, derivatives: int = 1, fast: bool = False, loops: bool = True
 ) -> casadi.Function:
     """The same Function backed by a cached shared library.
 
@@ -48,6 +69,9 @@ def compiled(
             and cosines in vector lanes: two to three times faster, equal to the interpreted
             Function to about 1e-15 of the largest element instead of the last bit. A map
             (`Function.map`) is computed for several columns at once.
+        loops: of `fast` code, whether models of big open trees, and their Jacobians, may be
+            computed by loops over the links where that is faster (`mbs.models.tree_core`); False
+            for equations written out in any case.
 
     Returns:
         a Function with the same name, inputs, outputs and default inputs; of a model, with its
@@ -60,14 +84,17 @@ def compiled(
     require_function(function)
     _check_order(derivatives)
     like: Any = getattr(function, "like", None)
-    library = _library(function, derivatives, fast) if compiler_found() else None
+    library = None
+    if compiler_found():
+        library = _looped_library(function, derivatives) if fast and loops else None
+        library = library or _library(function, derivatives, fast)
     if library is None:
         result: Any = with_array_calls(casadi.Function(function), None, like)
     else:
         code = casadi.external(function.name(), str(library))
         plain = functools.partial(compiled, derivatives=0)
         result = with_array_calls(code, library, like, plain)
-    again = functools.partial(compiled, derivatives=derivatives, fast=fast)
+    again = functools.partial(compiled, derivatives=derivatives, fast=fast, loops=loops)
     result._source = (again, (function,))
     return result  # type: ignore[no-any-return]
 
@@ -81,10 +108,45 @@ def _library(function: casadi.Function, derivatives: int, fast: bool) -> Path | 
     if found is None:
         return _built(function, derivatives, fast, None)
     key, text = found
-    record = write_record(key, text, derivatives, fast) if derivatives else None
+    every = derivatives_of(function.name(), derivatives)
+    record = write_record(key, text, every, fast) if derivatives else None
     if derivatives and record is None:  # nothing can be kept on disk: all at once
         return _built(function, derivatives, fast, None)
     return indexed_library(key, lambda: _built(function, derivatives, fast, record))
+
+
+def _looped_library(function: casadi.Function, derivatives: int) -> Path | None:
+    """The library of a model that loops over its links; None where straight lines are better.
+
+    What the loops do not have is in it as straight lines: the Function, or its derivatives, which
+    are made on demand.
+    """
+    offer: Any = getattr(function, "loops", None)
+    code: LoopCode | None = None if offer is None else offer.code(function, derivatives)
+    if code is None:
+        return None
+    name = function.name()
+    every = derivatives_of(name, derivatives) if derivatives else []
+    if code.jacobian:
+        of_lines = {f"jac_{name}"}
+        if code.value and derivatives == 1:  # CasADi makes products of the Jacobian
+            of_lines |= {f"fwd1_{name}", f"adj1_{name}"}
+        every = [part for part in every if part.name not in of_lines]
+        every += [by_parameters(name)] if code.by_parameters else []
+    if code.value and not every:
+        return cached_library(code.files, FAST_FLAGS, common=code.common)
+    digest = hashlib.sha256("\0".join(code.files.values()).encode()).hexdigest()
+    found = index_key(function, f"loops, {derivatives} derivatives, {digest}")
+    if found is None:
+        return None
+    key, text = found
+    record = write_record(key, text, every, True)
+    if record is None:
+        return None
+    files = {**code.files, "derivatives.c": source(every, record)}
+    if code.value:
+        return cached_library(files, FAST_FLAGS, common=code.common)
+    return indexed_library(key, lambda: kernel_library([function], files, code.common))
 
 
 def _built(
@@ -132,9 +194,9 @@ def fetch_derivatives(record: str, number: int, table: int) -> None:
         CompilerError: the file has gone, or the compiler refused the code.
         ModelError: it cannot be written as C.
     """
-    function, order, fast = read_record(Path(record))
-    every = derivatives_of(function.name(), order)
+    given, every, fast = read_record(Path(record))
     part = every[number]
+    function = given(part)
 
     def make() -> Path | None:
         if not part.pattern:

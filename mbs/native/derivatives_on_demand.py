@@ -4,7 +4,8 @@ CasADi finds the derivatives of an external Function `f` by the names `jac_f`, `
 in the library of `f`, whoever asks: a call of `jacobian`, a solver, a graph with a call of `f` in
 it, in this process or in one that a Function was sent to. To write and compile them takes ten times
 as long as `f`. So the library has these names, and behind them what asks Python for the true code
-when it is first called; Python finds the Function in a file of the cache.
+when it is first called; Python finds the Function in a file of the cache, or makes it where it was
+promised in this process.
 """
 
 from __future__ import annotations
@@ -12,11 +13,11 @@ from __future__ import annotations
 import ctypes
 import functools
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from importlib import resources
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi
 
@@ -82,10 +83,29 @@ def _derivative(function: casadi.Function, name: str) -> casadi.Function:
         return function
     way, _, rest = name.partition("_")
     inner = _derivative(function, rest)
+    if way == _BY_PARAMETERS:
+        return _by_parameters(inner, name)
     return inner.jacobian() if way == "jac" else getattr(inner, _WAYS[way])(1)
 
 
 _WAYS = {"fwd1": "forward", "adj1": "reverse"}
+
+_BY_PARAMETERS = "byp"
+
+
+def by_parameters(function: str) -> Derivative:
+    """The derivative of the first output of a Function by its last input, every element of it.
+
+    Args:
+        function: its name.
+    """
+    return Derivative(f"{_BY_PARAMETERS}_{function}")
+
+
+def _by_parameters(function: casadi.Function, name: str) -> casadi.Function:
+    symbols: Any = function.sx_in() if function.is_a("SXFunction") else function.mx_in()
+    slope = casadi.densify(casadi.jacobian(function.call(symbols)[0], symbols[-1]))
+    return casadi.Function(name, symbols, [slope], function.name_in(), ["slope"], {"cse": True})
 
 
 def derivatives_of(function: str, order: int) -> list[Derivative]:
@@ -147,17 +167,18 @@ def fill(table: int, library: Path, every: Sequence[Derivative], made: int) -> N
             addresses[k] = ctypes.cast(code[name + end], ctypes.c_void_p).value
 
 
-def write_record(key: str, text: str, order: int, fast: bool) -> Path | None:
+def write_record(key: str, text: str, every: Sequence[Derivative], fast: bool) -> Path | None:
     """The file of a Function whose derivatives are made later; None where it cannot be written.
 
     Args:
         key: distinguishes it from others.
         text: the serialised Function.
-        order: how often it can be differentiated.
+        every: these derivatives.
         fast: of which kind their code is.
     """
     record = cache_dir() / f"{key}{_SUFFIX}"
-    content = f"{order} {int(fast)}\n{text}".encode()
+    parts = (part.name + _ONLY_PATTERN * part.pattern for part in every)
+    content = f"{' '.join((str(int(fast)), *parts))}\n{text}".encode()
     with suppress(OSError, ValueError):
         if read_sealed(record) == content:
             return record
@@ -169,17 +190,53 @@ def write_record(key: str, text: str, order: int, fast: bool) -> Path | None:
     return record
 
 
+_ONLY_PATTERN = "*"
+
+
+class Record(NamedTuple):
+    """What derivatives are made of.
+
+    Attributes:
+        function: gives the Function of that derivative.
+        every: all of the derivatives.
+        fast: of which kind their code is.
+    """
+
+    function: Callable[[Derivative], casadi.Function]
+    every: Sequence[Derivative]
+    fast: bool
+
+
+_PROMISED: dict[Path, Record] = {}
+
+
+def promise(record: Path, content: Record) -> None:
+    """Have derivatives made in this process without a file, in which the equations would stand.
+
+    Args:
+        record: the path that the library has.
+        content: of it.
+    """
+    _PROMISED[record] = content
+
+
 @functools.lru_cache(maxsize=1)  # one derivative is often followed by another
-def read_record(record: Path) -> tuple[casadi.Function, int, bool]:
-    """The Function, the order of its derivatives and the kind of their code.
+def read_record(record: Path) -> Record:
+    """The Function, its derivatives and the kind of their code.
 
     Raises:
         CompilerError: the file has gone or is damaged.
     """
+    if record in _PROMISED:
+        return _PROMISED[record]
     try:
         options, _, text = read_sealed(record).decode().partition("\n")
-        order, fast = map(int, options.split())
-        return casadi.Function.deserialize(text), order, bool(fast)
+        fast, *names = options.split()
+        every = [
+            Derivative(n.removesuffix(_ONLY_PATTERN), n.endswith(_ONLY_PATTERN)) for n in names
+        ]
+        function = casadi.Function.deserialize(text)
+        return Record(lambda _: function, every, bool(int(fast)))
     except (OSError, ValueError, RuntimeError) as error:
         raise CompilerError(
             f"the derivatives of a compiled Function cannot be made: {record} has gone or is"

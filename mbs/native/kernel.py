@@ -8,7 +8,7 @@ import math
 import os
 import platform
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from importlib import resources
 from importlib.resources.abc import Traversable
 from itertools import accumulate
@@ -343,13 +343,16 @@ FAST_FLAGS = (
 
 
 def kernel_library(
-    functions: Sequence[Function], further: Mapping[str, str] | None = None
+    functions: Sequence[Function],
+    further: Mapping[str, str] | None = None,
+    common: Collection[str] = (),
 ) -> Path | None:
     """The library of fast code of Functions with different names.
 
     Args:
         functions: what to compile.
         further: file name to text of what else belongs to it.
+        common: of its C files, those that many libraries have.
 
     Returns:
         path of the library; None when some Function is not made of scalar operations that C has,
@@ -363,7 +366,7 @@ def kernel_library(
     except ModelError:
         return None
     notes = {"processor.h": f"/* {processor()} */\n"}
-    return cached_library({**files, **(further or {}), **notes}, FAST_FLAGS)
+    return cached_library({**files, **(further or {}), **notes}, FAST_FLAGS, common=common)
 
 
 @functools.cache

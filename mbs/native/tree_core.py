@@ -10,14 +10,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from itertools import accumulate
-from pathlib import Path
 
 import casadi
 from casadi import DM, MX, SX, Function, Sparsity
 
 from mbs.native.compiled import generated
-from mbs.native.compiler import cached_library
-from mbs.native.kernel import FAST_FLAGS, function_table, processor
+from mbs.native.derivatives_on_demand import by_parameters
+from mbs.native.kernel import function_table, processor
 
 ROWS = {
     **{"C": 0, "T": 9, "mass": 12, "h": 13, "J": 16, "turn": 22, "slide": 23, "inner": 24},
@@ -177,26 +176,32 @@ def tree_functions(
     return result
 
 
-def tree_library(table: TreeTable, parameters: int, default: Sequence[float] = ()) -> Path:
-    """The library of all models of a mechanism, in CasADi's calling convention.
+COMMON = ("tree_core.c",)
+"""Of the files of `tree_files`, those that all mechanisms have."""
+
+
+def tree_files(table: TreeTable, functions: Mapping[str, Function]) -> dict[str, str]:
+    """C text of models of a mechanism, in CasADi's calling convention.
+
+    Where the table follows from parameters the Jacobians call `byp_idm` and `byp_ddm` for the
+    derivatives by these, of which the text has only declarations.
 
     Args:
         table: of the mechanism.
-        parameters: how many it has.
-        default: CasADi's default of all of them, when there are some.
+        functions: which models: some of `tree_functions`.
 
-    Raises:
-        CompilerError: there is no compiler, or it refused the code.
+    Returns:
+        file name to text, for `FAST_FLAGS`; see `COMMON`.
     """
     runtime = resources.files("mbs.native").joinpath("runtime")
     own = ("tree_core.c", "tree_core.h", "sincos.h", "lanes.h")
     files = {name: runtime.joinpath(name).read_text("utf-8") for name in own}
     # the core is kept by its text, that of its headers, compiler and flags: "native" needs more
     files["lanes.h"] += f"/* {processor()} */\n"
-    files["mechanism.c"] = _source(table, tree_functions(table, parameters, default))
+    files["mechanism.c"] = _source(table, functions)
     if table.dependent is not None:
         files["dependent.c"] = generated([table.dependent])
-    return cached_library(files, FAST_FLAGS, common=["tree_core.c"])
+    return files
 
 
 def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
@@ -204,6 +209,7 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
     dependent = table.dependent
     head = [
         "#include <math.h>",
+        "#include <stdlib.h>",
         "#include <string.h>",
         "#include <stdint.h>",
         '#include "tree_core.h"',
@@ -260,6 +266,8 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
     lines = list(head)
     for name, function in functions.items():
         body, own = _call(name, table, function)
+        if name.startswith("jac_") and dependent is not None:
+            lines += _by_parameters(name.removeprefix("jac_"), function.n_in() - 1)
         lines += [
             f"EXPORT int {name}(const double **arg, double **res, casadi_int *iw, double *w, int"
             " mem) {",
@@ -272,6 +280,34 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
             function_table(function, f"{work} + {before + own}"),
         ]
     return "\n".join([*lines, ""])
+
+
+def _by_parameters(model: str, inputs: int) -> list[str]:
+    """What calls the derivatives of a model by parameters, made when they are first asked for.
+
+    Their work space is not known before, so it is not CasADi's.
+    """
+    name = by_parameters(model).name
+    return [
+        f"int {name}(const double **, double **, casadi_int *, double *, int);",
+        f"int {name}_work(casadi_int *, casadi_int *, casadi_int *, casadi_int *);",
+        f"static int by_parameters_of_{model}(const double **arg, double *out) {{",
+        "  casadi_int a, r, i, w;",
+        f"  if ({name}_work(&a, &r, &i, &w)) return 1;",
+        "  double *work = malloc((w + 1) * sizeof(double));",
+        "  casadi_int *integers = malloc((i + 1) * sizeof(casadi_int));",
+        f"  const double **in = calloc(a + {inputs}, sizeof(double *));",
+        "  double **res = calloc(r + 1, sizeof(double *));",
+        "  int failed = !work || !integers || !in || !res;",
+        "  if (!failed) {",
+        f"    memcpy(in, arg, {inputs} * sizeof(double *));",
+        "    res[0] = out;",
+        f"    failed = {name}(in, res, integers, work, 0);",
+        "  }",
+        "  free(work); free(integers); free(in); free(res);",
+        "  return failed;",
+        "}",
+    ]
 
 
 def _parameter(function: Function) -> str:
@@ -295,13 +331,14 @@ def _call(name: str, table: TreeTable, function: Function) -> tuple[list[str], i
 def _jacobian(model: str, table: TreeTable, function: Function) -> tuple[list[str], int]:
     """Derivatives by positions, of those along the velocities; what a tree lets be zero left out.
 
-    Derivatives by parameters, which the core does not have, are NaN.
+    Derivatives by parameters, which the core does not have, are those of the equations.
     """
     lines = []
     if "p" in function.name_in():
-        count = function.nnz_out(3)
-        value = "0" if table.dependent is None else "NAN"
-        lines.append(f"  if (res[3]) for (int k = 0; k < {count}; ++k) res[3][k] = {value};")
+        every = f"memset(res[3], 0, {function.nnz_out(3)} * sizeof(double))"
+        if table.dependent is not None:
+            every = f"if (by_parameters_of_{model}(arg, res[3])) return 1"
+        lines.append(f"  if (res[3]) {{ {every}; }}")
     call = f"  mbs_tree_{model}_derivatives(m, arg[0], arg[1], arg[2],"
     pattern = jacobian_pattern(table, model)
     if pattern.is_dense and table.plain:

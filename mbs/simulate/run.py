@@ -27,7 +27,7 @@ from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.files import read_sealed, write_sealed
 from mbs.loops.analysis import rows_at
 from mbs.loops.closure import least_upright, rolling_discs
-from mbs.loops.configuration import Values, start
+from mbs.loops.configuration import Values, start, start_position, start_velocity
 from mbs.loops.examine import row_independence
 from mbs.loops.velocity import constraint_jacobian, scales
 from mbs.models.contacts import KINDS, Contacts, contacts_of, require_lasting_rows, require_undriven
@@ -1191,21 +1191,30 @@ def _simulator_of(*state: Any) -> Simulator:
 
 
 def _started(system: System, q0: Values, v0: Values, p: Array) -> tuple[Array, Array]:
-    """The start of a motion; the last few are kept, for the next motion from the same one."""
-    named = [one.name for one in system.parameters]
+    """The start of a motion; the last few are kept, for the next motion from the same one.
 
-    def build() -> tuple[Array, Array]:
-        return start(system, q0, v0, dict(zip(named, _own(system, p), strict=True)))
-
+    So are positions alone: motions that differ in their velocities close the loops once.
+    """
+    own = _own(system, p)
+    named = dict(zip((one.name for one in system.parameters), own, strict=True))
     try:
-        key = tuple(
+        positions, velocities = (
             tuple(sorted(dict(given).items())) if isinstance(given, Mapping) else given
             for given in (q0, v0)
         )
-        hash(key)
+        hash((positions, velocities))
     except TypeError:  # lists, arrays, and what is refused
-        return build()
-    found: tuple[Array, Array] = system.recent("starts", (*key, *_own(system, p)), build, _KEPT)
+        return start(system, q0, v0, named)
+
+    def position() -> Array:
+        return start_position(system, q0, named)
+
+    def build() -> tuple[Array, Array]:
+        q: Array = system.recent("start positions", (positions, *own), position, _KEPT)
+        return q, start_velocity(system, q, v0, named)
+
+    key = (positions, velocities, *own)
+    found: tuple[Array, Array] = system.recent("starts", key, build, _KEPT)
     return found
 
 
@@ -1276,7 +1285,7 @@ def run(
             what was reached.
         Interrupted: control-C was pressed; a KeyboardInterrupt whose `result` has what was reached.
     """
-    simulator = Simulator(system, tau=tau, motion=motion, u=u, method=method)
+    simulator = simulator_of(system, tau=tau, motion=motion, u=u, method=method)
     return simulator(
         duration,
         q0=q0,
@@ -1287,6 +1296,32 @@ def run(
         tolerance=tolerance,
         quiet=quiet,
     )
+
+
+def simulator_of(system: System, inputs: Sequence[str] = (), **laws: Any) -> Simulator:
+    """What runs a motion under these laws; where they are numbers, the one of the last such run.
+
+    Args:
+        system: open or closed.
+        inputs: as of `Simulator`.
+        laws: likewise, and the method.
+    """
+
+    def build() -> Simulator:
+        return Simulator(system, inputs, **laws)
+
+    require_system(system)
+    key = list(inputs)
+    for name, law in laws.items():
+        if law is None or type(law) is str:
+            key.append(f"{name} {law}")
+            continue
+        # a function may say something else in the next call
+        if type(law) is not dict or any(type(value) not in (int, float) for value in law.values()):
+            return build()
+        key.append(f"{name} {law}")  # every digit of the numbers, and the signs of zeros
+    found: Simulator = system.recent("simulators", tuple(key), build, _KEPT)
+    return found
 
 
 def _first_bias(system: System, x0: Array, inputs: Function | None, p: Array) -> Array:

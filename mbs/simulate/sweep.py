@@ -32,7 +32,7 @@ from mbs.progress import progress
 from mbs.result import Result, optional_module
 from mbs.simulate.fmu import fmu
 from mbs.simulate.fmu_variables import numbers_of
-from mbs.simulate.run import Simulator, run
+from mbs.simulate.run import run, simulator_of
 from mbs.text import did_you_mean, quoted
 
 # The cases of a parameter study, and the folder that keeps their results.
@@ -592,7 +592,7 @@ class _Run:
         inputs |= given.pop("u", {})
         merged = _merge(options, given)
         laws = {name: merged.pop(name) for name in _LAWS if name in merged}
-        simulator = Simulator(self.system, list(inputs), **laws)
+        simulator = simulator_of(self.system, list(inputs), **laws)
         return simulator(quiet=True, inputs=inputs, **merged)
 
 

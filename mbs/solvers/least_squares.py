@@ -90,7 +90,7 @@ def _reflect(W: Array) -> None:
     W[0, 0] = first
 
 
-_MANY = 100
+MANY = 100
 """Unknowns from which a sparse matrix is worth its own arithmetic: pivots by length fill it."""
 _FULL = 0.1
 """Part of the elements that are not zero in a matrix that is sparse."""
@@ -104,7 +104,30 @@ _FILTERED = 2
 damping: each leaves 1e-3 of it."""
 
 
-def sparse_solution(A: Array, b: Array) -> Array:
+@dataclass(frozen=True, slots=True, eq=False)
+class Entries:
+    """A sparse matrix by its elements, each of which stands there once.
+
+    Attributes:
+        rows: (k,) integers.
+        columns: likewise.
+        values: (k,), zeros among them.
+        shape: of the matrix.
+    """
+
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    values: Array
+    shape: tuple[int, int]
+
+    def dense(self) -> Array:
+        """The matrix with its zeros."""
+        full = np.zeros(self.shape)
+        full[self.rows, self.columns] = self.values
+        return full
+
+
+def sparse_solution(A: Entries, b: Array) -> Array:
     """The shortest x (n,) of those that bring A x (m,) nearest to b, for large sparse matrices.
 
     Its time is proportional to the number of unknowns where they are tied to few others, as in
@@ -117,14 +140,14 @@ def sparse_solution(A: Array, b: Array) -> Array:
         A: (m, n).
         b: (m,).
     """
-    seen = A.any(axis=1)
-    A, b = A[seen], b[seen]
-    rows, columns = A.nonzero()
-    J = DM.triplet(rows.tolist(), columns.tolist(), DM(A[rows, columns].tolist()), *A.shape)
+    there = A.values != 0
+    seen, rows = np.unique(A.rows[there], return_inverse=True)
+    places, n = (rows.tolist(), A.columns[there].tolist()), A.shape[1]
+    J = DM.triplet(*places, DM(A.values[there].tolist()), len(seen), n)
     S = casadi.mtimes(J, J.T)
-    damping = _DAMPED * float(casadi.norm_inf(S))
-    D, LT, order = casadi.ldl(S + damping * DM.eye(len(A)))
-    x, goal = DM.zeros(A.shape[1]), DM(b.tolist())
+    damping = _DAMPED * max(map(abs, S.nonzeros()), default=0.0)
+    D, LT, order = casadi.ldl(S + damping * DM.eye(len(seen)))
+    x, goal = DM.zeros(n), DM(b[seen].tolist())
     for _ in range(_SOLUTIONS):
         left = goal - casadi.mtimes(J, x)
         for _ in range(_FILTERED):
@@ -137,8 +160,9 @@ def sparse_solution(A: Array, b: Array) -> Array:
 
 
 Vector = NDArray[np.float64]
-Residual = Callable[[Vector], tuple[Vector, Vector]]
-"""x -> residual (m,), Jacobian (m, n)."""
+Jacobian = Vector | Entries
+Residual = Callable[[Vector], tuple[Vector, Jacobian]]
+"""x -> residual (m,), Jacobian (m, n), as its elements where most of it is zero."""
 
 _STALLED = 1e-14
 """Length of a step [rad or m] that changes no digit of positions of size one that could matter."""
@@ -198,8 +222,7 @@ def gauss_newton(
         reached = bool((size <= tolerance).all())
         if reached and (size <= last_digits).all():
             break
-        large = J.shape[1] >= _MANY and np.count_nonzero(J) < _FULL * J.size
-        step = sparse_solution(J, -r) if large else smallest_solution(J, -r, rank_tolerance)
+        step = _step(J, -r, rank_tolerance)
         length = 1.0
         while length > (0.5 if reached else 1e-6):  # beyond the tolerance one step, if it helps
             trial = x + length * step
@@ -218,13 +241,28 @@ def gauss_newton(
     return LeastSquaresResult(x, norm, bool((np.abs(r) <= tolerance).all()))
 
 
+def _step(J: Jacobian, b: Vector, rank_tolerance: float) -> Vector:
+    """The shortest x that brings J x nearest to b."""
+    m, n = J.shape
+    values = J.values if isinstance(J, Entries) else J
+    if n >= MANY and np.count_nonzero(values) < _FULL * m * n:
+        return sparse_solution(J if isinstance(J, Entries) else _entries(J), b)
+    return smallest_solution(J.dense() if isinstance(J, Entries) else J, b, rank_tolerance)
+
+
+def _entries(J: Vector) -> Entries:
+    rows, columns = J.nonzero()
+    return Entries(rows, columns, J[rows, columns], J.shape)
+
+
 def _norm(x: Vector) -> float:
     """Its sum has one order, other than that of a dot product."""
     return math.sqrt(_sum(x * x))
 
 
-def _finite(r: Vector, J: Vector) -> bool:
-    return bool(np.isfinite(r).all() and np.isfinite(J).all())
+def _finite(r: Vector, J: Jacobian) -> bool:
+    values = J.values if isinstance(J, Entries) else J
+    return bool(np.isfinite(r).all() and np.isfinite(values).all())
 
 
 # The smallest sum of squares, where no root is near.
@@ -239,7 +277,7 @@ _SETTLED = 1e-16
 
 
 def levenberg_marquardt(
-    function: Residual, start: Vector, *, iterations: int = 300
+    function: Callable[[Vector], tuple[Vector, Vector]], start: Vector, *, iterations: int = 300
 ) -> LeastSquaresResult:
     """A local minimum of r' r; it is reached too where the Jacobian loses rank at it.
 

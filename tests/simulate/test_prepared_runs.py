@@ -255,3 +255,36 @@ def test_code_of_a_user_is_never_taken_from_an_earlier_process(disk, tmp_path):
     for other in ends[2:]:
         assert [line.split()[1] for line in other] == ["True", "True"]
     assert len({float(end.split()[0]) for pair in ends for end in pair}) == 3
+
+
+def test_a_run_keeps_what_it_prepared_for_numbers_not_for_functions(monkeypatch):
+    made, build = [], run_module.Simulator
+    monkeypatch.setattr(run_module, "Simulator", lambda *a, **k: made.append(a) or build(*a, **k))
+    system = mbs.load("planar_2r").assemble()
+    results = [swing(system, tau=tau) for tau in (None, {"q1": 1.0}, {"q1": 1.0}, None)]
+    assert len(made) == 2
+    assert np.array_equal(results[0].values, results[3].values)
+    assert np.array_equal(results[1].values, results[2].values)
+    assert not np.array_equal(results[0].values, results[1].values)
+    swing(system, tau={"q1": 1.0 + 1e-15})
+    swing(system, tau={"q1": 1.0}, method="rodas")
+    assert len(made) == 4
+    # a function may say something else in the next call
+    torque = [1.0]
+    pushed = [swing(system, tau=lambda t, q, v: [torque[0], 0]) for torque[0] in (1.0, 2.0)]
+    assert len(made) == 6
+    assert np.array_equal(pushed[0].values, results[1].values)
+    assert not np.array_equal(pushed[1].values, results[1].values)
+
+
+def test_motions_that_differ_in_velocities_close_the_loops_once(monkeypatch):
+    closed, close = [], run_module.start_position
+    count = lambda *a: closed.append(a) or close(*a)  # noqa: E731
+    monkeypatch.setattr(run_module, "start_position", count)
+    system, other = (mbs.load("four_bar").assemble() for _ in range(2))
+    name = system.speeds[system.active[0]].name
+    starts = [dict(v0={name: 1.0}), dict(v0={name: 2.0}), dict(q0={name: 0.3}, v0={name: 2.0})]
+    found = [swing(system, **one) for one in starts]
+    assert len(closed) == 2
+    for one, result in zip(reversed(starts), reversed(found), strict=True):
+        assert np.array_equal(swing(other, **one).values, result.values)

@@ -1,0 +1,265 @@
+"""A big open tree as a table of numbers, and the models that loop over it in place of equations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import casadi
+from casadi import SX, Function
+
+from mbs.assembly import System
+from mbs.assembly.model_function import default_in
+from mbs.assembly.tree import Link, quaternion_slices
+from mbs.components.joints import Motion
+from mbs.native.compiled import LoopCode
+from mbs.native.tree_core import (
+    COMMON,
+    ROWS,
+    TreeTable,
+    dependent_numbers,
+    place_of,
+    tree_files,
+    tree_functions,
+)
+from mbs.spatial import elements
+
+
+def unknown_to_core(system: System) -> str:
+    """Why the tree core has no models of a system, as the end of a sentence; empty when it has."""
+    if system.is_closed:
+        return (
+            "tree_core is for open trees and this system has loops or couplings;"
+            " use mbs.models.inverse_dynamics and direct_dynamics"
+        )
+    if not system.nv:
+        return "nothing moves, so that tree_core has no models of it"
+    for part in system.parts:
+        element = part.element
+        if not element.drives and (element.acts or element.binds):
+            return (
+                f"component {part.name} ({type(element).__name__}) has equations of"
+                " its own, which tree_core does not know; use mbs.models.inverse_dynamics and"
+                " direct_dynamics"
+            )
+    for j, link in enumerate(system.tree.links):
+        if link.rotor is not None and link.rotor.carrier not in (j, link.antecedent, -1):
+            return (
+                f"the rotor of {link.name} is on neither of the links of the joint,"
+                " which tree_core does not know; use mbs.models.inverse_dynamics"
+            )
+    return ""
+
+
+# Where loops over the links replace equations written out.
+
+
+_LONGEST = {"inertia": 30, "idm_derivatives": 13, "ddm_derivatives": 16, "idm": 100}
+"""Velocities from the base to a leaf up to which straight lines are faster: measured on chains
+(docs/speed.md). Branches count by themselves: their runs are what fills the lanes."""
+
+_LONGEST_OF_JACOBIAN = {"idm": 9, "ddm": 8}
+"""The same for the Jacobian by q, v and a or tau."""
+
+_MANY = 60_000
+"""Operations of straight lines beyond which loops are taken in any case: these compile for ten
+seconds and more, and no cache of a processor holds them."""
+
+
+@dataclass(frozen=True, slots=True)
+class TreeLoops:
+    """What `mbs.native.compiled` may take for a model of a tree.
+
+    Attributes:
+        system: the tree.
+        name: of the model in the core.
+    """
+
+    system: System
+    name: str
+
+    def code(self, function: Function, derivatives: int) -> LoopCode | None:
+        """C text of what loops do better than the equations; None where that is nothing.
+
+        Quaternions are left to the equations: off unit length these have other values, which
+        solvers that move q freely meet.
+
+        Args:
+            function: the equations.
+            derivatives: how often the answer will be differentiated.
+        """
+        system, name = self.system, self.name
+        if function.name() != name or quaternion_slices(system.tree) or unknown_to_core(system):
+            return None
+        longest = _longest_branch(system)
+        many = function.n_instructions() > _MANY
+        value = many or longest > _LONGEST.get(name, longest)
+        first = name in _LONGEST_OF_JACOBIAN and derivatives > 0
+        jacobian = first and (value or longest > _LONGEST_OF_JACOBIAN[name])
+        if not (value or jacobian):
+            return None
+        table = table_of(system)
+        shapes = shapes_of(system, table)
+        if _shape(shapes[name]) != _shape(function):
+            return None
+        names = [name] * value + [f"jac_{name}"] * jacobian
+        files = tree_files(table, {x: shapes[x] for x in names})
+        return LoopCode(files, COMMON, value, jacobian, jacobian and table.dependent is not None)
+
+
+def _shape(function: Function) -> list[object]:
+    """Names and sizes of inputs and outputs."""
+    return [
+        *((function.name_in(k), function.size_in(k)) for k in range(function.n_in())),
+        *((function.name_out(k), function.size_out(k)) for k in range(function.n_out())),
+    ]
+
+
+def _longest_branch(system: System) -> int:
+    """Velocities from the base to the leaf that has most of them before it."""
+    behind: list[int] = []
+    for link in system.tree.links:
+        before = behind[link.antecedent] if link.antecedent >= 0 else 0
+        behind.append(before + link.motion.nv)
+    return max(behind)
+
+
+def shapes_of(system: System, table: TreeTable) -> dict[str, Function]:
+    """Functions that have the names and shapes of those of the core, and no content."""
+    return tree_functions(table, len(system.parameters), default_in(system, 1)[1:])
+
+
+# The table of a tree: its links depth-first, a node for every velocity.
+
+
+def _depth_first(links: Sequence[Link]) -> list[int]:
+    """The links in an order in which every subtree follows its joint without a gap."""
+    behind: list[list[int]] = [[] for _ in links]
+    waiting: list[int] = []
+    for j, link in enumerate(links):
+        (behind[link.antecedent] if link.antecedent >= 0 else waiting).append(j)
+    order: list[int] = []
+    waiting.reverse()
+    while waiting:
+        j = waiting.pop()
+        order.append(j)
+        waiting += reversed(behind[j])
+    return order
+
+
+def table_of(system: System) -> TreeTable:
+    """The tree in numbers."""
+    links = system.tree.links
+    order = _depth_first(links)
+    lists = _lists(links, order)
+    numbers = [0.0] * place_of(0, -(-system.nv // 8) * 8) + [0.0] * 3
+    dependent: dict[int, SX] = {}
+
+    def put(at: int, value: SX) -> None:
+        if value.is_constant():
+            numbers[at] = float(value)
+        else:
+            numbers[at], dependent[at] = float("nan"), value
+
+    last = 0
+    for j in order:
+        link = links[j]
+        first, last = last, last + link.motion.nv
+        _put_link(lambda row, node, value: put(place_of(row, node), value), link, j, first)
+    for k, value in enumerate(elements(system.tree.gravity)):
+        put(len(numbers) - 3 + k, value)
+    return TreeTable(
+        size=system.nv,
+        positions=system.nq,
+        lists=lists,
+        numbers=numbers,
+        places=list(dependent),
+        dependent=dependent_numbers(list(dependent.values()), system.p) if dependent else None,
+    )
+
+
+_ONE = SX(1)
+_UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+
+
+def _put_link(put: Callable[[int, int, SX], None], link: Link, j: int, first: int) -> None:
+    """The numbers of the nodes of a link, the first of which is given."""
+    last, rotor = first + link.motion.nv - 1, link.rotor
+    pose, body = link.pose(), link.inertia
+    tensor = casadi.vertcat(*(body.J[r, c] for r, c in _UPPER))
+    fixed = (("C", pose.R), ("T", pose.p), ("mass", body.m), ("h", body.ms), ("J", tensor))
+    for name, value in fixed:
+        for k, element in enumerate(elements(SX(value))):
+            put(ROWS[name] + k, last, element)
+    # what a joint itself needs, the same for all of its velocities
+    each = {name: getattr(link, name) for name in ("Ia", "Fv", "stiffness", "rest", "Fs")}
+    each["width"] = link.Fs_width
+    if rotor is not None:
+        each["Ia"] = link.Ia + rotor.seen_at_joint
+    each |= {name: _ONE for name, motion in _KINDS.items() if link.motion is motion}
+    if link.antecedent >= 0:
+        each["inner"] = _ONE
+    for node in range(first, last + 1):
+        for name, value in each.items():
+            put(ROWS[name], node, value)
+    if rotor is not None and rotor.carrier >= 0:
+        for k, element in enumerate(elements(rotor.momentum)):
+            put(ROWS["spin"] + k, first, element)
+        put(ROWS["own"], first, SX(int(rotor.carrier == j)))
+
+
+_KINDS = {"turn": Motion.REVOLUTE, "slide": Motion.PRISMATIC}
+
+
+_KIND = {Motion.REVOLUTE: 0, Motion.PRISMATIC: 1, Motion.SPHERICAL: 2, Motion.FREE: 2}
+"""The kind of the first motion about an axis, as tree_core.h counts; the slides of free joints come
+first, and are counted last."""
+
+
+def _lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:
+    """The indices of the nodes of a tree."""
+    names = ("before", "link", "end", "first", "last", "kind", "q_at", "v_at", "runs_from", "runs")
+    result: dict[str, list[int]] = {name: [] for name in (*names, "joints", "rotor", "rub")}
+    first, last = dict[int, int](), {-1: -1}
+    ancestry: dict[int, list[int]] = {-1: []}
+    size = 0
+    for j in order:
+        link, count = links[j], links[j].motion.nv
+        i = link.antecedent
+        first[j], last[j] = size, size + count - 1
+        ancestry[j] = _extended(ancestry[i], size, size + count)
+        for h in range(count):
+            result["before"].append(size - 1 if h else last[i])
+            result["link"].append(last[i])
+            result["first"].append(first[j])
+            result["last"].append(last[j])
+            result["kind"].append(_KIND[link.motion] + (h + 3) % count)
+            result["q_at"].append(link.q.start if count == 1 else -1)
+            result["v_at"].append(link.v.start + h)
+            result["runs_from"].append(len(result["runs"]) // 2)
+            result["runs"] += ancestry[i]
+            if not link.Fs.is_zero():
+                result["rub"].append(size)
+            size += 1
+        if count > 1:
+            result["joints"] += [first[j], count, link.q.start]
+        if link.rotor is not None and link.rotor.carrier >= 0:
+            result["rotor"] += [first[j], last[link.rotor.carrier]]
+    result["runs_from"].append(len(result["runs"]) // 2)
+    end = dict(last)
+    for j in reversed(order):
+        i = links[j].antecedent
+        if i >= 0:
+            end[i] = max(end[i], end[j])
+    before = result["before"]
+    ahead = {b for k, b in enumerate(before) if b != k - 1}
+    result["fork"] = [int(k in ahead) for k in range(size)]
+    result["end"] = [end[j] + 1 for j in order for _ in range(links[j].motion.nv)]
+    return result
+
+
+def _extended(runs: list[int], first: int, end: int) -> list[int]:
+    """Runs of nodes with another one behind them."""
+    if runs and runs[-1] == first:
+        return [*runs[:-1], end]
+    return [*runs, first, end]

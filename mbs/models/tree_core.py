@@ -160,7 +160,7 @@ def _require_known(system: System) -> None:
         raise ModelError(f"{system.name}: nothing moves, so that tree_core has no models of it")
     for part in system.parts:
         element = part.element
-        if not element.drives and (element.acts or element.binds):
+        if not element.drives and (element.acts or element.binds or element.switches):
             raise ModelError(
                 f"{system.name}: component {part.name} ({type(element).__name__}) has equations of"
                 " its own, which tree_core does not know; use mbs.models.inverse_dynamics and"

@@ -107,6 +107,9 @@ from mbs.components.rotational import (
     OneWayClutch,
     PlanetaryGear,
     QuadraticSpeedTorque,
+    RigidBrake,
+    RigidClutch,
+    RigidOneWayClutch,
     ShaftSpringDamperSeries,
 )
 from mbs.components.sensors import (
@@ -210,6 +213,9 @@ __all__ = [
     "RelativeSensor",
     "Revolute",
     "RigidBody",
+    "RigidBrake",
+    "RigidClutch",
+    "RigidOneWayClutch",
     "RigidStop",
     "Rod",
     "RollingDisc",

@@ -404,17 +404,16 @@ def _collect(system: System, rows: list[_Row], element: ContactElement, q: SX, v
     E = SX(casadi.sparsify(casadi.jacobian(w, v)))
     at_rest = casadi.simplify(casadi.substitute(w, v, SX.zeros(system.nv)))
     if not E.nnz():
+        kind = type(element.part.element).__name__
         raise ModelError(
-            f"{system.name}: nothing moves what {element.name} ({type(element.part.element).__name__})"
-            " holds; let it act between bodies or shafts that move against each other"
+            f"{system.name}: nothing moves what {element.name} ({kind}) holds; let it act between"
+            " bodies or shafts that move against each other"
         )
-    number = None
-    if at_rest.is_zero() and E.nnz() == 1 and E.nonzeros()[0].is_one():
-        number = int(E.sparsity().get_triplet()[1][0])
+    number, key = None, tuple[Any, ...]((element.name, "of its own"))
     if at_rest.is_zero() and E.is_constant():
-        key: tuple[Any, ...] = (*E.sparsity().get_triplet()[1], *map(float, E.nonzeros()))
-    else:
-        key = (element.name, "of its own")
+        columns, factors = E.sparsity().get_triplet()[1], DM(E).nonzeros()
+        key = (*columns, *factors)
+        number = int(columns[0]) if factors == [1.0] else None
     kind = "friction" if isinstance(element.law, Friction) else "stop"
     row = next((row for row in rows if row.key == key and getattr(row, kind) is None), None)
     if row is None:
@@ -460,12 +459,12 @@ def _anchor(system: System, row: _Row, q: SX, v: SX) -> SX | None:
         return SX(row.stop.law.gap)
     at_rest = casadi.simplify(casadi.substitute(row.velocity, v, SX.zeros(system.nv)))
     columns = row.E.sparsity().get_triplet()[1]
-    links = [x for x in system.tree.links for k in columns if x.v.start <= k < x.v.stop]
+    links = [x for k in columns for x in system.tree.links if x.v.start <= k < x.v.stop]
     simple = all(x.q.stop - x.q.start == x.v.stop - x.v.start for x in links)
     if not at_rest.is_zero() or casadi.depends_on(row.E, q) or not simple:
         return None
-    moved = zip(row.E.nonzeros(), columns, links, strict=True)
-    return sum((SX(f) * q[x.q.start + k - x.v.start] for f, k, x in moved), SX(0))
+    moved = zip(columns, links, strict=True)
+    return sum((row.E[0, k] * q[x.q.start + k - x.v.start] for k, x in moved), SX(0))
 
 
 def _require_unread(system: System, part: AttachedPart) -> None:

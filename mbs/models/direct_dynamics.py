@@ -318,9 +318,7 @@ def _numbers(system: System, prescribed: Sequence[str]) -> tuple[int, ...]:
     return numbers
 
 
-def are_independent(
-    system: System, numbers: tuple[int, ...], *rows: NDArray[np.float64]
-) -> bool:
+def are_independent(system: System, numbers: tuple[int, ...], *rows: NDArray[np.float64]) -> bool:
     """Whether the loops leave these velocities, and rows (1, nv), independent as assembled."""
     if not system.is_closed and not rows:
         return True

@@ -107,8 +107,8 @@ def _positions(system: System) -> tuple[Array, Array]:
 
 def _number(limit: SX | None, otherwise: float) -> float:
     """A limit that is a number; a symbol has none yet."""
-    known = limit is not None and SX(limit).is_constant()
-    return float(SX(limit)) if known else otherwise
+    value = SX(otherwise) if limit is None else SX(limit)
+    return float(value) if value.is_constant() else otherwise
 
 
 def _magnitudes(system: System, what: str, given: Largest) -> list[tuple[int, float]]:

@@ -329,19 +329,19 @@ class _Check:
                 )
         if law.unit not in (None, "N", "N.m"):
             raise AssemblyError(
-                f"{self._title}: the effort of {label!r} has the unit {quoted(law.unit)}; use 'N'"
+                f"{self._title}: the effort{_of(label)} has the unit {quoted(law.unit)}; use 'N'"
                 " or 'N.m'"
             )
         if isinstance(law, Friction):
             self._contact_velocity("slip", label, law.slip)
-            limit = self._value(f"limit of {label!r}", law.limit)
+            limit = self._value(f"limit{_of(label)}", law.limit)
             sticking = limit
             if law.sticking is not None:
-                sticking = self._value(f"sticking of {label!r}", law.sticking)
+                sticking = self._value(f"sticking{_of(label)}", law.sticking)
             told = "friction is a finite effort, never below zero; write casadi.fmax"
-            self._require_range(f"the limit of {label!r}", limit, 0.0, np.inf, told)
+            self._require_range(f"the limit{_of(label)}", limit, 0.0, np.inf, told)
             told = "at rest friction holds at least its limit, so make it larger"
-            self._require_range(f"sticking of {label!r}", sticking, limit, np.inf, told)
+            self._require_range(f"sticking{_of(label)}", sticking, limit, np.inf, told)
         elif isinstance(law, OneWay):
             self._contact_velocity("velocity", label, law.velocity)
         else:
@@ -349,7 +349,7 @@ class _Check:
 
     def _contact_velocity(self, what: str, label: str, given: Any) -> None:
         """A velocity is linear in velocities; what it is at rest follows from parameters."""
-        name = f"the {what} of {label!r}"
+        name = f"the {what}{_of(label)}"
         value = self._value(name, given)
         signals = casadi.vertcat(self.system.z, self.system.u, *self.inputs.values())
         self._require_free_of(value, name, signals, "states or inputs")
@@ -368,7 +368,7 @@ class _Check:
 
     def _stop(self, label: str, law: Stop) -> None:
         """A gap of positions, limits and numbers of parameters."""
-        name = f"the gap of {label!r}"
+        name = f"the gap{_of(label)}"
         gap = self._value(name, law.gap)
         signals = casadi.vertcat(self.system.z, self.system.u, *self.inputs.values())
         self._require_free_of(gap, name, signals, "states or inputs")
@@ -384,15 +384,15 @@ class _Check:
         for field in ("lower", "upper", "restitution", "rest_speed"):
             given = getattr(law, field)
             if given is not None:
-                values[field] = self._value(f"{field} of {label!r}", given)
-                self._require_free_of(values[field], f"{field} of {label!r}", every, "the motion")
+                values[field] = self._value(f"{field}{_of(label)}", given)
+                self._require_free_of(values[field], f"{field}{_of(label)}", every, "the motion")
         told = "give a number between 0 and 1"
-        self._require_range(f"restitution of {label!r}", values["restitution"], 0.0, 1.0, told)
+        self._require_range(f"restitution{_of(label)}", values["restitution"], 0.0, 1.0, told)
         told, slowest = "give more than zero", values["rest_speed"]
-        self._require_range(f"rest_speed of {label!r}", slowest, NONZERO, np.inf, told)
+        self._require_range(f"rest_speed{_of(label)}", slowest, NONZERO, np.inf, told)
         if "lower" in values and "upper" in values:
             told, high = "give more than lower", values["upper"]
-            self._require_range(f"upper of {label!r}", high, values["lower"], np.inf, told)
+            self._require_range(f"upper{_of(label)}", high, values["lower"], np.inf, told)
 
     def _require_range(
         self, what: str, value: SX, least: SX | float, greatest: SX | float, told: str
@@ -404,9 +404,7 @@ class _Check:
         for point in self._probes():
             x, low, high = (float(one) for one in found(*point))
             if not np.isfinite(x) or not low <= x <= high:
-                raise AssemblyError(
-                    f"{self._title}: {what} is {x:.6g} at a random state; {told}"
-                )
+                raise AssemblyError(f"{self._title}: {what} is {x:.6g} at a random state; {told}")
 
     def _scalar(self, method: str) -> SX | None:
         if not self.element.has(method):
@@ -565,6 +563,11 @@ class _Check:
     @property
     def _title(self) -> str:
         return f"{self.part.name} ({type(self.element).__name__})"
+
+
+def _of(label: str) -> str:
+    """Which friction or stop is meant, in words."""
+    return f" of {label!r}" if label else ""
 
 
 def _kind(value: Any) -> str:

@@ -23,6 +23,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.system import Packed, packed, unpacked
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
+from mbs.components.custom import OneWay
 from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.files import read_sealed, write_sealed
 from mbs.loops.analysis import rows_at
@@ -30,7 +31,6 @@ from mbs.loops.closure import least_upright, rolling_discs
 from mbs.loops.configuration import Values, start
 from mbs.loops.examine import row_independence
 from mbs.loops.velocity import constraint_jacobian, scales
-from mbs.components.custom import OneWay
 from mbs.models.contacts import (
     KINDS,
     ContactElement,

@@ -1,27 +1,21 @@
 """Dry friction, rigid stops and freewheels of components of one's own, against hand formulas."""
 
 import casadi
-import fmpy
 import numpy as np
 import pytest
-from support.contact_mechanisms import FIVE_GUESS, five_bar, four_bar
-from support.messages import refused
+from support.contact_mechanisms import five_bar, four_bar
 
 import mbs
 from mbs.components import (
-    AbsoluteSensor,
     Body,
     CoulombFriction,
     Custom,
-    Free,
     PointMass,
     Prismatic,
     Revolute,
     RigidStop,
-    Spring,
     custom,
 )
-from mbs.errors import AssemblyError, ModelError
 
 G = 9.81
 
@@ -152,7 +146,7 @@ def test_friction_on_a_sum_of_two_coordinates_stops_it_and_then_holds_it():
     system, inverse = two_on_a_rope(), 1 / 2 + 4 / 3
     result = run(system, 2.0, v0={"x": 3.0, "y": 1.0})
     stops = 5.0 / (5.0 * inverse)
-    (time, *what), = result.events
+    ((time, *what),) = result.events
     assert what == ["rope", "rub sticks"]
     assert time == pytest.approx(stops, abs=1e-9)
     t = np.minimum(result.time, stops)
@@ -277,7 +271,9 @@ def test_a_point_that_rubs_brakes_a_pendulum_by_its_lever():
     q, v = result["j.q"], result["j.v"]
     # velocity of the point along x: -0.6 cos q times j's
     w = -0.6 * np.cos(q) * v
-    heat = np.concatenate([[0], np.cumsum(2.0 * np.diff(result.time) * (np.abs(w[1:]) + np.abs(w[:-1])) / 2)])
+    heat = np.concatenate(
+        [[0], np.cumsum(2.0 * np.diff(result.time) * (np.abs(w[1:]) + np.abs(w[:-1])) / 2)]
+    )
     energy = result["kinetic_energy"] + result["potential_energy"]
     np.testing.assert_allclose(energy, energy[0] - heat, atol=1e-4)  # trapezoids of 2 ms
     held = run(system, 1.0, q0={"j": 0.1})
@@ -364,7 +360,9 @@ def test_an_fmu_does_what_run_does(tmp_path, name, fmi, kind):
     allowed = 1e-7 if kind == "CoSimulation" else 1e-5
     shared = [c for c in here.units if c in there.units and c.endswith((".q", ".v", ".effort"))]
     assert any(c.endswith(".effort") for c in shared)
-    compared = [k for k, t in enumerate(here.time) if all(abs(t - e) > 1e-6 for e, *_ in here.events)]
+    compared = [
+        k for k, t in enumerate(here.time) if all(abs(t - e) > 1e-6 for e, *_ in here.events)
+    ]
     rows = [np.flatnonzero(np.abs(there.time - t) < 1e-9)[-1] for t in here.time[compared]]
     for column in shared:
         assert np.abs(there[column][rows] - here[column][compared]).max() < allowed, column

@@ -191,7 +191,7 @@ def _write(contacts: Contacts, motion: tuple[SX, SX], acting: tuple[SX, SX], sta
     after = SX(x)
     after[len(positions) : len(positions) + len(velocities)] = v[list(velocities)]
     for j, (q, number) in enumerate(zip(contacts.positions, contacts.velocities, strict=True)):
-        if number in velocities:
+        if number is not None and number in velocities:
             row = len(positions) + list(velocities).index(number)
             after[row] = casadi.if_else(stuck[j], 0, after[row])
         if q is not None and q in positions:

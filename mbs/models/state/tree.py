@@ -147,7 +147,8 @@ def _touch(
     contacts, modes = touch
     E = casadi.mtimes(contacts.rows(q), casadi.diag(DM(columns)))
     sizes = [
-        1 / casadi.sqrt(casadi.fmax(casadi.sumsqr(E[j, :]), _SMALL)) if k is None
+        1 / casadi.sqrt(casadi.fmax(casadi.sumsqr(E[j, :]), _SMALL))
+        if k is None
         else SX(1 / float(columns[k]))
         for j, k in enumerate(contacts.velocities)
     ]
@@ -165,9 +166,7 @@ def _switch(acting: SX) -> SX:
     return casadi.if_else(acting, _SHARED, 1)
 
 
-def _shortest(
-    J: SX, r: SX, off: SX, first: Array, columns: Array, last: SX
-) -> tuple[SX, SX]:
+def _shortest(J: SX, r: SX, off: SX, first: Array, columns: Array, last: SX) -> tuple[SX, SX]:
     """A short step x with J x = r, by rows that are not nearly dependent, and whether all are.
 
     Args:
@@ -258,16 +257,14 @@ def passage(
     E, bends = SX(0, nv), SX(0, 1)
     if contact is not None:
         modes, contacts = contact.modes, contact.contacts
-        if any(anchor is None for anchor in contacts.anchors):
+        places = [anchor for anchor in contacts.anchors if anchor is not None]
+        if len(places) < len(contacts):
             return None
         stuck, state = modes.stuck, contact.state
         p = casadi.vertcat(p, contact.values)
         braked -= casadi.mtimes(state.rows.T, modes.slide * state.sliding)
-        known = casadi.substitute(
-            [contacts.state.rows, contacts.state.bias, *map(SX, contacts.anchors)],
-            [contacts.q, contacts.v],
-            [q, v],
-        )
+        own = [contacts.state.rows, contacts.state.bias, *places]
+        known: list[SX] = casadi.substitute(own, [contacts.q, contacts.v], [q, v])
         anchors = [stuck[j] * anchor for j, anchor in enumerate(known[2:])]
         E = casadi.mtimes(casadi.diag(stuck), known[0])
         bends = -stuck * known[1]

@@ -294,8 +294,9 @@ def require_undriven(system: System, contacts: Contacts, driven: Sequence[int]) 
             )
     for j, name in enumerate(contacts.names):
         if driven and not _is_independent(system, contacts, driven, j):
+            through = " through the loops" if system.is_closed else ""
             raise ModelError(
-                f"{system.name}: the motions that are prescribed move {name} through the loops, on"
+                f"{system.name}: the motions that are prescribed move {name}{through}, on"
                 " which a rigid stop or Coulomb friction acts; use a JointStop or JointFriction"
                 " there"
             )

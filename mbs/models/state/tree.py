@@ -214,7 +214,10 @@ def passage(
     inputs: SX | None = None,
     given_inputs: SX | None = None,
 ) -> Passage | None:
-    """The functions of passages; None where nothing is lost, or rows bind velocities alone.
+    """The functions of passages; None where nothing is lost.
+
+    They are None as well where rows bind velocities alone, and where contacts act on velocities
+    that are the rate of no known position.
 
     Args:
         system: open or closed.
@@ -308,7 +311,7 @@ def passage(
 
 
 def _without_passages(system: System, point: tuple[SX, SX, SX, SX]) -> Passage:
-    """That of a system with rows on velocities alone: every configuration counts as regular."""
+    """That of a system without passages: every configuration counts as regular."""
     t, X, u, p = point
     nq, nv = system.nq, system.nv
     at = [t, X, SX.sym("z", 0), u, p]
@@ -383,7 +386,7 @@ class TreeState:
         project: `project(t, X, z, u, p) -> (X, residual)`, one Newton step onto the loops.
         start: `start(t, x, z, u, p) -> X` of states x and dependents z of the independent one.
         passage: of rows, forces and regularity.
-        passes: whether it is asked for passages; never where rows bind velocities alone.
+        passes: whether it is asked for passages; see `passage`.
         events: of rigid stops and Coulomb friction; None where there are none.
         rate: `rate(X) -> q'`, the rates of the positions in X.
         states: numbers in X of the states x.
@@ -438,8 +441,10 @@ def tree_state(
     through = passage(
         system, (s.t, X, system.p), SX(tau + load), rates, contact=contact, inputs=s.u
     )
-    if through is None and slips:
-        through = _without_passages(system, (s.t, X, s.u, system.p))
+    whole = [*point[:4], casadi.vertcat(system.p, contact.values) if contact else system.p]
+    passes = through is not None
+    if through is None and (slips or contact):
+        through = _without_passages(system, (s.t, X, s.u, whole[4]))
     if through is None:
         return None
     if contact is None:
@@ -462,7 +467,6 @@ def tree_state(
         few, values = few_modes(contact, system.p, outputs)
         return dense_function(name, [*at, few], values)
 
-    whole = [*point[:4], casadi.vertcat(system.p, contact.values) if contact else system.p]
     rhs = written("tree_rhs", point[:4], [rate, y])
     forces = written("forces", point[:4], through.forces.call(whole))
     events = None
@@ -491,7 +495,7 @@ def tree_state(
         project=written("tree_project", free, [casadi.vertcat(*kept, X[n:]), residual]),
         start=written("tree_start", [s.t, s.x, s.z, inputs], [start]),
         passage=replace(through, rows=rows, forces=forces, regularity=regularity),
-        passes=not slips,
+        passes=passes,
         events=events,
         states=(
             *layout.positions,

@@ -4,18 +4,23 @@ import casadi
 import numpy as np
 import pytest
 from support.contact_mechanisms import five_bar, four_bar
+from support.messages import refused
 
 import mbs
 from mbs.components import (
     Body,
+    Box,
     CoulombFriction,
     Custom,
+    Planar,
     PointMass,
     Prismatic,
     Revolute,
     RigidStop,
+    WrenchSensor,
     custom,
 )
+from mbs.errors import AssemblyError, ModelError
 
 G = 9.81
 
@@ -334,8 +339,164 @@ def test_rows_in_closed_loops_do_what_those_of_coordinates_do(name):
         np.testing.assert_allclose(other[column], one[column], atol=1e-7)
 
 
+class Line(Custom):
+    """Two points rub where their distance changes; the heat is a state."""
+
+    a = custom.frame()
+    b = custom.frame()
+    limit = custom.parameter("N")
+    heat = custom.state("J")
+
+    def frictions(self, at):
+        return {"rub": custom.Friction(at.a.to(at.b).rate, at.limit)}
+
+    def rates(self, at):
+        return {"heat": at.limit * casadi.fabs(at.a.to(at.b).rate)}
+
+
+def rubbed_loop():
+    """A four-bar whose coupler rubs on the ground."""
+    m = mbs.Mechanism("rubbed", gravity=(0, -G, 0))
+    lengths = {"a": 0.3, "b": 0.8, "c": 0.7}
+    a, b, c = (m.add(Box(name, length=x, mass=1.0)) for name, x in lengths.items())
+    m.connect(m.world, Revolute("j1", axis="z"), a.left)
+    m.connect(a.right, Revolute("j2", axis="z", actuated=False), b.left)
+    m.connect(b.right, Revolute("j3", axis="z", actuated=False), c.right)
+    m.connect(m.world.at(0.9, 0, 0), Revolute("j4", axis="z", actuated=False), c.left)
+    m.add(Line("line", m.world.at(0.2, -0.5, 0), b.at(0.1, 0.1, 0), limit=1.5))
+    return m.assemble(guess={"j1": 1.0, "j2": -0.5}, active=("j1",))
+
+
+def test_friction_between_points_of_a_closed_loop_takes_what_its_slip_says():
+    result = run(rubbed_loop(), 2.0, v0={"j1": 4.0}, step=0.005)
+    assert [what for *_, what in result.events] == ["rub slides"] * len(result.events)
+    assert len(result.events) > 3
+    total = result["kinetic_energy"] + result["potential_energy"] + result["line.heat"]
+    assert result["line.heat"][-1] > 1.0
+    assert np.ptp(total) < 1e-8  # J
+
+
+class Edge(Custom):
+    """A point slides along the x axis of its frame alone."""
+
+    point = custom.frame()
+
+    def velocity_rows(self, at):
+        return {"side": casadi.dot(at.point.R[:, 1], at.point.v)}
+
+
+def test_an_fmu_has_stops_beside_rows_that_bind_velocities_alone(tmp_path):
+    m = mbs.Mechanism("sled", gravity=(0, 0, -G))
+    body = m.add(Body("body", mass=1.0, com=(0.1, 0, 0), inertia=(0.1, 0.1, 0.1)))
+    m.connect(m.world, Planar("p", actuated=False), body)
+    m.add(Edge("edge", body))
+    m.add(CoulombFriction("dry", "p.phi", sliding=0.1))
+    system = m.assemble()
+    v0 = {"p.s_x": 1.0, "p.phi": 0.5}
+    here = run(system, 2.0, v0=v0)
+    assert [what for *_, what in here.events] == ["sticks"]
+    path = mbs.export.fmu(system, tmp_path / "sled.fmu")
+    start = {f"{name}.v": value for name, value in v0.items()}
+    there = mbs.simulate.fmu(path, 2.0, start=start, tolerance=1e-10, quiet=True)
+    for name in ("p.s_x.q", "p.s_y.q", "p.phi.q"):
+        assert abs(there[name][-1] - here[name][-1]) < 1e-7
+
+
+def test_where_drives_move_what_slips():
+    class Grip(Custom):
+        a = custom.coordinate()
+        b = custom.coordinate()
+
+        def frictions(self, at):
+            return {"grip": custom.Friction(at.b.v - at.a.v, 6.0)}
+
+    system = rail(Grip("grip", "x", "y"))  # y is 3 kg: it follows up to 2 m/s2
+    follows = run(system, 2.0, motion={"x.a": lambda t: 1.0})
+    np.testing.assert_allclose(follows["y.a"], 1.0, atol=1e-12)
+    np.testing.assert_allclose(follows["x.tau"], 2.0 + 3.0, atol=1e-12)
+    slips = run(system, 2.0, motion={"x.a": lambda t: 3.0})
+    assert slips.events == ((0.0, "grip", "grip slides"),)
+    np.testing.assert_allclose(slips["y.a"], 2.0, atol=1e-12)
+    refused(
+        ModelError,
+        "the motions that are prescribed move grip.grip, on which",
+        by=lambda: run(system, 1.0, motion={"x.a": 0.0, "y.a": 0.0}),
+    )
+
+
+def test_a_point_that_rubs_and_a_sensor_of_joint_forces_are_refused_together():
+    m = mbs.Mechanism("pendulum", gravity=(0, 0, -G))
+    bar = m.add(Body("bar", mass=1.2, com=(0, 0, -0.3), inertia=(0.05, 0.05, 0)))
+    m.connect(m.world, Revolute("j", axis="y"), bar)
+    m.add(Rub("rub", bar.at(0, 0, -0.6), limit=2.0))
+    m.add(WrenchSensor("cut", "j"))
+    told = "sensor cut reads the forces in a joint"
+    refused(ModelError, told, "Rub rub", by=lambda: run(m.assemble(), 1.0))
+
+
+def test_the_report_says_which_models_know_a_component():
+    class Both(OwnFriction):
+        def loads(self, at):
+            return {"joint": -at.joint.q}
+
+    lines = rail(OwnFriction("dry", "x", 1.0), Both("both", "y", 1.0)).report().splitlines()
+    assert lines[-2:] == [
+        "OwnFriction dry acts on x, in simulations; the other models leave it out.",
+        "Both both acts on y; its frictions and stops in simulations, the other models leave them"
+        " out.",
+    ]
+
+
+def test_what_has_no_events_yet_refuses_frictions_of_ones_own():
+    system = rail(OwnFriction("dry", "x", 1.0))
+    told = "dae has no events yet, which OwnFriction dry needs"
+    refused(ModelError, told, by=lambda: mbs.models.dae(system))
+
+
+SLIP, GAP = (lambda at: at.joint.v), (lambda at: at.joint.q)
+
+
+@pytest.mark.parametrize(
+    ("method", "law", "told"),
+    [
+        ("frictions", lambda at: 1.0, "frictions gives 1.0 for 'one'; give custom.Friction"),
+        ("stops", lambda at: custom.Friction(SLIP(at), 1), "stops gives a Friction for 'one'"),
+        ("frictions", lambda at: custom.Friction(at.joint.q, 1), "does not depend on velocities"),
+        ("frictions", lambda at: custom.Friction(at.joint.v**2, 1), "is not linear in velocities"),
+        ("frictions", lambda at: custom.Friction(at.joint.v + at.joint.q, 1), "follows at rest"),
+        (
+            "frictions",
+            lambda at: custom.Friction(SLIP(at) * at.u, 1),
+            "depends on states or inputs",
+        ),
+        ("frictions", lambda at: custom.Friction(SLIP(at), at.u), "friction is a finite effort"),
+        (
+            "frictions",
+            lambda at: custom.Friction(SLIP(at), casadi.inf),
+            "the limit of 'one' is inf",
+        ),
+        ("frictions", lambda at: custom.Friction(SLIP(at), 2, 1), "sticking of 'one' is 1"),
+        ("frictions", lambda at: custom.Friction(SLIP(at), 2, unit="W"), "the unit 'W'; use 'N'"),
+        ("stops", lambda at: custom.Stop(at.joint.v), "the gap of 'one' depends on velocities"),
+        ("stops", lambda at: custom.Stop(casadi.SX(1)), "does not depend on positions"),
+        ("stops", lambda at: custom.Stop(GAP(at), None), "neither lower nor upper"),
+        ("stops", lambda at: custom.Stop(GAP(at), restitution=1.5), "between 0 and 1"),
+        ("stops", lambda at: custom.Stop(GAP(at), rest_speed=0), "rest_speed of 'one' is 0"),
+        ("stops", lambda at: custom.Stop(GAP(at), 1.0, 0.5), "upper of 'one' is 0.5"),
+        ("stops", lambda at: custom.Stop(GAP(at), at.joint.q), "depends on the motion"),
+        ("stops", lambda at: custom.OneWay(at.joint.q), "the velocity of 'one' does not depend"),
+        ("stops", lambda at: custom.Stop(at.joint.q * casadi.SX.sym("k")), "the symbol 'k'"),
+    ],
+)
+def test_what_is_no_friction_or_stop_is_refused(method, law, told):
+    used = {"loads": lambda self, at: {"joint": at.u}}
+    fields = {"joint": custom.coordinate(), "u": custom.input(), **used}
+    mine = type("Mine", (Custom,), {**fields, method: lambda self, at: {"one": law(at)}})
+    refused(AssemblyError, "c (Mine)", told, by=lambda: rail(mine("c", "x")))
+
+
 @pytest.mark.parametrize(("fmi", "kind"), [("2.0", "CoSimulation"), ("3.0", "ModelExchange")])
-@pytest.mark.parametrize("name", ["rope", "pot", "pendulum", "rocker"])
+@pytest.mark.parametrize("name", ["rope", "pot", "pendulum", "rocker", "rubbed"])
 def test_an_fmu_does_what_run_does(tmp_path, name, fmi, kind):
     duration, start = 1.2, {}
     if name == "rope":
@@ -344,6 +505,8 @@ def test_an_fmu_does_what_run_does(tmp_path, name, fmi, kind):
         system = table(
             lambda m, ball: Wall("pot", m.world, ball, radius=0.5, e=0.4), gravity=(0.3, -G, 0)
         )
+    elif name == "rubbed":
+        system, start = rubbed_loop(), {"v0": {"j1": 4.0}}
     elif name == "pendulum":
         system, start = pendulum(), {"q0": {"j": 1.2}}
     else:

@@ -16,6 +16,7 @@ from casadi import DM, SX
 
 from mbs.assembly import System
 from mbs.assembly.parts import AttachedPart, WireSource
+from mbs.assembly.system import Packed, packed
 from mbs.assembly.tables import AttachedSensor
 from mbs.assembly.tree import Frame
 from mbs.components.custom import (
@@ -428,6 +429,32 @@ class PartsAt:
 
 def _same(value: Any) -> Any:
     return value
+
+
+_SAID = ("loads", "energy", "rates", "rows", "positive", "velocity_rows", "outputs")
+_SAID_OF_EVENTS = ("events", "crossings", "frictions", "stops", "limits")
+
+
+def content_of(system: System) -> tuple[Packed, Packed]:
+    """All that a system is known by beyond this process: its data, and what its components say.
+
+    A class of a user's own is known by its name alone in the first; the second holds what its
+    methods return, which another version of its text may change.
+    """
+
+    def said() -> Packed:
+        at = PartsAt(system, SX.sym("q", system.nq), SX.sym("v", system.nv))
+        every = list[Any]()
+        for part in system.parts:
+            if not type(part.element).__module__.startswith("mbs."):
+                seen = at.at(part)
+                seen.__dict__["lam"] = at.row_efforts().get(part.name, {})
+                methods = [m for m in (*_SAID, *_SAID_OF_EVENTS) if part.element.has(m)]
+                every.append([(m, getattr(part.element, m)(seen)) for m in methods])
+        return packed(every)
+
+    found: Packed = system.cached("what components say", said)
+    return system.content(), found
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -57,7 +57,7 @@ from mbs.native import compiled
 from mbs.native.compiler import cache_dir
 from mbs.numbers import OnArrays, on_arrays
 from mbs.progress import progress
-from mbs.recursions.parts import part_event_names
+from mbs.recursions.parts import content_of, part_event_names
 from mbs.result import Result
 from mbs.simulate.arguments import count_steps, positive
 from mbs.solvers import EventMotion, Events, integrate_events
@@ -1168,7 +1168,7 @@ class Simulator:
 def _on_disk(system: System, laws: Any, derive: Callable[[], FullState]) -> FullState:
     """The state equation that was derived from the same content, in whatever process.
 
-    What cannot be read is derived anew; MBS_KEEP_EQUATIONS=0 keeps nothing on disk.
+    What cannot be read, or has no text, is derived anew; MBS_KEEP_EQUATIONS=0 keeps nothing there.
 
     Args:
         system: open or closed.
@@ -1177,7 +1177,10 @@ def _on_disk(system: System, laws: Any, derive: Callable[[], FullState]) -> Full
     """
     if os.environ.get("MBS_KEEP_EQUATIONS", "1") == "0":
         return derive()
-    content = repr((system.content(), laws, casadi.CasadiMeta.version(), _sources()))
+    try:
+        content = repr((content_of(system), laws, casadi.CasadiMeta.version(), _sources()))
+    except (AttributeError, TypeError, pickle.PicklingError):  # such as a class in a function
+        return derive()
     name = hashlib.sha256(content.encode()).hexdigest()
     file = cache_dir() / f"equations-{name}.pickle"
     with suppress(Exception):  # it is not there, or damaged

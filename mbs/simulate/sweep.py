@@ -29,6 +29,7 @@ from mbs.errors import ExportError, Interrupted, MbsError, ModelError, SolverErr
 from mbs.files import check_archive, path_of, write_text
 from mbs.numbers import doubles
 from mbs.progress import progress
+from mbs.recursions.parts import content_of
 from mbs.result import Result, optional_module
 from mbs.simulate.fmu import fmu
 from mbs.simulate.fmu_variables import numbers_of
@@ -204,7 +205,7 @@ def study_of(
 
 def _system(system: System) -> tuple[str, bytes]:
     """Its name, and all that it holds, to the last digit."""
-    return system.name, repr(system.content()).encode()
+    return system.name, repr(content_of(system)).encode()
 
 
 def _fmu(path: object) -> tuple[str, bytes]:

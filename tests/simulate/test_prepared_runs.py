@@ -11,14 +11,17 @@ import pytest
 import mbs
 from mbs.components import (
     Box,
+    Custom,
     JointSensor,
     PointMass,
     Prismatic,
     Revolute,
     SampleHold,
     SpherePlaneContact,
+    custom,
 )
 
+sweep_module = importlib.import_module("mbs.simulate.sweep")
 run_module = importlib.import_module("mbs.simulate.run")
 
 
@@ -139,6 +142,47 @@ def test_what_differs_is_derived_anew(made, disk):
     assert len(made) == 2
     arm(1.0, {"j": 1e-3})
     assert len(made) == 3
+
+
+STRENGTH = 1.0
+
+
+class Push(Custom):
+    """A force that a number of this module says."""
+
+    joint = custom.coordinate()
+
+    def loads(self, at):
+        return {"joint": STRENGTH}
+
+
+def pushed(kind):
+    m = mbs.Mechanism("m", gravity=(0, 0, 0))
+    m.connect(m.world, Prismatic("z", axis="z", actuated=False), m.add(PointMass("stone", 1.0)))
+    m.add(kind("push", "z"))
+    return m.assemble()
+
+
+def test_a_component_whose_text_changed_is_derived_anew(made, disk, monkeypatch):
+    ends = [swing(pushed(Push))["z.v"][-1] for _ in range(2)]
+    assert len(made) == 1
+    first = sweep_module._system(pushed(Push))
+    monkeypatch.setitem(globals(), "STRENGTH", 2.0)
+    ends.append(swing(pushed(Push))["z.v"][-1])
+    assert len(made) == 2
+    assert ends == pytest.approx([0.5, 0.5, 1.0], abs=1e-12)
+    assert sweep_module._system(pushed(Push)) != first
+
+
+def test_a_class_in_a_function_is_simulated_and_not_kept(made, disk):
+    class Local(Push):
+        def loads(self, at):
+            return {"joint": 3.0}
+
+    ends = [swing(pushed(Local))["z.v"][-1] for _ in range(2)]
+    assert ends == pytest.approx([1.5, 1.5], abs=1e-12)
+    assert len(made) == 2
+    assert not list(disk.glob("*.pickle"))
 
 
 def flipped(content):

@@ -100,6 +100,7 @@ class ContactState:
 
     Attributes:
         rows: (k, nv) E, how the velocities of the contacts follow from v.
+        sizes: (k, 1) lengths of these rows.
         velocity: (k, 1) velocities of slip and of gaps, w = E v + what it is at rest.
         bias: (k, 1) dw/dt = E a + bias.
         measure: (k, 1) gaps, and velocities of what holds in one way; zero for friction alone.
@@ -107,6 +108,7 @@ class ContactState:
     """
 
     rows: SX
+    sizes: SX
     velocity: SX
     bias: SX
     measure: SX
@@ -168,6 +170,15 @@ class Contacts:
         """(k, nv) E."""
         (E,) = casadi.substitute([self.state.rows], [self.q], [casadi.densify(q)])
         return SX(E)
+
+    def unit_rows(self, q: SX) -> tuple[SX, SX]:
+        """(k, nv) the rows, brought to unit length; (k, 1) their lengths.
+
+        Equations that weigh rows need them of one size, however short a lever is.
+        """
+        rows, sizes = self.state.rows, self.state.sizes
+        E, found = casadi.substitute([rows, sizes], [self.q], [casadi.densify(q)])
+        return casadi.mtimes(casadi.diag(1 / found), E), found
 
     def velocity(self, q: SX, v: SX) -> SX:
         """(k, 1) velocities of slip and of gaps."""
@@ -383,6 +394,12 @@ def _contacts(system: System) -> Contacts:
         v=v,
         state=ContactState(
             rows=rows,
+            sizes=_stack(
+                SX(1)
+                if row.number is not None
+                else casadi.sqrt(casadi.fmax(casadi.sumsqr(row.E), _VANISHED))
+                for row in found
+            ),
             velocity=velocity,
             bias=SX(casadi.densify(casadi.jtimes(velocity, q, position_rate(system.tree, q, v)))),
             measure=_stack(SX(0) if x is None else x for x in measures),
@@ -513,29 +530,29 @@ def switched_dynamics(system: System, driven: tuple[int, ...]) -> Function:
     def build() -> tuple[Named, Named]:
         s, k = symbols_of(system, "tree"), len(driven) + len(contacts)
         tau, a_p, acting = SX.sym("tau", system.nv), SX.sym("a_p", k), SX.sym("acting", k)
-        rows = contacts.rows(s.q)
+        rows, sizes = contacts.unit_rows(s.q)
         E = casadi.vertcat(unit_rows(system, driven), rows)
+        every = casadi.vertcat(SX.ones(len(driven)), sizes)
         a, _, tau_p = constrained_accelerations(
-            system, s, tau, surroundings(system), E, a_p, acting
+            system, s, tau, surroundings(system), E, a_p / every, acting
         )
         A = inertia_matrix(system.tree, s.poses)
         # a limited link may be massless: what a stop then counts on is a millionth of the others'
         least = SX(1e-6 * inertia_size(system, A, s))
         own = [
-            _row_inertia(A, rows[j, :]) if n is None else A[n, n]
+            _row_inertia(A, rows[j, :]) / sizes[j] ** 2 if n is None else A[n, n]
             for j, n in enumerate(contacts.velocities)
         ]
         inertia = casadi.vertcat(*(casadi.fmax(x, least) for x in own))
         inputs: Named = [("q", s.q), ("v", s.v), ("tau", tau), ("a_p", a_p), ("acting", acting)]
-        return inputs, [("a", a), ("tau_p", tau_p), ("inertia", inertia)]
+        return inputs, [("a", a), ("tau_p", tau_p / every), ("inertia", inertia)]
 
     return model_function(system, ("switched_dynamics", driven), build)
 
 
 def _row_inertia(A: SX, row: SX) -> SX:
-    """What moves with a unit velocity of a row, the others at rest."""
-    square = casadi.fmax(casadi.sumsqr(row), _VANISHED)
-    return casadi.mtimes(row, casadi.mtimes(A, row.T)) / square**2
+    """What moves along a row of unit length at a unit velocity."""
+    return SX(casadi.mtimes(row, casadi.mtimes(A, row.T)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -645,11 +662,13 @@ def impact(system: System, driven: tuple[int, ...]) -> Function:
     def build() -> tuple[Named, Named]:
         s, k = symbols_of(system, "tree"), len(driven) + len(contacts)
         change, acting = SX.sym("dv_p", k), SX.sym("acting", k)
-        E = casadi.vertcat(unit_rows(system, driven), contacts.rows(s.q))
+        rows, sizes = contacts.unit_rows(s.q)
+        E = casadi.vertcat(unit_rows(system, driven), rows)
+        every = casadi.vertcat(SX.ones(len(driven)), sizes)
         A, (J, psi) = inertia_matrix(system.tree, s.poses), loop_rows(system, s)
-        right = SX.zeros(system.nv), SX.zeros(psi.numel()), change
+        right = SX.zeros(system.nv), SX.zeros(psi.numel()), change / every
         dv, _, P = constrained(system, s, (A, J, E), right, acting)
-        return [("q", s.q), ("dv_p", change), ("acting", acting)], [("dv", dv), ("P", P)]
+        return [("q", s.q), ("dv_p", change), ("acting", acting)], [("dv", dv), ("P", P / every)]
 
     return model_function(system, ("impact", driven), build)
 

@@ -1,5 +1,7 @@
 """Dry friction, rigid stops and freewheels of components of one's own, against hand formulas."""
 
+import importlib
+
 import casadi
 import numpy as np
 import pytest
@@ -337,6 +339,30 @@ def test_rows_in_closed_loops_do_what_those_of_coordinates_do(name):
     assert [what.split()[-1] for *_, what in other.events] == [what.split()[-1] for what in kinds]
     for column in (c for c in one.units if c.endswith((".q", ".v"))):
         np.testing.assert_allclose(other[column], one[column], atol=1e-7)
+
+
+@pytest.mark.parametrize("lever", [1e5, 1.0, 1e-2, 1e-5])
+def test_a_lever_of_any_length_holds(lever):
+    class Small(Custom):
+        joint = custom.coordinate()
+
+        def frictions(self, at):
+            return {"dry": custom.Friction(lever * at.joint.v, 5.0 / lever)}
+
+    result = run(rail(Small("small", "x"), gravity=(2.0, 0, 0)), 1.0)
+    assert np.abs(result["x.v"]).max() < 1e-12
+    np.testing.assert_allclose(lever * result["small.dry.effort"], -4.0, rtol=1e-12)
+
+
+def test_friction_and_stops_without_a_compiler(monkeypatch):
+    system = LOOPS["five"][0](*LOOPS["five"][2])
+    compiled = run(system, 0.7, step=0.05)
+    solvers = importlib.import_module("mbs.solvers.integrate")
+    monkeypatch.setattr(solvers, "compiler_found", lambda: False)
+    interpreted = run(five_bar(-G, *LOOPS["five"][2]), 0.7, step=0.05)
+    assert len(interpreted.events) == len(compiled.events) > 2
+    # two orders of the same sums
+    assert np.abs(interpreted["b1.q"] - compiled["b1.q"]).max() < 1e-9
 
 
 class Line(Custom):

@@ -124,6 +124,7 @@ from mbs.components.sensors import (
 from mbs.components.shapes import Shape
 from mbs.components.translational import (
     ElastoGap,
+    RigidSlidingBrake,
     SlidingBrake,
     SlidingDamper,
     SlidingMass,
@@ -216,6 +217,7 @@ __all__ = [
     "RigidBrake",
     "RigidClutch",
     "RigidOneWayClutch",
+    "RigidSlidingBrake",
     "RigidStop",
     "Rod",
     "RollingDisc",

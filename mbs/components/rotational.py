@@ -406,7 +406,7 @@ class RigidBrake(OneFlange):
 
     def frictions(self, at: Any) -> Mapping[str, Friction]:
         """On the speed of the shaft."""
-        return {"": _capacity_of(at, at.flange.speed)}
+        return {"": capacity_of(at, at.flange.speed)}
 
 
 class RigidClutch(TwoFlanges):
@@ -429,10 +429,11 @@ class RigidClutch(TwoFlanges):
 
     def frictions(self, at: Any) -> Mapping[str, Friction]:
         """On the difference of the speeds."""
-        return {"": _capacity_of(at, at.flange_b.speed - at.flange_a.speed)}
+        return {"": capacity_of(at, at.flange_b.speed - at.flange_a.speed)}
 
 
-def _capacity_of(at: Any, slip: SX) -> Friction:
+def capacity_of(at: Any, slip: SX) -> Friction:
+    """Coulomb friction of a brake or clutch on a velocity of slip."""
     sliding = at.capacity * casadi.fmax(at.engagement, 0)
     return Friction(slip, sliding, at.sticking * sliding)
 

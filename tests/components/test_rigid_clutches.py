@@ -9,12 +9,16 @@ from support.parts import asked, run
 import mbs
 from mbs.components import (
     Body,
+    CoulombFriction,
     FixedFlange,
     IdealGear,
+    PointMass,
+    Prismatic,
     Revolute,
     RigidBrake,
     RigidClutch,
     RigidOneWayClutch,
+    RigidSlidingBrake,
     ShaftInertia,
     TorqueSource,
 )
@@ -191,6 +195,26 @@ def test_a_clutch_behind_a_gear_and_a_brake_share_one_shaft():
     times = [t for t, _, what in result.events if what == "sticks"]
     assert times == pytest.approx([slips, rest], abs=1e-8)
     assert max(abs(result["a.v"][-1]), abs(result["b.v"][-1])) < 1e-12
+
+
+def test_a_brake_on_a_slide_and_friction_of_its_rail_hold_together():
+    m = mbs.Mechanism("slide", gravity=(0, 0, -10.0))
+    load = m.add(PointMass("load", 0.5))
+    joint = Prismatic("z", axis="z", actuated=False)
+    m.connect(m.world, joint, load)
+    brake = RigidSlidingBrake("brake", capacity=4.0, sticking=1.25)
+    m.connect(brake.flange, joint.flange)
+    m.add(CoulombFriction("rail", "z", sliding=1.0))
+    system = asked(m)
+    # the load needs 5 N: the rail holds one, the brake five
+    held = run(system, 1.0, u={"brake": 1.0})
+    assert np.abs(held["z.v"]).max() < 1e-12
+    total = held["brake.effort"] + held["rail.effort"]
+    np.testing.assert_allclose(total, 5.0, atol=1e-9)
+    # 0.6 of it holds 3 + 1: it slides, braked by 2.4 + 1
+    falls = run(system, 1.0, u={"brake": 0.6})
+    np.testing.assert_allclose(falls["z.a"], -(5.0 - 3.4) / 0.5, atol=1e-9)
+    assert falls.units["brake.effort"] == "N"
 
 
 @pytest.mark.parametrize(("fmi", "kind"), [("2.0", "ModelExchange"), ("3.0", "CoSimulation")])

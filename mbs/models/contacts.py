@@ -338,7 +338,7 @@ def require_lasting_rows(system: System, contacts: Contacts) -> None:
 
 
 @dataclass(slots=True, eq=False)
-class _Row:
+class _ContactRow:
     """One row of contacts while they are collected; the attributes are as of `Contacts`."""
 
     velocity: SX
@@ -358,7 +358,7 @@ class _Row:
 def _contacts(system: System) -> Contacts:
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     at = PartsAt(system, q, v)
-    found = list[_Row]()
+    found = list[_ContactRow]()
     for part in system.parts:
         if part.element.switches:
             seen = at.at(part)
@@ -416,7 +416,7 @@ def effort_unit(part: AttachedPart, law: Friction | Stop | OneWay) -> str:
     return EFFORT_UNIT[part.levers[0].unit] if part.levers and not part.frames else "N"
 
 
-def _collect(system: System, rows: list[_Row], element: ContactElement, q: SX, v: SX) -> None:
+def _collect(system: System, rows: list[_ContactRow], element: ContactElement, q: SX, v: SX) -> None:
     """Put an element on the row that has no element of its kind yet, or on a new one."""
     w = contact_velocity(system, element.law, q, v)
     E = SX(casadi.sparsify(casadi.jacobian(w, v)))
@@ -443,7 +443,7 @@ def _collect(system: System, rows: list[_Row], element: ContactElement, q: SX, v
                 f"{system.name}: {other.stop.name} and {element.name} act both on"
                 f" {system.speeds[number or 0].name}; give one {word} for a coordinate"
             )
-        row = _Row(w, E, key, number)
+        row = _ContactRow(w, E, key, number)
         rows.append(row)
     setattr(row, kind, element)
 
@@ -455,7 +455,7 @@ def contact_velocity(system: System, law: Friction | Stop | OneWay, q: SX, v: SX
     return SX(law.slip if isinstance(law, Friction) else law.velocity)
 
 
-def _measure(row: _Row) -> SX | None:
+def _measure(row: _ContactRow) -> SX | None:
     """What the indicators of a stop watch."""
     if row.stop is None:
         return None
@@ -471,7 +471,7 @@ def _index(value: SX | None, q: SX) -> int | None:
     return next((k for k, x in enumerate(elements) if casadi.is_equal(x, value)), None)
 
 
-def _anchor(system: System, row: _Row, q: SX, v: SX) -> SX | None:
+def _anchor(system: System, row: _ContactRow, q: SX, v: SX) -> SX | None:
     """What the velocity of a row is the rate of; None where that is not known."""
     if row.stop is not None and isinstance(row.stop.law, Stop):
         return SX(row.stop.law.gap)

@@ -416,7 +416,9 @@ def effort_unit(part: AttachedPart, law: Friction | Stop | OneWay) -> str:
     return EFFORT_UNIT[part.levers[0].unit] if part.levers and not part.frames else "N"
 
 
-def _collect(system: System, rows: list[_ContactRow], element: ContactElement, q: SX, v: SX) -> None:
+def _collect(
+    system: System, rows: list[_ContactRow], element: ContactElement, q: SX, v: SX
+) -> None:
     """Put an element on the row that has no element of its kind yet, or on a new one."""
     w = contact_velocity(system, element.law, q, v)
     E = SX(casadi.sparsify(casadi.jacobian(w, v)))

@@ -122,6 +122,7 @@ class _Check:
         self._events(modes)
         self._rows()
         self._contacts()
+        self._limits()
         if self.element.has("crossings"):
             free = casadi.vertcat(self.v, self.system.u)
             for label, value in self._mapping("crossings", self.at.at(self.part)).items():
@@ -307,6 +308,10 @@ class _Check:
             ("frictions", (Friction,), "custom.Friction(slip, limit)"),
         ):
             for label, law in (self._mapping(method) if self.element.has(method) else {}).items():
+                if not isinstance(label, str):
+                    raise AssemblyError(
+                        f"{self._title}: {method} has the label {quoted(label)}; give a text"
+                    )
                 if not isinstance(law, kinds):
                     raise AssemblyError(
                         f"{self._title}: {method} gives {_kind(law)} for {label!r}; give {give}"
@@ -317,7 +322,27 @@ class _Check:
                         f" {label!r}; choose another one"
                     )
                 labels[label] = method
-                self._contact(str(label), law)
+                self._contact(label, law)
+
+    def _limits(self) -> None:
+        """Pairs of parameters, by coordinate."""
+        found = self._mapping("limits") if self.element.has("limits") else {}
+        for port, pair in found.items():
+            if port not in self.part.coordinates:
+                raise AssemblyError(
+                    f"{self._title}: limits names {quoted(port)}, which is no coordinate;"
+                    f" {did_you_mean(str(port), self.part.coordinates)}"
+                )
+            if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+                raise AssemblyError(
+                    f"{self._title}: limits gives {_kind(pair)} for {port}; give (lower, upper),"
+                    " None for no limit"
+                )
+            every = casadi.vertcat(self.q, self.v, self.system.z, *self.inputs.values())
+            for given in pair:
+                if given is not None:
+                    value = self._value(f"a limit of {port}", given)
+                    self._require_free_of(value, f"a limit of {port}", every, "the motion")
 
     def _contact(self, label: str, law: Friction | Stop | OneWay) -> None:
         own = {*self.element.output_names, *self.part.states, *self.part.inputs}

@@ -14,6 +14,7 @@ from mbs.components import (
     Box,
     CoulombFriction,
     Custom,
+    Free,
     Planar,
     PointMass,
     Prismatic,
@@ -365,6 +366,76 @@ def test_friction_and_stops_without_a_compiler(monkeypatch):
     assert np.abs(interpreted["b1.q"] - compiled["b1.q"]).max() < 1e-9
 
 
+class Corner(Custom):
+    """A point stays above the ground, without friction."""
+
+    point = custom.frame()
+    e = custom.parameter("1", 0.0, min=0, max=1)
+
+    def stops(self, at):
+        return {"floor": custom.Stop(at.point.p[2], restitution=at.e)}
+
+
+def box(e, corners):
+    """A free body with corners."""
+    m = mbs.Mechanism("box", gravity=(0, 0, -G))
+    body = m.add(Body("body", mass=2.0, inertia=(0.02, 0.03, 0.04)))
+    m.connect(m.world, Free("f"), body)
+    for k, (x, y) in enumerate(corners):
+        m.add(Corner(f"c{k}", body.at(0.2 * x, 0.1 * y, -0.1), e=e))
+    return m.assemble(guess={"f.z": 0.3})
+
+
+def test_a_free_box_falls_on_its_four_corners_and_rests():
+    system = box(0.0, ((1, 1), (1, -1), (-1, 1), (-1, -1)))
+    result = run(system, 0.6)
+    assert [what for *_, what in result.events] == ["floor rests at lower"] * 4
+    assert result.events[0][0] == pytest.approx(np.sqrt(2 * 0.2 / G), abs=1e-9)
+    assert result["f.z.q"][-1] == pytest.approx(0.1, abs=1e-12)
+    efforts = [result[f"c{k}.floor.effort"][-1] for k in range(4)]
+    # four stops for three freedoms: rows that depend on others share alike, to the regularisation
+    np.testing.assert_allclose(efforts, 2.0 * G / 4, rtol=1e-7)
+
+
+def test_a_free_body_bounces_on_one_corner_without_loss(tmp_path):
+    system = box(1.0, ((1, 1),))
+    v0 = {"f.wx": 1.0}
+    result = run(system, 1.0, v0=v0)
+    assert len(result.events) > 2
+    assert np.ptp(result["kinetic_energy"] + result["potential_energy"]) < 1e-8
+    path = mbs.export.fmu(system, tmp_path / "box.fmu")
+    start = {"f.wx.v": 1.0}
+    there = mbs.simulate.fmu(path, 1.0, start=start, tolerance=1e-10, quiet=True)
+    assert abs(there["f.z.q"][-1] - result["f.z.q"][-1]) < 1e-7
+
+
+def test_friction_that_falls_with_the_speed_takes_its_heat():
+    class Stribeck(Custom):
+        joint = custom.coordinate()
+        heat = custom.state("J")
+
+        def limit(self, at):
+            return 2.0 + 3.0 * casadi.exp(-((at.joint.v / 0.2) ** 2))
+
+        def frictions(self, at):
+            return {"dry": custom.Friction(at.joint.v, self.limit(at))}
+
+        def rates(self, at):
+            return {"heat": self.limit(at) * casadi.fabs(at.joint.v)}
+
+    system = rail(Stribeck("dry", "x"), OwnSpring("spring", "x", k=50.0))
+    result = run(system, 3.0, q0={"x": 0.4}, step=0.002)
+    assert result.events[-1][1:] == ("dry", "dry sticks")
+    energy = result["kinetic_energy"] + result["potential_energy"] + result["dry.heat"]
+    np.testing.assert_allclose(energy, 4.0, atol=1e-8)
+    assert abs(50.0 * result["x.q"][-1]) < 5.0
+    assert np.abs(result["x.v"][result["dry.dry.mode"] == 0]).max() < 1e-12
+    # 4.9 N do not move it, 5.1 N do
+    for x, moves in ((0.098, False), (0.102, True)):
+        again = run(system, 0.1, q0={"x": x})
+        assert (np.abs(again["x.v"]).max() > 1e-3) == moves
+
+
 class Line(Custom):
     """Two points rub where their distance changes; the heat is a state."""
 
@@ -477,6 +548,22 @@ def test_what_has_no_events_yet_refuses_frictions_of_ones_own():
     system = rail(OwnFriction("dry", "x", 1.0))
     told = "dae has no events yet, which OwnFriction dry needs"
     refused(ModelError, told, by=lambda: mbs.models.dae(system))
+
+
+def test_limits_of_ones_own_are_bounds():
+    class Bounded(OwnStop):
+        def limits(self, at):
+            return {"joint": (at.lower, at.upper)}
+
+    found = mbs.models.limits(rail(Bounded("end", "y", lower=-0.5, upper=2.0)))
+    assert found.q_lower.tolist() == [-np.inf, -0.5]
+    assert found.q_upper.tolist() == [np.inf, 2.0]
+    for given, told in (
+        ({"q": (0, 1)}, "limits names 'q', which is no coordinate"),
+        ({"joint": 3.0}, "limits gives 3.0 for joint; give (lower, upper)"),
+    ):
+        kind = type("Mine", (OwnStop,), {"limits": lambda self, at, given=given: given})
+        refused(AssemblyError, told, by=lambda kind=kind: rail(kind("end", "y", lower=-0.5)))
 
 
 SLIP, GAP = (lambda at: at.joint.v), (lambda at: at.joint.q)

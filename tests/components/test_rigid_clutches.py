@@ -19,6 +19,7 @@ from mbs.components import (
     RigidClutch,
     RigidOneWayClutch,
     RigidSlidingBrake,
+    RigidStop,
     ShaftInertia,
     TorqueSource,
 )
@@ -142,6 +143,39 @@ def test_a_freewheel_drives_and_lets_its_driven_side_run_on():
     # b keeps what it had when it was let go
     common = 5 + (np.sin(2 * frees) - np.sin(2 * locks)) / (J_A + J_B)
     np.testing.assert_allclose(result["b.v"][result.time > frees], common, atol=1e-9)
+
+
+@pytest.mark.parametrize("w_a", [1.0, -1.0, 3.0])
+def test_an_impact_behind_a_freewheel_is_shared_where_it_locks(w_a):
+    m = mbs.Mechanism("line", gravity=(0, 0, 0))
+    a, b, free = ShaftInertia("a", J_A), ShaftInertia("b", J_B), RigidOneWayClutch("free")
+    m.connect(a.flange_b, free.flange_a)
+    m.connect(free.flange_b, b.flange_a)
+    m.add(RigidStop("stop", "b", upper=1.0, restitution=0.5))
+    result = run(asked(m), 1.0, v0={"a": w_a, "b": 5.0})
+    # b comes back with -2.5, slower than a: a plastic impact, momentum is kept in it
+    assert [what for *_, what in result.events] == ["bounces off upper", "locks"]
+    common = (J_A * w_a - J_B * 2.5) / (J_A + J_B)
+    assert result["a.v"][-1] == pytest.approx(common, abs=1e-9)
+    assert result["b.v"][-1] == pytest.approx(common, abs=1e-9)
+
+
+def test_a_freewheel_follows_a_shaft_that_is_driven():
+    system = between(RigidOneWayClutch("free"))
+    result = run(system, 3.0, motion={"a.v": lambda t: casadi.sin(t)}, step=0.01)
+    # b follows up to the largest speed, and keeps it
+    np.testing.assert_allclose(
+        result["b.v"], np.where(result.time < np.pi / 2, np.sin(result.time), 1.0), atol=1e-9
+    )
+    assert result.events == ((pytest.approx(np.pi / 2, abs=1e-8), "free", "frees"),)
+
+
+def test_an_open_clutch_has_few_events_and_no_torque():
+    system = between(RigidClutch("clutch", capacity=CAPACITY), TorqueSource("drive"))
+    result = run(system, 10.0, u=lambda t, q, v: [-1.0, casadi.cos(5 * t)])
+    assert len(result.events) < 20  # one for each change of the sign of the slip
+    np.testing.assert_allclose(result["a.v"], np.sin(5 * result.time) / 5 / J_A, atol=1e-9)
+    assert np.abs(result["b.v"]).max() < 1e-12
 
 
 def test_a_freewheel_that_starts_against_its_direction_is_refused():

@@ -126,7 +126,8 @@ class AttachedPart:
     @property
     def binds_alone(self) -> bool:
         """Whether rows are all that it has."""
-        return self.element.binds and not (self.element.acts or self.inputs or self.states)
+        others = self.element.acts or self.element.switches or self.inputs or self.states
+        return self.element.binds and not others
 
     def _unit(self, name: str) -> str:
         unit = self.element.declared[name].unit
@@ -147,7 +148,8 @@ class AttachedPart:
             turns = as_fast(number_or_sx(self.factor), self.levers[0].name)
             does = f"drives {self.levers[0].name} and turns {turns}"
         else:
-            verb = "acts" if self.element.acts else "binds what is" if self.element.binds else "is"
+            acts = self.element.acts or (self.element.switches and not self.element.binds)
+            verb = "acts" if acts else "binds what is" if self.element.binds else "is"
             does = f"{verb} {self.where}" if self.where else "works on signals alone"
             does += self.element.scope
         return f"{kind} {name} {does}{': ' if signals else ''}{', '.join(signals)}."
@@ -300,7 +302,7 @@ def _require_moving(
     """Refuse loads and rows on what cannot move."""
     links = {link for link, _ in frames}
     bodiless = not frames and not coordinates  # such as a capacitor, which only stores
-    if not (part.acts or part.binds) or bodiless or any(coordinates.values()):
+    if not (part.acts or part.binds or part.switches) or bodiless or any(coordinates.values()):
         return
     if links <= {-1} or (len(links) == 1 and len(frames) > 1):
         still = "does not move" if links <= {-1} else "is one rigid body"

@@ -107,6 +107,9 @@ from mbs.components.rotational import (
     OneWayClutch,
     PlanetaryGear,
     QuadraticSpeedTorque,
+    RigidBrake,
+    RigidClutch,
+    RigidOneWayClutch,
     ShaftSpringDamperSeries,
 )
 from mbs.components.sensors import (
@@ -121,6 +124,7 @@ from mbs.components.sensors import (
 from mbs.components.shapes import Shape
 from mbs.components.translational import (
     ElastoGap,
+    RigidSlidingBrake,
     SlidingBrake,
     SlidingDamper,
     SlidingMass,
@@ -210,6 +214,10 @@ __all__ = [
     "RelativeSensor",
     "Revolute",
     "RigidBody",
+    "RigidBrake",
+    "RigidClutch",
+    "RigidOneWayClutch",
+    "RigidSlidingBrake",
     "RigidStop",
     "Rod",
     "RollingDisc",

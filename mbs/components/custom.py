@@ -482,6 +482,68 @@ class Event:
     then: Mapping[str, Any]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Friction:
+    """Dry friction: it sticks up to an effort, and is braked beyond.
+
+    The velocity of slip is linear in velocities, with factors of positions and parameters; what it
+    is at rest, such as the speed of a belt, is of parameters alone. The effort acts along it: what
+    the ports get is what does the same work.
+
+    Source: Pfeiffer and Glocker 1996, chapter 5.
+
+    Attributes:
+        slip: (1, 1) velocity of slip [rad/s or m/s].
+        limit: (1, 1) friction while it slides, never below zero [N m or N]; of positions,
+            velocities, states, inputs and parameters.
+        sticking: (1, 1) the largest effort at which it sticks, at least the limit, and as large
+            when left out.
+        unit: of the effort, "N" or "N.m"; when left out that of the coordinate or shaft of the
+            component, and "N" where it has frames.
+    """
+
+    slip: Any
+    limit: Any
+    sticking: Any = None
+    unit: str | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stop:
+    """A rigid stop: a gap that stays between limits, with impacts and contact.
+
+    Source: Pfeiffer and Glocker 1996, chapters 4 and 6.
+
+    Attributes:
+        gap: (1, 1) of positions and parameters [rad or m].
+        lower: the least gap, of parameters; None for no stop on that side.
+        upper: the largest one, likewise.
+        restitution: Newton's, between 0 and 1, of parameters.
+        rest_speed: of the slowest rebound [rad/s or m/s], of parameters.
+        unit: of its effort, as that of `Friction`.
+    """
+
+    gap: Any
+    lower: Any = 0.0
+    upper: Any = None
+    restitution: Any = 0.0
+    rest_speed: Any = 1e-4
+    unit: str | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OneWay:
+    """A velocity that never falls below zero: a freewheel.
+
+    Attributes:
+        velocity: (1, 1) of velocities, as the slip of a `Friction` [rad/s or m/s].
+        unit: of its effort, as that of `Friction`.
+    """
+
+    velocity: Any
+    unit: str | None = None
+
+
 Load = FrameLoad | SX | float
 """A wrench on a frame; a force [N] or torque [N m] along a coordinate or on a flange."""
 
@@ -506,6 +568,9 @@ class Custom(OnPoints):
     - `outputs(at)`: the value of every output, by name.
     - `events(at)`: by label, when something happens at once, and what states and modes become; in
       simulations and FMUs.
+    - `frictions(at)`: dry frictions, a `Friction` each, by label; in simulations and FMUs.
+    - `stops(at)`: rigid stops and freewheels, a `Stop` or `OneWay` each, by label; likewise.
+    - `limits(at)`: between which values its coordinates stay, a pair each, by port.
     - `figures(at)`: what it looks like at its frames, a `Shape` each, of numbers.
     - `crossings(at)`: by label, what passes through zero where the law has a bend or is short:
       simulations end a step there, and step over none of them.
@@ -633,7 +698,11 @@ class Custom(OnPoints):
     @property
     def scope(self) -> str:
         """Where it counts, in words; nothing for a component of all models."""
-        return ""
+        if not self.switches:
+            return ""
+        if self.has(*(method for method in _METHODS if method not in _SWITCHES)):
+            return "; its frictions and stops in simulations, the other models leave them out"
+        return ", in simulations; the other models leave it out"
 
     def scoped(self: C, prefix: str) -> C:
         """The same component inside a mechanism that is placed in another one."""
@@ -681,6 +750,18 @@ class Custom(OnPoints):
         """What happens at once, by label: of positions, velocities, states, modes and inputs."""
         return {}
 
+    def frictions(self, at: Any) -> Mapping[str, Friction]:
+        """Its dry frictions, by label."""
+        return {}
+
+    def stops(self, at: Any) -> Mapping[str, Stop | OneWay]:
+        """Its rigid stops and freewheels, by label."""
+        return {}
+
+    def limits(self, at: Any) -> Mapping[str, tuple[SX | None, SX | None]]:
+        """Between which values its coordinates stay, by port; None for no limit on a side."""
+        return {}
+
     def crossings(self, at: Any) -> Mapping[str, SX]:
         """What passes through zero where the law has a bend or is short, by label.
 
@@ -715,6 +796,11 @@ class Custom(OnPoints):
     def binds(self) -> bool:
         """Whether it has rows."""
         return self.has("rows", "velocity_rows")
+
+    @property
+    def switches(self) -> bool:
+        """Whether it has frictions or stops, which hold at times and let go at others."""
+        return self.has(*_SWITCHES)
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -758,7 +844,10 @@ class Custom(OnPoints):
             )
 
 
-_METHODS = ("loads", "energy", "rates", "rows", "velocity_rows", "outputs")
+_SWITCHES = ("frictions", "stops")
+"""What a component says of rows that come and go."""
+
+_METHODS = ("loads", "energy", "rates", "rows", "velocity_rows", "outputs", *_SWITCHES)
 """What a component can say that models ask for."""
 
 _RESERVED = frozenset({"name", "declared", "symbols", "lam", *vars(Custom)})
@@ -859,9 +948,12 @@ __all__ = [
     "FlangeAt",
     "FrameAt",
     "FrameLoad",
+    "Friction",
+    "OneWay",
     "RelativeMotion",
     "Row",
     "Signal",
+    "Stop",
     "between",
     "coordinate",
     "flange",

@@ -16,7 +16,7 @@ from casadi import SX
 from mbs.components import custom
 from mbs.components.bodies import three
 from mbs.components.component import Component, Point, SymbolTable, named_scalars
-from mbs.components.custom import Custom, Load, RelativeMotion
+from mbs.components.custom import Custom, Friction, Load, OneWay, RelativeMotion, Stop
 from mbs.components.on_points import OnPair
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
@@ -90,6 +90,14 @@ class JointForce(CoordinateForce):
     def levers(self) -> tuple[tuple[str, Scalar], ...]:
         """The coordinate itself."""
         return ((self.joint, Number(1.0)),)
+
+    def limits(self, at: Any) -> Mapping[str, tuple[SX | None, SX | None]]:
+        """The fields lower and upper of a stop."""
+        lower, upper = (getattr(self, side, None) for side in ("lower", "upper"))
+        if lower is None and upper is None:
+            return {}
+        both = (None if x is None else to_sx(x, at.symbols) for x in (lower, upper))
+        return {"x": (next(both), next(both))}
 
     def _take_limits(self) -> None:
         """Convert the fields lower and upper of a stop to expressions, checking them."""
@@ -736,14 +744,7 @@ class FixedTendon(CoordinateForce):
 class JointContact(JointForce):
     """What may lock a coordinate of a joint, in simulations alone."""
 
-    @property
-    def scope(self) -> str:
-        """Which models know it."""
-        return ", in simulations; the other models leave it out"
-
-    def resistance(self, at: Any) -> SX:
-        """Nothing in smooth models."""
-        return SX(0)
+    loads = Custom.loads  # nothing in smooth models
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -783,6 +784,12 @@ class RigidStop(JointContact):
         """A limit is one of a position."""
         return True
 
+    def stops(self, at: Any) -> Mapping[str, Stop | OneWay]:
+        """That of its coordinate."""
+        lower, upper = self.limits(at)["x"]
+        e, slowest = (to_sx(x, at.symbols) for x in (self.restitution, self.rest_speed))
+        return {"": Stop(at.x.q, lower, upper, restitution=e, rest_speed=slowest)}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CoulombFriction(JointContact):
@@ -816,3 +823,9 @@ class CoulombFriction(JointContact):
                 f"{self.name}: sliding and sticking are zero, so that the CoulombFriction does"
                 " nothing; give a strength or leave it out"
             )
+
+    def frictions(self, at: Any) -> Mapping[str, Friction]:
+        """That of its coordinate."""
+        assert self.sticking is not None
+        sliding, sticking = (to_sx(x, at.symbols) for x in (self.sliding, self.sticking))
+        return {"": Friction(at.x.v, sliding, sticking)}

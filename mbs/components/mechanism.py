@@ -398,7 +398,10 @@ class Mechanism:
             component.require_made()
             if component.lowered or component.has_equations:
                 return
-            remedy = "write one of its methods loads, energy, rates, rows, velocity_rows or outputs"
+            remedy = (
+                "write one of its methods loads, energy, rates, rows, velocity_rows, frictions,"
+                " stops or outputs"
+            )
         elif isinstance(component, Joint) and not (component.places or component.closes):
             remedy = "write its method closing_rows"
         elif isinstance(component, Sensor) and not component.reads:

@@ -1,8 +1,9 @@
 """Parts of drive lines with losses, play, friction and several shafts.
 
-The laws are smooth: they have no modes and no events, so that every model has them. A brake
-creeps where a real one sticks, at a speed below the width of its law, and a freewheel rotates back
-by nothing but lets its shafts slip a little where it locks.
+Most laws are smooth: they have no modes and no events, so that every model has them. A smooth brake
+creeps where a real one sticks, at a speed below the width of its law, and a smooth freewheel
+rotates back by nothing but lets its shafts slip a little where it locks. Those that are rigid stick
+and lock at events, in simulations and FMUs.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import casadi
 from casadi import SX
 
 from mbs.components import custom
-from mbs.components.custom import Load, Row
+from mbs.components.custom import Friction, Load, OneWay, Row, Stop
 from mbs.components.drives import OneFlange, TwoFlanges
 from mbs.components.forces import smooth_ramp, smooth_sign
 from mbs.errors import DescriptionError
@@ -380,3 +381,72 @@ class OneWayClutch(_SlippingShafts):
 
     def _torque(self, at: Any) -> SX:
         return SX(at.damping * smooth_ramp(self._slip(at), at.width)[1])
+
+
+# Brakes, clutches and freewheels that stick: they have events, in simulations and FMUs.
+
+
+class RigidBrake(OneFlange):
+    """A brake between a shaft and the housing that sticks: Coulomb friction of a chosen capacity.
+
+    The shaft stands still until a torque beyond capacity times `engagement` moves it, and is
+    braked by that torque while it rotates. The input `engagement` is the share of the normal force,
+    from 0 for a brake that is released to 1; below zero it counts as zero.
+
+    Source: Pfeiffer and Glocker 1996, chapter 5.
+
+    Attributes:
+        capacity: torque of the brake when it is fully engaged [N m].
+        sticking: the largest torque at which it sticks, for a unit torque while it slides.
+    """
+
+    capacity = custom.parameter("N.m", min=0)
+    sticking = custom.parameter("1", 1.0, min=1)
+    engagement = custom.input()
+
+    def frictions(self, at: Any) -> Mapping[str, Friction]:
+        """On the speed of the shaft."""
+        return {"": capacity_of(at, at.flange.speed)}
+
+
+class RigidClutch(TwoFlanges):
+    """A friction clutch that sticks: its shafts rotate as one up to its capacity.
+
+    Beyond capacity times `engagement` they slip, with this torque between them, until their
+    speeds are equal again. The input `engagement` is the share of the normal force, from 0 for a
+    clutch that is open to 1; below zero it counts as zero. The effort is the torque from a to b.
+
+    Source: Pfeiffer and Glocker 1996, chapter 5.
+
+    Attributes:
+        capacity: torque of the clutch when it is fully engaged [N m].
+        sticking: the largest torque at which it sticks, for a unit torque while it slips.
+    """
+
+    capacity = custom.parameter("N.m", min=0)
+    sticking = custom.parameter("1", 1.0, min=1)
+    engagement = custom.input()
+
+    def frictions(self, at: Any) -> Mapping[str, Friction]:
+        """On the difference of the speeds."""
+        return {"": capacity_of(at, at.flange_b.speed - at.flange_a.speed)}
+
+
+def capacity_of(at: Any, slip: SX) -> Friction:
+    """Coulomb friction of a brake or clutch on a velocity of slip."""
+    sliding = at.capacity * casadi.fmax(at.engagement, 0)
+    return Friction(slip, sliding, at.sticking * sliding)
+
+
+class RigidOneWayClutch(TwoFlanges):
+    """A freewheel that locks: flange_b is never slower than flange_a, which drives it then.
+
+    It locks where the speeds become equal, without an impact, and frees where flange_a would have
+    to brake flange_b. The effort is the torque from a to b, never below zero.
+
+    Source: Pfeiffer and Glocker 1996, chapters 4 and 6.
+    """
+
+    def stops(self, at: Any) -> Mapping[str, Stop | OneWay]:
+        """On the difference of the speeds."""
+        return {"": OneWay(at.flange_b.speed - at.flange_a.speed)}

@@ -14,10 +14,10 @@ from typing import Any
 from casadi import SX
 
 from mbs.components import custom
-from mbs.components.custom import Load
+from mbs.components.custom import Friction, Load
 from mbs.components.drives import OneFlange, RigidPart, TwoFlanges
 from mbs.components.forces import smooth_ramp
-from mbs.components.rotational import friction_of
+from mbs.components.rotational import capacity_of, friction_of
 from mbs.expressions import Expression, expression
 
 _TOUCH = 1e-4
@@ -193,3 +193,23 @@ class SlidingBrake(OneFlange):
 
     def _force(self, at: Any) -> SX:
         return friction_of(at, at.flange.speed)
+
+
+class RigidSlidingBrake(OneFlange):
+    """A brake between a sliding part and its rail that sticks, as a `RigidBrake` on a shaft does.
+
+    Source: Pfeiffer and Glocker 1996, chapter 5.
+
+    Attributes:
+        capacity: force of the brake when it is fully engaged [N].
+        sticking: the largest force at which it sticks, for a unit force while it slides.
+    """
+
+    flange = custom.flange(slides=True)
+    capacity = custom.parameter("N", min=0)
+    sticking = custom.parameter("1", 1.0, min=1)
+    engagement = custom.input()
+
+    def frictions(self, at: Any) -> Mapping[str, Friction]:
+        """On the speed of the part."""
+        return {"": capacity_of(at, at.flange.speed)}

@@ -28,21 +28,20 @@ def constrained_accelerations(
     s: ModelSymbols,
     tau: SX,
     around: Surroundings,
-    prescribed: Sequence[int] = (),
+    prescribed: Sequence[int] | SX = (),
     a_p: SX | None = None,
     acting: SX | None = None,
 ) -> tuple[SX, SX, SX]:
     """Accelerations of the tree, and the efforts of what constrains them; links may be massless.
 
-    A a + H = tau + J' lam + E' tau_p with J a + psi = 0 and E a = a_p, where the rows of E are
-    those of the unit matrix.
+    A a + H = tau + J' lam + E' tau_p with J a + psi = 0 and E a = a_p.
 
     Args:
         system: open or closed.
         s: its symbols, in tree coordinates.
         tau: (nv, 1) joint efforts.
         around: what acts from outside.
-        prescribed: indices of the velocities whose accelerations are given.
+        prescribed: indices of the velocities whose accelerations are given, or the rows E (k, nv).
         a_p: (k, 1) these accelerations.
         acting: (k, 1) 1 where an acceleration is given, 0 where it is free after all and the
             effort is zero; all are given when left out.
@@ -54,15 +53,20 @@ def constrained_accelerations(
     H = tree_efforts(system, s, SX.zeros(system.nv), around)
     J, psi = loop_rows(system, s)
     given = SX(0, 1) if a_p is None else a_p
-    return constrained(system, s, (A, J), (tau - H, -psi, given), prescribed, acting)
+    E = prescribed if isinstance(prescribed, SX) else unit_rows(system, prescribed)
+    return constrained(system, s, (A, J, E), (tau - H, -psi, given), acting)
+
+
+def unit_rows(system: System, numbers: Sequence[int]) -> SX:
+    """(k, nv) rows of the unit matrix, by indices of velocities."""
+    return SX(DM.eye(system.nv))[list(numbers), :]
 
 
 def constrained(
     system: System,
     s: ModelSymbols,
-    left: tuple[SX, SX],
+    left: tuple[SX, SX, SX],
     right: tuple[SX, SX, SX],
-    prescribed: Sequence[int],
     acting: SX | None,
 ) -> tuple[SX, SX, SX]:
     """The x, y and z of A x = b + J' y + E' z, J x = d, E x = e where it acts.
@@ -70,13 +74,11 @@ def constrained(
     Args:
         system: open or closed.
         s: its symbols.
-        left: A (nv, nv) inertia matrix of the tree, J (r, nv) independent rows.
+        left: A (nv, nv) inertia matrix of the tree, J (r, nv) independent rows, E (k, nv) rows.
         right: b, d and e.
-        prescribed: indices of the velocities whose unit rows are those of E.
         acting: as of `constrained_accelerations`.
     """
-    (A, J), (b, d, e) = left, right
-    E = SX(DM.eye(system.nv))[list(prescribed), :]
+    (A, J, E), (b, d, e) = left, right
     size, r = inertia_size(system, A, s), J.shape[0]
     corner = None
     if acting is not None:

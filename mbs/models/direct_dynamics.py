@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import casadi
 import numpy as np
 from casadi import SX, Function
+from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
@@ -318,11 +319,13 @@ def _numbers(system: System, prescribed: Sequence[str]) -> tuple[int, ...]:
     return numbers
 
 
-def are_independent(system: System, numbers: tuple[int, ...]) -> bool:
-    """Whether the loops leave these velocities independent in the assembled configuration."""
-    if not system.is_closed:
+def are_independent(system: System, numbers: tuple[int, ...], *rows: NDArray[np.float64]) -> bool:
+    """Whether the loops leave these velocities, and rows (1, nv), independent as assembled."""
+    if not system.is_closed and not rows:
         return True
-    p = [system.p_default] if system.parameters else []
-    J = np.array(closure_jacobian(system)(list(system.configuration), *p))
-    E = np.eye(system.nv)[list(numbers)]
-    return rank(np.vstack([J, E])) == rank(J) + len(numbers)
+    J = np.empty((0, system.nv))
+    if system.is_closed:
+        p = [system.p_default] if system.parameters else []
+        J = np.array(closure_jacobian(system)(list(system.configuration), *p))
+    E = np.vstack([np.eye(system.nv)[list(numbers)], *rows])
+    return rank(np.vstack([J, E])) == rank(J) + len(E)

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from numbers import Real
 
 import numpy as np
+from casadi import SX
 from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
-from mbs.components.forces import JointStop, RigidStop
 from mbs.errors import ModelError
-from mbs.expressions import Scalar, to_float
+from mbs.recursions.parts import PartsAt
 from mbs.text import did_you_mean, quoted
 
 Array = NDArray[np.float64]
@@ -91,18 +91,24 @@ def _positions(system: System) -> tuple[Array, Array]:
             lower[k], upper[k] = -1.0, 1.0
         if coordinate.limits is not None:
             lower[k], upper[k] = coordinate.limits
+    at = PartsAt(system, SX.sym("q", system.nq))
     for force in system.parts:
-        place = force.levers[0].position if force.levers else None
-        if isinstance(force.element, (JointStop, RigidStop)) and place is not None:
-            lower[place] = max(lower[place], _number(force.element.lower, -np.inf))
-            upper[place] = min(upper[place], _number(force.element.upper, np.inf))
+        if not force.element.has("limits"):
+            continue
+        for port, (least, largest) in force.element.limits(at.at(force)).items():
+            levers = force.coordinates[port]
+            one = len(levers) == 1 and levers[0].factor.is_one()
+            place = levers[0].position if one else None
+            if place is not None:
+                lower[place] = max(lower[place], _number(least, -np.inf))
+                upper[place] = min(upper[place], _number(largest, np.inf))
     return lower, upper
 
 
-def _number(limit: Scalar | None, otherwise: float) -> float:
+def _number(limit: SX | None, otherwise: float) -> float:
     """A limit that is a number; a symbol has none yet."""
-    value = None if limit is None else to_float(limit)
-    return otherwise if value is None else value
+    value = SX(otherwise) if limit is None else SX(limit)
+    return float(value) if value.is_constant() else otherwise
 
 
 def _magnitudes(system: System, what: str, given: Largest) -> list[tuple[int, float]]:

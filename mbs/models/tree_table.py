@@ -36,7 +36,7 @@ def unknown_to_core(system: System) -> str:
         return "nothing moves, so that tree_core has no models of it"
     for part in system.parts:
         element = part.element
-        if not element.drives and (element.acts or element.binds):
+        if not element.drives and (element.acts or element.binds or element.switches):
             return (
                 f"component {part.name} ({type(element).__name__}) has equations of"
                 " its own, which tree_core does not know; use mbs.models.inverse_dynamics and"

@@ -17,9 +17,20 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.parts import AttachedPart, WireSource
 from mbs.assembly.tree import position_rate, quaternion_slices
-from mbs.components.custom import At, Event, FlangeAt, FrameLoad, Row, Signal
+from mbs.components.custom import (
+    At,
+    Event,
+    FlangeAt,
+    FrameLoad,
+    Friction,
+    OneWay,
+    Row,
+    Signal,
+    Stop,
+)
 from mbs.errors import AssemblyError, ExpressionError, MbsError
 from mbs.expressions import Expression
+from mbs.numbers import NONZERO
 from mbs.recursions.parts import PartsAt
 from mbs.text import did_you_mean, one_line, quoted
 
@@ -110,6 +121,8 @@ class _Check:
         rates = self._named("rates", [name for name in self.part.states if name not in modes])
         self._events(modes)
         self._rows()
+        self._contacts()
+        self._limits()
         if self.element.has("crossings"):
             free = casadi.vertcat(self.v, self.system.u)
             for label, value in self._mapping("crossings", self.at.at(self.part)).items():
@@ -287,6 +300,137 @@ class _Check:
                     " as a parameter"
                 )
 
+    def _contacts(self) -> None:
+        """Frictions and stops: what they act on, and their numbers at random states."""
+        labels = dict[str, str]()
+        for method, kinds, give in (
+            ("stops", (Stop, OneWay), "custom.Stop(gap) or custom.OneWay(velocity)"),
+            ("frictions", (Friction,), "custom.Friction(slip, limit)"),
+        ):
+            for label, law in (self._mapping(method) if self.element.has(method) else {}).items():
+                if not isinstance(label, str):
+                    raise AssemblyError(
+                        f"{self._title}: {method} has the label {quoted(label)}; give a text"
+                    )
+                if not isinstance(law, kinds):
+                    raise AssemblyError(
+                        f"{self._title}: {method} gives {_kind(law)} for {label!r}; give {give}"
+                    )
+                if label in labels:
+                    raise AssemblyError(
+                        f"{self._title}: {labels[label]} and {method} have both the label"
+                        f" {label!r}; choose another one"
+                    )
+                labels[label] = method
+                self._contact(label, law)
+
+    def _limits(self) -> None:
+        """Pairs of parameters, by coordinate."""
+        found = self._mapping("limits") if self.element.has("limits") else {}
+        for port, pair in found.items():
+            if port not in self.part.coordinates:
+                raise AssemblyError(
+                    f"{self._title}: limits names {quoted(port)}, which is no coordinate;"
+                    f" {did_you_mean(str(port), self.part.coordinates)}"
+                )
+            if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+                raise AssemblyError(
+                    f"{self._title}: limits gives {_kind(pair)} for {port}; give (lower, upper),"
+                    " None for no limit"
+                )
+            every = casadi.vertcat(self.q, self.v, self.system.z, *self.inputs.values())
+            for given in pair:
+                if given is not None:
+                    value = self._value(f"a limit of {port}", given)
+                    self._require_free_of(value, f"a limit of {port}", every, "the motion")
+
+    def _contact(self, label: str, law: Friction | Stop | OneWay) -> None:
+        own = {*self.element.output_names, *self.part.states, *self.part.inputs}
+        for column in ("mode", "effort"):
+            if not label and column in own:
+                raise AssemblyError(
+                    f"{self._title}: {column!r} is a column of what has the empty label, and a"
+                    " state, input or output; write a label"
+                )
+        if law.unit not in (None, "N", "N.m"):
+            raise AssemblyError(
+                f"{self._title}: the effort{_of(label)} has the unit {quoted(law.unit)}; use 'N'"
+                " or 'N.m'"
+            )
+        if isinstance(law, Friction):
+            self._contact_velocity("slip", label, law.slip)
+            limit = self._value(f"limit{_of(label)}", law.limit)
+            sticking = limit
+            if law.sticking is not None:
+                sticking = self._value(f"sticking{_of(label)}", law.sticking)
+            told = "friction is a finite effort, never below zero; write casadi.fmax"
+            self._require_range(f"the limit{_of(label)}", limit, 0.0, np.inf, told)
+            told = "at rest friction holds at least its limit, so make it larger"
+            self._require_range(f"sticking{_of(label)}", sticking, limit, np.inf, told)
+        elif isinstance(law, OneWay):
+            self._contact_velocity("velocity", label, law.velocity)
+        else:
+            self._stop(label, law)
+
+    def _contact_velocity(self, what: str, label: str, given: Any) -> None:
+        """A velocity is linear in velocities; what it is at rest follows from parameters."""
+        name = f"the {what}{_of(label)}"
+        value = self._value(name, given)
+        signals = casadi.vertcat(self.system.z, self.system.u, *self.inputs.values())
+        self._require_free_of(value, name, signals, "states or inputs")
+        slopes = casadi.jacobian(value, self.v)
+        if not slopes.nnz():
+            raise AssemblyError(
+                f"{self._title}: {name} does not depend on velocities; give a velocity, such as"
+                " at.shaft.speed"
+            )
+        rest = casadi.simplify(casadi.substitute(value, self.v, SX.zeros(self.v.numel())))
+        if casadi.depends_on(slopes, self.v) or casadi.depends_on(rest, self.q):
+            raise AssemblyError(
+                f"{self._title}: {name} is not linear in velocities, or follows at rest from"
+                " positions; write a sum of velocities, each with a factor"
+            )
+
+    def _stop(self, label: str, law: Stop) -> None:
+        """A gap of positions, limits and numbers of parameters."""
+        name = f"the gap{_of(label)}"
+        gap = self._value(name, law.gap)
+        signals = casadi.vertcat(self.system.z, self.system.u, *self.inputs.values())
+        self._require_free_of(gap, name, signals, "states or inputs")
+        self._require_free_of(gap, name, self.v, "velocities")
+        if not casadi.depends_on(gap, self.q):
+            raise AssemblyError(f"{self._title}: {name} does not depend on positions; give a gap")
+        if law.lower is None and law.upper is None:
+            raise AssemblyError(
+                f"{self._title}: {name} has neither lower nor upper; give one limit or both"
+            )
+        every = casadi.vertcat(self.q, self.v, signals)
+        values = {}
+        for field in ("lower", "upper", "restitution", "rest_speed"):
+            given = getattr(law, field)
+            if given is not None:
+                values[field] = self._value(f"{field}{_of(label)}", given)
+                self._require_free_of(values[field], f"{field}{_of(label)}", every, "the motion")
+        told = "give a number between 0 and 1"
+        self._require_range(f"restitution{_of(label)}", values["restitution"], 0.0, 1.0, told)
+        told, slowest = "give more than zero", values["rest_speed"]
+        self._require_range(f"rest_speed{_of(label)}", slowest, NONZERO, np.inf, told)
+        if "lower" in values and "upper" in values:
+            told, high = "give more than lower", values["upper"]
+            self._require_range(f"upper{_of(label)}", high, values["lower"], np.inf, told)
+
+    def _require_range(
+        self, what: str, value: SX, least: SX | float, greatest: SX | float, told: str
+    ) -> None:
+        """Refuse a number that is no finite one in a range at a random state."""
+        symbols = casadi.vertcat(self.system.z, *self.inputs.values())
+        given = [self.q, self.v, symbols, self.system.p]
+        found = Function("range", given, [value, SX(least), SX(greatest)])
+        for point in self._probes():
+            x, low, high = (float(one) for one in found(*point))
+            if not np.isfinite(x) or not low <= x <= high:
+                raise AssemblyError(f"{self._title}: {what} is {x:.6g} at a random state; {told}")
+
     def _scalar(self, method: str) -> SX | None:
         if not self.element.has(method):
             return None
@@ -444,6 +588,11 @@ class _Check:
     @property
     def _title(self) -> str:
         return f"{self.part.name} ({type(self.element).__name__})"
+
+
+def _of(label: str) -> str:
+    """Which friction or stop is meant, in words."""
+    return f" of {label!r}" if label else ""
 
 
 def _kind(value: Any) -> str:

@@ -23,6 +23,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.system import Packed, content_of, packed, unpacked
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
+from mbs.components.custom import OneWay
 from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.files import read_sealed, write_sealed
 from mbs.loops.analysis import rows_at
@@ -30,7 +31,14 @@ from mbs.loops.closure import least_upright, rolling_discs
 from mbs.loops.configuration import Values, start, start_position, start_velocity
 from mbs.loops.examine import row_independence
 from mbs.loops.velocity import constraint_jacobian, scales
-from mbs.models.contacts import KINDS, Contacts, contacts_of, require_lasting_rows, require_undriven
+from mbs.models.contacts import (
+    KINDS,
+    ContactElement,
+    Contacts,
+    contacts_of,
+    require_lasting_rows,
+    require_undriven,
+)
 from mbs.models.direct_dynamics import hybrid_dynamics
 from mbs.models.inverse_dynamics import bias
 from mbs.models.measurements import measurements
@@ -105,16 +113,22 @@ def first_modes(system: System, x0: Array, p: Array) -> Array:
     """
     contacts, nq = contacts_of(system), system.nq
     q, v = SX.sym("q", nq), SX.sym("v", system.nv)
-    start = Function("start", [q, v, system.p], [*contacts.first(q, v), *contacts.bounds])
+    found = [*contacts.first(q, v), *contacts.bounds, contacts.at(q, v).measure]
+    start = Function("start", [q, v, system.p], found)
     modes, outside, *limits = (
         np.array(value)[:, 0] for value in start(x0[:nq], x0[nq : nq + system.nv], p)
     )
     for number in np.flatnonzero(outside > 0):
         side, j = divmod(int(number), len(contacts))
-        position = contacts.positions[j]
-        assert position is not None
+        value, stop = limits[2][j], contacts.stops[j]
+        assert stop is not None
+        if isinstance(stop.law, OneWay):
+            raise ModelError(
+                f"{system.name}: {stop.name} starts at the velocity {value:g}, below zero, where it"
+                " holds; start it at zero or above, by v0"
+            )
         raise ModelError(
-            f"{system.name}: {contacts.names[j]} starts at {x0[position]:g}, beyond the"
+            f"{system.name}: {contacts.names[j]} starts at {value:g}, beyond the"
             f" {_LIMITS[2 * side - 1]} limit {limits[side][j]:g} of its rigid stop; start inside,"
             " by q0"
         )
@@ -128,25 +142,29 @@ def contact_columns(system: System) -> Iterator[tuple[int, str, str]]:
         system: with k coordinates on which contacts act, (2 k,) modes and (2 k,) efforts.
     """
     contacts = contacts_of(system)
-    for column, force in enumerate((*contacts.stops, *contacts.frictions)):
-        if force is not None:
-            unit = system.speeds[force.levers[0].velocity].unit
-            yield column, f"{force.element.name}.mode", "1"
-            yield 2 * len(contacts) + column, f"{force.element.name}.effort", EFFORT_UNIT[unit]
+    for column, element in enumerate((*contacts.stops, *contacts.frictions)):
+        if element is not None:
+            yield column, f"{element.name}.mode", "1"
+            yield 2 * len(contacts) + column, f"{element.name}.effort", element.unit
 
 
-def every_effort(system: System, tau: Array, efforts: Array) -> Array:
+def every_effort(system: System, q: Array, p: Array, tau: Array, efforts: Array) -> Array:
     """(m, nv) joint efforts, those of contacts included.
 
     Args:
-        system: with k coordinates on which contacts act, or none.
+        system: with k rows on which contacts act, or none.
+        q: (m, nq) positions.
+        p: (np,) parameters.
         tau: (m, nv) joint efforts without them.
         efforts: (m, 2 k) of the stops, then of friction.
     """
-    total = tau.copy()
-    for column, number in enumerate(2 * contacts_of(system).velocities):
-        total[:, number] += efforts[:, column]
-    return total
+    contacts, k = contacts_of(system), len(contacts_of(system))
+    if not k:
+        return tau
+    rows = Function("rows", [contacts.q, system.p], [casadi.densify(contacts.state.rows)])
+    E = np.array(rows(q.T, np.repeat(p[:, None], len(q), axis=1))).reshape(k, len(q), -1)
+    pushed: Array = np.einsum("jmn,mj->mn", E, efforts[:, :k] + efforts[:, k:])
+    return tau + pushed
 
 
 def list_events(
@@ -184,12 +202,19 @@ def _changes(
         for side, name in enumerate(("lower", "upper")):
             if side * k + j in event.fired:
                 rests = now == (-1, 1)[side]
-                yield stop.element.name, f"{'rests at' if rests else 'bounces off'} {name}"
+                what = f"{'rests at' if rests else 'bounces off'} {name}"
+                yield _said(stop, "locks" if isinstance(stop.law, OneWay) else what)
         if was and not now:
-            yield stop.element.name, f"leaves {_LIMITS[was]}"
+            freed = isinstance(stop.law, OneWay)
+            yield _said(stop, "frees" if freed else f"leaves {_LIMITS[was]}")
     slide_before, slides = before[k + j], event.modes[k + j]
     if friction is not None and slide_before != slides:
-        yield friction.element.name, "slides" if slides else "sticks"
+        yield _said(friction, "slides" if slides else "sticks")
+
+
+def _said(element: ContactElement, what: str) -> tuple[str, str]:
+    """The component, and what its friction or stop does."""
+    return element.part.name, f"{element.label} {what}" if element.label else what
 
 
 # Inputs of the devices of drive lines, in whatever form the user gives them.
@@ -942,7 +967,7 @@ def _result(system: System, legs: Sequence[Leg], p: Array, stop: Stop, columns: 
         if "sensors" in columns.blocks:
             every = np.repeat(p[:np_own, None], len(times), axis=1)
             motion = {"q": x[:, :nq].T, "v": x[:, nq:n].T, "z": x[:, n:].T, "u": u.T, "p": every}
-            whole = every_effort(system, tau, efforts)
+            whole = every_effort(system, x[:, :nq], p[:np_own], tau, efforts)
             sensors = sensor_values(system, {**motion, "a": a.T, "tau": whole.T})
         elif system.sensors:
             sensors = np.empty((len(times), sum(len(one.columns) for one in system.sensors)))

@@ -210,7 +210,7 @@ as numbers, so that no case has equations of its own."""
 def _system(system: System, options: Mapping[str, Any]) -> tuple[str, bytes]:
     """Its name, and what its motions under these laws follow from, to the last digit."""
     laws = {name: options[name] for name in _LAWS if name in options}
-    return system.name, Simulator(system, **laws).content()
+    return system.name, simulator_of(system, **laws).content()
 
 
 def _fmu(path: object) -> tuple[str, bytes]:

@@ -178,3 +178,25 @@ class TestServo:
         start = {"u": {"position.target": 0.5}, "z0": {"motor.i": 1.0, "position.x": -0.5}}
         result = agree(page["servo"], tmp_path, 0.3, [*shown[:-1], "position.f"], **start)
         assert np.all(result["encoder.q"] == result["elbow.q"])
+
+
+class TestBelt:
+    """Its formulas stand on the page."""
+
+    @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+    def test_an_fmu_does_what_run_does(self, page, tmp_path, kind):
+        start = {"one.v": 30.0, "two.v": -5.0}
+        v0 = {name.removesuffix(".v"): value for name, value in start.items()}
+        here = mbs.simulate.run(
+            page["drums"], 1.0, v0=v0, u={"motor": 3.0}, tolerance=1e-10, quiet=True
+        )
+        assert [what for *_, what in here.events] == ["belt sticks"]
+        path = mbs.export.fmu(page["drums"], tmp_path / "belt.fmu")
+        inputs = {"motor.tau": 3.0}
+        there = mbs.simulate.fmu(
+            path, 1.0, start=start, inputs=inputs, kind=kind, step=0.01, tolerance=1e-10, quiet=True
+        )
+        for name in ("one.v", "two.v", "one.q", "two.q"):
+            assert abs(there[name][-1] - here[name][-1]) < 1e-7
+        assert there["drive.belt.mode"][-1] == 0
+        assert there["drive.belt.effort"][-1] == pytest.approx(here["drive.belt.effort"][-1])

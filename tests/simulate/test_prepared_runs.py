@@ -11,12 +11,14 @@ import pytest
 import mbs
 from mbs.components import (
     Box,
+    Custom,
     JointSensor,
     PointMass,
     Prismatic,
     Revolute,
     SampleHold,
     SpherePlaneContact,
+    custom,
 )
 
 run_module = importlib.import_module("mbs.simulate.run")
@@ -139,6 +141,25 @@ def test_what_differs_is_derived_anew(made, disk):
     assert len(made) == 2
     arm(1.0, {"j": 1e-3})
     assert len(made) == 3
+
+
+def test_a_class_in_a_function_is_simulated_and_not_kept(made, disk):
+    class Push(Custom):
+        joint = custom.coordinate()
+
+        def loads(self, at):
+            return {"joint": 3.0}
+
+    def pushed():
+        m = mbs.Mechanism("m", gravity=(0, 0, 0))
+        m.connect(m.world, Prismatic("z", axis="z", actuated=False), m.add(PointMass("a", 1.0)))
+        m.add(Push("push", "z"))
+        return m.assemble()
+
+    ends = [swing(pushed())["z.v"][-1] for _ in range(2)]
+    assert ends == pytest.approx([1.5, 1.5], abs=1e-12)
+    assert len(made) == 2
+    assert not list(disk.glob("*.pickle"))
 
 
 def flipped(content):

@@ -15,7 +15,6 @@ import numpy as np
 from casadi import DM, SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.tables import EFFORT_UNIT
 from mbs.assembly.tree import position_rate
 from mbs.models.contacts import KINDS, ContactEquations, Contacts, impact, jump
 from mbs.models.state.drive import TreeMotion
@@ -60,7 +59,7 @@ def standstill(
     """
     active = list(system.active)
     rows = [j for j, number in enumerate(contacts.velocities) if number not in active]
-    if not rows or motion.G is None:
+    if not rows:
         return SX.zeros(len(active))
     stuck, change = required
     may_move = SX.ones(len(active))
@@ -68,12 +67,15 @@ def standstill(
         if number in prescribed:
             may_move[k] = 0
         elif number in contacts.velocities:
-            may_move[k] = 1 - stuck[contacts.velocities.index(number)]
-    G = motion.G[[contacts.velocities[j] for j in rows], :]
+            own = [j for j, other in enumerate(contacts.velocities) if other == number]
+            may_move[k] = 1 - casadi.mmax(stuck[own])
+    every, sizes = contacts.unit_rows(motion.q)
+    E = every[rows, :]
+    G = E[:, active] if motion.G is None else casadi.mtimes(E, motion.G)
     R = casadi.mtimes(casadi.diag(stuck[rows]), casadi.mtimes(G, casadi.diag(may_move)))
     S = casadi.mtimes(R, R.T) + casadi.diag(1 - stuck[rows]) + _SHARED * SX(DM.eye(len(rows)))
     D, LT, order = casadi.ldl(casadi.densify(S))
-    shares = casadi.ldl_solve(stuck[rows] * change[rows], D, LT, order)
+    shares = casadi.ldl_solve(stuck[rows] * change[rows] / sizes[rows], D, LT, order)
     return casadi.densify(casadi.mtimes(R.T, shares))
 
 
@@ -109,7 +111,7 @@ def minimal_jump(
     """
     contacts, (x, fired) = contact.contacts, before
     lower, upper, *_ = casadi.vertsplit(fired, len(contacts))
-    wall = (upper - lower) * ((upper - lower) * contacts.velocity(motion.v) >= 0)
+    wall = (upper - lower) * ((upper - lower) * contact.state.velocity >= 0)
     v, modes = _after(system, contact, motion, (_at_impact(contact, motion, wall), fired))
     now = contacts.modes(modes)
     at = casadi.if_else(now.limit == 0, wall, now.limit)
@@ -143,7 +145,8 @@ def _at_impact(contact: ContactEquations, motion: TreeMotion, wall: SX) -> SX:
     """
     contacts = contact.contacts
     depth = casadi.fmax(wall * contacts.distance(motion.q, wall), 0)
-    speed, rise = wall * contacts.velocity(motion.v), wall * contacts.velocity(contact.a)
+    rise = wall * (casadi.mtimes(contact.state.rows, contact.a) + contact.state.bias)
+    speed = wall * contact.state.velocity
     square = speed**2 - 2 * rise * depth
     since = casadi.if_else(
         square > 0,
@@ -160,17 +163,16 @@ def _after(
     contacts, (speed, fired) = contact.contacts, before
     v, modes = jump(system, contacts, contact.modes, (motion.q, speed, fired), contact.driven)
     stuck, m = contacts.modes(modes).stuck, len(contact.driven)
-    still = casadi.vertcat(SX.zeros(m), -stuck * contacts.velocity(v))
+    still = casadi.vertcat(SX.zeros(m), -stuck * contacts.velocity(motion.q, v))
     acting = casadi.vertcat(SX.ones(m), stuck)
-    numbers = (*contact.driven, *contacts.velocities)
-    dv = outputs_of(system, impact(system, numbers), motion.q, still, acting)[0]
+    dv = outputs_of(system, impact(system, contact.driven), motion.q, still, acting)[0]
     return v + casadi.mmax(stuck) * dv, modes
 
 
 def _shift(system: System, q: SX, x: SX, shift: SX, positions: Sequence[int]) -> SX:
-    """The state with independent positions of a closed system, which are at q, shifted."""
+    """The state with independent positions, which are at q, shifted."""
     after = SX(x)
-    if system.is_closed:
+    if not shift.is_zero():
         v = SX.zeros(system.nv)
         v[list(system.active)] = shift
         after[: len(positions)] += position_rate(system.tree, q, v)[list(positions)]
@@ -190,7 +192,7 @@ def _write(contacts: Contacts, motion: tuple[SX, SX], acting: tuple[SX, SX], sta
     after = SX(x)
     after[len(positions) : len(positions) + len(velocities)] = v[list(velocities)]
     for j, (q, number) in enumerate(zip(contacts.positions, contacts.velocities, strict=True)):
-        if number in velocities:
+        if number is not None and number in velocities:
             row = len(positions) + list(velocities).index(number)
             after[row] = casadi.if_else(stuck[j], 0, after[row])
         if q is not None and q in positions:
@@ -247,14 +249,14 @@ def used_modes(contacts: Contacts) -> list[int]:
 def element_names(contacts: Contacts) -> list[str]:
     """Names of the stops, then of the frictions."""
     elements = (*contacts.stops, *contacts.frictions)
-    return [element.element.name for element in elements if element is not None]
+    return [element.name for element in elements if element is not None]
 
 
 def contact_efforts(system: System, contacts: Contacts) -> tuple[ContactEffort, ...]:
     """The outputs of the efforts of stops, then of friction."""
-    units = [EFFORT_UNIT[system.speeds[k].unit] for k in contacts.velocities] * 2
-    pairs = zip(element_names(contacts), used_modes(contacts), strict=True)
-    return tuple(ContactEffort(f"{name}.effort", units[k], k) for name, k in pairs)
+    elements = (*contacts.stops, *contacts.frictions)
+    found = [(k, element) for k, element in enumerate(elements) if element is not None]
+    return tuple(ContactEffort(f"{element.name}.effort", element.unit, k) for k, element in found)
 
 
 def few_modes(contact: ContactEquations | None, p: SX, values: Sequence[SX]) -> tuple[SX, list[SX]]:
@@ -380,11 +382,11 @@ def _name(contacts: Contacts, j: int, word: str) -> str:
     limit, direction = {"pulled": ("lower", "up"), "pushed": ("upper", "down")}.get(word, ("", ""))
     parts = []
     if stop is not None and word in ("lower", "upper"):
-        parts.append(f"{stop.element.name} {word}")
-    if stop is not None and limit and getattr(stop.element, limit) is not None:
-        parts.append(f"{stop.element.name} leaves {limit}")
+        parts.append(f"{stop.name} {word}")
+    if stop is not None and limit and stop.sides[("lower", "upper").index(limit)]:
+        parts.append(f"{stop.name} leaves {limit}")
     if friction is not None and word not in ("lower", "upper"):
-        parts.append(f"{friction.element.name} {f'slides {direction}' if direction else 'stops'}")
+        parts.append(f"{friction.name} {f'slides {direction}' if direction else 'stops'}")
     return " or ".join(parts)
 
 

@@ -306,10 +306,7 @@ class Accelerations:
     def every_effort(self) -> SX:
         """(nv, 1) joint efforts, those of contacts included."""
         total = SX(self.tau)
-        if self.contact is not None:
-            for row, number in enumerate(2 * self.contact.contacts.velocities):
-                total[number] += self.contact.efforts[row]
-        return total
+        return total if self.contact is None else total + self.contact.pushes
 
 
 def minimal_accelerations(
@@ -351,10 +348,11 @@ def minimal_accelerations(
 def _stuck_accelerations(system: System, contact: ContactEquations, motion: TreeMotion) -> SX:
     """(nv, 1) accelerations under contacts, exact for independent joints that are stuck."""
     a, contacts, stuck = SX(contact.a), contact.contacts, contact.modes.stuck
-    back = -RETURN_RATE * contacts.velocity(motion.v)
+    back = -RETURN_RATE * contact.state.velocity
     a[list(system.active)] += standstill(system, contacts, motion, (stuck, back), contact.driven)
     for j, number in enumerate(contacts.velocities):
-        a[number] = casadi.if_else(stuck[j], back[j], a[number])
+        if number is not None:
+            a[number] = casadi.if_else(stuck[j], back[j], a[number])
     return a
 
 
@@ -689,12 +687,12 @@ def _rate(
     system: System, layout: MinimalLayout, motion: TreeMotion, response: Accelerations, devices: SX
 ) -> SX:
     """The rate of x; quaternions are drawn back to unit length."""
+    v = SX(motion.v)
+    v[list(system.active)] += at_limits(system, response.contact, motion)
     if system.is_closed:
-        v = SX(motion.v)
-        v[list(system.active)] += at_limits(system, response.contact, motion)
         rate = state_rates(system, layout.orientations, (motion.raw, motion.q, v))
     else:
-        rate = _steadied_rate(system, motion)
+        rate = _steadied_rate(system, replace(motion, v=v))
     return casadi.vertcat(
         _rows(rate, layout.positions), _rows(response.a, layout.velocities), devices
     )

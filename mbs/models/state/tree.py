@@ -61,6 +61,8 @@ _ASLEEP = 1e-6
 """What rows count in that case."""
 _SHARED = 1e-4
 """Square that is added to rows of contacts, which may depend on others: they converge as fast."""
+_SMALL = 1e-30
+"""Square of a row below which it vanishes: levers shorter than 1e-15 m are rounding."""
 _NEVER = 1e300
 """Pivot of a row that is left alone: what it would move, divided by this, is zero."""
 
@@ -107,7 +109,11 @@ def project_step(
         loops = independent_closure(system, symbols)
         measures = constraint_sizes(system)[kept_rows(system), :]  # (0, 1) where nothing is kept
         J = independent_constraint_rows(system, symbols)
-    distance, limit_off, still, slide_off = _touch(system, symbols, v, touch)
+    found = scales(system)
+    q_scales, v_scales = (
+        found.columns([row.unit for row in table]) for table in (system.coordinates, system.speeds)
+    )
+    distance, limit_off, still, slide_off, sizes = _touch(system, symbols, v, touch, v_scales)
     r = casadi.vertcat(loops, norms, *positions, distance)
     J_q = casadi.jacobian(r, symbols)
     prescribed = [
@@ -118,13 +124,9 @@ def project_step(
     target = casadi.vertcat(SX(J.shape[0] - len(prescribed), 1), *(v_p for _, v_p in prescribed))
     J = casadi.vertcat(J, casadi.jacobian(still, v))
     speed = casadi.vertcat(casadi.mtimes(J[: target.numel(), :], v) - target, still)
-    found = scales(system)
     first = found.rows[kept_rows(system)]
-    q_scales, v_scales = (
-        found.columns([row.unit for row in table]) for table in (system.coordinates, system.speeds)
-    )
-    step_q, _ = _shortest(J_q, r, limit_off, first[: loops.numel()], q_scales)
-    step_v, awake = _shortest(J, speed, slide_off, first, v_scales)
+    step_q, _ = _shortest(J_q, r, limit_off, first[: loops.numel()], q_scales, sizes)
+    step_v, awake = _shortest(J, speed, slide_off, first, v_scales, sizes)
     relative = casadi.vertcat(speed[: measures.numel(), 0] / measures, speed[measures.numel() :, 0])
     rows = casadi.vertcat(relative_rows(system, symbols), *positions, distance, relative)
     residual = casadi.if_else(awake, 1, _ASLEEP) * casadi.mmax(casadi.fabs(rows))
@@ -133,17 +135,29 @@ def project_step(
 
 
 def _touch(
-    system: System, q: SX, v: SX, touch: tuple[Contacts, Modes] | None
-) -> tuple[SX, SX, SX, SX]:
-    """Rows of positions at stops, then of velocities that are stuck; each with its `_switch`."""
+    system: System, q: SX, v: SX, touch: tuple[Contacts, Modes] | None, columns: Array
+) -> tuple[SX, SX, SX, SX, SX]:
+    """Rows of positions at stops, then of velocities that are stuck; each with its `_switch`.
+
+    The last ones are the factors that make rows of velocities of unit length, where `columns` are
+    the scales of v.
+    """
     if touch is None:
-        return SX(0, 1), SX(0, 1), SX(0, 1), SX(0, 1)
+        return SX(0, 1), SX(0, 1), SX(0, 1), SX(0, 1), SX(0, 1)
     contacts, modes = touch
+    E = casadi.mtimes(contacts.rows(q), casadi.diag(DM(columns)))
+    sizes = [
+        1 / casadi.sqrt(casadi.fmax(casadi.sumsqr(E[j, :]), _SMALL))
+        if k is None
+        else SX(1 / float(columns[k]))
+        for j, k in enumerate(contacts.velocities)
+    ]
     return (
         contacts.distance(q, modes.limit),
         _switch(modes.limit**2),
-        modes.stuck * contacts.velocity(v),
+        modes.stuck * contacts.velocity(q, v),
         _switch(modes.stuck),
+        casadi.vertcat(*sizes),
     )
 
 
@@ -152,7 +166,7 @@ def _switch(acting: SX) -> SX:
     return casadi.if_else(acting, _SHARED, 1)
 
 
-def _shortest(J: SX, r: SX, off: SX, first: Array, columns: Array) -> tuple[SX, SX]:
+def _shortest(J: SX, r: SX, off: SX, first: Array, columns: Array, last: SX) -> tuple[SX, SX]:
     """A short step x with J x = r, by rows that are not nearly dependent, and whether all are.
 
     Args:
@@ -161,10 +175,14 @@ def _shortest(J: SX, r: SX, off: SX, first: Array, columns: Array) -> tuple[SX, 
         off: what is added to the squares of the switched rows.
         first: scales of the rows of the loops; other rows are of unit length.
         columns: scales of the columns.
+        last: scales of the switched rows.
     """
     if J.shape[0] == 0:
         return SX.zeros(J.shape[1]), SX(1)
-    rows = DM([*first, *(_unit(J[k, :], columns) for k in range(len(first), J.shape[0]))])
+    middle = range(len(first), J.shape[0] - last.numel())
+    rows: Any = DM([*first, *(_unit(J[k, :], columns) for k in middle)])
+    if last.numel():
+        rows = casadi.vertcat(rows, last)
     B = rows * casadi.mtimes(J, casadi.diag(DM(columns)))
     every = casadi.vertcat(SX(J.shape[0] - off.numel(), 1), off)
     S = casadi.sparsify(casadi.mtimes(B, B.T)) + casadi.diag(every)
@@ -196,7 +214,10 @@ def passage(
     inputs: SX | None = None,
     given_inputs: SX | None = None,
 ) -> Passage | None:
-    """The functions of passages; None where nothing is lost, or rows bind velocities alone.
+    """The functions of passages; None where nothing is lost.
+
+    They are None as well where rows bind velocities alone, and where contacts act on velocities
+    that are the rate of no known position.
 
     Args:
         system: open or closed.
@@ -236,24 +257,29 @@ def passage(
     driven_rows = [q[number] - law[0] for number, law in zip(driven, laws, strict=True)]
     braked = SX(tau)
     anchors: list[SX] = []
-    E = SX(0, nv)
+    E, bends = SX(0, nv), SX(0, 1)
     if contact is not None:
         modes, contacts = contact.modes, contact.contacts
-        stuck = modes.stuck
+        places = [anchor for anchor in contacts.anchors if anchor is not None]
+        if len(places) < len(contacts):
+            return None
+        stuck, state = modes.stuck, contact.state
         p = casadi.vertcat(p, contact.values)
-        for j, number in enumerate(contacts.velocities):
-            braked[number] -= modes.slide[j] * contacts.sliding[j]
-            anchors.append(stuck[j] * q[_position(system, number)])
-        E = casadi.mtimes(casadi.diag(stuck), unit[list(contacts.velocities), :])
+        braked -= casadi.mtimes(state.rows.T, modes.slide * state.sliding)
+        own = [contacts.state.rows, contacts.state.bias, *places]
+        known: list[SX] = casadi.substitute(own, [contacts.q, contacts.v], [q, v])
+        anchors = [stuck[j] * anchor for j, anchor in enumerate(known[2:])]
+        E = casadi.mtimes(casadi.diag(stuck), known[0])
+        bends = -stuck * known[1]
     norms = norm_rows(system.tree, q)
     positions = casadi.vertcat(loops[0], *driven_rows, *anchors, norms)
     speeds = casadi.vertcat(loops[1], unit[drives, :], E)
     still = SX.zeros(len(anchors))
     b = casadi.vertcat(SX.zeros(count), *(law[1] for law in laws), still)
-    c = casadi.vertcat(loops[2], *(law[2] for law in laws), still)
+    c = casadi.vertcat(loops[2], *(law[2] for law in laws), bends)
     has_quaternions = nq > nv  # else N is the unit matrix, and J are the slopes of `positions`
     rate = position_rate(system.tree, q, v)
-    rank = len(closure.rows) + len(motions) + (casadi.sum1(stuck) if anchors else 0)
+    rank = len(closure.rows) + len(motions) + (_count_stuck(contact) if contact else 0)
     rows = [
         positions,
         casadi.jacobian(positions, q),
@@ -285,7 +311,7 @@ def passage(
 
 
 def _without_passages(system: System, point: tuple[SX, SX, SX, SX]) -> Passage:
-    """That of a system with rows on velocities alone: every configuration counts as regular."""
+    """That of a system without passages: every configuration counts as regular."""
     t, X, u, p = point
     nq, nv = system.nq, system.nv
     at = [t, X, SX.sym("z", 0), u, p]
@@ -320,10 +346,11 @@ def _mostly_dense(name: str, inputs: Sequence[SX], outputs: Sequence[SX]) -> Fun
     return Function(name, list(inputs), values, {"cse": True})
 
 
-def _position(system: System, number: int) -> int:
-    """The index in q of a velocity of a joint with one degree of freedom."""
-    link = next(link for link in system.tree.links if link.v.start <= number < link.v.stop)
-    return int(link.q.start + number - link.v.start)
+def _count_stuck(contact: ContactEquations) -> SX:
+    """How many rows are stuck, equal ones counted once."""
+    groups, stuck = contact.contacts.groups, contact.modes.stuck
+    same = [[j for j, other in enumerate(groups) if other == k] for k in dict.fromkeys(groups)]
+    return sum((casadi.mmax(stuck[rows]) for rows in same), SX(0))
 
 
 def _regularity(system: System, q: SX, drives: SX) -> SX:
@@ -359,7 +386,7 @@ class TreeState:
         project: `project(t, X, z, u, p) -> (X, residual)`, one Newton step onto the loops.
         start: `start(t, x, z, u, p) -> X` of states x and dependents z of the independent one.
         passage: of rows, forces and regularity.
-        passes: whether it is asked for passages; never where rows bind velocities alone.
+        passes: whether it is asked for passages; see `passage`.
         events: of rigid stops and Coulomb friction; None where there are none.
         rate: `rate(X) -> q'`, the rates of the positions in X.
         states: numbers in X of the states x.
@@ -414,8 +441,10 @@ def tree_state(
     through = passage(
         system, (s.t, X, system.p), SX(tau + load), rates, contact=contact, inputs=s.u
     )
-    if through is None and slips:
-        through = _without_passages(system, (s.t, X, s.u, system.p))
+    whole = [*point[:4], casadi.vertcat(system.p, contact.values) if contact else system.p]
+    passes = through is not None
+    if through is None and (slips or contact):
+        through = _without_passages(system, (s.t, X, s.u, whole[4]))
     if through is None:
         return None
     if contact is None:
@@ -438,7 +467,6 @@ def tree_state(
         few, values = few_modes(contact, system.p, outputs)
         return dense_function(name, [*at, few], values)
 
-    whole = [*point[:4], casadi.vertcat(system.p, contact.values) if contact else system.p]
     rhs = written("tree_rhs", point[:4], [rate, y])
     forces = written("forces", point[:4], through.forces.call(whole))
     events = None
@@ -467,7 +495,7 @@ def tree_state(
         project=written("tree_project", free, [casadi.vertcat(*kept, X[n:]), residual]),
         start=written("tree_start", [s.t, s.x, s.z, inputs], [start]),
         passage=replace(through, rows=rows, forces=forces, regularity=regularity),
-        passes=not slips,
+        passes=passes,
         events=events,
         states=(
             *layout.positions,

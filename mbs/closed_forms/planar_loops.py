@@ -18,7 +18,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from mbs.errors import NoClosedForm
+from mbs.errors import LoopError, NoClosedForm
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -125,6 +125,11 @@ _OPEN = 1e-9
 1e-14 at double ones, and what is no root stays above 1e-4 as a rule."""
 
 
+_DEPENDENT = 1e-5
+"""Rows that depend on others, at roots of these: a root at a fold is known to 1e-7 until all rows
+are refined together."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
     """Unknowns that follow from some rows alone.
@@ -145,6 +150,16 @@ class Part:
         return len(self.angles) + len(self.slides)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """Roots of a part: as `PlanarRoots`."""
+
+    theta: Real
+    s: Real
+    method: str
+    singular: bool = False
+
+
 def planar_roots(loops: PlanarLoops) -> PlanarRoots:
     """Every configuration that closes the loops.
 
@@ -152,37 +167,36 @@ def planar_roots(loops: PlanarLoops) -> PlanarRoots:
         loops: as many independent rows as make half of the unknowns, dependent rows beside them.
 
     Raises:
-        NoClosedForm: a part has more prismatic joints than are known here, or moves by itself.
+        NoClosedForm: a part has more prismatic joints than are known here.
+        LoopError: a part can move by itself.
     """
-    theta, s, methods = _solve(loops)
+    theta, s, parts = _solve(loops)
     theta, s, _ = refine(loops, theta, s)
-    return PlanarRoots(theta, s, tuple(dict.fromkeys(methods)))
+    methods = tuple(dict.fromkeys(part.method for part in parts))
+    return PlanarRoots(theta, s, methods, any(part.singular for part in parts))
 
 
-def _solve(loops: PlanarLoops) -> tuple[Real, Real, list[str]]:
+def _solve(loops: PlanarLoops) -> tuple[Real, Real, list[_Found]]:
     n, m = loops.counts
     if n + m == 0:
-        closed = np.all(np.abs(loops.constant) < _OPEN**0.5)
-        return np.zeros((int(closed), 0)), np.zeros((int(closed), 0)), []
+        closed = int(np.all(np.abs(loops.constant) < _DEPENDENT))
+        return np.zeros((closed, 0)), np.zeros((closed, 0)), []
     part = _smallest_part(loops)
-    own = _of_part(loops, part)
-    theta, s, method = _irreducible(own)
-    methods, found = [method], list[tuple[Real, Real]]()
-    rest_angles = [k for k in range(n) if k not in part.angles]
-    rest_slides = [j for j in range(m) if j not in part.slides]
-    for theta_k, s_k in zip(theta, s, strict=True):
-        more_theta, more_s, more = _solve(loops.with_known(part, theta_k, s_k))
-        methods += more
-        for other_theta, other_s in zip(more_theta, more_s, strict=True):
-            whole_theta, whole_s = np.empty(n), np.empty(m)
-            whole_theta[part.angles], whole_theta[rest_angles] = theta_k, other_theta
-            whole_s[part.slides], whole_s[rest_slides] = s_k, other_s
-            found.append((whole_theta, whole_s))
-    return (
-        np.array([theta for theta, _ in found]).reshape(len(found), n),
-        np.array([s for _, s in found]).reshape(len(found), m),
-        methods,
+    own = _irreducible(_of_part(loops, part))
+    parts, theta, s = [own], list[Real](), list[Real]()
+    rest = (
+        [k for k in range(n) if k not in part.angles],
+        [j for j in range(m) if j not in part.slides],
     )
+    for theta_k, s_k in zip(own.theta, own.s, strict=True):
+        more_theta, more_s, more = _solve(loops.with_known(part, theta_k, s_k))
+        parts += more
+        whole_theta, whole_s = np.empty((len(more_theta), n)), np.empty((len(more_s), m))
+        whole_theta[:, part.angles], whole_theta[:, rest[0]] = theta_k, more_theta
+        whole_s[:, part.slides], whole_s[:, rest[1]] = s_k, more_s
+        theta.append(whole_theta)
+        s.append(whole_s)
+    return np.concatenate([np.zeros((0, n)), *theta]), np.concatenate([np.zeros((0, m)), *s]), parts
 
 
 def _smallest_part(loops: PlanarLoops) -> Part:
@@ -235,39 +249,36 @@ def _of_part(loops: PlanarLoops, part: Part) -> PlanarLoops:
     )
 
 
-def _irreducible(loops: PlanarLoops) -> tuple[Real, Real, str]:
+def _irreducible(loops: PlanarLoops) -> _Found:
     """The roots of a part that has no smaller ones, and how they were found."""
     n, m = loops.counts
-    none = np.zeros((0, n)), np.zeros((0, m))
     if n + m == 1:
-        theta, s, method = _one_unknown(loops)
+        found = _one_unknown(loops)
     elif n + m == 2:
-        theta, s, method = _dyad(loops)
+        found = _dyad(loops)
     elif m == 0:
-        theta, degree = dixon_roots(loops.angles, loops.constant)
-        s, method = np.zeros((len(theta), 0)), f"Dixon's determinant of degree {degree}"
+        found = dixon_roots(loops.angles, loops.constant)
     elif n + m == 4:
-        theta, s, method = triad_roots(loops)
+        found = triad_roots(loops)
     else:
         raise NoClosedForm(
             f"{len(loops.constant)} plane loops that must be solved together hold {m} unknown"
             " prismatic joints, which is known for two loops alone"
         )
-    if not len(theta):
-        return *none, method
-    theta, s, residual = refine(loops, theta, s)
+    theta, s, residual = refine(loops, found.theta, found.s)
     kept = residual < _OPEN
-    return *_distinct(loops, theta[kept], s[kept]), method
+    theta, s = _distinct(loops, theta[kept], s[kept])
+    return _Found(theta, s, found.method, found.singular)
 
 
-def _one_unknown(loops: PlanarLoops) -> tuple[Real, Real, str]:
+def _one_unknown(loops: PlanarLoops) -> _Found:
     """One direction or displacement from a row that is enough for two."""
-    n, m = loops.counts
+    n, _ = loops.counts
     a = (loops.angles if n else loops.slides)[:, 0]
     value = -np.vdot(a, loops.constant) / np.vdot(a, a)
     if n:
-        return np.full((1, 1), np.angle(value)), np.zeros((1, 0)), "linear"
-    return np.zeros((1, 0)), np.full((1, 1), value.real), "linear"
+        return _Found(np.full((1, 1), np.angle(value)), np.zeros((1, 0)), "linear equations")
+    return _Found(np.zeros((1, 0)), np.full((1, 1), value.real), "linear equations")
 
 
 # A dyad: one loop of two unknowns, by the law of cosines and its kin.
@@ -278,36 +289,37 @@ _FOLD = 1e-12
 stretched: rounding of lengths in parts of the size."""
 
 
-def _dyad(loops: PlanarLoops) -> tuple[Real, Real, str]:
-    method = "quadratic equation of a dyad"
+def _dyad(loops: PlanarLoops) -> _Found:
+    method = "the quadratic equation of a dyad"
     n, _ = loops.counts
     b = loops.constant[0]
     if n == 2:
         a, c = loops.angles[0]
         first = _angles_of(np.conj(b) * a, (abs(c) ** 2 - abs(a) ** 2 - abs(b) ** 2) / 2)
         theta = [(t, np.angle(-(a * np.exp(1j * t) + b) / c)) for t in first]
-        return np.array(theta).reshape(-1, 2), np.zeros((len(theta), 0)), method
+        return _Found(np.array(theta).reshape(-1, 2), np.zeros((len(theta), 0)), method)
     if n == 0:
         D = np.stack([loops.slides[0].real, loops.slides[0].imag])
-        return np.zeros((1, 0)), np.linalg.solve(D, [-b.real, -b.imag])[None], "linear"
+        s = np.linalg.solve(D, [-b.real, -b.imag])
+        return _Found(np.zeros((1, 0)), s[None], "linear equations")
     a, d = loops.angles[0, 0], loops.slides[0, 0]
     # |a + d s| = |b| where the link carries the displacement, else |b + d s| = |a|
     begin, length = (b, abs(a)) if loops.carriers[0] == KNOWN else (a, abs(b))
     middle = -(np.conj(d) * begin).real / abs(d) ** 2
     square = (length**2 - abs(begin) ** 2) / abs(d) ** 2 + middle**2
     if square < -_FOLD:
-        return np.zeros((0, 1)), np.zeros((0, 1)), method
+        return _Found(np.zeros((0, 1)), np.zeros((0, 1)), method)
     s = middle + np.array([1, -1]) * np.sqrt(max(square, 0.0))
     moved = d * s
     unit = -(b + moved) / a if loops.carriers[0] == KNOWN else -b / (a + moved)
-    return np.angle(unit)[:, None], s[:, None], method
+    return _Found(np.angle(unit)[:, None], s[:, None], method)
 
 
 def _angles_of(w: complex, value: float) -> list[float]:
     """The angles t with Re(w e^(i t)) = value."""
     if abs(w) < _SMALL:
         if abs(value) < _SMALL:
-            raise NoClosedForm("a dyad of equal links turns about its own end")
+            raise LoopError("a dyad of equal links can turn about its own end")
         return []
     cosine = value / abs(w)
     if abs(cosine) > 1 + _FOLD:
@@ -396,7 +408,7 @@ _APART = 1e-6
 """Relative distance above which two roots x are counted as two."""
 
 
-def dixon_roots(angles: Complex, constant: Complex) -> tuple[Real, int]:
+def dixon_roots(angles: Complex, constant: Complex) -> _Found:
     """Candidates for the directions that close loops of revolute joints alone.
 
     Args:
@@ -404,25 +416,29 @@ def dixon_roots(angles: Complex, constant: Complex) -> tuple[Real, int]:
         constant: (L,) what is known.
 
     Returns:
-        (r, 2 L) angles [rad], to be refined and judged; the degree of the determinant.
+        Angles (r, 2 L) [rad], to be refined and judged.
 
     Raises:
-        NoClosedForm: the determinant vanishes everywhere, whatever is hidden.
+        LoopError: the determinant vanishes everywhere, whatever is hidden.
     """
-    solved = [
-        (x, t, pencil)
-        for hidden in range(angles.shape[1])
-        if (pencil := _pencil(angles, constant, hidden)) is not None
-        for x, t in _eigenvectors(pencil)
-    ]
+    n = angles.shape[1]
+    pencils = [_pencil(angles, constant, hidden) for hidden in range(n)]
+    solved = [(x, t, pencil) for pencil in pencils if pencil for x, t in _eigenvectors(pencil)]
     if not solved:
-        raise NoClosedForm("its equations vanish for every direction, so that links may move")
+        raise LoopError(
+            "the equations vanish for every direction of a link, so that links may move"
+        )
     degrees = [_count_distinct(x) for x, _, _ in solved]
     x, t, pencil = solved[int(np.argmax(degrees))]
     with np.errstate(all="ignore"):
         near = np.abs(np.log(np.abs(x))) < _NEAR_CIRCLE
-    theta = np.array([pencil.angles(x_k, t_k) for x_k, t_k in zip(x[near], t.T[near], strict=True)])
-    return theta.reshape(-1, angles.shape[1]), max(degrees)
+    theta = [pencil.angles(x_k, t_k) for x_k, t_k in zip(x[near], t.T[near], strict=True)]
+    return _Found(
+        np.array(theta).reshape(-1, n),
+        np.zeros((len(theta), 0)),
+        f"Dixon's determinant of degree {max(degrees)}",
+        len(solved) < len(pencils),
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -549,11 +565,12 @@ _TAIL = 1e-8
 """Coefficients above degree three, as parts of the largest: rounding of products of six lengths."""
 
 
-def triad_roots(loops: PlanarLoops) -> tuple[Real, Real, str]:
+def triad_roots(loops: PlanarLoops) -> _Found:
     """Candidates for the unknowns of two loops with prismatic joints.
 
     Raises:
         NoClosedForm: no direction leaves three circles and lines.
+        LoopError: the polynomial vanishes everywhere.
     """
     n, m = loops.counts
     for hidden in range(n):
@@ -562,7 +579,7 @@ def triad_roots(loops: PlanarLoops) -> tuple[Real, Real, str]:
             if triad is not None:
                 angle, degree = triad.angles()
                 theta, s = triad.unknowns(angle)
-                return theta, s, f"triad with prismatic joints, of degree {degree}"
+                return _Found(theta, s, f"the polynomial of a triad, of degree {degree}")
     raise NoClosedForm(
         f"two plane loops that must be solved together hold {n} directions and {m} prismatic"
         " joints in an order for which no closed form is known"
@@ -634,7 +651,10 @@ class _Triad:
         coefficients = spectrum[np.arange(-3, 4)]  # of x^-3 .. x^3
         largest = np.max(np.abs(spectrum))
         if largest < _ZERO or np.max(np.abs(spectrum[4:-3])) > _TAIL * largest:
-            raise NoClosedForm("its equation vanishes for every direction, so that links may move")
+            raise LoopError(
+                "the equation of a triad vanishes for every direction of a link, so that links may"
+                " move"
+            )
         degree = 3
         while degree > 0 and abs(coefficients[3 + degree]) < _ZERO * largest:
             degree -= 1

@@ -20,11 +20,13 @@ from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
 from mbs.closed_forms.arm import Arm, inverse
 from mbs.closed_forms.arm_search import General, general, general_of
+from mbs.closed_forms.hexapod import LEGS, poses
 from mbs.closed_forms.planar_loops import KNOWN, PlanarLoops, planar_roots
 from mbs.closed_forms.ring import PARAMETERS, extent, independent_indices, loop_links
 from mbs.components import Fixed, PointOnLine, Rod, Spherical
-from mbs.components.joints import Motion
+from mbs.components.joints import Freedom, Motion
 from mbs.errors import LoopError, NoClosedForm
+from mbs.expressions import to_sx
 from mbs.loops.closing import Vector, closure_parameters, difference
 from mbs.loops.plan import (
     Block,
@@ -34,10 +36,11 @@ from mbs.loops.plan import (
     is_bound,
     order_steps,
     plan,
+    posed_stages,
     started_at,
 )
 from mbs.recursions.chain import ChainJoint, Ring
-from mbs.spatial import Pose
+from mbs.spatial import Pose, vector
 
 Step = Stage | Block
 Matrix = NDArray[np.float64]
@@ -72,7 +75,7 @@ def steps_of(system: System) -> tuple[Step, ...]:
 
 def _block(work: Work, waiting: Sequence[int]) -> Block | None:
     """The first block that gives the assembled configuration back."""
-    for find in (planar_blocks, single_loops):
+    for find in (planar_blocks, single_loops, platforms):
         for block in find(work, waiting):
             if _gives_assembled(work, block):
                 return block
@@ -243,9 +246,7 @@ class _Plane:
 
     def drawing(self, q: Vector, p: Vector) -> _Drawing | None:
         """The loops in their plane at given positions; None where they do not lie in one."""
-        numbers = np.array(self.frames(q, p))
-        frames = numbers.T.reshape(-1, 4, 4).transpose(0, 2, 1)
-        return _draw(self, frames)
+        return _draw(self, _side_by_side(self.frames, q, p))
 
     def roots(self, q: Vector, p: Vector) -> Roots:
         """Every way to close the loops."""
@@ -546,7 +547,7 @@ class _SingleLoop:
 
     def roots(self, q: Vector, p: Vector) -> Roots:
         """Every way to close the loop."""
-        gaps = np.array(self.gaps(q, p)).T.reshape(-1, 4, 4).transpose(0, 2, 1)
+        gaps = _side_by_side(self.gaps, q, p)
         signs = np.array([joint.sign for joint in self.joints])
         found = general(self._general(gaps), inverse(gaps[0]))
         return Roots(found * signs, "the general inverse geometric model, of degree 16")
@@ -559,3 +560,262 @@ class _SingleLoop:
             names = tuple(joint.name for joint in self.joints)
             self.arm = (key, general_of(Arm(names, prismatic, between)))
         return self.arm[1]
+
+
+# A platform on six legs: between two points, one on the ground and one on the platform, each keeps
+# its length.
+
+
+def platforms(work: Work, waiting: Sequence[int]) -> Iterator[Block]:
+    """The block of a platform on six legs, with all loops that share its unknown joints."""
+    system = work.system
+    links = {
+        number: _unknown_links(work, number)
+        for number in waiting
+        if number < len(system.cuts) and not is_bound(system, number)
+    }
+    for numbers in _connected(links):
+        hexapod = _Hexapod.of(work, numbers, sorted(set().union(*(links[n] for n in numbers))))
+        if hexapod is not None:
+            cuts = [system.cuts[number].edge.joint.name for number in numbers]
+            yield Block(", ".join(cuts), hexapod.indices, hexapod.roots)
+
+
+class _Edge(NamedTuple):
+    """A joint, or a cut one, between two groups.
+
+    Attributes:
+        ends: the groups.
+        freedoms: of the joint, in its frame.
+        frames: numbers of the frames of the joint in both groups, of those that are computed; they
+            agree where the joint is at zero.
+    """
+
+    ends: tuple[int, int]
+    freedoms: tuple[Freedom, ...]
+    frames: tuple[int, int]
+
+
+_BALL = Freedom(Motion.SPHERICAL)
+
+
+def _edges(work: Work, numbers: list[int], links: list[int]) -> tuple[list[_Edge], Function]:
+    """The joints of a block, and Function of all positions and p: their frames, side by side."""
+    groups, system = _groups(work), work.system
+    edges, poses = list[_Edge](), [Pose.identity()]
+
+    def frame(pose: Pose) -> int:
+        poses.append(pose)
+        return len(poses) - 1
+
+    for k in links:
+        ends = (groups.joints[k].parent, k)
+        moved = Freedom(system.tree.links[k].motion)
+        edges.append(_Edge(ends, (moved,), (frame(groups.joints[k].at), 0)))
+    for number in numbers:
+        cut = system.cuts[number]
+        joint = cut.edge.joint
+        ends = (groups.group[cut.link_a], groups.group[cut.link_b])
+        a = frame(groups.pose[cut.link_a] @ cut.pose_a)
+        b = frame(groups.pose[cut.link_b] @ cut.pose_b)
+        if isinstance(joint, Rod) and not cut.welded:
+            # a group of its own, between two spherical joints
+            own = len(system.tree.links) + number
+            along = Pose.translation(vector([to_sx(joint.length, system.symbol_table), 0, 0]))
+            edges.append(_Edge((ends[0], own), (_BALL,), (a, 0)))
+            edges.append(_Edge((own, ends[1]), (_BALL,), (frame(along), b)))
+            continue
+        ball = isinstance(joint, Spherical)
+        freedoms = () if cut.welded else (_BALL,) if ball else tuple(joint.freedoms)
+        edges.append(_Edge(ends, freedoms, (a, b)))
+    values = casadi.horzcat(*(casadi.densify(pose.matrix) for pose in poses))
+    return edges, Function("frames", [work.q, system.p], [values])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Leg:
+    """The joints from the ground to the platform: each with whether it is passed forwards."""
+
+    edges: list[tuple[_Edge, bool]]
+
+
+def _legs(edges: Sequence[_Edge]) -> tuple[int, list[_Leg]] | None:
+    """The group of the platform, and its legs; None where there are not six between two groups."""
+    at = dict[int, list[_Edge]]()
+    for edge in edges:
+        for group in edge.ends:
+            at.setdefault(group, []).append(edge)
+    branching = [group for group, own in at.items() if len(own) > _PASSED]
+    others = [group for group in branching if group != _GROUND]
+    if len(others) != 1 or len(at.get(_GROUND, ())) != LEGS or len(at[others[0]]) != LEGS:
+        return None
+    legs = list[_Leg]()
+    for first in at[_GROUND]:
+        here, edge, passed = _GROUND, first, list[tuple[_Edge, bool]]()
+        while True:
+            forwards = edge.ends[0] == here
+            passed.append((edge, forwards))
+            here = edge.ends[1] if forwards else edge.ends[0]
+            if here == others[0]:
+                break
+            following = [other for other in at[here] if other is not edge]
+            if here == _GROUND or len(following) != 1:
+                return None
+            edge = following[0]
+        legs.append(_Leg(passed))
+    return others[0], legs
+
+
+_GROUND = -1
+_PASSED = 2
+"""Joints of a group in the middle of a leg: one before it and one behind it."""
+_MEETING = 1e-9
+"""Distance of a centre from an axis, as a part of the lengths of a leg: products of some transforms
+leave 1e-15."""
+_FREEDOMS = {Motion.REVOLUTE: 1, Motion.SPHERICAL: 3}
+_LEAST = 5
+"""Freedoms of a leg that binds nothing but a distance; a sixth is its spin."""
+
+
+class _Axis(NamedTuple):
+    """A passive joint of a leg with all of them at zero: a centre, or an axis through a point."""
+
+    motion: Motion
+    point: Vector
+    along: Vector
+
+
+class _Distance(NamedTuple):
+    """What a leg keeps: the distance of a point of the ground from one of the platform."""
+
+    a: Vector
+    b: Vector
+    length: float
+
+
+def _distance(leg: _Leg, frames: Matrix) -> _Distance | None:
+    """The two centres of a leg; None where it is no such leg."""
+    here, axes = np.eye(4), list[_Axis]()
+    for edge, forwards in leg.edges:
+        near, far = (frames[k] for k in (edge.frames if forwards else edge.frames[::-1]))
+        at = here @ near
+        turned = at[:3, :3]
+        axes += [
+            _Axis(f.motion, at[:3, 3], turned @ np.array(f.axis, dtype=float))
+            for f in edge.freedoms
+        ]
+        here = at @ inverse(far)
+    if any(axis.motion not in _FREEDOMS for axis in axes):
+        return None
+    if sum(_FREEDOMS[axis.motion] for axis in axes) < _LEAST:
+        return None
+    size = max(float(np.max(np.abs([axis.point for axis in axes]), initial=0.0)), 1e-300)
+    for k in range(1, len(axes)):
+        a, b = _centre(axes[:k], size), _centre(axes[k:], size)
+        if a is not None and b is not None:
+            back = inverse(here)
+            return _Distance(a, back[:3, :3] @ b + back[:3, 3], float(np.linalg.norm(a - b)))
+    return None
+
+
+def _centre(axes: Sequence[_Axis], size: float) -> Vector | None:
+    """The only point that consecutive joints leave where it is."""
+    balls = [axis.point for axis in axes if axis.motion is Motion.SPHERICAL]
+    lines = [axis for axis in axes if axis.motion is Motion.REVOLUTE]
+    if balls:
+        point = balls[0]
+    elif len(lines) > 1:
+        across = [np.eye(3) - np.outer(axis.along, axis.along) for axis in lines]
+        if np.linalg.cond(np.sum(across, axis=0)) > 1 / _PARALLEL:
+            return None
+        side = np.sum([P @ axis.point for P, axis in zip(across, lines, strict=True)], axis=0)
+        point = np.linalg.solve(np.sum(across, axis=0), side)
+    else:
+        return None
+    gaps = [np.linalg.norm(np.cross(axis.along, point - axis.point)) for axis in lines]
+    gaps += [np.linalg.norm(ball - point) for ball in balls]
+    return point if max(gaps) < _MEETING * size else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Hexapod:
+    """A platform on six legs, and how its joints follow once its pose is known.
+
+    Attributes:
+        system: whose loops they are.
+        legs: of the platform.
+        frames: Function of all positions and p: the frames that the legs run over.
+        stages: that give the joints, from all positions with those of the pose behind them.
+        extent: how many positions these are.
+        chosen: the branch of each stage in which the system was assembled.
+    """
+
+    system: System
+    legs: list[_Leg]
+    frames: Function
+    stages: list[Stage]
+    extent: int
+    chosen: tuple[int, ...]
+
+    @staticmethod
+    def of(work: Work, numbers: list[int], links: list[int]) -> _Hexapod | None:
+        """None where the loops are not those of such a platform."""
+        system = work.system
+        edges, frames = _edges(work, numbers, links)
+        found = _legs(edges)
+        if found is None:
+            return None
+        platform, legs = found
+        rng = np.random.default_rng(_SEED)
+        for _ in range(_SAMPLES):
+            q = rng.uniform(-1.5, 1.5, work.q.numel())
+            p = rng.uniform(*PARAMETERS, system.p.numel())
+            if any(_distance(leg, _side_by_side(frames, q, p)) is None for leg in legs):
+                return None
+        posed = posed_stages(system, platform, [k for k in work.known if k < system.nq])
+        if posed is None:
+            return None
+        return _Hexapod(system, legs, frames, posed.stages, posed.extent, posed.chosen)
+
+    @property
+    def indices(self) -> tuple[int, ...]:
+        """Of the joints in q."""
+        every = {index for stage in self.stages for index in stage.indices}
+        return tuple(sorted(index for index in every if index < self.system.nq))
+
+    def roots(self, q: Vector, p: Vector) -> Roots:
+        """Every pose of the platform, with each joint on the side on which it was assembled."""
+        frames = _side_by_side(self.frames, q, p)
+        kept = [_distance(leg, frames) for leg in self.legs]
+        legs = [leg for leg in kept if leg is not None]
+        if len(legs) < LEGS:
+            raise NoClosedForm(
+                f"{self.system.name}: legs that meet in points elsewhere do not here"
+            )
+        found = poses(
+            np.array([leg.a for leg in legs]),
+            np.array([leg.b for leg in legs]),
+            np.array([leg.length for leg in legs]),
+        )
+        indices, values = list(self.indices), list[Vector]()
+        for e, place in zip(found.e, found.p, strict=True):
+            whole = np.zeros(self.extent)
+            whole[: self.system.nq] = q[: self.system.nq]
+            whole[-7:] = [*place, *e]
+            for stage, branch in zip(self.stages, self.chosen, strict=True):
+                whole[list(stage.indices)] = np.array(stage.values(whole, p))[:, branch]
+            values.append(whole[indices])
+        every = np.array(values).reshape(len(values), len(indices))
+        lost = int(np.sum(~np.all(np.isfinite(every), axis=1)))
+        told = (
+            f"{found.proof}, but {lost} poses at which joints do not follow"
+            if lost
+            else found.proof
+        )
+        return Roots(every, told, found.complete and not lost)
+
+
+def _side_by_side(frames: Function, q: Vector, p: Vector) -> Matrix:
+    """(k, 4, 4) frames that a Function gives in one row of blocks."""
+    values = np.array(frames(q, p))
+    return values.T.reshape(-1, 4, 4).transpose(0, 2, 1)

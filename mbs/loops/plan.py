@@ -672,6 +672,52 @@ def _plan_to(system: System, frame: str | int) -> Posed:
     return replace(plan, stages=verify(system, plan.stages, started))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class PosedStages:
+    """Stages that give the rest from some positions and the pose of a link.
+
+    Attributes:
+        stages: in their order.
+        extent: how many positions there are, seven of the pose at their end.
+        chosen: the branch of each stage in which the system was assembled.
+    """
+
+    stages: list[Stage]
+    extent: int
+    chosen: tuple[int, ...]
+
+
+def posed_stages(system: System, link: int, known: Collection[int]) -> PosedStages | None:
+    """How the loops follow from known positions and the pose of a link; None where they do not.
+
+    Args:
+        system: the assembled mechanism, with loops.
+        link: whose pose in the base link's frame is known.
+        known: indices in q.
+    """
+    weld = _weld(link, Pose.identity(), Pose.identity())
+    first = extent(replace(system, cuts=(*system.cuts, weld), _cache={}))
+    q = SX.sym("q", first + _POSE)
+    cuts = (*system.cuts, _weld(link, Pose.identity(), free_pose(q[first:])))
+    welded = replace(system, cuts=cuts, _cache={})
+    places = {*known, *spin_indices(welded).values(), *range(first, first + _POSE)}
+    try:
+        stages = order_stages(welded, places, q)
+    except NoClosedForm:
+        return None
+    configuration, p = np.array(system.configuration), closure_parameters(system)
+    symbols = SX.sym("q", system.nq)
+    at = relative_pose(system.tree, symbols, (-1, Pose.identity()), (link, Pose.identity()))
+    T = np.array(
+        Function("pose", [symbols, system.p], [casadi.densify(at.matrix)])(configuration, p)
+    )
+    start = np.zeros(first + _POSE)
+    start[list(known)] = configuration[list(known)]
+    start[first : first + 3], start[first + 3 :] = T[:3, 3], _quaternion(T[:3, :3])
+    chosen = branches_from(system, stages, start, configuration, p)
+    return PosedStages(stages, first + _POSE, chosen) if len(chosen) == len(stages) else None
+
+
 def _weld(link: int, pose: Pose, goal: Pose) -> Cut:
     joint = Edge(Fixed("pose"), 0, 0, Pose.identity(), Pose.identity(), None)
     return Cut(joint, -1, link, goal, pose, True)

@@ -53,9 +53,7 @@ def test_sparse_loops_that_do_not_split(seed):
 def test_dependent_rows_change_nothing():
     loops = triad(np.random.default_rng(5), ("RR", "RR", "RR"))
     mix = np.array([[1.0, 0], [0, 1], [1, 1], [2, -1]])
-    more = PlanarLoops(
-        mix @ loops.angles, mix @ loops.slides, loops.carriers, mix @ loops.constant
-    )
+    more = PlanarLoops(mix @ loops.angles, mix @ loops.slides, loops.carriers, mix @ loops.constant)
     assert missed(more, planar_roots(more), searched(loops, 200, 5)) == 0
 
 
@@ -105,6 +103,4 @@ def test_what_is_not_known_is_said():
     with pytest.raises(NoClosedForm, match="do not determine all of their links"):
         planar_roots(PlanarLoops(np.ones((1, 3)), np.zeros((1, 0)), np.zeros(0, int), np.ones(1)))
     with pytest.raises(LoopError, match="a dyad of equal links"):
-        planar_roots(
-            PlanarLoops(np.ones((1, 2)), np.zeros((1, 0)), np.zeros(0, int), np.zeros(1))
-        )
+        planar_roots(PlanarLoops(np.ones((1, 2)), np.zeros((1, 0)), np.zeros(0, int), np.zeros(1)))

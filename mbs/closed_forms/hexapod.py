@@ -93,7 +93,7 @@ _MOST_STEPS = 4000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Path:
+class Path:
     """Q(t) = Q0 + t Q1 + t^2 Q2, from one platform to another.
 
     Attributes:
@@ -103,12 +103,12 @@ class _Path:
     Q: Complex
 
     @staticmethod
-    def between(start: Legs, end: Legs) -> _Path:
+    def between(start: Legs, end: Legs) -> Path:
         """Along a straight line of a, b and c."""
         middle = Legs((start.a + end.a) / 2, (start.b + end.b) / 2, (start.c + end.c) / 2)
         first, half, last = start.forms(), middle.forms(), end.forms()
         bend = 2 * (first + last) - 4 * half
-        return _Path(np.array([first, last - first - bend, bend]))
+        return Path(np.array([first, last - first - bend, bend]))
 
     def slopes(self, x: Complex, t: Real) -> tuple[Complex, Complex]:
         """Derivatives by x, (r, 7, 8), and by t, (r, 7), of the rows at x (r, 8) and t (r,)."""
@@ -123,20 +123,20 @@ def _square(J: Complex, patch: Complex) -> Complex:
     return np.concatenate([J, patch.conj()[:, None, :]], axis=1)
 
 
-def _velocity(path: _Path, x: Complex, t: Real, patch: Complex) -> Complex:
+def _velocity(path: Path, x: Complex, t: Real, patch: Complex) -> Complex:
     J, rate = path.slopes(x, t)
     side = np.concatenate([rate, np.zeros((len(x), 1))], axis=1)
     return np.asarray(-np.linalg.solve(_square(J, patch), side[..., None])[..., 0], np.complex128)
 
 
-def _correction(path: _Path, x: Complex, t: Real, patch: Complex) -> Complex:
+def _correction(path: Path, x: Complex, t: Real, patch: Complex) -> Complex:
     J, _ = path.slopes(x, t)
     rows = np.einsum("rij,rj->ri", J, x) / 2
     side = np.concatenate([rows, np.zeros((len(x), 1))], axis=1)
     return np.asarray(-np.linalg.solve(_square(J, patch), side[..., None])[..., 0], np.complex128)
 
 
-def follow(path: _Path, x: Complex, tolerance: float = _TOLERANCE) -> tuple[Complex, Real]:
+def follow(path: Path, x: Complex, tolerance: float = _TOLERANCE) -> tuple[Complex, Real]:
     """The roots (r, 8) at the end, of length one, and how far each came.
 
     That is 1, or less at a singular root, which is approached in ever smaller steps. Runge and
@@ -165,7 +165,7 @@ def follow(path: _Path, x: Complex, tolerance: float = _TOLERANCE) -> tuple[Comp
     return x, t
 
 
-def _step(path: _Path, x: Complex, t: Real, h: Real) -> tuple[Complex, Real, Real]:
+def _step(path: Path, x: Complex, t: Real, h: Real) -> tuple[Complex, Real, Real]:
     """The corrected prediction and the lengths of both corrections."""
     s = h[:, None]
     k1 = _velocity(path, x, t, x)
@@ -207,7 +207,7 @@ class Ends:
 
 def certify(legs: Legs, x: Complex, t: Real) -> Ends:
     """The ends of the paths, refined, and which of them are certified."""
-    path = _Path(np.array([legs.forms(), np.zeros((_ROWS, _SIZE, _SIZE))])[[0, 1, 1]])
+    path = Path(np.array([legs.forms(), np.zeros((_ROWS, _SIZE, _SIZE))])[[0, 1, 1]])
     regular = t >= 1
     for _ in range(3):
         now = np.flatnonzero(regular)
@@ -284,7 +284,7 @@ def monodromy(seed: int, most: int = 200) -> Start:
         ways = [legs, random_legs(rng), random_legs(rng), legs]
         y, done = x, np.ones(len(x), dtype=bool)
         for begin, end in pairwise(ways):
-            y, t = follow(_Path.between(begin, end), y)
+            y, t = follow(Path.between(begin, end), y)
             done &= t >= 1
         every = np.concatenate([x, y[done]])
         ends = certify(legs, every, np.ones(len(every)))
@@ -326,7 +326,7 @@ def own_start(a: bytes, b: bytes) -> Start:
     x, counts = np.zeros((0, _SIZE), dtype=complex), list[int]()
     for number in (0, 1):
         kept = kept_start(number)
-        y, t = follow(_Path.between(kept.legs, legs), kept.x)
+        y, t = follow(Path.between(kept.legs, legs), kept.x)
         own = certify(legs, y, t)
         counts.append(int(np.sum(own.regular)))
         x = _distinct_roots(legs, np.concatenate([x, own.x[own.regular]]))
@@ -334,7 +334,7 @@ def own_start(a: bytes, b: bytes) -> Start:
     while idle < _IDLE:
         y = x
         for begin, end in ((legs, second), (second, third), (third, legs)):
-            y, t = follow(_Path.between(begin, end), y)
+            y, t = follow(Path.between(begin, end), y)
             y = y[t >= 1]
         known, x = len(x), _distinct_roots(legs, np.concatenate([x, y]))
         idle = idle + 1 if len(x) == known else 0
@@ -418,7 +418,7 @@ def poses(a: Real, b: Real, length: Real) -> Poses:
     c = np.sum(a0**2, axis=1) + np.sum(b0**2, axis=1) - square
     legs = Legs(a0.astype(complex), b0.astype(complex), c.astype(complex))
     start = own_start(a0.tobytes(), b0.tobytes())
-    path, expected = _Path.between(start.legs, legs), len(start.x)
+    path, expected = Path.between(start.legs, legs), len(start.x)
     for tolerance in (_TOLERANCE, _TOLERANCE / 10, _TOLERANCE / 100):
         x, t = follow(path, start.x, tolerance)
         ends = certify(legs, x, t)

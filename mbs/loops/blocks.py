@@ -762,8 +762,10 @@ class _Hexapod:
         """None where the loops are not those of such a platform."""
         system = work.system
         edges, frames = _edges(work, numbers, links)
-        found = _legs(edges)
-        if found is None:
+        # a free joint that places the platform binds nothing
+        free = [edge for edge in edges if any(f.motion is Motion.FREE for f in edge.freedoms)]
+        found = _legs([edge for edge in edges if edge not in free])
+        if found is None or any(edge.ends != (_GROUND, found[0]) for edge in free):
             return None
         platform, legs = found
         rng = np.random.default_rng(_SEED)

@@ -11,7 +11,8 @@ import numpy as np
 
 from mbs.assembly import System
 from mbs.assembly.tree import quaternion_slices
-from mbs.closed_forms.ring import extent, independent_indices
+from mbs.closed_forms.ring import extent, independent_indices, spin_indices
+from mbs.components.joints import Motion
 from mbs.errors import LoopError, ModelError
 from mbs.loops.blocks import Step, steps_of
 from mbs.loops.closing import (
@@ -208,17 +209,25 @@ def _require_locked(closing: Closing, q: Vector) -> None:
     Raises:
         LoopError: names the joints that move most.
     """
+    system, free = closing.system, closing.free
+    spins = spin_indices(system)
     J = closing.rows(q)[1]
     _, values, V = np.linalg.svd(J)
-    if len(values) == J.shape[1] and values[-1] > _SINGULAR * values[0]:
+    count = len(free) - int(np.sum(values > _SINGULAR * values[0]))
+    if count <= len(spins):
         return
-    system, free = closing.system, closing.free
+    # the motion that turns rods about their lines least
+    spinning = {index + k for index in spins for k in range(Motion.SPHERICAL.nq)}
+    others = [k for k, index in enumerate(free) if index not in spinning]
+    loose = V[-count:].T
+    along = loose @ np.linalg.svd(loose[others])[2][0]
     pushed = q.copy()
-    pushed[free] += _PUSH * V[-1]
+    pushed[free] += _PUSH * along
     near = closing.nearest(pushed)
-    if not near.is_closed or np.max(np.abs(difference(system, near.q, q))) < _PUSH / 10:
+    moved = np.abs(difference(system, near.q, q))[[free[k] for k in others]]
+    if not near.is_closed or np.max(moved, initial=0.0) < _PUSH / 10:
         return
-    motion = np.abs(V[-1])
+    motion = np.abs(along)
     names = [
         system.coordinates[k].name
         for k, x in zip(free, motion, strict=True)

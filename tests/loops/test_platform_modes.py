@@ -5,7 +5,7 @@ import pytest
 from support.configurations import active, same, searched
 from support.flat_loops import flat_loop
 from support.messages import refused
-from support.platforms import planar_platform
+from support.platforms import hexapod, planar_platform
 from support.ring_loops import ring_loop
 
 import mbs
@@ -139,3 +139,44 @@ def test_a_motion_of_its_own_is_told():
         "congruent: foot0, head0, foot1, foot2 can move while the independent joints stay; modes",
         by=lambda: modes(system, [0.1, 0.1, 0.1]),
     )
+
+
+@pytest.mark.parametrize("leg", ["UPS", "RUS", "R rod", "SPS"])
+@pytest.mark.parametrize("seed", range(3))
+def test_platforms_on_six_legs(leg, seed):
+    """A search may end with universal joints on the other side: poses of the platform count."""
+    system = hexapod(seed, leg).assemble()
+    q_a = active(system)
+    found = modes(system, q_a)
+    assert found.complete
+    assert found.proof == "homotopy, certified: 40 of 40 paths"
+    assert len(found) % 2 == 0
+    pose = mbs.models.transform(system, "platform")
+    places = [np.array(pose(mode.q)) for mode in found]
+    assert any(same(system, mode.q, system.configuration) for mode in found)
+    assert max(mode.residual for mode in found) < 1e-12
+    for q in searched(system, q_a, starts=40, seed=seed):
+        T = np.array(pose(q))
+        assert min(np.abs(T - place).max() for place in places) < 1e-5
+    apart = [np.abs(T - S).max() for k, T in enumerate(places) for S in places[:k]]
+    assert min(apart) > 1e-3
+
+
+def test_the_catalogues_platform():
+    """Semi-regular hexagons: 28 complex poses, eight of them real here."""
+    system = mbs.load("stewart_platform").assemble()
+    found = modes(system)
+    assert (len(found), found.complete) == (8, True)
+    assert found.proof == "homotopy, certified: 28 of 28 paths"
+    assert any(same(system, mode.q, system.configuration) for mode in found)
+
+
+def test_a_platform_on_similar_hexagons_has_other_independent_joints():
+    rng = np.random.default_rng(3)
+    angles = rng.uniform(0, 6, 6)
+    a = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(6)])
+    # five legs are independent, so that a joint of the sixth one stands for its motor
+    system = hexapod(1, "UPS", (a, 0.5 * a)).assemble()
+    assert len([k for k in system.active if system.speeds[k].name.startswith("leg")]) == 5
+    with pytest.raises(NoClosedForm):
+        modes(system)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import functools
 import json
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import resources
 from itertools import pairwise
@@ -126,14 +127,26 @@ def _square(J: Complex, patch: Complex) -> Complex:
 def _velocity(path: Path, x: Complex, t: Real, patch: Complex) -> Complex:
     J, rate = path.slopes(x, t)
     side = np.concatenate([rate, np.zeros((len(x), 1))], axis=1)
-    return np.asarray(-np.linalg.solve(_square(J, patch), side[..., None])[..., 0], np.complex128)
+    return -_solved(_square(J, patch), side)
 
 
 def _correction(path: Path, x: Complex, t: Real, patch: Complex) -> Complex:
     J, _ = path.slopes(x, t)
     rows = np.einsum("rij,rj->ri", J, x) / 2
     side = np.concatenate([rows, np.zeros((len(x), 1))], axis=1)
-    return np.asarray(-np.linalg.solve(_square(J, patch), side[..., None])[..., 0], np.complex128)
+    return -_solved(_square(J, patch), side)
+
+
+def _solved(A: Complex, b: Complex) -> Complex:
+    """(r, 8) solutions of A x = b, NaN where A is singular to the last bit."""
+    try:
+        return np.asarray(np.linalg.solve(A, b[..., None])[..., 0], np.complex128)
+    except np.linalg.LinAlgError:
+        x = np.full(b.shape, np.nan, dtype=np.complex128)
+        for k in range(len(b)):
+            with suppress(np.linalg.LinAlgError):
+                x[k] = np.linalg.solve(A[k], b[k])
+        return x
 
 
 def follow(path: Path, x: Complex, tolerance: float = _TOLERANCE) -> tuple[Complex, Real]:
@@ -150,11 +163,8 @@ def follow(path: Path, x: Complex, tolerance: float = _TOLERANCE) -> tuple[Compl
             break
         x0, t0 = x[going], t[going]
         step = np.minimum(h[going], 1 - t0)
-        try:
+        with np.errstate(all="ignore"):  # near singular matrices steps have no bounds
             tried, first, second = _step(path, x0, t0, step)
-        except np.linalg.LinAlgError:  # a matrix is singular to the last bit
-            h[going] *= _SHRINK
-            continue
         good = (first < 2 * tolerance) & (second < max(tolerance**1.5, 1e-12))
         factor = _SAFETY * (tolerance / np.maximum(first, 1e-300)) ** 0.2
         factor = np.where(np.isfinite(factor), factor, _SHRINK)
@@ -213,10 +223,14 @@ def certify(legs: Legs, x: Complex, t: Real) -> Ends:
         now = np.flatnonzero(regular)
         if len(now):
             y = x[now] + _correction(path, x[now], t[now], x[now])
-            x[now] = y / np.linalg.norm(y, axis=1, keepdims=True)
+            regular[now] = np.all(np.isfinite(y), axis=1)
+            with np.errstate(invalid="ignore"):
+                y /= np.linalg.norm(y, axis=1, keepdims=True)
+            x[now] = np.where(regular[now, None], y, x[now])
     for k in np.flatnonzero(regular):
         J, _ = path.slopes(x[k : k + 1], np.zeros(1))
-        W = np.linalg.inv(_square(J, x[k : k + 1])[0])
+        unit = np.eye(_SIZE, dtype=np.complex128)
+        W = _solved(np.repeat(_square(J, x[k : k + 1]), _SIZE, axis=0), unit).T
         rows = np.append(J[0] @ x[k] / 2, 0.0)
         bend = np.linalg.norm(np.tensordot(W[:, :_ROWS], path.Q[0], axes=1))
         along = x @ x[k].conj()
@@ -313,8 +327,9 @@ def own_start(a: bytes, b: bytes) -> Start:
     """All roots of a platform with complex lengths of its legs, from which any others are reached.
 
     Special ends of the legs leave fewer than forty: 28 for semi-regular hexagons, 16 where the legs
-    meet in pairs. Both kept starts must lead to the same ones; where they do not, ways around other
-    lengths are gone until three of them bring nothing new.
+    meet in pairs. They are regular, since lengths at which some are not make no open set. Both kept
+    starts must lead to the same ones; where they do not, ways around other lengths are gone until
+    three of them bring nothing new.
 
     Args:
         a: the bytes of (6, 3) ends on the ground, in sizes of the platform about their mean.

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mbs.assembly import System
+from mbs.assembly.model_function import require_system
 from mbs.assembly.tree import quaternion_slices
 from mbs.closed_forms.ring import extent, independent_indices, spin_indices
 from mbs.components.joints import Motion
@@ -99,6 +100,7 @@ def modes(
             stay, so that modes cannot be counted.
         ModelError: a joint is unknown or not independent, or a value is not finite.
     """
+    require_system(system)
     steps = steps_of(system)
     stages = [step for step in steps if isinstance(step, Stage)]
     count = math.prod(len(stage.labels) for stage in stages)

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.errors import LoopError
+from mbs.numbers import NONZERO
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -88,13 +89,16 @@ _TOLERANCE = 1e-4
 """First correction of Newton's method after a step, as a part of |x| = 1: at 1e-2 a tenth of the
 platforms lost a path to another one."""
 _FIRST_STEP, _LEAST_STEP = 0.01, 1e-9
-_SHRINK, _GROW = 0.2, 3.0
-_SAFETY = 0.9
+"""Of t, from 0 to 1: the first is shorter than most that follow; one below the other stands before
+a singular root, to which the steps of a regular path do not come near."""
+_SHRINK, _GROW, _SAFETY = 0.2, 3.0, 0.9
+"""Of steps, as in solvers of differential equations: at most by these, and a little less than what
+the fifth power of the step says."""
 _MOST_STEPS = 4000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Path:
+class Homotopy:
     """Q(t) = Q0 + t Q1 + t^2 Q2, from one platform to another.
 
     Attributes:
@@ -104,12 +108,12 @@ class Path:
     Q: Complex
 
     @staticmethod
-    def between(start: Legs, end: Legs) -> Path:
+    def between(start: Legs, end: Legs) -> Homotopy:
         """Along a straight line of a, b and c."""
         middle = Legs((start.a + end.a) / 2, (start.b + end.b) / 2, (start.c + end.c) / 2)
         first, half, last = start.forms(), middle.forms(), end.forms()
         bend = 2 * (first + last) - 4 * half
-        return Path(np.array([first, last - first - bend, bend]))
+        return Homotopy(np.array([first, last - first - bend, bend]))
 
     def slopes(self, x: Complex, t: Real) -> tuple[Complex, Complex]:
         """Derivatives by x, (r, 7, 8), and by t, (r, 7), of the rows at x (r, 8) and t (r,)."""
@@ -124,13 +128,13 @@ def _square(J: Complex, patch: Complex) -> Complex:
     return np.concatenate([J, patch.conj()[:, None, :]], axis=1)
 
 
-def _velocity(path: Path, x: Complex, t: Real, patch: Complex) -> Complex:
+def _velocity(path: Homotopy, x: Complex, t: Real, patch: Complex) -> Complex:
     J, rate = path.slopes(x, t)
     side = np.concatenate([rate, np.zeros((len(x), 1))], axis=1)
     return -_solved(_square(J, patch), side)
 
 
-def _correction(path: Path, x: Complex, t: Real, patch: Complex) -> Complex:
+def _correction(path: Homotopy, x: Complex, t: Real, patch: Complex) -> Complex:
     J, _ = path.slopes(x, t)
     rows = np.einsum("rij,rj->ri", J, x) / 2
     side = np.concatenate([rows, np.zeros((len(x), 1))], axis=1)
@@ -149,7 +153,7 @@ def _solved(A: Complex, b: Complex) -> Complex:
         return x
 
 
-def follow(path: Path, x: Complex, tolerance: float = _TOLERANCE) -> tuple[Complex, Real]:
+def follow(path: Homotopy, x: Complex, tolerance: float = _TOLERANCE) -> tuple[Complex, Real]:
     """The roots (r, 8) at the end, of length one, and how far each came.
 
     That is 1, or less at a singular root, which is approached in ever smaller steps. Runge and
@@ -165,8 +169,9 @@ def follow(path: Path, x: Complex, tolerance: float = _TOLERANCE) -> tuple[Compl
         step = np.minimum(h[going], 1 - t0)
         with np.errstate(all="ignore"):  # near singular matrices steps have no bounds
             tried, first, second = _step(path, x0, t0, step)
-        good = (first < 2 * tolerance) & (second < max(tolerance**1.5, 1e-12))
-        factor = _SAFETY * (tolerance / np.maximum(first, 1e-300)) ** 0.2
+        # the second correction is about the square of the first where the root is regular
+        good = (first < 2 * tolerance) & (second < tolerance**1.5)
+        factor = _SAFETY * (tolerance / np.maximum(first, NONZERO)) ** (1 / 5)
         factor = np.where(np.isfinite(factor), factor, _SHRINK)
         h[going] = step * np.clip(factor, _SHRINK, np.where(good, _GROW, 0.5))
         won = going[good]
@@ -175,7 +180,7 @@ def follow(path: Path, x: Complex, tolerance: float = _TOLERANCE) -> tuple[Compl
     return x, t
 
 
-def _step(path: Path, x: Complex, t: Real, h: Real) -> tuple[Complex, Real, Real]:
+def _step(path: Homotopy, x: Complex, t: Real, h: Real) -> tuple[Complex, Real, Real]:
     """The corrected prediction and the lengths of both corrections."""
     s = h[:, None]
     k1 = _velocity(path, x, t, x)
@@ -217,7 +222,7 @@ class Ends:
 
 def certify(legs: Legs, x: Complex, t: Real) -> Ends:
     """The ends of the paths, refined, and which of them are certified."""
-    path = Path(np.array([legs.forms(), np.zeros((_ROWS, _SIZE, _SIZE))])[[0, 1, 1]])
+    path = Homotopy(np.array([legs.forms(), np.zeros((_ROWS, _SIZE, _SIZE))])[[0, 1, 1]])
     regular = t >= 1
     for _ in range(3):
         now = np.flatnonzero(regular)
@@ -298,7 +303,7 @@ def monodromy(seed: int, most: int = 200) -> Start:
         ways = [legs, random_legs(rng), random_legs(rng), legs]
         y, done = x, np.ones(len(x), dtype=bool)
         for begin, end in pairwise(ways):
-            y, t = follow(Path.between(begin, end), y)
+            y, t = follow(Homotopy.between(begin, end), y)
             done &= t >= 1
         every = np.concatenate([x, y[done]])
         ends = certify(legs, every, np.ones(len(every)))
@@ -341,7 +346,7 @@ def own_start(a: bytes, b: bytes) -> Start:
     x, counts = np.zeros((0, _SIZE), dtype=complex), list[int]()
     for number in (0, 1):
         kept = kept_start(number)
-        y, t = follow(Path.between(kept.legs, legs), kept.x)
+        y, t = follow(Homotopy.between(kept.legs, legs), kept.x)
         own = certify(legs, y, t)
         counts.append(int(np.sum(own.regular)))
         x = _distinct_roots(legs, np.concatenate([x, own.x[own.regular]]))
@@ -349,7 +354,7 @@ def own_start(a: bytes, b: bytes) -> Start:
     while idle < _IDLE:
         y = x
         for begin, end in ((legs, second), (second, third), (third, legs)):
-            y, t = follow(Path.between(begin, end), y)
+            y, t = follow(Homotopy.between(begin, end), y)
             y = y[t >= 1]
         known, x = len(x), _distinct_roots(legs, np.concatenate([x, y]))
         idle = idle + 1 if len(x) == known else 0
@@ -386,6 +391,9 @@ hundredths at most there, and the root by as much as the root of that."""
 _CLOSED = 1e-11
 """Lengths of legs that fit, in parts of the size of the platform: Newton's method leaves 1e-15, and
 at a fold, where it is slow, 1e-13."""
+_EXACT, _LOOSE = 1e-16, 1e-12
+"""Squares of lengths that are exact but for rounding, and relative singular values below which a
+pose is not moved along: those of folds."""
 _SAME = 1e-6
 """Distance of e, and of p in sizes, below which two real roots are one: a fold, met from both
 sides."""
@@ -433,7 +441,7 @@ def poses(a: Real, b: Real, length: Real) -> Poses:
     c = np.sum(a0**2, axis=1) + np.sum(b0**2, axis=1) - square
     legs = Legs(a0.astype(complex), b0.astype(complex), c.astype(complex))
     start = own_start(a0.tobytes(), b0.tobytes())
-    path, expected = Path.between(start.legs, legs), len(start.x)
+    path, expected = Homotopy.between(start.legs, legs), len(start.x)
     for tolerance in (_TOLERANCE, _TOLERANCE / 10, _TOLERANCE / 100):
         x, t = follow(path, start.x, tolerance)
         ends = certify(legs, x, t)
@@ -520,9 +528,9 @@ def _refined(a: Real, b: Real, square: Real, e: Real, p: Real) -> tuple[Real, Re
         best_e = np.where(better[:, None], e, best_e)
         best_p = np.where(better[:, None], p, best_p)
         worst = np.where(better, error, worst)
-        if not np.any(better & (error > 1e-16)):
+        if not np.any(better & (error > _EXACT)):
             break
-        step = -np.linalg.pinv(2 * J, rcond=1e-12) @ (value - square)[..., None]
+        step = -np.linalg.pinv(2 * J, rcond=_LOOSE) @ (value - square)[..., None]
         p = best_p + step[:, :3, 0]
         turn = np.concatenate([np.ones((len(e), 1)), step[:, 3:, 0] / 2], axis=1)
         e = _products(turn, best_e)

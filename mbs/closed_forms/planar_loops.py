@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.errors import LoopError, NoClosedForm
+from mbs.numbers import NONZERO
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -70,7 +71,7 @@ class PlanarLoops:
         whole = np.concatenate([unit, np.ones((len(unit), 1))], axis=1)
         return whole[:, self.carriers]
 
-    def with_known(self, part: Part, theta: Real, s: Real) -> PlanarLoops:
+    def with_known(self, part: PlanarPart, theta: Real, s: Real) -> PlanarLoops:
         """What is left where the unknowns of a part are known: their columns go to the constant."""
         n, m = self.counts
         every_theta, every_s = np.zeros((1, n)), np.zeros((1, m))
@@ -131,7 +132,7 @@ are refined together."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Part:
+class PlanarPart:
     """Unknowns that follow from some rows alone.
 
     Attributes:
@@ -199,7 +200,7 @@ def _solve(loops: PlanarLoops) -> tuple[Real, Real, list[_Found]]:
     return np.concatenate([np.zeros((0, n)), *theta]), np.concatenate([np.zeros((0, m)), *s]), parts
 
 
-def _smallest_part(loops: PlanarLoops) -> Part:
+def _smallest_part(loops: PlanarLoops) -> PlanarPart:
     n, m = loops.counts
     columns = np.concatenate([loops.angles, loops.slides], axis=1)
     for size in range(1, n + m + 1):
@@ -210,7 +211,7 @@ def _smallest_part(loops: PlanarLoops) -> Part:
             rows = _left_null(columns[:, [k for k in range(n + m) if k not in chosen]])
             own = _rank(rows @ columns[:, list(chosen)])
             if 2 * own >= size:
-                return Part(angles, slides, rows)
+                return PlanarPart(angles, slides, rows)
     raise NoClosedForm("the loops do not determine all of their links")
 
 
@@ -219,7 +220,7 @@ def _left_null(columns: Complex) -> Complex:
     if not columns.shape[1]:
         return np.eye(len(columns), dtype=complex)
     U, values, _ = np.linalg.svd(columns)
-    rank = int(np.sum(values > _SMALL * max(values[0], 1e-300)))
+    rank = int(np.sum(values > _SMALL * max(values[0], NONZERO)))
     return U[:, rank:].conj().T
 
 
@@ -231,7 +232,7 @@ def _rank(matrix: Complex) -> int:
     return int(np.sum(values > _SMALL))
 
 
-def _of_part(loops: PlanarLoops, part: Part) -> PlanarLoops:
+def _of_part(loops: PlanarLoops, part: PlanarPart) -> PlanarLoops:
     """The rows of a part alone, as few as it needs."""
     rows = part.rows
     columns = np.concatenate([loops.angles[:, part.angles], loops.slides[:, part.slides]], axis=1)
@@ -333,6 +334,9 @@ def _angles_of(w: complex, value: float) -> list[float]:
 
 _STEPS = 12
 _CLOSED = 1e-15
+"""Rows that are exact but for rounding, lengths in parts of the size."""
+_LOOSE = 1e-13
+"""Relative singular value below which a root is not moved along: those of folds."""
 _SAME = 1e-6
 """Distance of two roots [rad, or parts of the size] below which they are one where the middle
 between them closes too: at a fold the two ends of Newton's method lie about a root of 1e-14 from
@@ -360,7 +364,7 @@ def refine(loops: PlanarLoops, theta: Real, s: Real) -> tuple[Real, Real, Real]:
             break
         J = np.concatenate([slope.real, slope.imag], axis=1)
         r = np.concatenate([value.real, value.imag], axis=1)
-        step = np.linalg.pinv(J, rcond=1e-13) @ r[:, :, None]
+        step = np.linalg.pinv(J, rcond=_LOOSE) @ r[:, :, None]
         x = np.where(better[:, None], x - np.clip(step[:, :, 0], -0.5, 0.5), x)
     best[:, :n] = pi - np.mod(pi - best[:, :n], 2 * pi)
     return best[:, :n], best[:, n:], worst
@@ -667,7 +671,7 @@ class _Triad:
         """All unknowns at angles (r,) of the hidden direction."""
         x = np.exp(1j * angle)
         N, D, _ = self._meeting(x)
-        y = self._curves(x)[3] + (N / np.where(D == 0, 1e-300, D))[:, None] * self.alpha
+        y = self._curves(x)[3] + (N / np.where(D == 0, NONZERO, D))[:, None] * self.alpha
         n, _ = self.loops.counts
         theta = np.empty((len(x), n))
         theta[:, self.hidden] = angle

@@ -29,20 +29,21 @@ from mbs.errors import LoopError, NoClosedForm
 from mbs.expressions import to_sx
 from mbs.loops.closing import Vector, closure_parameters, difference
 from mbs.loops.plan import (
-    Block,
+    LoopBlock,
+    PlanWork,
     Roots,
     Stage,
-    Work,
     is_bound,
     order_steps,
     plan,
     posed_stages,
     started_at,
 )
+from mbs.numbers import NONZERO
 from mbs.recursions.chain import ChainJoint, Ring
 from mbs.spatial import Pose, vector
 
-Step = Stage | Block
+Step = Stage | LoopBlock
 Matrix = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
@@ -73,7 +74,7 @@ def steps_of(system: System) -> tuple[Step, ...]:
     return steps
 
 
-def _block(work: Work, waiting: Sequence[int]) -> Block | None:
+def _block(work: PlanWork, waiting: Sequence[int]) -> LoopBlock | None:
     """The first block that gives the assembled configuration back."""
     for find in (planar_blocks, single_loops, platforms):
         for block in find(work, waiting):
@@ -82,7 +83,7 @@ def _block(work: Work, waiting: Sequence[int]) -> Block | None:
     return None
 
 
-def _gives_assembled(work: Work, block: Block) -> bool:
+def _gives_assembled(work: PlanWork, block: LoopBlock) -> bool:
     """Whether the assembled configuration is among the roots of a block."""
     system = work.system
     q = np.array(system.configuration)
@@ -114,7 +115,7 @@ class _Joined(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Groups:
+class _RigidGroups:
     """The rigid groups of a tree, each named after its first link, -1 for that of the base.
 
     Attributes:
@@ -128,7 +129,7 @@ class _Groups:
     joints: dict[int, _Joined]
 
 
-def _groups(work: Work) -> _Groups:
+def _groups(work: PlanWork) -> _RigidGroups:
     group, pose, joints = {-1: -1}, {-1: Pose.identity()}, dict[int, _Joined]()
     for k, link in enumerate(work.system.tree.links):
         before = pose[link.antecedent] @ link.pose()
@@ -139,10 +140,10 @@ def _groups(work: Work) -> _Groups:
         else:
             group[k], pose[k] = k, Pose.identity()
             joints[k] = _Joined(k, group[link.antecedent], before)
-    return _Groups(group, pose, joints)
+    return _RigidGroups(group, pose, joints)
 
 
-def _unknown_links(work: Work, number: int) -> set[int]:
+def _unknown_links(work: PlanWork, number: int) -> set[int]:
     """The links of the tree in a loop whose joints are unknown."""
     tree = work.system.tree
     back, out = loop_links(work.system, work.system.cuts[number])
@@ -176,7 +177,7 @@ _SAMPLES, _SEED = 3, 20260301
 holds by structure."""
 
 
-def planar_blocks(work: Work, waiting: Sequence[int]) -> Iterator[Block]:
+def planar_blocks(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
     """Blocks of plane loops, each with all loops that share its unknown joints."""
     links = {
         number: _unknown_links(work, number)
@@ -188,10 +189,10 @@ def planar_blocks(work: Work, waiting: Sequence[int]) -> Iterator[Block]:
         if plane is not None:
             cuts = [work.system.cuts[number].edge.joint.name for number in numbers]
             indices = [work.system.tree.links[k].q.start for k in plane.links]
-            yield Block(", ".join(cuts), tuple(indices), plane.roots)
+            yield LoopBlock(", ".join(cuts), tuple(indices), plane.roots)
 
 
-def _is_flat_kind(work: Work, number: int) -> bool:
+def _is_flat_kind(work: PlanWork, number: int) -> bool:
     """Whether a loop has revolute and prismatic joints alone, but for the one that closes it."""
     if is_bound(work.system, number) or isinstance(work.system.cuts[number].edge.joint, Rod):
         return False
@@ -221,7 +222,7 @@ class _Plane:
     frames: Function
 
     @staticmethod
-    def of(work: Work, numbers: list[int], links: list[int]) -> _Plane | None:
+    def of(work: PlanWork, numbers: list[int], links: list[int]) -> _Plane | None:
         """None where the loops are not plane, or not in one plane."""
         groups, system = _groups(work), work.system
         cuts = [system.cuts[number] for number in numbers]
@@ -501,7 +502,7 @@ class _Draughtsman:
 _JOINTS = 6
 
 
-def single_loops(work: Work, waiting: Sequence[int]) -> Iterator[Block]:
+def single_loops(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
     """Blocks of one loop, by the general inverse geometric model."""
     for number in waiting:
         if number >= len(work.system.cuts) or is_bound(work.system, number):
@@ -511,7 +512,7 @@ def single_loops(work: Work, waiting: Sequence[int]) -> Iterator[Block]:
         if plain and len(ring.joints) == _JOINTS:
             loop = _SingleLoop.of(work, ring)
             indices = tuple(_index(joint) for joint in loop.joints)
-            yield Block(work.system.cuts[number].edge.joint.name, indices, loop.roots)
+            yield LoopBlock(work.system.cuts[number].edge.joint.name, indices, loop.roots)
 
 
 def _index(joint: ChainJoint) -> int:
@@ -537,7 +538,7 @@ class _SingleLoop:
     arm: tuple[bytes, General] | None = None
 
     @staticmethod
-    def of(work: Work, ring: Ring) -> _SingleLoop:
+    def of(work: PlanWork, ring: Ring) -> _SingleLoop:
         moving = [casadi.depends_on(gap.pose.matrix, work.q) for gap in ring.gaps]
         ring = ring.rotated(moving.index(True) if any(moving) else 0)
         values = casadi.horzcat(*(casadi.densify(gap.pose.matrix) for gap in ring.gaps))
@@ -566,7 +567,7 @@ class _SingleLoop:
 # its length.
 
 
-def platforms(work: Work, waiting: Sequence[int]) -> Iterator[Block]:
+def platforms(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
     """The block of a platform on six legs, with all loops that share its unknown joints."""
     system = work.system
     links = {
@@ -578,7 +579,7 @@ def platforms(work: Work, waiting: Sequence[int]) -> Iterator[Block]:
         hexapod = _Hexapod.of(work, numbers, sorted(set().union(*(links[n] for n in numbers))))
         if hexapod is not None:
             cuts = [system.cuts[number].edge.joint.name for number in numbers]
-            yield Block(", ".join(cuts), hexapod.indices, hexapod.roots)
+            yield LoopBlock(", ".join(cuts), hexapod.indices, hexapod.roots)
 
 
 class _Edge(NamedTuple):
@@ -599,7 +600,7 @@ class _Edge(NamedTuple):
 _BALL = Freedom(Motion.SPHERICAL)
 
 
-def _edges(work: Work, numbers: list[int], links: list[int]) -> tuple[list[_Edge], Function]:
+def _edges(work: PlanWork, numbers: list[int], links: list[int]) -> tuple[list[_Edge], Function]:
     """The joints of a block, and Function of all positions and p: their frames, side by side."""
     groups, system = _groups(work), work.system
     edges, poses = list[_Edge](), [Pose.identity()]
@@ -709,7 +710,7 @@ def _distance(leg: _Leg, frames: Matrix) -> _Distance | None:
         return None
     if sum(_FREEDOMS[axis.motion] for axis in axes) < _LEAST:
         return None
-    size = max(float(np.max(np.abs([axis.point for axis in axes]), initial=0.0)), 1e-300)
+    size = max(float(np.max(np.abs([axis.point for axis in axes]), initial=0.0)), NONZERO)
     for k in range(1, len(axes)):
         a, b = _centre(axes[:k], size), _centre(axes[k:], size)
         if a is not None and b is not None:
@@ -758,7 +759,7 @@ class _Hexapod:
     chosen: tuple[int, ...]
 
     @staticmethod
-    def of(work: Work, numbers: list[int], links: list[int]) -> _Hexapod | None:
+    def of(work: PlanWork, numbers: list[int], links: list[int]) -> _Hexapod | None:
         """None where the loops are not those of such a platform."""
         system = work.system
         edges, frames = _edges(work, numbers, links)

@@ -56,8 +56,8 @@ class Mode:
     residual: float
 
 
-class Modes(list[Mode]):
-    """Modes, and what is known of whether they are all.
+class ModeList(list[Mode]):
+    """ModeList, and what is known of whether they are all.
 
     Attributes:
         complete: whether these are all modes that there are.
@@ -77,7 +77,7 @@ def modes(
     q_active: Given = None,
     *,
     parameters: Mapping[str, float] | None = None,
-) -> Modes:
+) -> ModeList:
     """All configurations with these positions of the independent joints.
 
     By closed forms where the loops have them; else loops that depend on each other, such as those
@@ -113,7 +113,7 @@ def modes(
     start[independent_indices(system)] = independent_positions(system, q_active)
     if len(stages) == len(steps):
         every = every_configuration(stages, start, p)
-        return Modes(
+        return ModeList(
             _distinct(_checked(system, q[: system.nq], branch, p) for q, branch in every),
             proof="closed forms",
         )
@@ -142,7 +142,7 @@ def _same(mode: Mode, other: Mode) -> bool:
     return bool(np.max(np.abs(np.subtract(mode.q, other.q)), initial=0.0) < _SAME)
 
 
-# Modes of loops that are solved in numbers, one step after the other.
+# ModeList of loops that are solved in numbers, one step after the other.
 
 
 _REFINED = 1e-4
@@ -156,7 +156,7 @@ _PUSH = 0.01
 it comes back, to 1e-6."""
 
 
-def _of_blocks(system: System, steps: Sequence[Step], start: Vector, p: Vector) -> Modes:
+def _of_blocks(system: System, steps: Sequence[Step], start: Vector, p: Vector) -> ModeList:
     told = list[Roots]()
     try:
         every = list(_every(steps, start, p, told))
@@ -170,7 +170,7 @@ def _of_blocks(system: System, steps: Sequence[Step], start: Vector, p: Vector) 
     for mode in found:
         _require_locked(closing, np.array(mode.q))
     proofs = dict.fromkeys(roots.proof for roots in told)
-    return Modes(found, complete=all(roots.complete for roots in told), proof="; ".join(proofs))
+    return ModeList(found, complete=all(roots.complete for roots in told), proof="; ".join(proofs))
 
 
 def _every(steps: Sequence[Step], q: Vector, p: Vector, told: list[Roots]) -> Iterator[Vector]:

@@ -97,7 +97,7 @@ class Roots:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Block:
+class LoopBlock:
     """Loops that only numbers solve, mostly several that share unknown joints.
 
     Attributes:
@@ -324,7 +324,7 @@ def plan_from(system: System, known: Collection[int]) -> tuple[Stage, ...]:
 
 
 @dataclass(slots=True)
-class Work:
+class PlanWork:
     """What of a plan is solved so far.
 
     Attributes:
@@ -339,9 +339,9 @@ class Work:
     q: SX
     values: SX
     known: set[int]
-    steps: list[Stage | Block] = field(default_factory=list)
+    steps: list[Stage | LoopBlock] = field(default_factory=list)
 
-    def take(self, stage: Stage | Block) -> None:
+    def take(self, stage: Stage | LoopBlock) -> None:
         """Count what a step gives as known."""
         self.steps.append(stage)
         self.known |= set(stage.indices)
@@ -372,13 +372,13 @@ def order_stages(system: System, known: Collection[int], q: SX) -> list[Stage]:
     return [step for step in steps if isinstance(step, Stage)]
 
 
-Blocks = Callable[["Work", Sequence[int]], Block | None]
+Blocks = Callable[["PlanWork", Sequence[int]], LoopBlock | None]
 """A block among the loops that wait, by their numbers; None where there is none."""
 
 
 def order_steps(
     system: System, known: Collection[int], q: SX, blocks: Blocks
-) -> list[Stage | Block]:
+) -> list[Stage | LoopBlock]:
     """Stages, and blocks where none of the loops that are left can be solved by itself.
 
     Args:
@@ -390,7 +390,7 @@ def order_steps(
     Raises:
         NoClosedForm: a loop cannot be solved, or no loop gives a position.
     """
-    work = Work(system, q, SX(q), set(known))
+    work = PlanWork(system, q, SX(q), set(known))
     binding = [part for part in system.parts if part.element.has("rows")]
     pending = list(range(len(system.cuts) + len(system.couplings) + len(binding)))
     reasons = dict[int, str]()
@@ -414,7 +414,7 @@ def order_steps(
     return work.steps
 
 
-def _attempt(work: Work, number: int) -> Stage | str | None:
+def _attempt(work: PlanWork, number: int) -> Stage | str | None:
     """A loop, or a coupling, solved with what is known; why not; None where nothing is unknown."""
     system = work.system
     if number >= len(system.cuts) + len(system.couplings):
@@ -432,7 +432,7 @@ def _attempt(work: Work, number: int) -> Stage | str | None:
     return root if isinstance(root, str) else _stage(work, joint.name, root)
 
 
-def _point_stage(work: Work, waiting: Sequence[int]) -> Stage | None:
+def _point_stage(work: PlanWork, waiting: Sequence[int]) -> Stage | None:
     """Slides that several loops share and the rigid links in these hold, if there are such."""
     system, groups = work.system, dict[frozenset[int], dict[int, Span]]()
     for number in waiting:
@@ -455,7 +455,7 @@ def is_bound(system: System, number: int) -> bool:
     return isinstance(joint, Constraint) and not isinstance(joint, (PointOnLine, Rod))
 
 
-def _bound_by_part(work: Work, number: int) -> str | None:
+def _bound_by_part(work: PlanWork, number: int) -> str | None:
     """Why the rows of a component have no closed form; None where nothing in them is unknown."""
     binding = [part for part in work.system.parts if part.element.has("rows")]
     part = binding[number]
@@ -467,14 +467,14 @@ def _bound_by_part(work: Work, number: int) -> str | None:
     return f"the rows of a {type(part.element).__name__} bind it"
 
 
-def _coupling_stage(work: Work, coupling: CoordinateCoupling) -> Stage | str | None:
+def _coupling_stage(work: PlanWork, coupling: CoordinateCoupling) -> Stage | str | None:
     if work.known.issuperset(coupling.coordinates):
         return None
     root = coupled_position(coupling, work.known, work.q)
     return root if isinstance(root, str) else _stage(work, coupling.name, root)
 
 
-def _stage(work: Work, name: str, root: LoopBranches) -> Stage:
+def _stage(work: PlanWork, name: str, root: LoopBranches) -> Stage:
     arguments, branches = [work.q, work.system.p], list(root.branches.values())
     indices = tuple(sorted(branches[0]))
     columns = [casadi.vertcat(*(branch[index] for index in indices)) for branch in branches]

@@ -17,8 +17,8 @@ from support.messages import refused
 
 from mbs.closed_forms.hexapod import (
     DEGREE,
+    Homotopy,
     Legs,
-    Path,
     certify,
     follow,
     kept_start,
@@ -129,7 +129,7 @@ def test_what_is_kept_can_be_made_anew():
     """Monodromy from one root finds forty, and following them leads to those that are kept."""
     made, kept = monodromy(7), kept_start(0)
     assert len(made.x) == DEGREE
-    x, t = follow(Path.between(made.legs, kept.legs), made.x)
+    x, t = follow(Homotopy.between(made.legs, kept.legs), made.x)
     assert np.all(t == 1)
     overlap = np.abs(x @ kept.x.conj().T)
     np.testing.assert_allclose(np.sort(overlap.max(axis=0)), 1.0, atol=1e-9)

@@ -19,8 +19,8 @@ from support.arm_search import plain_arm
 
 import mbs
 from mbs.assembly import System
+from mbs.closed_forms.arm_core import core
 from mbs.models.inverse_geometry import solve
-from mbs.models.inverse_geometry.core import core
 from mbs.models.inverse_geometry.many import solve_many
 
 _SHARE = 0.03

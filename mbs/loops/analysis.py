@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import Closure, Coordinate, LoopRow, System
 from mbs.components import MotionJoint
-from mbs.errors import AssemblyError, Unclosable
+from mbs.errors import Unclosable
 from mbs.loops.closing import Closing, closure_parameters, constraint_sizes, mechanism_size
 from mbs.loops.closure import row_groups
 from mbs.loops.configuration import closed_configuration
@@ -51,7 +51,6 @@ def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] 
 
     Raises:
         Unclosable: no configuration closes the loops.
-        AssemblyError: the loops leave no motion.
     """
     p = closure_parameters(system)
     configuration = _assembled(system, guess, p)
@@ -220,9 +219,7 @@ def _drive(
     pivoting; all of them drive the mechanism, and what they leave free its own velocities.
     """
     if mobility == 0:
-        raise AssemblyError(
-            f"{system.name}: the loops leave no motion (mobility 0); take a joint's constraint away"
-        )
+        return _Drive((), tuple(k for k, speed in enumerate(system.speeds) if speed.actuated))
     free = [null_space_of(_without_zeros(J), mobility) for J in jacobians]
     motors = tuple(k for k, speed in enumerate(system.speeds) if speed.actuated)
     first = tuple(dict.fromkeys([*chosen, *motors]))

@@ -64,6 +64,11 @@ def independent_positions(system: System, values: Given) -> list[float]:
     whole = system.position({name: x for name, x in fixed.items() if name not in spins})
     spin = system.velocity(spins)
     for name in fixed:
+        if not names:
+            raise ModelError(
+                f"{system.name}: {name} is given, but the loops leave no motion (mobility 0); leave"
+                " q_active out"
+            )
         if name not in names:
             raise ModelError(
                 f"{system.name}: {name} follows from the loops once a branch is named; give"

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from mbs.assembly import System
+from mbs.assembly.model_function import require_system
 from mbs.assembly.tree import quaternion_slices
-from mbs.closed_forms.ring import extent, independent_indices
+from mbs.closed_forms.ring import extent, independent_indices, spin_indices
+from mbs.components.joints import Motion
 from mbs.errors import LoopError, ModelError
+from mbs.loops.blocks import Step, steps_of
 from mbs.loops.closing import (
     CLOSED,
     OPEN,
+    TOLERANCE,
     Closing,
     Vector,
     closure_parameters,
@@ -23,7 +27,7 @@ from mbs.loops.closing import (
     within_half_turn,
 )
 from mbs.loops.function import Given, independent_positions
-from mbs.loops.plan import every_configuration, plan
+from mbs.loops.plan import Roots, Stage, every_configuration
 from mbs.loops.pose import Goal, goal
 from mbs.solvers.rank import rank
 from mbs.text import quoted
@@ -52,16 +56,34 @@ class Mode:
     residual: float
 
 
+class ModeList(list[Mode]):
+    """ModeList, and what is known of whether they are all.
+
+    Attributes:
+        complete: whether these are all modes that there are.
+        proof: why, in words: "closed forms", or what was solved in numbers.
+    """
+
+    def __init__(
+        self, found: Iterable[Mode] = (), *, complete: bool = True, proof: str = ""
+    ) -> None:
+        super().__init__(found)
+        self.complete = complete
+        self.proof = proof
+
+
 def modes(
     system: System,
     q_active: Given = None,
     *,
     parameters: Mapping[str, float] | None = None,
-) -> list[Mode]:
-    """All configurations with these positions of the independent joints, by closed forms.
+) -> ModeList:
+    """All configurations with these positions of the independent joints.
 
-    Each is checked with every closure row and for joints that face the right way. The list is
-    empty where the mechanism cannot be assembled; two modes that meet are listed once.
+    By closed forms where the loops have them; else loops that depend on each other, such as those
+    of a platform on three or six legs, are solved together in numbers, and the modes have no
+    labels. Each mode is checked with every closure row and for joints that face the right way. The
+    list is empty where the mechanism cannot be assembled; two modes that meet are listed once.
 
     Args:
         system: the assembled mechanism.
@@ -69,12 +91,18 @@ def modes(
             `system.free`; those left out stay as in the assembled configuration.
         parameters: values of symbols, the others at their defaults.
 
+    Returns:
+        The modes; `complete` and `proof` tell whether they are all.
+
     Raises:
         NoClosedForm: a loop is solved by iteration only.
-        LoopError: there are more than 4096 branches.
+        LoopError: there are more than 4096 branches; or joints can move while the independent ones
+            stay, so that modes cannot be counted.
         ModelError: a joint is unknown or not independent, or a value is not finite.
     """
-    stages = plan(system)
+    require_system(system)
+    steps = steps_of(system)
+    stages = [step for step in steps if isinstance(step, Stage)]
     count = math.prod(len(stage.labels) for stage in stages)
     if count > _MOST:
         raise LoopError(
@@ -83,9 +111,18 @@ def modes(
     p = closure_parameters(system, parameters)
     start = np.zeros(extent(system))
     start[independent_indices(system)] = independent_positions(system, q_active)
+    if len(stages) == len(steps):
+        every = every_configuration(stages, start, p)
+        return ModeList(
+            _distinct(_checked(system, q[: system.nq], branch, p) for q, branch in every),
+            proof="closed forms",
+        )
+    return _of_blocks(system, steps, start, p)
+
+
+def _distinct(modes: Iterable[Mode | None]) -> list[Mode]:
     found: list[Mode] = []
-    for q, branch in every_configuration(stages, start, p):
-        mode = _checked(system, q[: system.nq], branch, p)
+    for mode in modes:
         if mode is not None and not any(_same(mode, other) for other in found):
             found.append(mode)
     return found
@@ -103,6 +140,104 @@ def _checked(system: System, q: Vector, branch: tuple[str, ...], p: Vector) -> M
 
 def _same(mode: Mode, other: Mode) -> bool:
     return bool(np.max(np.abs(np.subtract(mode.q, other.q)), initial=0.0) < _SAME)
+
+
+# ModeList of loops that are solved in numbers, one step after the other.
+
+
+_REFINED = 1e-4
+"""Distance [rad or m] over which a root is refined with all rows: at a fold roots of polynomials
+are known to 1e-6, and other modes are farther away."""
+_SINGULAR = 1e-6
+"""Singular value, as a part of the largest, below which a mode may move while the independent
+joints stay, or lies at a fold: modes are closed to 1e-12, whose root that is."""
+_PUSH = 0.01
+"""By how much such a mode is pushed along that motion [rad, or sizes of the mechanism]: from a fold
+it comes back, to 1e-6."""
+
+
+def _of_blocks(system: System, steps: Sequence[Step], start: Vector, p: Vector) -> ModeList:
+    told = list[Roots]()
+    try:
+        every = list(_every(steps, start, p, told))
+    except LoopError as error:
+        if str(error).startswith(system.name):
+            raise
+        raise LoopError(f"{system.name}: {error}; {_REMEDY}") from None
+    locked = tuple(k for k in independent_indices(system) if k < system.nq)
+    closing = Closing(system, p, locked)
+    found = _distinct(_checked(system, _refined(closing, q[: system.nq]), (), p) for q in every)
+    for mode in found:
+        _require_locked(closing, np.array(mode.q))
+    proofs = dict.fromkeys(roots.proof for roots in told)
+    return ModeList(found, complete=all(roots.complete for roots in told), proof="; ".join(proofs))
+
+
+def _every(steps: Sequence[Step], q: Vector, p: Vector, told: list[Roots]) -> Iterator[Vector]:
+    """All positions, one step after the other; what blocks tell is added to a list."""
+    if not steps:
+        yield q
+        return
+    step, rest = steps[0], steps[1:]
+    if isinstance(step, Stage):
+        values = np.array(step.values(q, p)).T
+    else:
+        told.append(step.solve(q, p))
+        values = told[-1].values
+    for row in values:
+        if np.all(np.isfinite(row)):
+            longer = q.copy()
+            longer[list(step.indices)] = row
+            yield from _every(rest, longer, p, told)
+
+
+def _refined(closing: Closing, q: Vector) -> Vector:
+    if closing.openness(q) <= TOLERANCE:
+        return q
+    near = closing.nearest(q)
+    moved = np.max(np.abs(difference(closing.system, near.q, q)), initial=0.0)
+    return near.q if near.is_closed and moved < _REFINED else q
+
+
+_REMEDY = (
+    "modes cannot be counted there; give other positions or lengths, or use mbs.loops.solve with a"
+    " guess for one configuration"
+)
+
+
+def _require_locked(closing: Closing, q: Vector) -> None:
+    """Refuse a mode that can move while the independent joints stay.
+
+    Raises:
+        LoopError: names the joints that move most.
+    """
+    system, free = closing.system, closing.free
+    spins = spin_indices(system)
+    J = closing.rows(q)[1]
+    _, values, V = np.linalg.svd(J)
+    count = len(free) - int(np.sum(values > _SINGULAR * values[0]))
+    if count <= len(spins):
+        return
+    # the motion that turns rods about their lines least
+    spinning = {index + k for index in spins for k in range(Motion.SPHERICAL.nq)}
+    others = [k for k, index in enumerate(free) if index not in spinning]
+    loose = V[-count:].T
+    along = loose @ np.linalg.svd(loose[others])[2][0]
+    pushed = q.copy()
+    pushed[free] += _PUSH * along
+    near = closing.nearest(pushed)
+    moved = np.abs(difference(system, near.q, q))[[free[k] for k in others]]
+    if not near.is_closed or np.max(moved, initial=0.0) < _PUSH / 10:
+        return
+    motion = np.abs(along)
+    names = [
+        system.coordinates[k].name
+        for k, x in zip(free, motion, strict=True)
+        if x > motion.max() / 10
+    ]
+    raise LoopError(
+        f"{system.name}: {', '.join(names)} can move while the independent joints stay; {_REMEDY}"
+    )
 
 
 # The configurations that bring a frame to one pose, as far as random starts lead to them.

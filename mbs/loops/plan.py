@@ -81,6 +81,36 @@ class Stage:
     chosen: int = 0
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Roots:
+    """Every way to close the loops of a block, at one place.
+
+    Attributes:
+        values: (r, k) positions of the block, one row a root.
+        proof: how they were found, as part of a sentence.
+        complete: whether that proves that they are all.
+    """
+
+    values: Vector
+    proof: str
+    complete: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoopBlock:
+    """Loops that only numbers solve, mostly several that share unknown joints.
+
+    Attributes:
+        name: of the cut joints.
+        indices: indices in q of what it gives.
+        solve: all roots, from all positions, of which known ones are used, and p.
+    """
+
+    name: str
+    indices: tuple[int, ...]
+    solve: Callable[[Vector, Vector], Roots]
+
+
 def branches_at(system: System, stages: Sequence[Stage], q: Vector, p: Vector) -> tuple[int, ...]:
     """The branches of all stages that lead to the closed configuration q; as far as they do.
 
@@ -294,28 +324,28 @@ def plan_from(system: System, known: Collection[int]) -> tuple[Stage, ...]:
 
 
 @dataclass(slots=True)
-class _Work:
-    """What is solved so far.
+class PlanWork:
+    """What of a plan is solved so far.
 
     Attributes:
         system: whose loops they are.
         q: symbols of all positions.
         values: the same, with numbers for positions that turned out not to change.
         known: places of what is known.
-        stages: in their order.
+        steps: in their order.
     """
 
     system: System
     q: SX
     values: SX
     known: set[int]
-    stages: list[Stage] = field(default_factory=list)
+    steps: list[Stage | LoopBlock] = field(default_factory=list)
 
-    def take(self, stage: Stage) -> None:
-        """Count what a stage gives as known."""
-        self.stages.append(stage)
+    def take(self, stage: Stage | LoopBlock) -> None:
+        """Count what a step gives as known."""
+        self.steps.append(stage)
         self.known |= set(stage.indices)
-        if len(stage.labels) == 1:
+        if isinstance(stage, Stage) and len(stage.labels) == 1:
             p = self.system.p
             found = constants(stage.values(self.q, p), self.q, p)
             for index, number in zip(stage.indices, found, strict=True):
@@ -338,12 +368,34 @@ def order_stages(system: System, known: Collection[int], q: SX) -> list[Stage]:
     Raises:
         NoClosedForm: a loop cannot be solved, or no loop gives a position.
     """
-    work = _Work(system, q, SX(q), set(known))
+    steps = order_steps(system, known, q, lambda work, waiting: None)
+    return [step for step in steps if isinstance(step, Stage)]
+
+
+Blocks = Callable[["PlanWork", Sequence[int]], LoopBlock | None]
+"""A block among the loops that wait, by their numbers; None where there is none."""
+
+
+def order_steps(
+    system: System, known: Collection[int], q: SX, blocks: Blocks
+) -> list[Stage | LoopBlock]:
+    """Stages, and blocks where none of the loops that are left can be solved by itself.
+
+    Args:
+        system: whose loops they are.
+        known: places of the positions that are known.
+        q: symbols of all positions.
+        blocks: finds a block.
+
+    Raises:
+        NoClosedForm: a loop cannot be solved, or no loop gives a position.
+    """
+    work = PlanWork(system, q, SX(q), set(known))
     binding = [part for part in system.parts if part.element.has("rows")]
     pending = list(range(len(system.cuts) + len(system.couplings) + len(binding)))
     reasons = dict[int, str]()
     while pending:
-        before, waiting = len(work.stages), list[int]()
+        before, waiting = len(work.steps), list[int]()
         for number in pending:
             outcome = _attempt(work, number)
             while isinstance(outcome, Stage):
@@ -352,17 +404,17 @@ def order_stages(system: System, known: Collection[int], q: SX) -> list[Stage]:
             if outcome is not None:
                 waiting.append(number)
                 reasons[number] = outcome
-        if waiting and len(work.stages) == before:
-            undetermined = _point_stage(work, waiting)
+        if waiting and len(work.steps) == before:
+            undetermined = _point_stage(work, waiting) or blocks(work, waiting)
             if undetermined is None:
                 raise NoClosedForm(_refusal(system, waiting, reasons))
             work.take(undetermined)
         pending = waiting
     _require_all(system, work.known)
-    return work.stages
+    return work.steps
 
 
-def _attempt(work: _Work, number: int) -> Stage | str | None:
+def _attempt(work: PlanWork, number: int) -> Stage | str | None:
     """A loop, or a coupling, solved with what is known; why not; None where nothing is unknown."""
     system = work.system
     if number >= len(system.cuts) + len(system.couplings):
@@ -374,17 +426,17 @@ def _attempt(work: _Work, number: int) -> Stage | str | None:
     if all(system.tree.links[k].q.start in work.known for k in (*back, *out)):
         return None
     joint = cut.edge.joint
-    if _is_bound(system, number):
+    if is_bound(system, number):
         return f"a {type(joint).__name__} closes it"
     root = closed_form(work.ring(number), work.q, system.p)
     return root if isinstance(root, str) else _stage(work, joint.name, root)
 
 
-def _point_stage(work: _Work, waiting: Sequence[int]) -> Stage | None:
+def _point_stage(work: PlanWork, waiting: Sequence[int]) -> Stage | None:
     """Slides that several loops share and the rigid links in these hold, if there are such."""
     system, groups = work.system, dict[frozenset[int], dict[int, Span]]()
     for number in waiting:
-        if number < len(system.cuts) and not _is_bound(system, number):
+        if number < len(system.cuts) and not is_bound(system, number):
             for span in spans(work.ring(number), work.q, system.p):
                 indices = prismatic_indices(span)
                 if indices:
@@ -397,13 +449,13 @@ def _point_stage(work: _Work, waiting: Sequence[int]) -> Stage | None:
     return None
 
 
-def _is_bound(system: System, number: int) -> bool:
+def is_bound(system: System, number: int) -> bool:
     """Whether a loop has joints other than revolute, prismatic and spherical."""
     joint = system.cuts[number].edge.joint
     return isinstance(joint, Constraint) and not isinstance(joint, (PointOnLine, Rod))
 
 
-def _bound_by_part(work: _Work, number: int) -> str | None:
+def _bound_by_part(work: PlanWork, number: int) -> str | None:
     """Why the rows of a component have no closed form; None where nothing in them is unknown."""
     binding = [part for part in work.system.parts if part.element.has("rows")]
     part = binding[number]
@@ -415,14 +467,14 @@ def _bound_by_part(work: _Work, number: int) -> str | None:
     return f"the rows of a {type(part.element).__name__} bind it"
 
 
-def _coupling_stage(work: _Work, coupling: CoordinateCoupling) -> Stage | str | None:
+def _coupling_stage(work: PlanWork, coupling: CoordinateCoupling) -> Stage | str | None:
     if work.known.issuperset(coupling.coordinates):
         return None
     root = coupled_position(coupling, work.known, work.q)
     return root if isinstance(root, str) else _stage(work, coupling.name, root)
 
 
-def _stage(work: _Work, name: str, root: LoopBranches) -> Stage:
+def _stage(work: PlanWork, name: str, root: LoopBranches) -> Stage:
     arguments, branches = [work.q, work.system.p], list(root.branches.values())
     indices = tuple(sorted(branches[0]))
     columns = [casadi.vertcat(*(branch[index] for index in indices)) for branch in branches]
@@ -618,6 +670,52 @@ def _plan_to(system: System, frame: str | int) -> Posed:
         return plan.started(np.array(at(configuration, p)[0]), configuration)
 
     return replace(plan, stages=verify(system, plan.stages, started))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PosedStages:
+    """Stages that give the rest from some positions and the pose of a link.
+
+    Attributes:
+        stages: in their order.
+        extent: how many positions there are, seven of the pose at their end.
+        chosen: the branch of each stage in which the system was assembled.
+    """
+
+    stages: list[Stage]
+    extent: int
+    chosen: tuple[int, ...]
+
+
+def posed_stages(system: System, link: int, known: Collection[int]) -> PosedStages | None:
+    """How the loops follow from known positions and the pose of a link; None where they do not.
+
+    Args:
+        system: the assembled mechanism, with loops.
+        link: whose pose in the base link's frame is known.
+        known: indices in q.
+    """
+    weld = _weld(link, Pose.identity(), Pose.identity())
+    first = extent(replace(system, cuts=(*system.cuts, weld), _cache={}))
+    q = SX.sym("q", first + _POSE)
+    cuts = (*system.cuts, _weld(link, Pose.identity(), free_pose(q[first:])))
+    welded = replace(system, cuts=cuts, _cache={})
+    places = {*known, *spin_indices(welded).values(), *range(first, first + _POSE)}
+    try:
+        stages = order_stages(welded, places, q)
+    except NoClosedForm:
+        return None
+    configuration, p = np.array(system.configuration), closure_parameters(system)
+    symbols = SX.sym("q", system.nq)
+    at = relative_pose(system.tree, symbols, (-1, Pose.identity()), (link, Pose.identity()))
+    T = np.array(
+        Function("pose", [symbols, system.p], [casadi.densify(at.matrix)])(configuration, p)
+    )
+    start = np.zeros(first + _POSE)
+    start[list(known)] = configuration[list(known)]
+    start[first : first + 3], start[first + 3 :] = T[:3, 3], _quaternion(T[:3, :3])
+    chosen = branches_from(system, stages, start, configuration, p)
+    return PosedStages(stages, first + _POSE, chosen) if len(chosen) == len(stages) else None
 
 
 def _weld(link: int, pose: Pose, goal: Pose) -> Cut:

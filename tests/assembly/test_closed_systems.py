@@ -21,7 +21,8 @@ from mbs.components import (
     Spherical,
     Universal,
 )
-from mbs.errors import AssemblyError, Unclosable
+from mbs.errors import AssemblyError, ModelError, Unclosable
+from mbs.export import fmu
 
 DOWN = (0, -9.81, 0)
 
@@ -379,11 +380,20 @@ def test_no_motion_left():
     b = m.add(solid("b"))
     m.connect(m.world, Revolute("j1"), b)
     m.connect(m.world.at(1), Revolute("j2"), b.at(1))
+    system = m.assemble()
+    assert system.closure.mobility == 0
+    assert system.active == system.free == ()
+    assert "Mobility 0" in system.report()
     refused(
-        AssemblyError,
+        ModelError,
         "m: the loops leave no motion (mobility 0)",
         "take a joint's constraint away",
-        by=m.assemble,
+        by=lambda: mbs.simulate.run(system, 1.0),
+    )
+    refused(
+        ModelError,
+        "m: the loops leave no motion (mobility 0)",
+        by=lambda: fmu(system, "m.fmu"),
     )
 
 

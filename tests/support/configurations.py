@@ -19,9 +19,13 @@ def near_assembled(system, reach, seed):
 
 
 def searched(system, q_a, starts=150, seed=0, reach=3.5):
-    """All configurations with these independent positions that random starts lead to."""
+    """All configurations with these independent positions that random starts lead to.
+
+    Rods that spin do so as they like.
+    """
     rng = np.random.default_rng(seed)
-    indices = independent_indices(system)
+    given = [(k, x) for k, x in zip(independent_indices(system), q_a, strict=True) if k < system.nq]
+    indices, q_a = [k for k, _ in given], [x for _, x in given]
     closing = Closing(system, closure_parameters(system), tuple(indices))
     found = []
     for _ in range(starts):

@@ -22,13 +22,13 @@ def flat_loop(seed, kinds, active, closing=None, tilted=True):
     m = Mechanism(f"flat{seed}", gravity=(0.0, -9.81, 0.0))
     R = random_rotation(rng) if tilted else np.eye(3)
     points = [np.array([*rng.uniform(-1, 1, 2), 0.0]) for _ in kinds]
-    turns = [_turn(rng.uniform(-3, 3)) for _ in kinds]
+    turns = [turn_about_z(rng.uniform(-3, 3)) for _ in kinds]
     place, turned = np.zeros(3), np.eye(3)
     here = m.world.at(*rng.uniform(-1, 1, 3), rotation=R)
     before, n = here, len(kinds)
     for k, kind in enumerate(kinds):
         at = before.at(*(turned.T @ (points[k] - place)), rotation=turned.T @ turns[k])
-        joint = _joint(rng, f"j{k}", kind, k in active)
+        joint = flat_joint(rng, f"j{k}", kind, k in active)
         if k < n - 1:
             body = m.add(random_body(rng, f"bar{k}"))
             m.connect(at, joint, body)
@@ -40,12 +40,14 @@ def flat_loop(seed, kinds, active, closing=None, tilted=True):
     return m
 
 
-def _turn(angle):
+def turn_about_z(angle):
+    """The rotation about z."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _joint(rng, name, kind, driven):
+def flat_joint(rng, name, kind, driven):
+    """A revolute joint about z, either way round, or a prismatic one across it."""
     if kind == "R":
         axis = "z" if rng.uniform() < 0.5 else "-z"
         return Revolute(name, axis=axis, actuated=driven or None)

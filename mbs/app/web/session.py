@@ -173,6 +173,8 @@ def assembly_modes(system: System, q: Sequence[float]) -> tuple[Mode, ...] | str
         return "its loops are closed by iteration, so that its assembly modes cannot be listed"
     except LoopError as error:
         return str(error)
+    if not found.complete:
+        return f"not all of its assembly modes are known: {found.proof}"
     return tuple(found[:_MOST_MODES])
 
 

@@ -1,9 +1,9 @@
 """Inverse geometric models: the configurations that take a frame of a robot to a pose."""
 
+from mbs.closed_forms.arm_search import Nearest
 from mbs.models.inverse_geometry.closed_form import InverseGeometry, function
 from mbs.models.inverse_geometry.follow import Followed, follow
 from mbs.models.inverse_geometry.many import ManySolutions, solve_many
-from mbs.models.inverse_geometry.search import Nearest
 from mbs.models.inverse_geometry.self_motions import Family
 from mbs.models.inverse_geometry.sheet import text
 from mbs.models.inverse_geometry.solutions import Solution, Solutions

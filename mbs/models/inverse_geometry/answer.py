@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Arm, Array
+from mbs.closed_forms.arm_search import Nearest, nearest
 from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.gathering import Gathered
-from mbs.models.inverse_geometry.search import Nearest, nearest
 from mbs.models.inverse_geometry.self_motions import Family, connected, curve, family, freedoms
 from mbs.models.inverse_geometry.solutions import RobotSolution, Solutions, Wishes, unreachable
 from mbs.models.inverse_geometry.target import SINGULAR, Target, distinct, multiplicity, reduction

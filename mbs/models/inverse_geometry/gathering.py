@@ -9,6 +9,7 @@ import numpy as np
 from casadi import DM, SX, Function
 
 from mbs.closed_forms.arm import Array
+from mbs.closed_forms.arm_search import General, general, general_of, polish, search
 from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.chain import FrameChain
@@ -17,7 +18,6 @@ from mbs.models.inverse_geometry.closed_form import (
     require_method,
     sequence_of,
 )
-from mbs.models.inverse_geometry.search import General, general, general_of, polish, search
 from mbs.models.inverse_geometry.target import Target
 
 METHODS = ("auto", *CLOSED_FORMS, "general", "search")

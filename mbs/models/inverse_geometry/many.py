@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, Array
+from mbs.closed_forms.arm_search import General, general_many, polish
 from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import NoClosedForm
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_poses
@@ -23,7 +24,6 @@ from mbs.models.inverse_geometry.closed_form import (
     sequence_of,
 )
 from mbs.models.inverse_geometry.gathering import ILL_CONDITIONED, METHODS, general_ready
-from mbs.models.inverse_geometry.search import General, general_many, polish
 from mbs.models.inverse_geometry.solutions import (
     WITHIN,
     CoordinateLimits,

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.closed_forms.arm import Array
+from mbs.closed_forms.arm_search import Nearest
 from mbs.errors import ModelError
-from mbs.models.inverse_geometry.search import Nearest
 from mbs.models.inverse_geometry.self_motions import Family
 from mbs.models.inverse_geometry.target import Target
 from mbs.text import did_you_mean, quoted

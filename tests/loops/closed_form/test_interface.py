@@ -126,7 +126,8 @@ def test_loops_without_closed_form_say_why():
     mechanism, guess = closed_chain(2, "revolute")
     system = mechanism.assemble(guess=guess)
     with pytest.raises(NoClosedForm, match=r"closing has no closed form known here, 6 positions"):
-        modes(system)
+        function(system)
+    assert modes(system).proof == "the general inverse geometric model, of degree 16"
     with pytest.raises(LoopError, match=r"use mbs\.loops\.solve without branch"):
         function(system)
     with pytest.raises(NoClosedForm):

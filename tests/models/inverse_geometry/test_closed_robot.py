@@ -7,12 +7,12 @@ from support.closed_mechanisms import closed_chain
 from support.configurations import same
 
 import mbs
+from mbs.closed_forms.arm_search import search
 from mbs.components import Body, Mechanism, Revolute, Spherical
 from mbs.loops.closing import Closing
 from mbs.loops.modes import closed_configurations
 from mbs.loops.plan import complete
 from mbs.models.inverse_geometry.chain import frame_chain
-from mbs.models.inverse_geometry.search import search
 from mbs.models.inverse_geometry.whole_robot import close, configurations_at, why_searched
 
 NONE = np.zeros(0)

@@ -2,14 +2,14 @@ import numpy as np
 import pytest
 from support.plain_arms import apart, khalil, manseur_doty, puma, random_arm
 
-from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.search import (
+from mbs.closed_forms.arm_search import (
     general,
     general_many,
     general_of,
     general_with_numpy,
     search,
 )
+from mbs.errors import ModelError, NoClosedForm
 from mbs.native import compiler_found
 
 WAYS = [

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from support.plain_arms import khalil, puma
 
-from mbs.models.inverse_geometry.search import merged, merged_with_numpy, wrapped
+from mbs.closed_forms.arm_search import merged, merged_with_numpy, wrapped
 from mbs.native import compiler_found
 
 WAYS = [

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from support.plain_arms import apart, manseur_doty, puma, random_arm
 
-from mbs.models.inverse_geometry.search import (
+from mbs.closed_forms.arm_search import (
     SEED,
     counted_search,
     random_configurations,

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from support.plain_arms import apart, khalil, manseur_doty, puma, random_arm
 
-from mbs.models.inverse_geometry.search import polish, polished_with_numpy
+from mbs.closed_forms.arm_search import polish, polished_with_numpy
 from mbs.native import compiler_found
 
 WAYS = [

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Arm, Array
-from mbs.models.inverse_geometry.raghavan_roth import Prepared
+from mbs.closed_forms.raghavan_roth.numbers import Prepared
 from mbs.native import cached_library, compiler_found
 
 Hits: TypeAlias = NDArray[np.int64]

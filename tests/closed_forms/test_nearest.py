@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from support.plain_arms import khalil, puma, random_arm
 
-from mbs.models.inverse_geometry.search import nearest, nearest_with_numpy
+from mbs.closed_forms.arm_search import nearest, nearest_with_numpy
 from mbs.native import compiler_found
 
 PLANAR = khalil([(0, 0, 0, 0), (0, 1.0, 0, 0), (0, 0.5, 0, 0)])

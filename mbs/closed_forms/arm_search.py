@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-import mbs.models.inverse_geometry.core as core
+import mbs.closed_forms.arm_core as core
 from mbs.closed_forms.arm import Arm, Array, gap_to
+from mbs.closed_forms.arm_core import HandedLoop, Numbers, solved_by
+from mbs.closed_forms.raghavan_roth.numbers import Prepared, candidates_many, prepare
 from mbs.errors import NoClosedForm
-from mbs.models.inverse_geometry.core import HandedLoop, Numbers, solved_by
-from mbs.models.inverse_geometry.raghavan_roth import Prepared, candidates_many, prepare
 
 # Levenberg and Marquardt's steps of many configurations towards a target pose, on numpy arrays.
 

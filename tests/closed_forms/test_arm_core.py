@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from support.plain_arms import apart, manseur_doty, puma, random_arm
 
-import mbs.models.inverse_geometry.core as core
-from mbs.models.inverse_geometry.search import general, general_of, merged, nearest, polish, search
+import mbs.closed_forms.arm_core as core
+from mbs.closed_forms.arm_search import general, general_of, merged, nearest, polish, search
 from mbs.native import compiler_found
 
 

@@ -1,0 +1,545 @@
+"""A platform on six legs of known lengths, in numbers: every pose of it, by certified homotopy.
+
+The pose is a unit quaternion e and g = p e, p the place of the platform; with it the length of a
+leg from a on the ground to b on the platform is a quadratic form in (e, g). The forty complex poses
+of a platform that is kept are followed while its legs become the given ones, with complex lengths;
+from there, once for each platform, those are followed that it has to any lengths.
+
+Source: Wampler 1996 for the equations; Dietmaier 1998 for forty real poses.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib import resources
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbs.errors import LoopError
+from mbs.numbers import NONZERO
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# The equations: quadratic forms of x = (e, g), whose values vanish where the legs fit.
+
+
+LEGS = 6
+_SIZE = 8
+_ROWS = LEGS + 1
+
+
+def _left(a: Complex) -> Complex:
+    """(..., 4, 4) the matrices of quaternion products a q, of vectors a (..., 3)."""
+    x, y, z = np.moveaxis(a, -1, 0)
+    o = np.zeros_like(x)
+    rows = np.array([[o, -x, -y, -z], [x, o, -z, y], [y, z, o, -x], [z, -y, x, o]])
+    product: Complex = np.moveaxis(rows, (0, 1), (-2, -1))
+    return product
+
+
+def _right(b: Complex) -> Complex:
+    """(..., 4, 4) the matrices of quaternion products q b, of vectors b (..., 3)."""
+    x, y, z = np.moveaxis(b, -1, 0)
+    o = np.zeros_like(x)
+    rows = np.array([[o, -x, -y, -z], [x, o, z, -y], [y, -z, o, x], [z, y, -x, o]])
+    product: Complex = np.moveaxis(rows, (0, 1), (-2, -1))
+    return product
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Legs:
+    """Six legs, in numbers that may be complex.
+
+    Attributes:
+        a: (6, 3) their ends on the ground.
+        b: (6, 3) those on the platform, in its frame.
+        c: (6,) a.a + b.b less the square of the length.
+    """
+
+    a: Complex
+    b: Complex
+    c: Complex
+
+    def forms(self) -> Complex:
+        """(7, 8, 8) symmetric matrices; the last one makes p a vector."""
+        Q = np.zeros((_ROWS, _SIZE, _SIZE), dtype=np.complex128)
+        Q[:LEGS, 4:, 4:] = np.eye(4)
+        N = _right(self.b) - _left(self.a)
+        Q[:LEGS, 4:, :4], Q[:LEGS, :4, 4:] = N, np.swapaxes(N, 1, 2)
+        Q[:LEGS, :4, :4] = 2 * _left(self.a) @ _right(self.b)
+        Q[:LEGS, :4, :4] += self.c[:, None, None] * np.eye(4)
+        Q[LEGS, 4:, :4] = Q[LEGS, :4, 4:] = np.eye(4)
+        return Q
+
+
+_SEED = 20260302
+
+
+# Following the roots while the legs become others, all roots at once.
+
+
+_TOLERANCE = 1e-4
+"""First correction of Newton's method after a step, as a part of |x| = 1: at 1e-2 a tenth of the
+platforms lost a path to another one."""
+_FIRST_STEP, _LEAST_STEP = 0.01, 1e-9
+"""Of t, from 0 to 1: the first is shorter than most that follow; one below the other stands before
+a singular root, to which the steps of a regular path do not come near."""
+_SHRINK, _GROW, _SAFETY = 0.2, 3.0, 0.9
+"""Of steps, as in solvers of differential equations: at most by these, and a little less than what
+the fifth power of the step says."""
+_MOST_STEPS = 4000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Homotopy:
+    """Q(t) = Q0 + t Q1 + t^2 Q2, from one platform to another.
+
+    Attributes:
+        Q: (3, 7, 8, 8).
+    """
+
+    Q: Complex
+
+    @staticmethod
+    def between(start: Legs, end: Legs) -> Homotopy:
+        """Along a straight line of a, b and c."""
+        middle = Legs((start.a + end.a) / 2, (start.b + end.b) / 2, (start.c + end.c) / 2)
+        first, half, last = start.forms(), middle.forms(), end.forms()
+        bend = 2 * (first + last) - 4 * half
+        return Homotopy(np.array([first, last - first - bend, bend]))
+
+    def slopes(self, x: Complex, t: Real) -> tuple[Complex, Complex]:
+        """Derivatives by x, (r, 7, 8), and by t, (r, 7), of the rows at x (r, 8) and t (r,)."""
+        Y = (x @ self.Q.reshape(-1, _SIZE).T).reshape(len(x), 3, _ROWS, _SIZE)
+        s = t[:, None, None]
+        J = 2 * (Y[:, 0] + s * (Y[:, 1] + s * Y[:, 2]))
+        return J, np.einsum("rij,rj->ri", Y[:, 1] + 2 * s * Y[:, 2], x)
+
+
+def _square(J: Complex, patch: Complex) -> Complex:
+    """With the patch as the last row: the length of x does not change to first order."""
+    return np.concatenate([J, patch.conj()[:, None, :]], axis=1)
+
+
+def _velocity(path: Homotopy, x: Complex, t: Real, patch: Complex) -> Complex:
+    J, rate = path.slopes(x, t)
+    side = np.concatenate([rate, np.zeros((len(x), 1))], axis=1)
+    return -_solved(_square(J, patch), side)
+
+
+def _correction(path: Homotopy, x: Complex, t: Real, patch: Complex) -> Complex:
+    J, _ = path.slopes(x, t)
+    rows = np.einsum("rij,rj->ri", J, x) / 2
+    side = np.concatenate([rows, np.zeros((len(x), 1))], axis=1)
+    return -_solved(_square(J, patch), side)
+
+
+def _solved(A: Complex, b: Complex) -> Complex:
+    """(r, 8) solutions of A x = b, NaN where A is singular to the last bit."""
+    try:
+        return np.asarray(np.linalg.solve(A, b[..., None])[..., 0], np.complex128)
+    except np.linalg.LinAlgError:
+        x = np.full(b.shape, np.nan, dtype=np.complex128)
+        for k in range(len(b)):
+            with suppress(np.linalg.LinAlgError):
+                x[k] = np.linalg.solve(A[k], b[k])
+        return x
+
+
+def follow(path: Homotopy, x: Complex, tolerance: float = _TOLERANCE) -> tuple[Complex, Real]:
+    """The roots (r, 8) at the end, of length one, and how far each came.
+
+    That is 1, or less at a singular root, which is approached in ever smaller steps. Runge and
+    Kutta's fourth order predicts, two steps of Newton's method correct.
+    """
+    x = x / np.linalg.norm(x, axis=1, keepdims=True)
+    t, h = np.zeros(len(x)), np.full(len(x), _FIRST_STEP)
+    for _ in range(_MOST_STEPS):
+        going = np.flatnonzero((t < 1) & (h > _LEAST_STEP))
+        if not len(going):
+            break
+        x0, t0 = x[going], t[going]
+        step = np.minimum(h[going], 1 - t0)
+        with np.errstate(all="ignore"):  # near singular matrices steps have no bounds
+            tried, first, second = _step(path, x0, t0, step)
+        # the second correction is about the square of the first where the root is regular
+        good = (first < 2 * tolerance) & (second < tolerance**1.5)
+        factor = _SAFETY * (tolerance / np.maximum(first, NONZERO)) ** (1 / 5)
+        factor = np.where(np.isfinite(factor), factor, _SHRINK)
+        h[going] = step * np.clip(factor, _SHRINK, np.where(good, _GROW, 0.5))
+        won = going[good]
+        x[won] = tried[good] / np.linalg.norm(tried[good], axis=1, keepdims=True)
+        t[won] = np.where(step[good] >= 1 - t0[good], 1.0, t0[good] + step[good])
+    return x, t
+
+
+def _step(path: Homotopy, x: Complex, t: Real, h: Real) -> tuple[Complex, Real, Real]:
+    """The corrected prediction and the lengths of both corrections."""
+    s = h[:, None]
+    k1 = _velocity(path, x, t, x)
+    k2 = _velocity(path, x + s / 2 * k1, t + h / 2, x)
+    k3 = _velocity(path, x + s / 2 * k2, t + h / 2, x)
+    k4 = _velocity(path, x + s * k3, t + h, x)
+    y = x + s / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    first = _correction(path, y, t + h, x)
+    y = y + first
+    second = _correction(path, y, t + h, x)
+    return y + second, np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
+
+
+# Which ends are regular roots, each its own: a certificate.
+
+
+_CERTAIN = 0.03
+"""Of |J^-1 F| |J^-1 H / 2|: below 0.157 Newton's method converges quadratically to one root; room
+for rounding and for the norm of matrices."""
+_APART = 1e-6
+"""Distance, as a part of |x| = 1, above which two roots are two: certified ones differ by more than
+ten times what Newton's method still moves them, 1e-12."""
+_FLAT = 1e-6
+"""Length of e, as a part of |x| = 1, below which a root is at infinity."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ends:
+    """Where the paths end.
+
+    Attributes:
+        x: (r, 8) roots, of length one.
+        regular: (r,) whether each is certified to be near a regular root of its own.
+    """
+
+    x: Complex
+    regular: NDArray[np.bool_]
+
+
+def certify(legs: Legs, x: Complex, t: Real) -> Ends:
+    """The ends of the paths, refined, and which of them are certified."""
+    path = Homotopy(np.array([legs.forms(), np.zeros((_ROWS, _SIZE, _SIZE))])[[0, 1, 1]])
+    regular = t >= 1
+    for _ in range(3):
+        now = np.flatnonzero(regular)
+        if len(now):
+            y = x[now] + _correction(path, x[now], t[now], x[now])
+            regular[now] = np.all(np.isfinite(y), axis=1)
+            with np.errstate(invalid="ignore"):
+                y /= np.linalg.norm(y, axis=1, keepdims=True)
+            x[now] = np.where(regular[now, None], y, x[now])
+    for k in np.flatnonzero(regular):
+        J, _ = path.slopes(x[k : k + 1], np.zeros(1))
+        unit = np.eye(_SIZE, dtype=np.complex128)
+        W = _solved(np.repeat(_square(J, x[k : k + 1]), _SIZE, axis=0), unit).T
+        rows = np.append(J[0] @ x[k] / 2, 0.0)
+        bend = np.linalg.norm(np.tensordot(W[:, :_ROWS], path.Q[0], axes=1))
+        along = x @ x[k].conj()
+        same = np.linalg.norm(x - along[:, None] * x[k], axis=1) < _APART
+        alone = not np.any(same & regular & (np.arange(len(x)) < k))
+        certain = float(np.linalg.norm(W @ rows)) * bend < _CERTAIN
+        regular[k] = certain and alone and float(np.linalg.norm(x[k, :4])) > _FLAT
+    return Ends(x, regular)
+
+
+# The platform whose forty roots are kept, and how they were found: by monodromy.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Start:
+    """A platform with complex legs, and its forty roots.
+
+    Attributes:
+        legs: of it.
+        x: (40, 8) roots.
+    """
+
+    legs: Legs
+    x: Complex
+
+
+DEGREE = 40
+
+
+def random_legs(rng: np.random.Generator) -> Legs:
+    """Complex legs about the origin, of about unit size."""
+
+    def drawn(*shape: int) -> Complex:
+        z = rng.normal(size=shape) + 1j * rng.normal(size=shape)
+        return np.asarray(z / np.sqrt(2), np.complex128)
+
+    return _centred(Legs(drawn(LEGS, 3), drawn(LEGS, 3), drawn(LEGS)))
+
+
+def _centred(legs: Legs) -> Legs:
+    return Legs(legs.a - legs.a.mean(axis=0), legs.b - legs.b.mean(axis=0), legs.c)
+
+
+def monodromy(seed: int, most: int = 200) -> Start:
+    """Roots of random legs, by carrying those that are known around closed ways of other legs.
+
+    Args:
+        seed: of all numbers.
+        most: ways that are tried before forty are given up.
+    """
+    rng = np.random.default_rng(seed)
+    legs = random_legs(rng)
+    e, p = (
+        rng.normal(size=4) + 1j * rng.normal(size=4),
+        rng.normal(size=3) + 1j * rng.normal(size=3),
+    )
+    first = np.concatenate([e, _left(p) @ e])
+    # the constants that make this a root
+    rest = np.einsum("i,kij,j->k", first, legs.forms()[:LEGS], first)
+    legs = Legs(legs.a, legs.b, legs.c - rest / (e @ e))
+    x = first[None] / np.linalg.norm(first)
+    for _ in range(most):
+        if len(x) >= DEGREE:
+            break
+        ways = [legs, random_legs(rng), random_legs(rng), legs]
+        y, done = x, np.ones(len(x), dtype=bool)
+        for begin, end in pairwise(ways):
+            y, t = follow(Homotopy.between(begin, end), y)
+            done &= t >= 1
+        every = np.concatenate([x, y[done]])
+        ends = certify(legs, every, np.ones(len(every)))
+        x = ends.x[ends.regular]
+    return Start(legs, x)
+
+
+def text_of(start: Start) -> str:
+    """The numbers of a start, to be kept in a file."""
+    parts = {"a": start.legs.a, "b": start.legs.b, "c": start.legs.c, "x": start.x}
+    return json.dumps({name: [z.real.tolist(), z.imag.tolist()] for name, z in parts.items()})
+
+
+@functools.cache
+def kept_start(number: int) -> Start:
+    """One of the two starts that are kept beside this file."""
+    file = resources.files("mbs.closed_forms") / "hexapod_starts" / f"{number}.json"
+    told = json.loads(file.read_text(encoding="utf-8"))
+    parts = {name: np.array(told[name][0]) + 1j * np.array(told[name][1]) for name in "abcx"}
+    a, b, c, x = (np.asarray(parts[name], dtype=np.complex128) for name in "abcx")
+    return Start(Legs(a, b, c), x)
+
+
+@functools.lru_cache(maxsize=16)
+def own_start(a: bytes, b: bytes) -> Start:
+    """All roots of a platform with complex lengths of its legs, from which any others are reached.
+
+    Special ends of the legs leave fewer than forty: 28 for semi-regular hexagons, 16 where the legs
+    meet in pairs. They are regular, since lengths at which some are not make no open set. Both kept
+    starts must lead to the same ones; where they do not, ways around other lengths are gone until
+    three of them bring nothing new.
+
+    Args:
+        a: the bytes of (6, 3) ends on the ground, in sizes of the platform about their mean.
+        b: of those on the platform.
+    """
+    ends = [np.frombuffer(told).reshape(LEGS, 3).astype(complex) for told in (a, b)]
+    rng = np.random.default_rng(_SEED)
+    legs, second, third = (Legs(ends[0], ends[1], _lengths(rng)) for _ in range(3))
+    x, counts = np.zeros((0, _SIZE), dtype=complex), list[int]()
+    for number in (0, 1):
+        kept = kept_start(number)
+        y, t = follow(Homotopy.between(kept.legs, legs), kept.x)
+        own = certify(legs, y, t)
+        counts.append(int(np.sum(own.regular)))
+        x = _distinct_roots(legs, np.concatenate([x, own.x[own.regular]]))
+    idle = 0 if {*counts} != {len(x)} else _IDLE
+    while idle < _IDLE:
+        y = x
+        for begin, end in ((legs, second), (second, third), (third, legs)):
+            y, t = follow(Homotopy.between(begin, end), y)
+            y = y[t >= 1]
+        known, x = len(x), _distinct_roots(legs, np.concatenate([x, y]))
+        idle = idle + 1 if len(x) == known else 0
+        second, third = (Legs(ends[0], ends[1], _lengths(rng)) for _ in range(2))
+    return Start(legs, x)
+
+
+_IDLE = 3
+"""Ways without new roots after which all are taken to be known."""
+
+
+def _lengths(rng: np.random.Generator) -> Complex:
+    return rng.normal(size=LEGS) + 1j * rng.normal(size=LEGS)
+
+
+def _distinct_roots(legs: Legs, x: Complex) -> Complex:
+    ends = certify(legs, x.copy(), np.ones(len(x)))
+    return ends.x[ends.regular]
+
+
+# The real poses of a platform.
+
+
+_RIGID = 1e-9
+"""Least singular value of the legs' lines, as a part of the largest, below which the legs hold the
+platform at no pose: similar hexagons leave 1e-15."""
+_POSES = 4
+_REAL = 1e-6
+"""Imaginary part of a root, as a part of |x| = 1, below which it may be real; Newton's method on
+real numbers decides."""
+_NEARLY_REAL = 0.1
+"""The same where a path stopped before its end, at a root where two meet: t misses 1 by some
+hundredths at most there, and the root by as much as the root of that."""
+_CLOSED = 1e-11
+"""Lengths of legs that fit, in parts of the size of the platform: Newton's method leaves 1e-15, and
+at a fold, where it is slow, 1e-13."""
+_EXACT, _LOOSE = 1e-16, 1e-12
+"""Squares of lengths that are exact but for rounding, and relative singular values below which a
+pose is not moved along: those of folds."""
+_SAME = 1e-6
+"""Distance of e, and of p in sizes, below which two real roots are one: a fold, met from both
+sides."""
+_FOLD = 1e-2
+"""By how much t may miss 1 where two roots meet at the end."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Poses:
+    """Every pose of a platform.
+
+    Attributes:
+        e: (r, 4) unit quaternions, the first number not negative.
+        p: (r, 3) places of the frame of the platform.
+        proof: what is certain, as part of a sentence.
+        complete: whether that proves that these are all.
+    """
+
+    e: Real
+    p: Real
+    proof: str
+    complete: bool
+
+
+def poses(a: Real, b: Real, length: Real) -> Poses:
+    """Every pose in which six legs have their lengths.
+
+    Args:
+        a: (6, 3) ends of the legs on the ground [m].
+        b: (6, 3) ends on the platform, in its frame [m].
+        length: (6,) of the legs [m].
+
+    Raises:
+        LoopError: the legs hold the platform at no pose.
+    """
+    middle, own = a.mean(axis=0), b.mean(axis=0)
+    size = float(np.sqrt(np.mean((a - middle) ** 2) + np.mean((b - own) ** 2))) or 1.0
+    a0, b0 = (a - middle) / size, (b - own) / size
+    if not _holds(a0, b0):
+        raise LoopError(
+            "the ends of its six legs lie so that they hold the platform at no pose, as on similar"
+            " hexagons"
+        )
+    square = (length / size) ** 2
+    c = np.sum(a0**2, axis=1) + np.sum(b0**2, axis=1) - square
+    legs = Legs(a0.astype(complex), b0.astype(complex), c.astype(complex))
+    start = own_start(a0.tobytes(), b0.tobytes())
+    path, expected = Homotopy.between(start.legs, legs), len(start.x)
+    for tolerance in (_TOLERANCE, _TOLERANCE / 10, _TOLERANCE / 100):
+        x, t = follow(path, start.x, tolerance)
+        ends = certify(legs, x, t)
+        found = _real(a0, b0, square, ends, t)
+        certain = int(np.sum(ends.regular))
+        # each root where two of them meet is the end of two paths
+        complete = certain + 2 * found.folds == expected
+        if complete:
+            break
+    meet = f", and {2 * found.folds} where poses meet" if found.folds else ""
+    proof = f"homotopy, certified: {certain} of {expected} paths{meet}"
+    return Poses(found.e, found.p * size + middle - _rotations(found.e) @ own, proof, complete)
+
+
+def _rotations(e: Real) -> Real:
+    w, x, y, z = e.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1)) if len(e) else np.zeros((0, 3, 3))
+
+
+def _slopes(a: Real, b: Real, e: Real, p: Real) -> tuple[Real, Real]:
+    """Squares of the lengths (r, 6), and half their derivatives by [p; turn], (r, 6, 6)."""
+    arm = np.einsum("rij,kj->rki", _rotations(e), b)
+    way = p[:, None, :] + arm - a
+    return np.sum(way**2, axis=2), np.concatenate([way, np.cross(arm, way)], axis=2)
+
+
+def _holds(a: Real, b: Real) -> bool:
+    rng = np.random.default_rng(_SEED)
+    e = rng.normal(size=(_POSES, 4))
+    e /= np.linalg.norm(e, axis=1, keepdims=True)
+    values = np.linalg.svd(_slopes(a, b, e, rng.normal(size=(_POSES, 3)))[1], compute_uv=False)
+    return bool(np.max(values[:, -1] / values[:, 0]) > _RIGID)
+
+
+class _RealRoots(NamedTuple):
+    """Quaternions (r, 4), places (r, 3) in sizes, and how many of them lie at folds."""
+
+    e: Real
+    p: Real
+    folds: int
+
+
+def _real(a: Real, b: Real, square: Real, ends: Ends, t: Real) -> _RealRoots:
+    """The real roots among the ends."""
+    near = ends.regular | ((t < 1) & (t > 1 - _FOLD))
+    near &= np.linalg.norm(ends.x[:, :4], axis=1) > _FLAT**0.5
+    order = np.argsort(~ends.regular[near], kind="stable")
+    x, regular = ends.x[near][order], ends.regular[near][order]
+    lead = x[np.arange(len(x)), np.argmax(np.abs(x[:, :4]), axis=1)]
+    x = x * (np.abs(lead) / lead)[:, None] if len(x) else x
+    limit = np.where(regular, _REAL, _NEARLY_REAL)
+    candidate = np.max(np.abs(x.imag), axis=1, initial=0.0) < limit
+    x, regular = x[candidate].real, regular[candidate]
+    e = x[:, :4] / np.linalg.norm(x[:, :4], axis=1, keepdims=True)
+    g = x[:, 4:] / np.linalg.norm(x[:, :4], axis=1, keepdims=True)
+    # p = g e*: the vector part
+    p = -g[:, :1] * e[:, 1:] + e[:, :1] * g[:, 1:] - np.cross(g[:, 1:], e[:, 1:])
+    e, p, error = _refined(a, b, square, e, p)
+    kept = list[int]()
+    for k in np.flatnonzero(error < _CLOSED):
+        if not any(_is_same(e[k], p[k], e[other], p[other]) for other in kept):
+            kept.append(int(k))
+    e = np.where(e[:, :1] < 0, -e, e)
+    return _RealRoots(e[kept], p[kept], int(np.sum(~regular[kept])))
+
+
+def _is_same(e: Real, p: Real, other_e: Real, other_p: Real) -> bool:
+    turn = min(np.max(np.abs(e - other_e)), np.max(np.abs(e + other_e)))
+    return bool(max(turn, np.max(np.abs(p - other_p))) < _SAME)
+
+
+def _refined(a: Real, b: Real, square: Real, e: Real, p: Real) -> tuple[Real, Real, Real]:
+    """Newton's method on real poses, and the largest errors of squares of lengths (r,)."""
+    best_e, best_p, worst = e, p, np.full(len(e), np.inf)
+    for _ in range(30):
+        value, J = _slopes(a, b, e, p)
+        error = np.max(np.abs(value - square), axis=1, initial=0.0)
+        better = error < worst
+        best_e = np.where(better[:, None], e, best_e)
+        best_p = np.where(better[:, None], p, best_p)
+        worst = np.where(better, error, worst)
+        if not np.any(better & (error > _EXACT)):
+            break
+        step = -np.linalg.pinv(2 * J, rcond=_LOOSE) @ (value - square)[..., None]
+        p = best_p + step[:, :3, 0]
+        turn = np.concatenate([np.ones((len(e), 1)), step[:, 3:, 0] / 2], axis=1)
+        e = _products(turn, best_e)
+        e = e / np.linalg.norm(e, axis=1, keepdims=True)
+    return best_e, best_p, worst
+
+
+def _products(e: Real, other: Real) -> Real:
+    """(r, 4) products of quaternions."""
+    scalar = e[:, :1] * other[:, :1] - np.sum(e[:, 1:] * other[:, 1:], axis=1, keepdims=True)
+    vector = e[:, :1] * other[:, 1:] + other[:, :1] * e[:, 1:] + np.cross(e[:, 1:], other[:, 1:])
+    return np.concatenate([scalar, vector], axis=1)

@@ -1,0 +1,680 @@
+"""Plane loops that must be solved together, in numbers: every configuration that closes them.
+
+With complex numbers for vectors of the plane, the rows are A theta + D (s theta_c) + b = 0: theta_k
+is a unit number, the direction of link k, and a prismatic joint displaces by s along a direction
+that its link c carries. Parts that can be solved by themselves are solved first; what is left of
+them is a dyad, a set of revolute joints (Dixon's determinant) or a triad with prismatic joints.
+
+Source: Wampler 2001.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbs.errors import LoopError, NoClosedForm
+from mbs.numbers import NONZERO
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+Numbers = NDArray[np.int64]
+
+KNOWN = -1
+"""In place of the number of a link: one whose direction is known."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanarLoops:
+    """Rows of plane loops, lengths as parts of their size.
+
+    Attributes:
+        angles: (L, n) what the directions of the links are multiplied by.
+        slides: (L, m) the same of the displacements, where the links that carry them are at zero.
+        carriers: (m,) numbers of these links, or `KNOWN`.
+        constant: (L,) what is known.
+    """
+
+    angles: Complex
+    slides: Complex
+    carriers: Numbers
+    constant: Complex
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """How many directions and how many displacements are unknown."""
+        return self.angles.shape[1], self.slides.shape[1]
+
+    def rows(self, theta: Real, s: Real) -> tuple[Complex, Complex]:
+        """Rows (r, L) and their derivatives by angles and displacements (r, L, n + m).
+
+        Args:
+            theta: (r, n) angles [rad].
+            s: (r, m) displacements.
+        """
+        unit = np.exp(1j * theta)
+        carried = self._carried(unit)
+        moved = s * carried
+        value = unit @ self.angles.T + moved @ self.slides.T + self.constant
+        turned = 1j * unit[:, None, :] * self.angles
+        for j, k in enumerate(self.carriers):
+            if k != KNOWN:
+                turned[:, :, k] += 1j * moved[:, j, None] * self.slides[:, j]
+        return value, np.concatenate([turned, carried[:, None, :] * self.slides], axis=2)
+
+    def _carried(self, unit: Complex) -> Complex:
+        whole = np.concatenate([unit, np.ones((len(unit), 1))], axis=1)
+        return whole[:, self.carriers]
+
+    def with_known(self, part: PlanarPart, theta: Real, s: Real) -> PlanarLoops:
+        """What is left where the unknowns of a part are known: their columns go to the constant."""
+        n, m = self.counts
+        every_theta, every_s = np.zeros((1, n)), np.zeros((1, m))
+        every_theta[0, part.angles], every_s[0, part.slides] = theta, s
+        unit = np.exp(1j * every_theta)
+        carried = self._carried(unit)[0]
+        constant = (
+            self.constant
+            + self.angles[:, part.angles] @ unit[0, part.angles]
+            + self.slides[:, part.slides] @ (every_s[0] * carried)[part.slides]
+        )
+        others = [k for k in range(n) if k not in part.angles]
+        left = [j for j in range(m) if j not in part.slides]
+        number = {k: place for place, k in enumerate(others)}
+        turned = [
+            self.slides[:, j] * (1 if self.carriers[j] in number else carried[j]) for j in left
+        ]
+        return PlanarLoops(
+            self.angles[:, others],
+            np.array(turned, dtype=complex).reshape(len(left), len(constant)).T,
+            np.array([number.get(int(self.carriers[j]), KNOWN) for j in left], dtype=int),
+            constant,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanarRoots:
+    """All configurations of plane loops.
+
+    Attributes:
+        theta: (r, n) directions of the links [rad].
+        s: (r, m) displacements.
+        methods: what was solved, such as "Dixon's determinant of degree 6".
+        singular: whether some equation vanishes for every direction: some links may move while all
+            that is known stays.
+    """
+
+    theta: Real
+    s: Real
+    methods: tuple[str, ...]
+    singular: bool
+
+
+# Parts that can be solved by themselves: as many rows in which nothing else is left as they need.
+
+
+_SMALL = 1e-10
+"""Singular values below this part of the largest count as zero: columns of rank one leave 1e-15,
+links of a millionth of the mechanism 1e-6."""
+_OPEN = 1e-9
+"""Rows that are closed, lengths in parts of the size: Newton's method leaves 1e-15 at single roots,
+1e-14 at double ones, and what is no root stays above 1e-4 as a rule."""
+
+
+_DEPENDENT = 1e-5
+"""Rows that depend on others, at roots of these: a root at a fold is known to 1e-7 until all rows
+are refined together."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanarPart:
+    """Unknowns that follow from some rows alone.
+
+    Attributes:
+        angles: their numbers among the directions.
+        slides: their numbers among the displacements.
+        rows: (d, L) the combinations of rows in which nothing else is left.
+    """
+
+    angles: list[int]
+    slides: list[int]
+    rows: Complex
+
+    @property
+    def size(self) -> int:
+        """How many unknowns they are."""
+        return len(self.angles) + len(self.slides)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """Roots of a part: as `PlanarRoots`."""
+
+    theta: Real
+    s: Real
+    method: str
+    singular: bool = False
+
+
+def planar_roots(loops: PlanarLoops) -> PlanarRoots:
+    """Every configuration that closes the loops.
+
+    Args:
+        loops: as many independent rows as make half of the unknowns, dependent rows beside them.
+
+    Raises:
+        NoClosedForm: a part has more prismatic joints than are known here.
+        LoopError: a part can move by itself.
+    """
+    theta, s, parts = _solve(loops)
+    theta, s, _ = refine(loops, theta, s)
+    methods = tuple(dict.fromkeys(part.method for part in parts))
+    return PlanarRoots(theta, s, methods, any(part.singular for part in parts))
+
+
+def _solve(loops: PlanarLoops) -> tuple[Real, Real, list[_Found]]:
+    n, m = loops.counts
+    if n + m == 0:
+        closed = int(np.all(np.abs(loops.constant) < _DEPENDENT))
+        return np.zeros((closed, 0)), np.zeros((closed, 0)), []
+    part = _smallest_part(loops)
+    own = _irreducible(_of_part(loops, part))
+    parts, theta, s = [own], list[Real](), list[Real]()
+    rest = (
+        [k for k in range(n) if k not in part.angles],
+        [j for j in range(m) if j not in part.slides],
+    )
+    for theta_k, s_k in zip(own.theta, own.s, strict=True):
+        more_theta, more_s, more = _solve(loops.with_known(part, theta_k, s_k))
+        parts += more
+        whole_theta, whole_s = np.empty((len(more_theta), n)), np.empty((len(more_s), m))
+        whole_theta[:, part.angles], whole_theta[:, rest[0]] = theta_k, more_theta
+        whole_s[:, part.slides], whole_s[:, rest[1]] = s_k, more_s
+        theta.append(whole_theta)
+        s.append(whole_s)
+    return np.concatenate([np.zeros((0, n)), *theta]), np.concatenate([np.zeros((0, m)), *s]), parts
+
+
+def _smallest_part(loops: PlanarLoops) -> PlanarPart:
+    n, m = loops.counts
+    columns = np.concatenate([loops.angles, loops.slides], axis=1)
+    for size in range(1, n + m + 1):
+        for chosen in combinations(range(n + m), size):
+            angles, slides = [k for k in chosen if k < n], [k - n for k in chosen if k >= n]
+            if any(loops.carriers[j] not in (*angles, KNOWN) for j in slides):
+                continue
+            rows = _left_null(columns[:, [k for k in range(n + m) if k not in chosen]])
+            own = _rank(rows @ columns[:, list(chosen)])
+            if 2 * own >= size:
+                return PlanarPart(angles, slides, rows)
+    raise NoClosedForm("the loops do not determine all of their links")
+
+
+def _left_null(columns: Complex) -> Complex:
+    """(d, L) rows whose products with the columns vanish."""
+    if not columns.shape[1]:
+        return np.eye(len(columns), dtype=complex)
+    U, values, _ = np.linalg.svd(columns)
+    rank = int(np.sum(values > _SMALL * max(values[0], NONZERO)))
+    return U[:, rank:].conj().T
+
+
+def _rank(matrix: Complex) -> int:
+    if not matrix.size:
+        return 0
+    values = np.linalg.svd(matrix, compute_uv=False)
+    # entries are parts of the size of the mechanism: what is below counts as no row
+    return int(np.sum(values > _SMALL))
+
+
+def _of_part(loops: PlanarLoops, part: PlanarPart) -> PlanarLoops:
+    """The rows of a part alone, as few as it needs."""
+    rows = part.rows
+    columns = np.concatenate([loops.angles[:, part.angles], loops.slides[:, part.slides]], axis=1)
+    needed = (part.size + 1) // 2
+    if len(rows) > needed:  # rows that depend on each other: the combinations that say most
+        U = np.linalg.svd(rows @ columns)[0]
+        rows = U[:, :needed].conj().T @ rows
+    number = {k: place for place, k in enumerate(part.angles)}
+    carriers = [number.get(int(loops.carriers[j]), KNOWN) for j in part.slides]
+    return PlanarLoops(
+        rows @ loops.angles[:, part.angles],
+        rows @ loops.slides[:, part.slides],
+        np.array(carriers, dtype=int),
+        rows @ loops.constant,
+    )
+
+
+def _irreducible(loops: PlanarLoops) -> _Found:
+    """The roots of a part that has no smaller ones, and how they were found."""
+    n, m = loops.counts
+    if n + m == 1:
+        found = _one_unknown(loops)
+    elif n + m == 2:
+        found = _dyad(loops)
+    elif m == 0:
+        found = dixon_roots(loops.angles, loops.constant)
+    elif n + m == 4:
+        found = triad_roots(loops)
+    else:
+        raise NoClosedForm(
+            f"{len(loops.constant)} plane loops that must be solved together hold {m} unknown"
+            " prismatic joints, which is known for two loops alone"
+        )
+    theta, s, residual = refine(loops, found.theta, found.s)
+    kept = residual < _OPEN
+    theta, s = _distinct(loops, theta[kept], s[kept])
+    return _Found(theta, s, found.method, found.singular)
+
+
+def _one_unknown(loops: PlanarLoops) -> _Found:
+    """One direction or displacement from a row that is enough for two."""
+    n, _ = loops.counts
+    a = (loops.angles if n else loops.slides)[:, 0]
+    value = -np.vdot(a, loops.constant) / np.vdot(a, a)
+    if n:
+        return _Found(np.full((1, 1), np.angle(value)), np.zeros((1, 0)), "linear equations")
+    return _Found(np.zeros((1, 0)), np.full((1, 1), value.real), "linear equations")
+
+
+# A dyad: one loop of two unknowns, by the law of cosines and its kin.
+
+
+_FOLD = 1e-12
+"""By how much a cosine may pass one, or the square of a displacement be below zero, where a dyad is
+stretched: rounding of lengths in parts of the size."""
+
+
+def _dyad(loops: PlanarLoops) -> _Found:
+    method = "the quadratic equation of a dyad"
+    n, _ = loops.counts
+    b = loops.constant[0]
+    if n == 2:
+        a, c = loops.angles[0]
+        first = _angles_of(np.conj(b) * a, (abs(c) ** 2 - abs(a) ** 2 - abs(b) ** 2) / 2)
+        theta = [(t, np.angle(-(a * np.exp(1j * t) + b) / c)) for t in first]
+        return _Found(np.array(theta).reshape(-1, 2), np.zeros((len(theta), 0)), method)
+    if n == 0:
+        D = np.stack([loops.slides[0].real, loops.slides[0].imag])
+        s = np.linalg.solve(D, [-b.real, -b.imag])
+        return _Found(np.zeros((1, 0)), s[None], "linear equations")
+    a, d = loops.angles[0, 0], loops.slides[0, 0]
+    # |a + d s| = |b| where the link carries the displacement, else |b + d s| = |a|
+    begin, length = (b, abs(a)) if loops.carriers[0] == KNOWN else (a, abs(b))
+    middle = -(np.conj(d) * begin).real / abs(d) ** 2
+    square = (length**2 - abs(begin) ** 2) / abs(d) ** 2 + middle**2
+    if square < -_FOLD:
+        return _Found(np.zeros((0, 1)), np.zeros((0, 1)), method)
+    s = middle + np.array([1, -1]) * np.sqrt(max(square, 0.0))
+    moved = d * s
+    unit = -(b + moved) / a if loops.carriers[0] == KNOWN else -b / (a + moved)
+    return _Found(np.angle(unit)[:, None], s[:, None], method)
+
+
+def _angles_of(w: complex, value: float) -> list[float]:
+    """The angles t with Re(w e^(i t)) = value."""
+    if abs(w) < _SMALL:
+        if abs(value) < _SMALL:
+            raise LoopError("a dyad of equal links can turn about its own end")
+        return []
+    cosine = value / abs(w)
+    if abs(cosine) > 1 + _FOLD:
+        return []
+    t = np.arccos(np.clip(cosine, -1.0, 1.0))
+    return [float(t - np.angle(w)), float(-t - np.angle(w))]
+
+
+# Newton's method on all unknowns, many starts at once.
+
+
+_STEPS = 12
+_CLOSED = 1e-15
+"""Rows that are exact but for rounding, lengths in parts of the size."""
+_LOOSE = 1e-13
+"""Relative singular value below which a root is not moved along: those of folds."""
+_SAME = 1e-6
+"""Distance of two roots [rad, or parts of the size] below which they are one where the middle
+between them closes too: at a fold the two ends of Newton's method lie about a root of 1e-14 from
+it."""
+_BETWEEN = 1e-11
+"""Rows in that middle: at a fold the square of 1e-6, between two roots of their own a part of their
+distance."""
+
+
+def refine(loops: PlanarLoops, theta: Real, s: Real) -> tuple[Real, Real, Real]:
+    """Roots made exact, as far as rounding allows.
+
+    Returns:
+        (r, n) angles within half a turn of zero, (r, m) displacements, (r,) largest rows.
+    """
+    n = theta.shape[1]
+    x = np.concatenate([theta, s], axis=1)
+    best, worst = x.copy(), np.full(len(x), np.inf)
+    for _ in range(_STEPS):
+        value, slope = loops.rows(x[:, :n], x[:, n:])
+        residual = np.max(np.abs(value), axis=1, initial=0.0)
+        better = residual < worst
+        best[better], worst[better] = x[better], residual[better]
+        if not len(x) or np.all(worst < _CLOSED) or not np.any(better):
+            break
+        J = np.concatenate([slope.real, slope.imag], axis=1)
+        r = np.concatenate([value.real, value.imag], axis=1)
+        step = np.linalg.pinv(J, rcond=_LOOSE) @ r[:, :, None]
+        x = np.where(better[:, None], x - np.clip(step[:, :, 0], -0.5, 0.5), x)
+    best[:, :n] = pi - np.mod(pi - best[:, :n], 2 * pi)
+    return best[:, :n], best[:, n:], worst
+
+
+def _distinct(loops: PlanarLoops, theta: Real, s: Real) -> tuple[Real, Real]:
+    kept = list[int]()
+    for k in range(len(theta)):
+        if not any(_is_same(loops, theta, s, k, other) for other in kept):
+            kept.append(k)
+    return theta[kept], s[kept]
+
+
+def _is_same(loops: PlanarLoops, theta: Real, s: Real, k: int, other: int) -> bool:
+    turn = pi - np.mod(pi - (theta[k] - theta[other]), 2 * pi)
+    slide = s[k] - s[other]
+    if max(np.max(np.abs(turn), initial=0.0), np.max(np.abs(slide), initial=0.0)) > _SAME:
+        return False
+    middle = theta[other] + turn / 2, s[other] + slide / 2
+    value, _ = loops.rows(middle[0][None], middle[1][None])
+    return bool(np.max(np.abs(value)) < _BETWEEN)
+
+
+# Revolute joints alone: L rows in 2 L directions, by Dixon's determinant.
+#
+# With x one of the directions, hidden, the determinant of W(x) vanishes where the others follow;
+# products of their inverses are its null vector. After the lower rows are multiplied by x, W is a
+# linear pencil.
+#
+# Source: Wampler 2001.
+
+
+_NEAR_CIRCLE = 0.5
+"""Of |log |x||: roots of real mechanisms are unit numbers; at a fold two of them leave the circle
+by the root of rounding, 1e-7, and at a fourfold root by 1e-3."""
+_SINGULAR = 1e-13
+"""Reciprocal condition of the pencil at the best of some places, below which it is singular
+everywhere: regular ones of a thousand mechanisms have 1e-7 at least."""
+_ZERO = 1e-12
+"""Elements of W that vanish, as parts of the largest: products of zeros of the loops are exact."""
+_FAR = 1e6
+"""Absolute values of x between whose inverse and which roots are counted; others are rounding of
+zero and infinity."""
+_APART = 1e-6
+"""Relative distance above which two roots x are counted as two."""
+
+
+def dixon_roots(angles: Complex, constant: Complex) -> _Found:
+    """Candidates for the directions that close loops of revolute joints alone.
+
+    Args:
+        angles: (L, 2 L) what the directions are multiplied by.
+        constant: (L,) what is known.
+
+    Returns:
+        Angles (r, 2 L) [rad], to be refined and judged.
+
+    Raises:
+        LoopError: the determinant vanishes everywhere, whatever is hidden.
+    """
+    n = angles.shape[1]
+    pencils = [_pencil(angles, constant, hidden) for hidden in range(n)]
+    solved = [(x, t, pencil) for pencil in pencils if pencil for x, t in _eigenvectors(pencil)]
+    if not solved:
+        raise LoopError(
+            "the equations vanish for every direction of a link, so that links may move"
+        )
+    degrees = [_count_distinct(x) for x, _, _ in solved]
+    x, t, pencil = solved[int(np.argmax(degrees))]
+    with np.errstate(all="ignore"):
+        near = np.abs(np.log(np.abs(x))) < _NEAR_CIRCLE
+    theta = [pencil.angles(x_k, t_k) for x_k, t_k in zip(x[near], t.T[near], strict=True)]
+    return _Found(
+        np.array(theta).reshape(-1, n),
+        np.zeros((len(theta), 0)),
+        f"Dixon's determinant of degree {max(degrees)}",
+        len(solved) < len(pencils),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pencil:
+    """W = P + x Q with one direction hidden; rows and columns of zeros are left out.
+
+    Attributes:
+        hidden: number of the direction x.
+        others: numbers of the others.
+        products: for each column the set of directions, of which it is the product of inverses.
+    """
+
+    hidden: int
+    others: list[int]
+    products: list[frozenset[int]]
+    P: Complex
+    Q: Complex
+
+    def angles(self, x: complex, t: Complex) -> Real:
+        """All directions at a root x with null vector t, as angles."""
+        theta = np.zeros(len(self.others) + 1)
+        theta[self.hidden] = np.angle(x)
+        place = {product: k for k, product in enumerate(self.products)}
+        for j in self.others:
+            pairs = [
+                (t[k], t[place[product | {j}]])
+                for product, k in place.items()
+                if j not in product and product | {j} in place
+            ]
+            inverse = sum(np.conj(low) * high for low, high in pairs)
+            theta[j] = -np.angle(inverse)
+        return theta
+
+
+def _sign(order: tuple[int, ...]) -> int:
+    swaps = sum(a > b for k, a in enumerate(order) for b in order[k + 1 :])
+    return -1 if swaps % 2 else 1
+
+
+def _pencil(angles: Complex, constant: Complex, hidden: int) -> _Pencil | None:
+    L, n = angles.shape
+    others = [k for k in range(n) if k != hidden]
+    a, b, c = angles, constant, angles[:, hidden]
+    upper = list(combinations(others, L))
+    lower = list(combinations(others, L - 1))
+    size = len(upper)
+    P, Q = np.zeros((2 * size, 2 * size), complex), np.zeros((2 * size, 2 * size), complex)
+
+    def det(*columns: Complex) -> complex:
+        return complex(np.linalg.det(np.column_stack(columns)))
+
+    def rest(product: tuple[int, ...]) -> tuple[int, ...]:
+        return tuple(k for k in others if k not in product)
+
+    # in signs the hidden direction stands for zero, before all others
+    for k, J in enumerate(upper):
+        left = rest(J)
+        factor = _sign((-1, *left, *J)) * det(*(-a[:, j].conj() for j in J))
+        P[k, k] = factor * det(b, *(a[:, j] for j in left))
+        Q[k, k] = factor * det(c, *(a[:, j] for j in left))
+    for row, K in enumerate(lower, size):
+        left = rest(K)
+        factor = _sign((*left, -1, *K)) * det(*(a[:, j] for j in left))
+        P[row, row] = factor * det(c.conj(), *(-a[:, j].conj() for j in K))
+        Q[row, row] = factor * det(b.conj(), *(-a[:, j].conj() for j in K))
+        for j in left:
+            column = upper.index(tuple(sorted((*K, j))))
+            value = factor * det(a[:, j].conj(), *(-a[:, m].conj() for m in K))
+            P[column, row] = value
+            Q[row, column] = value
+    products = [frozenset(J) for J in (*upper, *lower)]
+    largest = np.maximum(np.abs(P), np.abs(Q))
+    kept = list(range(2 * size))
+    while True:
+        block = largest[np.ix_(kept, kept)]
+        full = (block.max(axis=0) > _ZERO * block.max()) & (block.max(axis=1) > _ZERO * block.max())
+        if np.all(full):
+            break
+        kept = [k for k, one in zip(kept, full, strict=True) if one]
+        if not kept:
+            return None
+    square = np.ix_(kept, kept)
+    return _Pencil(hidden, others, [products[k] for k in kept], P[square], Q[square])
+
+
+_PLACES = np.exp(1j * np.array([0.7, 2.1, 3.3, 4.9, 5.8])) * np.array([1.0, 0.8, 1.25, 0.9, 1.1])
+"""Where the pencil is inverted, at the best of them: any that are no roots."""
+
+
+def _eigenvectors(pencil: _Pencil) -> Iterator[tuple[Complex, Complex]]:
+    """The roots x and null vectors as columns; nothing where the pencil is singular everywhere."""
+    scale = 1 / np.maximum(np.abs(pencil.P), np.abs(pencil.Q)).max(axis=1)
+    P, Q = scale[:, None] * pencil.P, scale[:, None] * pencil.Q
+    shifted = [P + x * Q for x in _PLACES]
+    regular = [1 / np.linalg.cond(W) for W in shifted]
+    best = int(np.argmax(regular))
+    if regular[best] < _SINGULAR:
+        return
+    # (P + x0 Q) t = -(x - x0) Q t
+    values, vectors = np.linalg.eig(np.linalg.solve(shifted[best], Q))
+    with np.errstate(all="ignore"):
+        x = _PLACES[best] - 1 / values
+    finite = np.isfinite(x) & (np.abs(x) < _FAR) & (np.abs(x) > 1 / _FAR)
+    yield x[finite], vectors[:, finite]
+
+
+def _count_distinct(x: Complex) -> int:
+    kept = list[complex]()
+    for value in x:
+        if all(abs(value - other) > _APART * abs(value) for other in kept):
+            kept.append(value)
+    return len(kept)
+
+
+# A triad with prismatic joints: two loops in one direction x and three more unknowns.
+#
+# With x given, the three are y = y0(x) + t alpha, t any complex number: a unit y is a circle of t,
+# a real one (after its carrier is turned back) a line. Where three circles or lines meet in one
+# point is a trigonometric polynomial in x of degree three at most.
+
+
+_SAMPLES = 16
+_TAIL = 1e-8
+"""Coefficients above degree three, as parts of the largest: rounding of products of six lengths."""
+
+
+def triad_roots(loops: PlanarLoops) -> _Found:
+    """Candidates for the unknowns of two loops with prismatic joints.
+
+    Raises:
+        NoClosedForm: no direction leaves three circles and lines.
+        LoopError: the polynomial vanishes everywhere.
+    """
+    n, m = loops.counts
+    for hidden in range(n):
+        if all(k in (KNOWN, hidden) for k in loops.carriers):
+            triad = _Triad.of(loops, hidden)
+            if triad is not None:
+                angle, degree = triad.angles()
+                theta, s = triad.unknowns(angle)
+                return _Found(theta, s, f"the polynomial of a triad, of degree {degree}")
+    raise NoClosedForm(
+        f"two plane loops that must be solved together hold {n} directions and {m} prismatic"
+        " joints in an order for which no closed form is known"
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Triad:
+    """Two loops with one direction hidden.
+
+    Attributes:
+        loops: whose.
+        hidden: number of the direction x.
+        columns: (2, 3) of the three other unknowns: directions, then displacements.
+        alpha: (3,) the combination of these columns that vanishes.
+    """
+
+    loops: PlanarLoops
+    hidden: int
+    columns: Complex
+    alpha: Complex
+
+    @staticmethod
+    def of(loops: PlanarLoops, hidden: int) -> _Triad | None:
+        """None where two of the three columns are parallel."""
+        others = [k for k in range(loops.counts[0]) if k != hidden]
+        columns = np.concatenate([loops.angles[:, others], loops.slides], axis=1)
+        alpha = np.linalg.svd(columns)[2][-1].conj()
+        if np.min(np.abs(alpha)) < _SMALL:
+            return None
+        return _Triad(loops, hidden, columns, alpha)
+
+    def _curves(self, x: Complex) -> tuple[Real, Complex, Real, Complex]:
+        """K |t|^2 + 2 Re(u* t) + w = 0 of the three unknowns, at (r,) directions x; y at t = 0."""
+        fixed = x[:, None] * self.loops.angles[:, self.hidden] + self.loops.constant
+        y = -fixed @ np.linalg.pinv(self.columns).T
+        turned = self.loops.counts[0] - 1
+        k, w = np.zeros(3), np.empty((len(x), 3))
+        u = np.empty((len(x), 3), complex)
+        k[:turned] = 1.0
+        u[:, :turned] = y[:, :turned] * np.conj(self.alpha[:turned])
+        u[:, :turned] /= np.abs(self.alpha[:turned]) ** 2
+        w[:, :turned] = (np.abs(y[:, :turned]) ** 2 - 1) / np.abs(self.alpha[:turned]) ** 2
+        for j, carrier in enumerate(self.loops.carriers, turned):
+            # y e^(-i carrier) is real: its imaginary part is Re(-i ..)
+            back = 1.0 if carrier == KNOWN else np.conj(x)
+            u[:, j] = np.conj(-1j * self.alpha[j] * back) / 2
+            w[:, j] = np.imag(y[:, j] * back)
+        return k, u, w, y
+
+    def _meeting(self, x: Complex) -> tuple[Complex, Real, Real]:
+        """N and D of the point t = N / D on two of the curves, and the polynomial."""
+        k, u, w, _ = self._curves(x)
+        first = 0
+        lines_u, lines_w = u - (k != 0) * u[:, :1], w - (k != 0) * w[:, :1]
+        if k[0] == 0:
+            lines_u, lines_w = u, w
+        N = 0.5j * (lines_w[:, 1] * lines_u[:, 2] - lines_w[:, 2] * lines_u[:, 1])
+        D = np.imag(np.conj(lines_u[:, 1]) * lines_u[:, 2])
+        value = 2 * np.real(np.conj(u[:, first]) * N) + w[:, first] * D
+        if k[0]:
+            value = np.abs(N) ** 2 + value * D
+        return N, D, value
+
+    def angles(self) -> tuple[Real, int]:
+        """The angles of the hidden direction near which the polynomial vanishes; its degree."""
+        x = np.exp(2j * pi * np.arange(_SAMPLES) / _SAMPLES)
+        spectrum = np.fft.fft(self._meeting(x)[2]) / _SAMPLES
+        coefficients = spectrum[np.arange(-3, 4)]  # of x^-3 .. x^3
+        largest = np.max(np.abs(spectrum))
+        if largest < _ZERO or np.max(np.abs(spectrum[4:-3])) > _TAIL * largest:
+            raise LoopError(
+                "the equation of a triad vanishes for every direction of a link, so that links may"
+                " move"
+            )
+        degree = 3
+        while degree > 0 and abs(coefficients[3 + degree]) < _ZERO * largest:
+            degree -= 1
+        roots = np.roots(coefficients[3 - degree : 4 + degree][::-1])
+        with np.errstate(all="ignore"):
+            near = np.abs(np.log(np.abs(roots))) < _NEAR_CIRCLE
+        return np.angle(roots[near]), 2 * degree
+
+    def unknowns(self, angle: Real) -> tuple[Real, Real]:
+        """All unknowns at angles (r,) of the hidden direction."""
+        x = np.exp(1j * angle)
+        N, D, _ = self._meeting(x)
+        y = self._curves(x)[3] + (N / np.where(D == 0, NONZERO, D))[:, None] * self.alpha
+        n, _ = self.loops.counts
+        theta = np.empty((len(x), n))
+        theta[:, self.hidden] = angle
+        theta[:, [k for k in range(n) if k != self.hidden]] = np.angle(y[:, : n - 1])
+        back = np.where(self.loops.carriers == KNOWN, 1.0, np.conj(x)[:, None])
+        return theta, np.real(y[:, n - 1 :] * back)

@@ -1,0 +1,824 @@
+"""Loops that have no closed form by themselves, solved in numbers: every configuration of a block.
+
+Where the plan of `mbs.loops.plan` ends, a block is looked for among the loops that are left: plane
+loops that share unknown joints, one loop of six revolute and prismatic joints, or a platform on six
+legs. Its roots stand for a stage then, and the plan goes on behind them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import casadi
+import numpy as np
+from casadi import SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.khalil_frames import Cut
+from mbs.closed_forms.arm import Arm, inverse
+from mbs.closed_forms.arm_search import General, general, general_of
+from mbs.closed_forms.hexapod import LEGS, poses
+from mbs.closed_forms.planar_loops import KNOWN, PlanarLoops, planar_roots
+from mbs.closed_forms.ring import PARAMETERS, extent, independent_indices, loop_links
+from mbs.components import Fixed, PointOnLine, Rod, Spherical
+from mbs.components.joints import Freedom, Motion
+from mbs.errors import LoopError, NoClosedForm
+from mbs.expressions import to_sx
+from mbs.loops.closing import Vector, closure_parameters, difference
+from mbs.loops.plan import (
+    LoopBlock,
+    PlanWork,
+    Roots,
+    Stage,
+    is_bound,
+    order_steps,
+    plan,
+    posed_stages,
+    started_at,
+)
+from mbs.numbers import NONZERO
+from mbs.recursions.chain import ChainJoint, Ring
+from mbs.spatial import Pose, vector
+
+Step = Stage | LoopBlock
+Matrix = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_NEAR = 1e-5
+"""Difference of positions [rad or m] between a root and a configuration that it is: closed to
+1e-12, a configuration is known to the square root, 1e-6, where two roots meet."""
+
+
+def steps_of(system: System) -> tuple[Step, ...]:
+    """The plan of a system where there is one, else stages and blocks that solve its loops.
+
+    Args:
+        system: the assembled mechanism.
+
+    Raises:
+        NoClosedForm: a loop has no closed form and belongs to no block known here.
+    """
+
+    def build() -> tuple[Step, ...]:
+        known = independent_indices(system)
+        try:
+            return plan(system)
+        except NoClosedForm:
+            q = SX.sym("q", extent(system))
+            return tuple(order_steps(system, known, q, _block))
+
+    steps: tuple[Step, ...] = system.cached("steps", build)
+    return steps
+
+
+def _block(work: PlanWork, waiting: Sequence[int]) -> LoopBlock | None:
+    """The first block that gives the assembled configuration back."""
+    for find in (planar_blocks, single_loops, platforms):
+        for block in find(work, waiting):
+            if _gives_assembled(work, block):
+                return block
+    return None
+
+
+def _gives_assembled(work: PlanWork, block: LoopBlock) -> bool:
+    """Whether the assembled configuration is among the roots of a block."""
+    system = work.system
+    q = np.array(system.configuration)
+    start = started_at(system, q, range(system.nq))
+    try:
+        roots = block.solve(start, closure_parameters(system))
+    except NoClosedForm:
+        return False
+    except LoopError:  # it moves by itself there, which is told where its roots are asked for
+        return True
+    indices = [k for k, index in enumerate(block.indices) if index < system.nq]
+    for values in roots.values:
+        reached = q.copy()
+        reached[[block.indices[k] for k in indices]] = values[indices]
+        if np.max(np.abs(difference(system, reached, q)), initial=0.0) < _NEAR:
+            return True
+    return False
+
+
+# Rigid groups of links: those whose joints to each other are known.
+
+
+class _Joined(NamedTuple):
+    """An unknown joint of the tree that leads from one rigid group to another."""
+
+    link: int
+    parent: int
+    at: Pose
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _RigidGroups:
+    """The rigid groups of a tree, each named after its first link, -1 for that of the base.
+
+    Attributes:
+        group: of every link.
+        pose: of every link in the frame of the first link of its group.
+        joints: by the number of a group, the joint that leads to it.
+    """
+
+    group: dict[int, int]
+    pose: dict[int, Pose]
+    joints: dict[int, _Joined]
+
+
+def _groups(work: PlanWork) -> _RigidGroups:
+    group, pose, joints = {-1: -1}, {-1: Pose.identity()}, dict[int, _Joined]()
+    for k, link in enumerate(work.system.tree.links):
+        before = pose[link.antecedent] @ link.pose()
+        if all(index in work.known for index in range(link.q.start, link.q.stop)):
+            moved = ChainJoint(link.name, link.motion, link.q.start, 1)
+            group[k] = group[link.antecedent]
+            pose[k] = before @ moved.displacement(work.q[link.q.start : link.q.stop])
+        else:
+            group[k], pose[k] = k, Pose.identity()
+            joints[k] = _Joined(k, group[link.antecedent], before)
+    return _RigidGroups(group, pose, joints)
+
+
+def _unknown_links(work: PlanWork, number: int) -> set[int]:
+    """The links of the tree in a loop whose joints are unknown."""
+    tree = work.system.tree
+    back, out = loop_links(work.system, work.system.cuts[number])
+    return {k for k in (*back, *out) if tree.links[k].q.start not in work.known}
+
+
+def _connected(links: dict[int, set[int]]) -> list[list[int]]:
+    """Loops, by their unknown links, that share some, in groups."""
+    left, found = list(links), list[list[int]]()
+    while left:
+        own, before = [left.pop(0)], 0
+        shared = set(links[own[0]])
+        while len(own) != before:
+            before = len(own)
+            more = [number for number in left if links[number] & shared]
+            own += more
+            left = [number for number in left if number not in more]
+            for number in more:
+                shared |= links[number]
+        found.append(sorted(own))
+    return found
+
+
+# Plane loops that share unknown joints.
+
+
+_PARALLEL = 1e-9
+"""Cosine between what must be perpendicular: products of a few transforms leave 1e-15."""
+_SAMPLES, _SEED = 3, 20260301
+"""Positions and parameters at which the loops of a block must be plane: what holds at all of them
+holds by structure."""
+
+
+def planar_blocks(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
+    """Blocks of plane loops, each with all loops that share its unknown joints."""
+    links = {
+        number: _unknown_links(work, number)
+        for number in waiting
+        if number < len(work.system.cuts) and _is_flat_kind(work, number)
+    }
+    for numbers in _connected(links):
+        plane = _Plane.of(work, numbers, sorted(set().union(*(links[n] for n in numbers))))
+        if plane is not None:
+            cuts = [work.system.cuts[number].edge.joint.name for number in numbers]
+            indices = [work.system.tree.links[k].q.start for k in plane.links]
+            yield LoopBlock(", ".join(cuts), tuple(indices), plane.roots)
+
+
+def _is_flat_kind(work: PlanWork, number: int) -> bool:
+    """Whether a loop has revolute and prismatic joints alone, but for the one that closes it."""
+    if is_bound(work.system, number) or isinstance(work.system.cuts[number].edge.joint, Rod):
+        return False
+    links = work.system.tree.links
+    return all(links[k].motion.nq == 1 for k in _unknown_links(work, number))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Plane:
+    """Plane loops of a system.
+
+    Attributes:
+        system: whose loops they are.
+        cuts: that close them.
+        links: that unknown joints lead to, antecedents first.
+        parents: the groups from which these joints lead.
+        ends: the groups of both frames of every cut.
+        frames: Function of all positions and p: the frames of the joints, of both ends of the cuts,
+            each (4, 4) in the frame of its group, side by side.
+    """
+
+    system: System
+    cuts: list[Cut]
+    links: list[int]
+    parents: list[int]
+    ends: list[tuple[int, int]]
+    frames: Function
+
+    @staticmethod
+    def of(work: PlanWork, numbers: list[int], links: list[int]) -> _Plane | None:
+        """None where the loops are not plane, or not in one plane."""
+        groups, system = _groups(work), work.system
+        cuts = [system.cuts[number] for number in numbers]
+        poses = [groups.joints[k].at for k in links]
+        for cut in cuts:
+            poses += [groups.pose[cut.link_a] @ cut.pose_a, groups.pose[cut.link_b] @ cut.pose_b]
+        values = casadi.horzcat(*(casadi.densify(pose.matrix) for pose in poses))
+        plane = _Plane(
+            system,
+            cuts,
+            links,
+            [groups.joints[k].parent for k in links],
+            [(groups.group[cut.link_a], groups.group[cut.link_b]) for cut in cuts],
+            Function("frames", [work.q, system.p], [values]),
+        )
+        rng = np.random.default_rng(_SEED)
+        for _ in range(_SAMPLES):
+            q = rng.uniform(-1.5, 1.5, work.q.numel())
+            if plane.drawing(q, rng.uniform(*PARAMETERS, system.p.numel())) is None:
+                return None
+        return plane
+
+    def drawing(self, q: Vector, p: Vector) -> _Drawing | None:
+        """The loops in their plane at given positions; None where they do not lie in one."""
+        return _draw(self, _side_by_side(self.frames, q, p))
+
+    def roots(self, q: Vector, p: Vector) -> Roots:
+        """Every way to close the loops."""
+        drawing = self.drawing(q, p)
+        if drawing is None:
+            raise NoClosedForm(
+                f"{self.system.name}: loops that are plane elsewhere are not so here"
+            )
+        found = planar_roots(drawing.loops)
+        values = drawing.positions(found.theta, found.s)
+        proof = " and ".join(found.methods)
+        return Roots(values, proof, not found.singular)
+
+
+@dataclass(slots=True)
+class _Turn:
+    """How a group is rotated: with a class of groups, and by how much more [rad]."""
+
+    number: int
+    offset: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Drawing:
+    """Plane loops as equations.
+
+    Attributes:
+        loops: in parts of their size.
+        size: the longest length in them [m].
+        joints: for every joint of the tree how its position follows: the sign of its axis and the
+            rotations of both groups where it is revolute, the number of its displacement else.
+    """
+
+    loops: PlanarLoops
+    size: float
+    joints: list[tuple[int, _Turn, _Turn] | int]
+
+    def positions(self, theta: Vector, s: Vector) -> Vector:
+        """(r, k) positions of the joints of the tree [rad or m]."""
+        whole = np.concatenate([theta, np.zeros((len(theta), 1))], axis=1)
+        values = np.empty((len(theta), len(self.joints)))
+        for k, joint in enumerate(self.joints):
+            if isinstance(joint, int):
+                values[:, k] = s[:, joint] * self.size
+                continue
+            sign, before, after = joint
+            turn = whole[:, after.number] - whole[:, before.number] + after.offset - before.offset
+            values[:, k] = sign * (np.pi - np.mod(np.pi - turn, 2 * np.pi))
+        return values
+
+
+@dataclass(slots=True)
+class _Point:
+    """A point of a group: by the numbers of rotations, and of displacements, what multiplies."""
+
+    turned: dict[int, complex]
+    slid: dict[int, complex]
+
+    def plus(self, number: int, value: complex) -> _Point:
+        """Moved by a vector that rotates with a class of groups."""
+        return _Point({**self.turned, number: self.turned.get(number, 0) + value}, self.slid)
+
+    def slides(self, number: int, value: complex) -> _Point:
+        """Moved by a displacement."""
+        return _Point(self.turned, {**self.slid, number: value})
+
+
+class _Bent(Exception):
+    """The loops do not lie in one plane."""
+
+
+def _draw(plane: _Plane, frames: Matrix) -> _Drawing | None:
+    try:
+        return _Draughtsman(plane, frames).drawing()
+    except _Bent:
+        return None
+
+
+class _Draughtsman:
+    """Reads the equations of plane loops off their frames where all unknown joints are at zero."""
+
+    def __init__(self, plane: _Plane, frames: Matrix) -> None:
+        self.plane = plane
+        n = len(plane.links)
+        top = next(k for k in plane.parents if k not in plane.links)
+        self.zero = {top: np.eye(4)}
+        for k, parent, at in zip(plane.links, plane.parents, frames[:n], strict=True):
+            self.zero[k] = self.zero[parent] @ at
+        self.a = [self.zero[a] @ T for (a, _), T in zip(plane.ends, frames[n::2], strict=True)]
+        self.b = [
+            self.zero[b] @ T for (_, b), T in zip(plane.ends, frames[n + 1 :: 2], strict=True)
+        ]
+        self.normal = self._normal()
+        across = np.cross(self.normal, np.eye(3)[np.argmin(np.abs(self.normal))])
+        self.x = across / np.linalg.norm(across)
+        self.y = np.cross(self.normal, self.x)
+        self.turns = {top: _Turn(KNOWN, 0.0)}
+        self.points = {top: _Point({KNOWN: self.vector(np.zeros(3))}, {})}
+        self.carriers = list[int]()
+
+    def _normal(self) -> Vector:
+        links = self.plane.system.tree.links
+        for k in self.plane.links:
+            if links[k].motion is Motion.REVOLUTE:
+                normal: Vector = self.zero[k][:3, 2]
+                return normal
+        raise _Bent
+
+    def vector(self, value: Vector) -> complex:
+        """A vector of the plane as a complex number."""
+        return complex(self.x @ value, self.y @ value)
+
+    def drawing(self) -> _Drawing:
+        """The equations."""
+        joints = [
+            self._pass(k, parent)
+            for k, parent in zip(self.plane.links, self.plane.parents, strict=True)
+        ]
+        welds = list[tuple[int, int, float]]()
+        rows = [self._close(number, welds) for number in range(len(self.plane.cuts))]
+        merged = self._merge(welds)
+        return self._equations(rows, joints, merged)
+
+    def _pass(self, k: int, parent: int) -> tuple[int, int] | int:
+        """Through a joint of the tree: the sign of its axis and its groups, or its displacement."""
+        axis = self.zero[k][:3, 2]
+        cosine = float(self.normal @ axis)
+        before = self.turns[parent]
+        step = self.vector(self.zero[k][:3, 3] - self.zero[parent][:3, 3])
+        point = self.points[parent].plus(before.number, step * np.exp(1j * before.offset))
+        if self.plane.system.tree.links[k].motion is Motion.REVOLUTE:
+            if abs(cosine) < 1 - _PARALLEL:
+                raise _Bent
+            self.turns[k], self.points[k] = _Turn(k, 0.0), point
+            return (1 if cosine > 0 else -1), parent
+        if abs(cosine) > _PARALLEL:
+            raise _Bent
+        self.turns[k] = _Turn(before.number, before.offset)
+        self.points[k] = self._slide(point, axis, before)
+        return len(self.carriers) - 1
+
+    def _slide(self, point: _Point, axis: Vector, turn: _Turn) -> _Point:
+        self.carriers.append(turn.number)
+        return point.slides(len(self.carriers) - 1, self.vector(axis) * np.exp(1j * turn.offset))
+
+    def _end(self, group: int, frame: Matrix) -> _Point:
+        turn = self.turns[group]
+        step = self.vector(frame[:3, 3] - self.zero[group][:3, 3])
+        return self.points[group].plus(turn.number, step * np.exp(1j * turn.offset))
+
+    def _close(self, number: int, welds: list[tuple[int, int, float]]) -> _Point:
+        """What must vanish for a cut joint; rotations that it ties are added to the welds."""
+        cut, (group_a, group_b) = self.plane.cuts[number], self.plane.ends[number]
+        frame_a, frame_b = self.a[number], self.b[number]
+        a, b = self._end(group_a, frame_a), self._end(group_b, frame_b)
+        turning, axes = self._freedoms(cut, frame_a)
+        for axis in axes:
+            a = self._slide(a, axis, self.turns[group_a])
+        if not turning:
+            side = int(np.argmin(np.abs(self.normal @ frame_a[:3, :3])))
+            turn = np.angle(self.vector(frame_b[:3, side]) / self.vector(frame_a[:3, side]))
+            welds.append((group_a, group_b, float(turn)))
+        turned = dict(a.turned)
+        for k, value in b.turned.items():
+            turned[k] = turned.get(k, 0) - value
+        slid = dict(a.slid)
+        for k, value in b.slid.items():
+            slid[k] = slid.get(k, 0) - value
+        return _Point(turned, slid)
+
+    def _freedoms(self, cut: Cut, frame: Matrix) -> tuple[bool, list[Vector]]:
+        """Whether a cut joint rotates in the plane, and along what it slides in it."""
+        joint = cut.edge.joint
+        if cut.welded or isinstance(joint, Fixed):
+            return False, []
+        if isinstance(joint, Spherical):
+            return True, []
+        if isinstance(joint, PointOnLine):
+            axis = frame[:3, :3] @ np.array(joint.axis)
+            if abs(self.normal @ axis) > _PARALLEL:
+                raise _Bent
+            return True, [axis]
+        turning, axes = False, list[Vector]()
+        for freedom in joint.freedoms:
+            axis = frame[:3, :3] @ np.array(freedom.axis)
+            cosine = abs(float(self.normal @ axis))
+            if freedom.motion is Motion.REVOLUTE and cosine > 1 - _PARALLEL:
+                turning = True
+            elif freedom.motion is Motion.PRISMATIC and cosine < _PARALLEL and not turning:
+                axes.append(axis)
+            elif freedom.motion not in (Motion.REVOLUTE, Motion.PRISMATIC) or turning:
+                raise _Bent
+        return turning, axes
+
+    def _merge(self, welds: list[tuple[int, int, float]]) -> dict[int, _Turn]:
+        """By the number of each rotation the one that it is, with what welds tie to each other."""
+        merged = {k: _Turn(k, 0.0) for k in [KNOWN, *self.plane.links]}
+
+        def resolved(turn: _Turn) -> _Turn:
+            found = merged[turn.number]
+            return _Turn(found.number, found.offset + turn.offset)
+
+        for group_a, group_b, angle in welds:
+            # frame_b is rotated with frame_a: theta_b + angle = theta_a
+            a, b = resolved(self.turns[group_a]), resolved(self.turns[group_b])
+            gap = a.offset - b.offset - angle
+            if a.number == b.number:
+                continue
+            if b.number == KNOWN:
+                a, b, gap = b, a, -gap
+            for k, turn in merged.items():
+                if turn.number == b.number:
+                    merged[k] = _Turn(a.number, turn.offset + gap)
+        return merged
+
+    def _equations(
+        self, rows: list[_Point], joints: list[tuple[int, int] | int], merged: dict[int, _Turn]
+    ) -> _Drawing:
+        used = {merged[turn.number].number for turn in self.turns.values()}
+        numbers = sorted(used - {KNOWN})
+        place = {number: k for k, number in enumerate(numbers)} | {KNOWN: KNOWN}
+        angles = np.zeros((len(rows), len(numbers) + 1), dtype=np.complex128)
+        slides = np.zeros((len(rows), len(self.carriers)), dtype=np.complex128)
+        for r, row in enumerate(rows):
+            for number, value in row.turned.items():
+                turn = merged[number]
+                angles[r, place[turn.number]] += value * np.exp(1j * turn.offset)
+            for j, value in row.slid.items():
+                slides[r, j] = value * np.exp(1j * merged[self.carriers[j]].offset)
+        size = float(np.max(np.abs(angles), initial=0.0)) or 1.0
+        scaled = np.divide(angles, size)
+        carriers = np.array([place[merged[k].number] for k in self.carriers], dtype=int)
+        loops = PlanarLoops(scaled[:, :-1], slides, carriers, scaled[:, -1])
+
+        def turn_of(group: int) -> _Turn:
+            own = self.turns[group]
+            found = merged[own.number]
+            return _Turn(place[found.number], found.offset + own.offset)
+
+        told = list[tuple[int, _Turn, _Turn] | int]()
+        for k, joint in zip(self.plane.links, joints, strict=True):
+            if isinstance(joint, int):
+                told.append(joint)
+            else:
+                told.append((joint[0], turn_of(joint[1]), turn_of(k)))
+        return _Drawing(loops, size, told)
+
+
+# One loop of six unknown revolute and prismatic joints: an arm that reaches a known pose.
+
+
+_JOINTS = 6
+
+
+def single_loops(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
+    """Blocks of one loop, by the general inverse geometric model."""
+    for number in waiting:
+        if number >= len(work.system.cuts) or is_bound(work.system, number):
+            continue
+        ring = work.ring(number)
+        plain = all(joint.motion in (Motion.REVOLUTE, Motion.PRISMATIC) for joint in ring.joints)
+        if plain and len(ring.joints) == _JOINTS:
+            loop = _SingleLoop.of(work, ring)
+            indices = tuple(_index(joint) for joint in loop.joints)
+            yield LoopBlock(work.system.cuts[number].edge.joint.name, indices, loop.roots)
+
+
+def _index(joint: ChainJoint) -> int:
+    assert joint.index is not None  # it is revolute or prismatic
+    return joint.index
+
+
+@dataclass(slots=True, eq=False)
+class _SingleLoop:
+    """A loop of six unknown joints, begun where what is known moves it.
+
+    Attributes:
+        system: whose loop it is.
+        joints: in their order.
+        gaps: Function of all positions and p: the transforms before the joints, side by side.
+        arm: the loop without the first of them, and what the solver made of it, as of the last
+            call; other positions or parameters may change it.
+    """
+
+    system: System
+    joints: tuple[ChainJoint, ...]
+    gaps: Function
+    arm: tuple[bytes, General] | None = None
+
+    @staticmethod
+    def of(work: PlanWork, ring: Ring) -> _SingleLoop:
+        moving = [casadi.depends_on(gap.pose.matrix, work.q) for gap in ring.gaps]
+        ring = ring.rotated(moving.index(True) if any(moving) else 0)
+        values = casadi.horzcat(*(casadi.densify(gap.pose.matrix) for gap in ring.gaps))
+        return _SingleLoop(
+            work.system, ring.joints, Function("gaps", [work.q, work.system.p], [values])
+        )
+
+    def roots(self, q: Vector, p: Vector) -> Roots:
+        """Every way to close the loop."""
+        gaps = _side_by_side(self.gaps, q, p)
+        signs = np.array([joint.sign for joint in self.joints])
+        found = general(self._general(gaps), inverse(gaps[0]))
+        return Roots(found * signs, "the general inverse geometric model, of degree 16")
+
+    def _general(self, gaps: Matrix) -> General:
+        between = np.concatenate([np.eye(4)[None], gaps[1:], np.eye(4)[None]])
+        key = between.tobytes()
+        if self.arm is None or self.arm[0] != key:
+            prismatic = np.array([not joint.is_rotational for joint in self.joints])
+            names = tuple(joint.name for joint in self.joints)
+            self.arm = (key, general_of(Arm(names, prismatic, between)))
+        return self.arm[1]
+
+
+# A platform on six legs: between two points, one on the ground and one on the platform, each keeps
+# its length.
+
+
+def platforms(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
+    """The block of a platform on six legs, with all loops that share its unknown joints."""
+    system = work.system
+    links = {
+        number: _unknown_links(work, number)
+        for number in waiting
+        if number < len(system.cuts) and not is_bound(system, number)
+    }
+    for numbers in _connected(links):
+        hexapod = _Hexapod.of(work, numbers, sorted(set().union(*(links[n] for n in numbers))))
+        if hexapod is not None:
+            cuts = [system.cuts[number].edge.joint.name for number in numbers]
+            yield LoopBlock(", ".join(cuts), hexapod.indices, hexapod.roots)
+
+
+class _Edge(NamedTuple):
+    """A joint, or a cut one, between two groups.
+
+    Attributes:
+        ends: the groups.
+        freedoms: of the joint, in its frame.
+        frames: numbers of the frames of the joint in both groups, of those that are computed; they
+            agree where the joint is at zero.
+    """
+
+    ends: tuple[int, int]
+    freedoms: tuple[Freedom, ...]
+    frames: tuple[int, int]
+
+
+_BALL = Freedom(Motion.SPHERICAL)
+
+
+def _edges(work: PlanWork, numbers: list[int], links: list[int]) -> tuple[list[_Edge], Function]:
+    """The joints of a block, and Function of all positions and p: their frames, side by side."""
+    groups, system = _groups(work), work.system
+    edges, poses = list[_Edge](), [Pose.identity()]
+
+    def frame(pose: Pose) -> int:
+        poses.append(pose)
+        return len(poses) - 1
+
+    for k in links:
+        ends = (groups.joints[k].parent, k)
+        moved = Freedom(system.tree.links[k].motion)
+        edges.append(_Edge(ends, (moved,), (frame(groups.joints[k].at), 0)))
+    for number in numbers:
+        cut = system.cuts[number]
+        joint = cut.edge.joint
+        ends = (groups.group[cut.link_a], groups.group[cut.link_b])
+        a = frame(groups.pose[cut.link_a] @ cut.pose_a)
+        b = frame(groups.pose[cut.link_b] @ cut.pose_b)
+        if isinstance(joint, Rod) and not cut.welded:
+            # a group of its own, between two spherical joints
+            own = len(system.tree.links) + number
+            along = Pose.translation(vector([to_sx(joint.length, system.symbol_table), 0, 0]))
+            edges.append(_Edge((ends[0], own), (_BALL,), (a, 0)))
+            edges.append(_Edge((own, ends[1]), (_BALL,), (frame(along), b)))
+            continue
+        ball = isinstance(joint, Spherical)
+        freedoms = () if cut.welded else (_BALL,) if ball else tuple(joint.freedoms)
+        edges.append(_Edge(ends, freedoms, (a, b)))
+    values = casadi.horzcat(*(casadi.densify(pose.matrix) for pose in poses))
+    return edges, Function("frames", [work.q, system.p], [values])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Leg:
+    """The joints from the ground to the platform: each with whether it is passed forwards."""
+
+    edges: list[tuple[_Edge, bool]]
+
+
+def _legs(edges: Sequence[_Edge]) -> tuple[int, list[_Leg]] | None:
+    """The group of the platform, and its legs; None where there are not six between two groups."""
+    at = dict[int, list[_Edge]]()
+    for edge in edges:
+        for group in edge.ends:
+            at.setdefault(group, []).append(edge)
+    branching = [group for group, own in at.items() if len(own) > _PASSED]
+    others = [group for group in branching if group != _GROUND]
+    if len(others) != 1 or len(at.get(_GROUND, ())) != LEGS or len(at[others[0]]) != LEGS:
+        return None
+    legs = list[_Leg]()
+    for first in at[_GROUND]:
+        here, edge, passed = _GROUND, first, list[tuple[_Edge, bool]]()
+        while True:
+            forwards = edge.ends[0] == here
+            passed.append((edge, forwards))
+            here = edge.ends[1] if forwards else edge.ends[0]
+            if here == others[0]:
+                break
+            following = [other for other in at[here] if other is not edge]
+            if here == _GROUND or len(following) != 1:
+                return None
+            edge = following[0]
+        legs.append(_Leg(passed))
+    return others[0], legs
+
+
+_GROUND = -1
+_PASSED = 2
+"""Joints of a group in the middle of a leg: one before it and one behind it."""
+_MEETING = 1e-9
+"""Distance of a centre from an axis, as a part of the lengths of a leg: products of some transforms
+leave 1e-15."""
+_FREEDOMS = {Motion.REVOLUTE: 1, Motion.SPHERICAL: 3}
+_LEAST = 5
+"""Freedoms of a leg that binds nothing but a distance; a sixth is its spin."""
+
+
+class _Axis(NamedTuple):
+    """A passive joint of a leg with all of them at zero: a centre, or an axis through a point."""
+
+    motion: Motion
+    point: Vector
+    along: Vector
+
+
+class _Distance(NamedTuple):
+    """What a leg keeps: the distance of a point of the ground from one of the platform."""
+
+    a: Vector
+    b: Vector
+    length: float
+
+
+def _distance(leg: _Leg, frames: Matrix) -> _Distance | None:
+    """The two centres of a leg; None where it is no such leg."""
+    here, axes = np.eye(4), list[_Axis]()
+    for edge, forwards in leg.edges:
+        near, far = (frames[k] for k in (edge.frames if forwards else edge.frames[::-1]))
+        at = here @ near
+        turned = at[:3, :3]
+        axes += [
+            _Axis(f.motion, at[:3, 3], turned @ np.array(f.axis, dtype=float))
+            for f in edge.freedoms
+        ]
+        here = at @ inverse(far)
+    if any(axis.motion not in _FREEDOMS for axis in axes):
+        return None
+    if sum(_FREEDOMS[axis.motion] for axis in axes) < _LEAST:
+        return None
+    size = max(float(np.max(np.abs([axis.point for axis in axes]), initial=0.0)), NONZERO)
+    for k in range(1, len(axes)):
+        a, b = _centre(axes[:k], size), _centre(axes[k:], size)
+        if a is not None and b is not None:
+            back = inverse(here)
+            return _Distance(a, back[:3, :3] @ b + back[:3, 3], float(np.linalg.norm(a - b)))
+    return None
+
+
+def _centre(axes: Sequence[_Axis], size: float) -> Vector | None:
+    """The only point that consecutive joints leave where it is."""
+    balls = [axis.point for axis in axes if axis.motion is Motion.SPHERICAL]
+    lines = [axis for axis in axes if axis.motion is Motion.REVOLUTE]
+    if balls:
+        point = balls[0]
+    elif len(lines) > 1:
+        across = [np.eye(3) - np.outer(axis.along, axis.along) for axis in lines]
+        if np.linalg.cond(np.sum(across, axis=0)) > 1 / _PARALLEL:
+            return None
+        side = np.sum([P @ axis.point for P, axis in zip(across, lines, strict=True)], axis=0)
+        point = np.linalg.solve(np.sum(across, axis=0), side)
+    else:
+        return None
+    gaps = [np.linalg.norm(np.cross(axis.along, point - axis.point)) for axis in lines]
+    gaps += [np.linalg.norm(ball - point) for ball in balls]
+    return point if max(gaps) < _MEETING * size else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Hexapod:
+    """A platform on six legs, and how its joints follow once its pose is known.
+
+    Attributes:
+        system: whose loops they are.
+        legs: of the platform.
+        frames: Function of all positions and p: the frames that the legs run over.
+        stages: that give the joints, from all positions with those of the pose behind them.
+        extent: how many positions these are.
+        chosen: the branch of each stage in which the system was assembled.
+    """
+
+    system: System
+    legs: list[_Leg]
+    frames: Function
+    stages: list[Stage]
+    extent: int
+    chosen: tuple[int, ...]
+
+    @staticmethod
+    def of(work: PlanWork, numbers: list[int], links: list[int]) -> _Hexapod | None:
+        """None where the loops are not those of such a platform."""
+        system = work.system
+        edges, frames = _edges(work, numbers, links)
+        # a free joint that places the platform binds nothing
+        free = [edge for edge in edges if any(f.motion is Motion.FREE for f in edge.freedoms)]
+        found = _legs([edge for edge in edges if edge not in free])
+        if found is None or any(edge.ends != (_GROUND, found[0]) for edge in free):
+            return None
+        platform, legs = found
+        rng = np.random.default_rng(_SEED)
+        for _ in range(_SAMPLES):
+            q = rng.uniform(-1.5, 1.5, work.q.numel())
+            p = rng.uniform(*PARAMETERS, system.p.numel())
+            if any(_distance(leg, _side_by_side(frames, q, p)) is None for leg in legs):
+                return None
+        posed = posed_stages(system, platform, [k for k in work.known if k < system.nq])
+        if posed is None:
+            return None
+        return _Hexapod(system, legs, frames, posed.stages, posed.extent, posed.chosen)
+
+    @property
+    def indices(self) -> tuple[int, ...]:
+        """Of the joints in q."""
+        every = {index for stage in self.stages for index in stage.indices}
+        return tuple(sorted(index for index in every if index < self.system.nq))
+
+    def roots(self, q: Vector, p: Vector) -> Roots:
+        """Every pose of the platform, with each joint on the side on which it was assembled."""
+        frames = _side_by_side(self.frames, q, p)
+        kept = [_distance(leg, frames) for leg in self.legs]
+        legs = [leg for leg in kept if leg is not None]
+        if len(legs) < LEGS:
+            raise NoClosedForm(
+                f"{self.system.name}: legs that meet in points elsewhere do not here"
+            )
+        found = poses(
+            np.array([leg.a for leg in legs]),
+            np.array([leg.b for leg in legs]),
+            np.array([leg.length for leg in legs]),
+        )
+        indices, values = list(self.indices), list[Vector]()
+        for e, place in zip(found.e, found.p, strict=True):
+            whole = np.zeros(self.extent)
+            whole[: self.system.nq] = q[: self.system.nq]
+            whole[-7:] = [*place, *e]
+            for stage, branch in zip(self.stages, self.chosen, strict=True):
+                whole[list(stage.indices)] = np.array(stage.values(whole, p))[:, branch]
+            values.append(whole[indices])
+        every = np.array(values).reshape(len(values), len(indices))
+        lost = int(np.sum(~np.all(np.isfinite(every), axis=1)))
+        told = (
+            f"{found.proof}, but {lost} poses at which joints do not follow"
+            if lost
+            else found.proof
+        )
+        return Roots(every, told, found.complete and not lost)
+
+
+def _side_by_side(frames: Function, q: Vector, p: Vector) -> Matrix:
+    """(k, 4, 4) frames that a Function gives in one row of blocks."""
+    values = np.array(frames(q, p))
+    return values.T.reshape(-1, 4, 4).transpose(0, 2, 1)

@@ -1,0 +1,106 @@
+"""Plane loops in numbers against Levenberg-Marquardt from many starts, and what is degenerate."""
+
+from itertools import combinations_with_replacement
+
+import numpy as np
+import pytest
+from support.plane_equations import closed_loops, missed, searched, triad
+from support.sweeps import EVERY_CASE
+
+from mbs.closed_forms.planar_loops import PlanarLoops, dixon_roots, planar_roots
+from mbs.errors import LoopError, NoClosedForm
+
+SEEDS = range(100) if EVERY_CASE else range(3)
+LEGS = list(combinations_with_replacement(["RR", "PR", "RP"], 3))
+
+
+@pytest.mark.parametrize("kinds", LEGS, ids="_".join)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_triads(kinds, seed):
+    loops = triad(np.random.default_rng(seed), kinds)
+    roots = planar_roots(loops)
+    assert not roots.singular
+    assert missed(loops, roots, searched(loops, 200, seed)) == 0
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_three_loops(seed):
+    loops = closed_loops(np.random.default_rng(seed), 3)
+    roots = planar_roots(loops)
+    assert roots.methods == ("Dixon's determinant of degree 20",)
+    assert missed(loops, roots, searched(loops, 1000, seed)) == 0
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_sparse_loops_are_split(seed):
+    """A triad, and behind it a dyad on its platform: no equation holds all six links."""
+    rng = np.random.default_rng(seed)
+    loops = closed_loops(rng, 3, zeros=[(0, 4), (0, 5), (1, 4), (1, 5), (2, 0), (2, 2), (2, 3)])
+    roots = planar_roots(loops)
+    assert roots.methods == ("Dixon's determinant of degree 6", "the quadratic equation of a dyad")
+    assert missed(loops, roots, searched(loops, 600, seed)) == 0
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_sparse_loops_that_do_not_split(seed):
+    rng = np.random.default_rng(seed)
+    loops = closed_loops(rng, 3, zeros=[(0, 3), (0, 5), (1, 1), (1, 4), (2, 0), (2, 2)])
+    roots = planar_roots(loops)
+    assert len(roots.methods) == 1
+    assert missed(loops, roots, searched(loops, 1000, seed)) == 0
+
+
+def test_dependent_rows_change_nothing():
+    loops = triad(np.random.default_rng(5), ("RR", "RR", "RR"))
+    mix = np.array([[1.0, 0], [0, 1], [1, 1], [2, -1]])
+    more = PlanarLoops(mix @ loops.angles, mix @ loops.slides, loops.carriers, mix @ loops.constant)
+    assert missed(more, planar_roots(more), searched(loops, 200, 5)) == 0
+
+
+def test_rows_that_contradict_each_other_have_no_roots():
+    loops = triad(np.random.default_rng(5), ("RR", "RR", "RR"))
+    mix = np.array([[1.0, 0], [0, 1], [1, 1]])
+    constant = mix @ loops.constant + np.array([0, 0, 0.1])
+    more = PlanarLoops(mix @ loops.angles, mix @ loops.slides, loops.carriers, constant)
+    assert len(planar_roots(more).theta) == 0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_fold_is_kept(seed):
+    """Legs in line with the normals of the curve of the platform: two roots meet."""
+    rng = np.random.default_rng(seed)
+    loops = triad(rng, ("RR", "RR", "RR"))
+    theta = np.array(rng.uniform(-3, 3, (1, 4)))
+    # the three forces along the legs meet in one point: the platform may turn about it
+    point = rng.normal() + 1j * rng.normal()
+    E = np.array([[1, -1, 0], [1, 0, -1]])
+    ends = rng.normal(size=3) + 1j * rng.normal(size=3)
+    z = np.exp(1j * theta[0, 0])
+    along = (point - ends * z) / np.abs(point - ends * z)
+    theta[0, 1:] = np.angle(along)
+    angles = np.column_stack([E @ ends, -E * rng.uniform(0.3, 1.5, 3)])
+    constant = -(angles @ np.exp(1j * theta[0]))
+    folded = PlanarLoops(angles, loops.slides, loops.carriers, constant)
+    roots = planar_roots(folded)
+    gap = np.abs(np.exp(1j * roots.theta) - np.exp(1j * theta)).max(axis=1)
+    assert gap.min() < 1e-4
+
+
+def test_equal_legs_of_a_congruent_platform_move():
+    """The platform may be carried in a circle: said by a singular equation, never in silence."""
+    rng = np.random.default_rng(2)
+    ends = rng.normal(size=3) + 1j * rng.normal(size=3)
+    E = np.array([[1, -1, 0], [1, 0, -1]])
+    angles = np.column_stack([E @ ends, -0.7 * E])
+    loops = PlanarLoops(angles, np.zeros((2, 0)), np.zeros(0, int), -(E @ ends).astype(complex))
+    assert dixon_roots(loops.angles, loops.constant).singular
+
+
+def test_what_is_not_known_is_said():
+    rng = np.random.default_rng(1)
+    with pytest.raises(NoClosedForm, match="hold 1 unknown prismatic joints"):
+        planar_roots(closed_loops(rng, 3, slides=1))
+    with pytest.raises(NoClosedForm, match="do not determine all of their links"):
+        planar_roots(PlanarLoops(np.ones((1, 3)), np.zeros((1, 0)), np.zeros(0, int), np.ones(1)))
+    with pytest.raises(LoopError, match="a dyad of equal links"):
+        planar_roots(PlanarLoops(np.ones((1, 2)), np.zeros((1, 0)), np.zeros(0, int), np.zeros(1)))

@@ -1,0 +1,182 @@
+"""Modes of loops that must be solved together, against Gauss-Newton from many random starts."""
+
+import numpy as np
+import pytest
+from support.configurations import active, same, searched
+from support.flat_loops import flat_loop
+from support.messages import refused
+from support.platforms import hexapod, planar_platform
+from support.ring_loops import ring_loop
+
+import mbs
+import mbs.simulate
+from mbs.components import Body, Mechanism, Prismatic, Revolute
+from mbs.errors import LoopError, ModelError, NoClosedForm
+from mbs.loops import function, modes, solve
+
+PLATFORMS = {
+    "3-RRR": (("RRR", "RRR", "RRR"), (0, 0, 0), "Dixon's determinant of degree 6"),
+    "3-RPR": (("RPR", "RPR", "RPR"), (1, 1, 1), "Dixon's determinant of degree 6"),
+    "Stephenson III": (("RRR", "RR", "RR"), (0, None, None), "Dixon's determinant of degree 6"),
+    "RPR, PRR, RRP": (("RPR", "PRR", "RRP"), (0, 0, 1), "the polynomial of a triad, of degree 6"),
+    "3-PRP": (("RRP", "RP", "RP"), (0, None, None), "the polynomial of a triad, of degree 2"),
+}
+
+
+def check(system, starts):
+    """None of what a search finds is missing; every mode closes the loops."""
+    q_a = active(system)
+    found = modes(system, q_a)
+    assert found.complete
+    for q in searched(system, q_a, starts=starts):
+        assert any(same(system, q, mode.q) for mode in found)
+    for mode in found:
+        assert mode.branch == ()
+        assert mode.residual < 1e-12
+        np.testing.assert_allclose(active(system, mode.q), q_a, atol=1e-12)
+    return found
+
+
+@pytest.mark.parametrize("kind", PLATFORMS)
+@pytest.mark.parametrize("seed", range(5))
+def test_plane_platforms(kind, seed):
+    legs, driven, method = PLATFORMS[kind]
+    found = check(planar_platform(seed, legs, driven).assemble(), starts=60)
+    assert found.proof == method
+    assert len(found) in range(2, 7)
+
+
+@pytest.mark.parametrize("kinds", ["RRRRRRR", "RRPRRPR", "RPRRRRP"])
+@pytest.mark.parametrize("seed", range(3))
+def test_one_loop_of_six_unknown_joints(kinds, seed):
+    system = ring_loop(seed, kinds).assemble()
+    found = check(system, starts=100)
+    assert found.proof == "the general inverse geometric model, of degree 16"
+    assert len(found) in range(1, 17)
+    # elsewhere the arm is the same one and its target another
+    q_a = np.array(found[0].q)[list(system.free)] + 0.05
+    for q in searched(system, q_a, starts=60):
+        assert any(same(system, q, mode.q) for mode in modes(system, q_a))
+
+
+def test_a_mode_is_followed_by_a_guess():
+    system = planar_platform(2, ("RPR",) * 3, (1, 1, 1)).assemble()
+    names = [c.name for c in system.coordinates]
+    for mode in modes(system):
+        guess = dict(zip(names, mode.q, strict=True))
+        assert same(system, solve(system, guess=guess), mode.q)
+    with pytest.raises(NoClosedForm):
+        solve(system, branch=[])
+    with pytest.raises(NoClosedForm):
+        function(system)
+
+
+@pytest.mark.parametrize("legs", [("RR", "RR", "RR"), ("RR", "PR", "RP"), ("PR", "PR", "PR")])
+def test_a_triad_without_motors(legs):
+    system = planar_platform(1, legs).assemble()
+    assert system.closure.mobility == 0
+    found = check(system, starts=60)
+    assert len(found) >= 1
+    np.testing.assert_array_equal(solve(system), system.configuration)
+    refused(
+        ModelError,
+        "is given, but the loops leave no motion (mobility 0); leave q_active out",
+        by=lambda: modes(system, {system.coordinates[0].name: 0.0}),
+    )
+
+
+def test_structures_list_their_modes():
+    triangle = flat_loop(1, "RRR", ()).assemble()
+    assert [mode.branch for mode in modes(triangle)] == [("j0:+",), ("j0:-",)]
+    for kinds in ("SSR", "SSP", "UPS"):
+        system = ring_loop(3, kinds, active=()).assemble()
+        expected = len(modes(system))
+        assert expected >= 2, kinds
+
+
+def test_a_triangle_carries_its_weight():
+    """Bars of 1 kg at 60 degrees: each foot carries 10 N, and pushes 10 N / 4 / sin 60 out."""
+    m = Mechanism("triangle", gravity=(0, -10, 0), guess={"a": 0.9, "b": 2.2})
+    left, right = (m.add(Body(n, mass=1, com=(0.5, 0, 0), inertia=(1, 1, 1))) for n in ("l", "r"))
+    m.connect(m.world, Revolute("a"), left)
+    m.connect(m.world.at(1.0), Revolute("b"), right)
+    m.connect(left.at(1.0), Revolute("c"), right.at(1.0))
+    system = m.assemble()
+    wrenches = mbs.models.joint_wrenches(system)
+    q = np.array(system.configuration)
+    values = wrenches.call([q, *[np.zeros(wrenches.size_in(k)) for k in range(1, wrenches.n_in())]])
+    forces = np.array(values[0])
+    names = [row.name for row in system.joints]
+    for name in ("a", "b"):
+        force = np.linalg.norm(forces[:3, names.index(name)])
+        assert force == pytest.approx(np.hypot(10, 2.5 / np.sin(np.pi / 3)), rel=1e-9)
+    refused(
+        ModelError,
+        "triangle: the loops leave no motion (mobility 0), so that there is nothing to simulate",
+        "mbs.models.joint_wrenches",
+        by=lambda: mbs.simulate.run(system, 1.0),
+    )
+
+
+def congruent():
+    """A platform congruent to the ground on three telescopic legs."""
+    m = Mechanism("congruent", guess={"foot0": 0.4, "leg1": 0.1})
+    platform = m.add(Body("platform", mass=1, inertia=(1, 1, 1)))
+    for k, (x, y) in enumerate([(0.0, 0.0), (1.0, 0.1), (0.3, 0.8)]):
+        low, high = (m.add(Body(f"{n}{k}", mass=1, inertia=(1, 1, 1))) for n in ("low", "high"))
+        m.connect(m.world.at(x, y), Revolute(f"foot{k}"), low)
+        m.connect(low, Prismatic(f"leg{k}", axis="x", actuated=True), high)
+        m.connect(high.at(0.7), Revolute(f"head{k}"), platform.at(x, y))
+    return m.assemble()
+
+
+def test_a_motion_of_its_own_is_told():
+    """With equal legs the platform may be carried in a circle while the motors stay."""
+    system = congruent()
+    check(system, starts=60)
+    refused(
+        LoopError,
+        "congruent: foot0, head0, foot1, foot2 can move while the independent joints stay; modes",
+        by=lambda: modes(system, [0.1, 0.1, 0.1]),
+    )
+
+
+@pytest.mark.parametrize("leg", ["UPS", "RUS", "R rod", "SPS"])
+@pytest.mark.parametrize("seed", range(3))
+def test_platforms_on_six_legs(leg, seed):
+    """A search may end with universal joints on the other side: poses of the platform count."""
+    system = hexapod(seed, leg).assemble()
+    q_a = active(system)
+    found = modes(system, q_a)
+    assert found.complete
+    assert found.proof == "homotopy, certified: 40 of 40 paths"
+    assert len(found) % 2 == 0
+    pose = mbs.models.transform(system, "platform")
+    places = [np.array(pose(mode.q)) for mode in found]
+    assert any(same(system, mode.q, system.configuration) for mode in found)
+    assert max(mode.residual for mode in found) < 1e-12
+    for q in searched(system, q_a, starts=40, seed=seed):
+        T = np.array(pose(q))
+        assert min(np.abs(T - place).max() for place in places) < 1e-5
+    apart = [np.abs(T - S).max() for k, T in enumerate(places) for S in places[:k]]
+    assert min(apart) > 1e-3
+
+
+def test_the_catalogues_platform():
+    """Semi-regular hexagons: 28 complex poses, eight of them real here."""
+    system = mbs.load("stewart_platform").assemble()
+    found = modes(system)
+    assert (len(found), found.complete) == (8, True)
+    assert found.proof == "homotopy, certified: 28 of 28 paths"
+    assert any(same(system, mode.q, system.configuration) for mode in found)
+
+
+def test_a_platform_on_similar_hexagons_has_other_independent_joints():
+    rng = np.random.default_rng(3)
+    angles = rng.uniform(0, 6, 6)
+    a = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(6)])
+    # five legs are independent, so that a joint of the sixth one stands for its motor
+    system = hexapod(1, "UPS", (a, 0.5 * a)).assemble()
+    assert len([k for k in system.active if system.speeds[k].name.startswith("leg")]) == 5
+    with pytest.raises(NoClosedForm):
+        modes(system)

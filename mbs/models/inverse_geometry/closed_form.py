@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import casadi
@@ -422,6 +423,43 @@ def all_branches(
     outputs = {name: casadi.densify(v) for name, v in zip(_OUTPUTS, values, strict=True)}
     every = [*inputs.values()], [*outputs.values()], [*inputs], [*outputs]
     return function_of(without_sines(graph_of(Function("igm_all", *every, {"cse": True}))))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseBatch:
+    """What `all_branches` gives for N poses.
+
+    Attributes:
+        q: (N, branches, n) positions of the chain's joints [rad or m].
+        residual, real, regular, mark: (N, branches).
+    """
+
+    q: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    real: NDArray[np.float64]
+    regular: NDArray[np.float64]
+    mark: NDArray[np.float64]
+
+
+def plain_branches(
+    chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64]
+) -> Function:
+    """`all_branches` for numbers p, (np,); kept on the system."""
+    key = ("igm_all", sequence, *chain.key, p.tobytes())
+    plain: Function = chain.system.cached(key, lambda: all_branches(chain, sequence, p))
+    return plain
+
+
+def at_poses(plain: Function, T: NDArray[np.float64]) -> PoseBatch:
+    """What `all_branches` gives for poses T, (N, 4, 4), by the interpreter."""
+    n, branches = plain.size_out(0)
+    count = len(T)
+    if not count:
+        rows = [np.empty((0, branches)) for _ in range(4)]
+        return PoseBatch(np.empty((0, branches, n)), *rows)
+    columns = np.swapaxes(T, 1, 2).reshape(-1, 4).T
+    q, *parts = (np.array(part) for part in plain.map(count)(columns))
+    return PoseBatch(q.T.reshape(-1, branches, n), *(part.T for part in parts))
 
 
 def _column(chain: FrameChain, leaf: Leaf, T: SX, p: NDArray[np.float64] | None) -> list[SX]:

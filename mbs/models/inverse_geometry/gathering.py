@@ -110,7 +110,7 @@ def _by_closed_form(
     near = np.flatnonzero(error < _BRANCH_NEAR * max(1.0, target.arm.length))
     doubtful = bool(np.min(regular) < _DEGENERATE)
     labels = tuple(sequence.label(int(b)) for b in near)
-    return _polish(target, Gathered(q[near], labels, _name(chain, sequence, p), doubtful))
+    return _polish(target, Gathered(q[near], labels, closed_form_name(chain, sequence, p), doubtful))
 
 
 def _leaves(chain: FrameChain, sequence: StepSequence, p: Array) -> Function:
@@ -132,7 +132,7 @@ def _leaves(chain: FrameChain, sequence: StepSequence, p: Array) -> Function:
     return function
 
 
-def _name(chain: FrameChain, sequence: StepSequence, p: Array) -> str:
+def closed_form_name(chain: FrameChain, sequence: StepSequence, p: Array) -> str:
     """Which of the closed forms a sequence is."""
     try:
         return "pieper" if sequence is sequence_of(chain, "pieper", p) else "paul"

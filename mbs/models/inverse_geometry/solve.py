@@ -10,12 +10,13 @@ import numpy as np
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
-from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, roots
+from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, named, roots
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
-from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS
-from mbs.models.inverse_geometry.gathering import Gathered, gather, gather_further
+from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, require_method
+from mbs.models.inverse_geometry.gathering import METHODS, Gathered, gather, gather_further
+from mbs.models.inverse_geometry.kernel import kernel_of
 from mbs.models.inverse_geometry.solutions import Given, Solutions, Wishes, bounds, leaves_out
-from mbs.models.inverse_geometry.target import NEARLY_SINGULAR, Target
+from mbs.models.inverse_geometry.target import Target, nearly_singular
 from mbs.models.inverse_geometry.whole_robot import parallel
 
 
@@ -61,13 +62,20 @@ def solve(
     require_system(system)
     p = np.array(system.parameter_values(parameters))
     target = target_pose(system, T)
-    chain = _chain_or_none(system, frame, locked)
+    chain = chain_or_none(system, frame, locked)
     wishes = _wishes(system, chain, limits, seed)
     if chain is None:
         return parallel(wishes, frame, target, p)
     question = Question(chain, Target(chain.arm(p), target), p, wishes)
+    require_method(system, method, METHODS)
+    kernel = kernel_of(chain, p, method)
+    draft = None if kernel is None else kernel.draft(target)
+    if kernel is not None and draft is not None and draft.certain:
+        labels = [kernel.labels[b] for b in draft.branch]
+        found = [ChainRoot(q, name, 1) for q, name in zip(draft.q, labels, strict=True)]
+        return answer(question, found, kernel.method)
     found, used = solved(question, method)
-    return answer(question, found, used)
+    return answer(question, named(question, found, kernel.labels if kernel else ()), used)
 
 
 def solved(question: Question, method: str) -> tuple[list[ChainRoot], str]:
@@ -84,7 +92,7 @@ def solved(question: Question, method: str) -> tuple[list[ChainRoot], str]:
     return roots(target, gathered, question.chain_indices), gathered.method
 
 
-def _chain_or_none(
+def chain_or_none(
     system: System, frame: str | int | None, locked: Mapping[str, float] | None
 ) -> FrameChain | None:
     """The chain to the frame; None where a robot with loops has none that can stand alone."""
@@ -102,7 +110,7 @@ def _is_doubtful(target: Target, gathered: Gathered) -> bool:
     """Whether a solution may be missing: none was found, or next to a singular configuration."""
     if gathered.doubtful or not len(gathered.q):
         return True
-    return bool(np.min(target.singular_values(gathered.q)[:, -1]) < NEARLY_SINGULAR)
+    return bool(np.any(nearly_singular(target.arm, gathered.q)))
 
 
 def _wishes(

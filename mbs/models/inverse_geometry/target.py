@@ -11,7 +11,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+import mbs.models.inverse_geometry.core as core
 from mbs.closed_forms.arm import Arm, Array, gap_to
 from mbs.numbers import NONZERO
 
@@ -92,6 +94,16 @@ class Target:
             if np.max(size) < _TARGET_SETTLED:
                 break
         return x
+
+
+def nearly_singular(arm: Arm, q: Array) -> NDArray[np.bool_]:
+    """(m,) which of configurations q, (m, n), are next to a singular one."""
+    library = core.core_of(arm)
+    if library is not None:
+        return core.singular_by(library, arm, q, NEARLY_SINGULAR)
+    # of whatever pose
+    least = Target(arm, np.eye(4)).singular_values(q)[:, -1]
+    return np.asarray(least < NEARLY_SINGULAR)
 
 
 # Which of the configurations that were found are one solution.

@@ -25,6 +25,10 @@ _REFINEMENTS = 8
 _SETTLED = 1e-7
 """Move [rad or arm lengths] below which the middle of meeting roots stays: rounding moves a double
 root by the root of 1e-16, 1e-8."""
+_ONE_ROOT = 1e-6
+"""Distance [rad or arm lengths] from the middle of meeting roots up to which they count as one; a
+solution that is farther from it stands for itself, however little the forward model tells it
+from its neighbour."""
 _EXACT = 0.02
 """Part of the tolerance of solutions, 2e-14 of the length, that rounding leaves: a singular root at
 which no others meet, and that misses by more, is not certain to be isolated."""
@@ -136,14 +140,22 @@ def _nearly_moving(target: Target, root: ChainRoot, chain: ChainIndices) -> Chai
 def _isolate(target: Target, root: ChainRoot) -> tuple[ChainRoot, bool]:
     """With its multiplicity, moved to where its roots meet, and whether it stays there."""
     q, count = root.q, 1
+    inexact = float(target.residual(q)) >= _EXACT * target.tolerance
     for _ in range(_REFINEMENTS):
         count, better = multiplicity(reduction(target, q))
         moved = float(np.max(np.abs(target.wrapped((better - q) / target.unit))))
+        if count > 1 and not inexact and _distance(target, better, root.q) > _ONE_ROOT:
+            return replace(root, multiplicity=1), True
         q = better
         if moved < _SETTLED:
             exact = count > 1 or float(target.residual(q)) < _EXACT * target.tolerance
             return replace(root, q=q, multiplicity=count), exact
     return replace(root, q=q, multiplicity=count), False
+
+
+def _distance(target: Target, q: Array, other: Array) -> float:
+    """The largest difference of a joint [rad or arm lengths]."""
+    return float(np.max(np.abs(target.wrapped((q - other) / target.unit))))
 
 
 def _on(target: Target, found: list[ChainRoot], k: int, others: list[int]) -> set[int]:

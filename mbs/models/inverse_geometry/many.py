@@ -359,14 +359,16 @@ def solve_many(
         ModelError: a matrix is no rigid transform, a name is unknown, or more than six joints
             are free.
     """
-    from mbs.models.inverse_geometry.solve import solve  # which solves single poses as this does
+    from mbs.models.inverse_geometry.solve import solve_rigid  # it has the drafts of this module
 
     require_system(system)
     require_method(system, method, METHODS)
     poses, p = target_poses(system, T), np.array(system.parameter_values(parameters))
 
     def solved(pose: Array) -> Solutions:
-        return solve(system, pose, frame, method, given, locked=locked, parameters=parameters)
+        return solve_rigid(
+            system, pose, frame, method, given, locked=locked, parameters=parameters
+        )
 
     given = limits if system.is_closed else None
     if system.is_closed:

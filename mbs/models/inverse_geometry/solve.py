@@ -9,6 +9,7 @@ import numpy as np
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
+from mbs.closed_forms.arm import Array
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, named, roots
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
@@ -60,14 +61,36 @@ def solve(
         NoClosedForm: "pieper" or "paul" was asked for and does not fit.
     """
     require_system(system)
-    p = np.array(system.parameter_values(parameters))
     target = target_pose(system, T)
+    return solve_rigid(
+        system, target, frame, method, limits, seed, locked=locked, parameters=parameters
+    )
+
+
+def solve_rigid(
+    system: System,
+    target: Array,
+    frame: str | int | None,
+    method: str,
+    limits: bool | Given | None = None,
+    seed: Mapping[str, float] | Sequence[float] | None = None,
+    *,
+    locked: Mapping[str, float] | None,
+    parameters: Mapping[str, float] | None,
+) -> Solutions:
+    """`solve` for a transform that is rigid to the last digit: rounded twice it would be another.
+
+    Args:
+        system, frame, method, limits, seed, locked, parameters: as of `solve`.
+        target: (4, 4) as `target_pose` gives it.
+    """
+    p = np.array(system.parameter_values(parameters))
     chain = chain_or_none(system, frame, locked)
     wishes = _wishes(system, chain, limits, seed)
     if chain is None:
         return parallel(wishes, frame, target, p)
-    question = Question(chain, Target(chain.arm(p), target), p, wishes)
     require_method(system, method, METHODS)
+    question = Question(chain, Target(chain.arm(p), target), p, wishes)
     kernel = kernel_of(chain, p, method)
     draft = None if kernel is None else kernel.draft(target)
     if kernel is not None and draft is not None and draft.certain:

@@ -17,7 +17,7 @@ from mbs.models.inverse_geometry.gathering import METHODS
 from mbs.models.inverse_geometry.kernel import CERTAIN, PoseKernel, kernel_of
 from mbs.models.inverse_geometry.search import Nearest
 from mbs.models.inverse_geometry.solutions import Solutions
-from mbs.models.inverse_geometry.solve import chain_or_none, solve
+from mbs.models.inverse_geometry.solve import chain_or_none, solve_rigid
 
 
 class PoseAnswer:
@@ -151,7 +151,7 @@ class PoseSolver:
         """Without compiled code, and next to singular configurations."""
         draft = self._kernel.draft(T) if self._kernel else None
         if draft is None or self._kernel is None or not draft.certain:
-            found = self.solutions(T)
+            found = self._solve(T)
             q = found.q
             turned = self._turning & (np.abs(q) > np.pi)
             q = np.where(turned, np.pi - np.mod(np.pi - q, 2 * np.pi), q)
@@ -164,7 +164,10 @@ class PoseSolver:
 
     def solutions(self, T: Any) -> Solutions:
         """What `solve` gives for a pose (4, 4) [m]."""
-        return solve(
+        return self._solve(target_pose(self.system, T))
+
+    def _solve(self, T: Array) -> Solutions:
+        return solve_rigid(
             self.system,
             T,
             self.frame,

@@ -101,8 +101,9 @@ def roots(target: Target, gathered: Gathered, chain: ChainIndices) -> list[Chain
 def _merge(target: Target, gathered: Gathered) -> list[ChainRoot]:
     residual = target.residual(gathered.q) if len(gathered.q) else np.zeros(0)
     found = []
-    for group in distinct(target, gathered.q):
-        best = min(group, key=lambda k: float(residual[k]))
+    for group in distinct(target, gathered.q, gathered.labels):
+        # a branch of a closed form first, then the better one
+        best = min(group, key=lambda k: (not gathered.labels[k], float(residual[k])))
         label = next((gathered.labels[k] for k in group if gathered.labels[k]), "")
         found.append(ChainRoot(gathered.q[best], label, 1))
     return found
@@ -171,7 +172,8 @@ def _on(target: Target, found: list[ChainRoot], k: int, others: list[int]) -> se
 def _merged_again(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
     """Without the copies of a multiple root that were moved to its middle."""
     q = np.array([root.q for root in found]).reshape(len(found), target.arm.size)
-    return [found[group[0]] for group in distinct(target, q)]
+    branches = [root.label for root in found]
+    return [found[group[0]] for group in distinct(target, q, branches)]
 
 
 # From the solutions of a chain to those of the robot: names of branches, loops, reasons.

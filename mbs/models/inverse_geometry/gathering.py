@@ -29,6 +29,8 @@ those that are not real miss by little, and all others that do not hold miss by 
 _DEGENERATE = 1e-5
 """Squared and free of units, below which a step loses digits and its other roots may be missed:
 five of sixteen in the square, half as many in the angle."""
+EXACT = 2e-15
+"""Residual, of max(1 m, the arm's length), that is rounding of the forward model."""
 ILL_CONDITIONED = 1e-9
 """Regularity of the general method below which it may miss solutions: seven digits are left of a
 root, of a double one three."""
@@ -155,10 +157,15 @@ def _polish(target: Target, gathered: Gathered) -> Gathered:
     """The solutions beside what was gathered."""
     if not len(gathered.q):
         return gathered
+    own = target.residual(gathered.q)
     better = polish(target.arm, target.T, gathered.q)
-    solved = np.flatnonzero(better.residual < target.tolerance)
+    # what rounding leaves stays: next to two singularities each step of a closed form is exact,
+    # and Newton's steps go astray along a valley
+    exact = own <= EXACT * max(1.0, target.arm.length)
+    q = np.where(exact[:, None], gathered.q, better.q)
+    solved = np.flatnonzero(exact | (better.residual < target.tolerance))
     labels = tuple(gathered.labels[k] for k in solved)
-    return Gathered(better.q[solved], labels, gathered.method, gathered.doubtful)
+    return Gathered(q[solved], labels, gathered.method, gathered.doubtful)
 
 
 def general_ready(chain: FrameChain, p: Array) -> General | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -111,6 +112,8 @@ def nearly_singular(arm: Arm, q: Array) -> NDArray[np.bool_]:
 
 _SAME, _CLOSE = 1e-9, 1e-2
 """Distances [rad or arm lengths] below which two solutions are one, and may be one."""
+_SPLIT = 1e-7
+"""The same of two branches of a closed form: rounding splits a double root by the root of 1e-16."""
 _FLOOR, _WORSE = 2e-15, 4.0
 """Residual half way, of max(1 m, the length), that is rounding of the forward model, some units of
 2e-16; and of the worse of two solutions, whose own miss the half way may show. It grows with the
@@ -118,7 +121,7 @@ square of the distance of two roots, so that they are told apart from 1e-7 on.""
 _ACROSS = 3  # Newton steps back into a bent valley: of 1e-2, 1e-4, 1e-8 from it rounding is left
 
 
-def distinct(target: Target, q: Array) -> list[list[int]]:
+def distinct(target: Target, q: Array, apart_from: Sequence[object] = ()) -> list[list[int]]:
     """The configurations in groups of equal ones, the groups and their members in the given order.
 
     Two are one solution when they are closer than 1e-9, or closer than 1e-2 and a configuration
@@ -128,25 +131,30 @@ def distinct(target: Target, q: Array) -> list[list[int]]:
     Args:
         target: the pose they take.
         q: (m, n) solutions [rad or m].
+        apart_from: of each its branch of a closed form, or something false; those of different
+            branches are one only where they are closer than 1e-7.
     """
     x = q / target.unit
     apart = np.max(np.abs(target.wrapped(x[:, None] - x)), axis=2, initial=0.0)
     first, second = np.nonzero(np.triu(apart < _CLOSE, 1))
     if not len(first):  # each is close to itself alone
         return [[k] for k in range(len(q))]
+    limit = _FLOOR * max(1.0, target.arm.length)
+    own = target.residual(q)
+    limits = np.maximum(limit, _WORSE * np.maximum(own[first], own[second]))
     joined = apart[first, second] < _SAME
-    open_pairs = np.flatnonzero(~joined)
-    if len(open_pairs):
-        i, j = first[open_pairs], second[open_pairs]
-        own = target.residual(q)
-        limit = np.maximum(
-            _FLOOR * max(1.0, target.arm.length), _WORSE * np.maximum(own[i], own[j])
-        )
-        joined[open_pairs] = half_way(target, x[i], x[j]) < limit
-    group = np.arange(len(q))
-    for i, j in zip(first[joined], second[joined], strict=True):
-        a, b = sorted((group[i], group[j]))
-        group[group == b] = a
+    i, j = first[~joined], second[~joined]
+    joined[~joined] = half_way(target, x[i], x[j]) < limits[~joined]
+    branch = list(apart_from) or [None] * len(q)
+    both = np.array([bool(branch[i] and branch[j]) for i, j in zip(first, second, strict=True)])
+    joined &= ~both | (apart[first, second] < _SPLIT)
+    # of two branches first; then copies go to what is nearest, and join no two branches
+    group, told = np.arange(len(q)), np.array([bool(name) for name in branch])
+    order = np.lexsort((apart[first, second], ~both))
+    for k in order[joined[order]]:
+        a, b = sorted((group[first[k]], group[second[k]]))
+        if a != b and (both[k] or not (np.any(told[group == a]) and np.any(told[group == b]))):
+            group[group == b] = a
     return [list(map(int, np.flatnonzero(group == g))) for g in np.unique(group)]
 
 

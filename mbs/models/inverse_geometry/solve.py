@@ -14,7 +14,13 @@ from mbs.errors import ModelError
 from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, named, roots
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, require_method
-from mbs.models.inverse_geometry.gathering import METHODS, Gathered, gather, gather_further
+from mbs.models.inverse_geometry.gathering import (
+    METHODS,
+    Gathered,
+    along_valleys,
+    gather,
+    gather_further,
+)
 from mbs.models.inverse_geometry.kernel import kernel_of
 from mbs.models.inverse_geometry.solutions import Given, Solutions, Wishes, bounds, leaves_out
 from mbs.models.inverse_geometry.target import Target, nearly_singular
@@ -111,7 +117,7 @@ def solved(question: Question, method: str) -> tuple[list[ChainRoot], str]:
     chain, target, p = question.chain, question.target, question.p
     gathered = gather(chain, target, method, p)
     if method in ("auto", *CLOSED_FORMS) and _is_doubtful(target, gathered):
-        gathered = gather_further(chain, target, gathered, p)
+        gathered = along_valleys(target, gather_further(chain, target, gathered, p))
     return roots(target, gathered, question.chain_indices), gathered.method
 
 

@@ -157,9 +157,9 @@ def machine_code(function: casadi.Function) -> MachineCode | None:
     if hasattr(library, f"{name}_incref"):
         library[f"{name}_incref"]()
     ends = ("", "_checkout", "_release")
-    addresses = [_address(library, f"{name}{end}") for end in ends]
+    evaluate, checkout, release = (_address(library, f"{name}{end}") for end in ends)
     arguments, results, integers, reals = (number.value for number in work)
-    return MachineCode(library, *addresses, (arguments, results, integers, reals))
+    return MachineCode(library, evaluate, checkout, release, (arguments, results, integers, reals))
 
 
 def _address(library: ctypes.CDLL, name: str) -> int:

@@ -241,9 +241,11 @@ _ROUNDING = 1e-9
 class InverseGeometry(ModelFunction):
     """A closed form ``igm(T, branch) -> q, valid``, and how its branches and steps are called."""
 
-    def __init__(self, function: Function, system: System, sequence: StepSequence, annotate: Any):
-        super().__init__(function, system, annotate)
-        self._sequence = sequence
+    def __init__(
+        self, function: Function, chain: FrameChain, sequence: StepSequence, annotate: Any
+    ):
+        super().__init__(function, chain.system, annotate)
+        self._chain, self._sequence = chain, sequence
 
     @property
     def branches(self) -> int:
@@ -252,6 +254,19 @@ class InverseGeometry(ModelFunction):
 
     @property
     def labels(self) -> tuple[str, ...]:
+        """The name of every branch, as in the answers of `solve`.
+
+        They are those of shoulder, elbow and wrist of an arm that has them, else `signs`; with
+        symbols among its lengths, on which names may depend, always `signs`.
+        """
+        from mbs.models.inverse_geometry.branches import branch_labels  # which samples branches
+
+        if self.system.parameters:
+            return self.signs
+        return branch_labels(self._chain, self._sequence, np.zeros(0))
+
+    @property
+    def signs(self) -> tuple[str, ...]:
         """The signs of every branch, such as "q3:+ q2:- q5:+"."""
         return tuple(self._sequence.label(b) for b in range(self.branches))
 
@@ -321,7 +336,7 @@ def function(
     def make() -> Function:
         key = ("igm", method, *chain.key)
         plain: Any = model_function(system, key, lambda: _built(chain, sequence))
-        return InverseGeometry(Function(plain), system, sequence, plain.annotated)
+        return InverseGeometry(Function(plain), chain, sequence, plain.annotated)
 
     made: Function = system.cached(("inverse geometry", method, *chain.key), make)
     return made
@@ -441,9 +456,7 @@ class PoseBatch:
     mark: NDArray[np.float64]
 
 
-def plain_branches(
-    chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64]
-) -> Function:
+def plain_branches(chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64]) -> Function:
     """`all_branches` for numbers p, (np,); kept on the system."""
     key = ("igm_all", sequence, *chain.key, p.tobytes())
     plain: Function = chain.system.cached(key, lambda: all_branches(chain, sequence, p))

@@ -224,9 +224,10 @@ def _crossing(target: Target, low: _Valley, high: _Valley) -> Array:
         beyond = middle.height * low.height < 0
         low = low._replace(height=np.where(beyond, 0.5 * low.height, low.height))
         high = high._replace(height=np.where(beyond, high.height, 0.5 * high.height))
-        low, high = _Valley(
-            *(_where(~beyond, a, b) for a, b in zip(middle, low, strict=True))
-        ), _Valley(*(_where(beyond, a, b) for a, b in zip(middle, high, strict=True)))
+        low, high = (
+            _Valley(*(_where(~beyond, a, b) for a, b in zip(middle, low, strict=True))),
+            _Valley(*(_where(beyond, a, b) for a, b in zip(middle, high, strict=True))),
+        )
     best = np.abs(low.height) < np.abs(high.height)
     return _where(best, low.x, high.x)
 
@@ -243,7 +244,9 @@ def _by_closed_form(
     near = np.flatnonzero(error < _BRANCH_NEAR * max(1.0, target.arm.length))
     doubtful = bool(np.min(regular) < _DEGENERATE)
     labels = tuple(sequence.label(int(b)) for b in near)
-    return _polish(target, Gathered(q[near], labels, closed_form_name(chain, sequence, p), doubtful))
+    return _polish(
+        target, Gathered(q[near], labels, closed_form_name(chain, sequence, p), doubtful)
+    )
 
 
 def _leaves(chain: FrameChain, sequence: StepSequence, p: Array) -> Function:

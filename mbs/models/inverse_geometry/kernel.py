@@ -114,7 +114,6 @@ class PoseKernel:
         turned = np.where(self._arm.prismatic | (np.abs(q) <= np.pi), q, self._arm.wrapped(q))
         return PoseDraft(turned, draft.residual[0, valid], valid, not draft.searched[0])
 
-
     def _settled(self, library: ctypes.CDLL, T: Array, sequence: StepSequence) -> PoseDraft:
         """By the interpreter and the compiled core."""
         plain = plain_branches(self.chain, sequence, self.p)
@@ -213,8 +212,9 @@ def _pose_code(chain: FrameChain, p: Array, solves: StepSequence | General) -> _
         addresses = (machine.evaluate, machine.checkout, machine.release)
         sizes = (room, arguments, results, integers, reals)
         own = _SolverStruct(handed.address, None, *addresses, *sizes, suspect_of(solves), *end)
-    solver = np.frombuffer(own, dtype=np.float64)
+    solver = np.frombuffer(memoryview(own).cast("B"), dtype=np.float64)
     inputs = [SX.sym("T", 4, 4), SX.sym("solver", solver.size)]
+    room = max(room, 2)  # one column alone would come as a vector
     outputs = [SX.zeros(nq, room), SX.zeros(room), SX.zeros(room), SX.zeros(2)]
     signature = Function("mbs_pose", inputs, outputs)
     call = array_builtin(signature, core.path_of(library), finite=False, more=work)

@@ -15,6 +15,7 @@ from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, Array
 from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import NoClosedForm
+from mbs.models.inverse_geometry.branches import branch_labels
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_poses
 from mbs.models.inverse_geometry.closed_form import (
     CLOSED_FORMS,
@@ -160,7 +161,7 @@ def draft_solutions(
     searched = np.any(doubtful | (every.regular < _DEGENERATE), axis=1)
     searched |= _merge(arm, every, valid)
     searched |= _next_to_singular(arm, every, valid, suspect_of(sequence))
-    labels = tuple(sequence.label(b) for b in range(sequence.branches))
+    labels = branch_labels(chain, sequence, p)
     return BranchSolutions(every.q, valid, every.residual, labels, searched)
 
 
@@ -366,9 +367,7 @@ def solve_many(
     poses, p = target_poses(system, T), np.array(system.parameter_values(parameters))
 
     def solved(pose: Array) -> Solutions:
-        return solve_rigid(
-            system, pose, frame, method, given, locked=locked, parameters=parameters
-        )
+        return solve_rigid(system, pose, frame, method, given, locked=locked, parameters=parameters)
 
     given = limits if system.is_closed else None
     if system.is_closed:

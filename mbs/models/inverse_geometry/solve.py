@@ -87,8 +87,14 @@ def solve_rigid(
     """`solve` for a transform that is rigid to the last digit: rounded twice it would be another.
 
     Args:
-        system, frame, method, limits, seed, locked, parameters: as of `solve`.
+        system: as of `solve`.
         target: (4, 4) as `target_pose` gives it.
+        frame: as of `solve`.
+        method: likewise.
+        limits: likewise.
+        seed: likewise.
+        locked: likewise.
+        parameters: likewise.
     """
     p = np.array(system.parameter_values(parameters))
     chain = chain_or_none(system, frame, locked)

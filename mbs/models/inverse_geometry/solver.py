@@ -40,7 +40,7 @@ class PoseAnswer:
         self,
         q: Array,
         residual: Array,
-        labels: Mapping[float, str] | tuple[str, ...],
+        labels: Mapping[int, str] | tuple[str, ...],
         branch: Any,
         solver: PoseSolver,
         T: Any,
@@ -59,8 +59,8 @@ class PoseAnswer:
     def labels(self) -> tuple[str, ...]:
         """The name of the branch of each."""
         if self._branch is None:
-            return self._labels  # type: ignore[return-value]
-        return tuple([self._labels[b] for b in self._branch.tolist()])  # type: ignore[index]
+            return tuple(self._labels)  # type: ignore[arg-type]
+        return tuple([self._labels[b] for b in self._branch.tolist()])
 
     @property
     def solutions(self) -> Solutions:
@@ -113,7 +113,9 @@ class PoseSolver:
         p = np.array(system.parameter_values(parameters))
         chain = chain_or_none(system, frame, locked)
         open_chain = None if chain is None or system.is_closed else chain
-        self._kernel: PoseKernel | None = open_chain and kernel_of(open_chain, p, method)
+        self._kernel: PoseKernel | None = None
+        if open_chain is not None:
+            self._kernel = kernel_of(open_chain, p, method)
         self.used = self._kernel.method if self._kernel else "search"
         closed_form = self._kernel is not None and self.used != "general"
         self.labels = self._kernel.labels if self._kernel and closed_form else ()
@@ -142,9 +144,7 @@ class PoseSolver:
             if state == CERTAIN:
                 m = int(count)
                 own = T if m else np.array(T)
-                return PoseAnswer(
-                    q.T[:m], residual[:m], self._names, branch[:m], self, own, None
-                )
+                return PoseAnswer(q.T[:m], residual[:m], self._names, branch[:m], self, own, None)
         return self._in_python(target_pose(self.system, T))
 
     def _in_python(self, T: Array) -> PoseAnswer:

@@ -147,7 +147,7 @@ def branch_labels(chain: FrameChain, sequence: StepSequence, p: Array) -> tuple[
         names = _names_at_samples(chain, sequence, p, arm, has) if has.wrist else []
         if names and len(set(names)) == len(names) and all(names):
             return tuple(names)
-        return tuple(sequence.label(b) for b in range(sequence.branches))
+        return tuple(sequence.label(b) or "1" for b in range(sequence.branches))
 
     found: tuple[str, ...] = chain.system.cached(
         ("branch labels", sequence, *chain.key, p.tobytes()), named

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import functools
 from importlib import resources
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -16,7 +17,7 @@ from mbs.native import cached_library, compiler_found
 
 Hits: TypeAlias = NDArray[np.int64]
 
-_PAIRS = ("rigid", "arm", "arm_search", "pair", "dense", "eigenvalues", "raghavan_roth")
+_PAIRS = ("rigid", "arm", "arm_search", "pair", "dense", "eigenvalues", "raghavan_roth", "pose")
 _SOURCES = (
     "arm_descend.c",
     "arm_nearest.c",
@@ -43,6 +44,11 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "mbs_general": (
         _integer,
         (_pointer, _pointer, _pointer, _integer, _integer, _pointer, _pointer, _pointer, _pointer),
+    ),
+    "mbs_singular": (None, (_pointer, _real, _integer, _pointer, _pointer)),
+    "mbs_settle": (
+        ctypes.c_int,
+        (_pointer, _pointer, _integer, *[_pointer] * 4, _real, _pointer, _pointer),
     ),
     "mbs_nearest": (_real, (_pointer, _pointer, _integer, ctypes.c_ulonglong, _pointer)),
 }
@@ -75,6 +81,11 @@ def core_of(arm: Arm) -> ctypes.CDLL | None:
         CompilerError: the compiler refused the code.
     """
     return core() if arm.size <= _JOINTS else None
+
+
+def path_of(library: ctypes.CDLL) -> Path:
+    """The file of the core."""
+    return Path(library._name)
 
 
 @functools.cache
@@ -137,6 +148,46 @@ def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int)
     handed = Handed(arm)
     library.mbs_nearest(handed.address, _at(target), starts, seed, _at(q))
     return q
+
+
+def singular_by(library: ctypes.CDLL, arm: Arm, q: Array, bound: float) -> NDArray[np.bool_]:
+    """Which of configurations q, (m, n), have a singular value below a bound, (m,)."""
+    own, singular = _wanted(q, len(q), arm.size), np.empty(len(q), dtype=bool)
+    handed = Handed(arm)
+    library.mbs_singular(handed.address, bound, len(q), _at(own), singular.ctypes.data)
+    return singular
+
+
+def settled_by(
+    library: ctypes.CDLL, handed: Handed, T: Array, every: tuple[Array, ...], suspect: float
+) -> tuple[Array, Array, Array, bool]:
+    """The solutions among the branches of a closed form for one pose.
+
+    Args:
+        library: the core.
+        handed: the arm.
+        T: (4, 4) a rigid transform [m].
+        every: (branches, n) q and (branches,) residual, which are written over, real and regular.
+        suspect: of the last two, from which on the Jacobian is not asked.
+
+    Returns:
+        (m, n) configurations, (m,) residuals, (m,) numbers of branches, and whether none may be
+        missing.
+    """
+    q, residual = every[:2]
+    number, count = np.empty(len(residual)), ctypes.c_longlong(0)
+    target = _wanted(T, 4, 4)
+    doubtful = library.mbs_settle(
+        handed.address,
+        _at(target),
+        len(residual),
+        *map(_at, every),
+        suspect,
+        _at(number),
+        ctypes.addressof(count),
+    )
+    m = count.value
+    return q[:m], residual[:m], number[:m], not doubtful
 
 
 class Handed:

@@ -104,7 +104,7 @@ def _settle(
 # Which of many solutions for one pose are the same configuration.
 
 
-_SAME, _CLOSE, _BETWEEN = 1e-6, 1e-2, 1e-13  # see `merged`
+_SAME, _CLOSE, _BETWEEN = 1e-9, 1e-2, 1e-14  # see `merged`
 _REACHED = 1e-12  # relative residual of a solution: 1e-16 of rounding, and room for long arms
 
 

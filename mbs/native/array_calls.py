@@ -92,7 +92,11 @@ class InputCheck(NamedTuple):
 
 
 def array_builtin(
-    function: Function, library: Path, finite: bool, guard: InputCheck | None = None
+    function: Function,
+    library: Path,
+    finite: bool,
+    guard: InputCheck | None = None,
+    more: int = 0,
 ) -> ArrayCall | None:
     """The builtin of a function in a library, in CasADi's calling convention.
 
@@ -106,6 +110,7 @@ def array_builtin(
         finite: answer None too where an input or a result is not a finite number, or a number
             other than zero stands for several elements.
         guard: answer None too where it says so.
+        more: doubles of work space beyond what the library says it needs.
 
     Returns:
         the builtin; None when the function has dozens of inputs or outputs.
@@ -113,6 +118,7 @@ def array_builtin(
     name, code = function.name(), ctypes.CDLL(str(library))
     work = [ctypes.c_longlong() for _ in range(4)]
     code[f"{name}_work"](*map(ctypes.byref, work))
+    work[3].value += more
     inputs = [function.sparsity_in(k) for k in range(function.n_in())]
     outputs = [function.sparsity_out(k) for k in range(function.n_out())]
     caller = _caller()

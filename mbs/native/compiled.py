@@ -1,5 +1,6 @@
 """A Function as machine code: equal to the interpreted one to the last bit, or faster."""
 
+import ctypes
 import functools
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
@@ -180,6 +181,52 @@ def _compiled(
     if unwritten(text):
         return None
     return cached_library({"function.c": text, **further}, flags_for(text))
+
+
+class MachineCode(NamedTuple):
+    """Where C finds the fast code of a Function, in CasADi's calling convention.
+
+    Attributes:
+        library: that holds it; as long as it lives the addresses hold.
+        evaluate, checkout, release: addresses, 0 for what it does without.
+        work: pointers to arguments and results, integers and doubles that it works with.
+    """
+
+    library: ctypes.CDLL
+    evaluate: int
+    checkout: int
+    release: int
+    work: tuple[int, int, int, int]
+
+
+def machine_code(function: casadi.Function) -> MachineCode | None:
+    """The fast code of a Function for other C code to call; None where there is none.
+
+    Args:
+        function: any Function without free symbols.
+
+    Raises:
+        ModelError: it is no Function, or it has free symbols.
+        CompilerError: CC names no compiler, or the compiler refused the code.
+    """
+    require_function(function)
+    path = _library(function, 0, True) if compiler_found() else None
+    if path is None:
+        return None
+    name, library = function.name(), ctypes.CDLL(str(path))
+    work = [ctypes.c_longlong() for _ in range(4)]
+    library[f"{name}_work"](*map(ctypes.byref, work))
+    if hasattr(library, f"{name}_incref"):
+        library[f"{name}_incref"]()
+    ends = ("", "_checkout", "_release")
+    evaluate, checkout, release = (_address(library, f"{name}{end}") for end in ends)
+    arguments, results, integers, reals = (number.value for number in work)
+    return MachineCode(library, evaluate, checkout, release, (arguments, results, integers, reals))
+
+
+def _address(library: ctypes.CDLL, name: str) -> int:
+    found = ctypes.cast(library[name], ctypes.c_void_p).value if hasattr(library, name) else None
+    return found or 0
 
 
 def fetch_derivatives(record: str, number: int, table: int) -> None:

@@ -8,6 +8,7 @@ from mbs.models.inverse_geometry.self_motions import Family
 from mbs.models.inverse_geometry.sheet import text
 from mbs.models.inverse_geometry.solutions import Solution, Solutions
 from mbs.models.inverse_geometry.solve import solve
+from mbs.models.inverse_geometry.solver import PoseAnswer, PoseSolver, solver
 
 __all__ = [
     "Family",
@@ -15,11 +16,14 @@ __all__ = [
     "InverseGeometry",
     "ManySolutions",
     "Nearest",
+    "PoseAnswer",
+    "PoseSolver",
     "Solution",
     "Solutions",
     "follow",
     "function",
     "solve",
     "solve_many",
+    "solver",
     "text",
 ]

@@ -8,123 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mbs.closed_forms.arm import Arm, Array
+from mbs.closed_forms.arm import Array
 from mbs.closed_forms.arm_search import Nearest, nearest
+from mbs.models.inverse_geometry.branches import Anatomy, anatomy, labels
 from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.gathering import Gathered
 from mbs.models.inverse_geometry.self_motions import Family, connected, curve, family, freedoms
 from mbs.models.inverse_geometry.solutions import RobotSolution, Solutions, Wishes, unreachable
 from mbs.models.inverse_geometry.target import SINGULAR, Target, distinct, multiplicity, reduction
 from mbs.models.inverse_geometry.whole_robot import ClosedConfiguration, close, why_searched
-
-# Names of the branches of an arm with a spherical wrist: shoulder, elbow, wrist.
-#
-# Source: Lee & Ziegler 1984, definitions of the arm, elbow and wrist indicators.
-
-
-_PARALLEL = 1e-9
-"""Sine or cosine between axes, or part of the arm's length, that counts as zero: products of six
-transforms leave 1e-15 of rounding, descriptions with twelve digits 1e-12."""
-_UNDECIDED = 1e-9
-"""Indicator of a branch, lengths in those of the arm, at which two branches meet: its sign is
-rounding there and names neither."""
-
-
-@dataclass(frozen=True, slots=True)
-class Anatomy:
-    """Which branches of an arm have a name.
-
-    Attributes:
-        shoulder: axes 1 and 2 are at right angles, so that the wrist centre is before or behind
-            the shoulder.
-        elbow: axes 2 and 3 are parallel, so that the elbow is above or below the line from the
-            shoulder to the wrist centre.
-        wrist: axes 4, 5 and 6 meet.
-    """
-
-    shoulder: bool
-    elbow: bool
-    wrist: bool
-
-
-def anatomy(arm: Arm) -> Anatomy:
-    """What an arm has of shoulder, elbow and wrist."""
-    if arm.size != 6 or any(arm.prismatic[3:]) or not _wrist_meets(arm):
-        return Anatomy(False, False, False)
-    axes, origins = arm.lines(np.zeros(6))
-    shoulder = not any(arm.prismatic[:2]) and abs(axes[0] @ axes[1]) < _PARALLEL
-    parallel = np.linalg.norm(np.cross(axes[1], axes[2])) < _PARALLEL
-    apart = np.linalg.norm(np.cross(axes[1], origins[2] - origins[1])) > _PARALLEL * arm.length
-    elbow = shoulder and not arm.prismatic[2] and bool(parallel and apart)
-    return Anatomy(bool(shoulder), elbow, True)
-
-
-def labels(arm: Arm, has: Anatomy, q: Array) -> list[str]:
-    """The names of configurations' branches, such as "shoulder right, elbow up, no flip".
-
-    A name is left out where the configuration stands between two branches; an arm without a
-    spherical wrist has none.
-
-    Args:
-        arm: its joints.
-        has: what it has of shoulder, elbow and wrist.
-        q: (m, n) configurations [rad or m].
-    """
-    if not has.wrist:
-        return [""] * len(q)
-    axes, points = arm.lines(q)
-    a, p = np.moveaxis(axes, 1, 0), np.moveaxis(points, 1, 0)
-    reach = _meeting(a[4], p[4], a[5], p[5]) - p[1]
-    right = _dot(a[0], np.cross(a[1], reach)) / arm.length
-    bend = _dot(a[1], np.cross(reach, p[2] - p[1])) / arm.length**2
-    turn = _dot(np.cross(a[3], a[5]), a[4])
-    return [_label(has, *three) for three in zip(right, bend, turn, strict=True)]
-
-
-def _label(has: Anatomy, right: float, bend: float, turn: float) -> str:
-    names = []
-    if has.shoulder and abs(right) > _UNDECIDED:
-        names.append("shoulder right" if right > 0 else "shoulder left")
-    if has.elbow:
-        names.append(_elbow(bend, right))
-    if abs(turn) > _UNDECIDED:
-        names.append("no flip" if turn > 0 else "flip")
-    return ", ".join(name for name in names if name)
-
-
-def _elbow(bend: float, right: float) -> str:
-    if abs(bend) <= _UNDECIDED:
-        return "elbow straight"
-    if abs(right) <= _UNDECIDED:
-        return ""
-    return "elbow up" if bend * right > 0 else "elbow down"
-
-
-def _wrist_meets(arm: Arm) -> bool:
-    """Whether axes 4, 5, 6 meet in one point; they do so in every configuration if in two."""
-    # any two [rad or m], at neither of which an axis is at zero or a half turn
-    return all(_meet(arm, q) for q in (np.full(6, 0.3), np.full(6, 1.1)))
-
-
-def _meet(arm: Arm, q: Array) -> bool:
-    axes, points = arm.lines(q)
-    if min(np.linalg.norm(np.cross(axes[k], axes[k + 1])) for k in (3, 4)) < _PARALLEL:
-        return False
-    centre = _meeting(axes[4], points[4], axes[5], points[5])
-    away = [np.linalg.norm(np.cross(axes[k], centre - points[k])) for k in (3, 4, 5)]
-    return bool(max(away) < _PARALLEL * arm.length)
-
-
-def _meeting(a: Array, p: Array, b: Array, r: Array) -> Array:
-    """The point of the line (p, a) nearest the line (r, b), (..., 3)."""
-    n = np.cross(a, b)
-    s = _dot(np.cross(r - p, b), n) / _dot(n, n)
-    return np.asarray(p + s[..., None] * a, dtype=float)
-
-
-def _dot(a: Array, b: Array) -> Array:
-    return np.asarray(np.sum(a * b, axis=-1), dtype=float)
-
 
 # The distinct solutions of a pose, how often each counts, and the self-motions among them.
 
@@ -133,6 +25,10 @@ _REFINEMENTS = 8
 _SETTLED = 1e-7
 """Move [rad or arm lengths] below which the middle of meeting roots stays: rounding moves a double
 root by the root of 1e-16, 1e-8."""
+_ONE_ROOT = 1e-6
+"""Distance [rad or arm lengths] from the middle of meeting roots up to which they count as one; a
+solution that is farther from it stands for itself, however little the forward model tells it
+from its neighbour."""
 _EXACT = 0.02
 """Part of the tolerance of solutions, 2e-14 of the length, that rounding leaves: a singular root at
 which no others meet, and that misses by more, is not certain to be isolated."""
@@ -205,8 +101,9 @@ def roots(target: Target, gathered: Gathered, chain: ChainIndices) -> list[Chain
 def _merge(target: Target, gathered: Gathered) -> list[ChainRoot]:
     residual = target.residual(gathered.q) if len(gathered.q) else np.zeros(0)
     found = []
-    for group in distinct(target, gathered.q):
-        best = min(group, key=lambda k: float(residual[k]))
+    for group in distinct(target, gathered.q, gathered.labels):
+        # a branch of a closed form first, then the better one
+        best = min(group, key=lambda k: (not gathered.labels[k], float(residual[k])))
         label = next((gathered.labels[k] for k in group if gathered.labels[k]), "")
         found.append(ChainRoot(gathered.q[best], label, 1))
     return found
@@ -244,14 +141,22 @@ def _nearly_moving(target: Target, root: ChainRoot, chain: ChainIndices) -> Chai
 def _isolate(target: Target, root: ChainRoot) -> tuple[ChainRoot, bool]:
     """With its multiplicity, moved to where its roots meet, and whether it stays there."""
     q, count = root.q, 1
+    inexact = float(target.residual(q)) >= _EXACT * target.tolerance
     for _ in range(_REFINEMENTS):
         count, better = multiplicity(reduction(target, q))
         moved = float(np.max(np.abs(target.wrapped((better - q) / target.unit))))
+        if count > 1 and not inexact and _distance(target, better, root.q) > _ONE_ROOT:
+            return replace(root, multiplicity=1), True
         q = better
         if moved < _SETTLED:
             exact = count > 1 or float(target.residual(q)) < _EXACT * target.tolerance
             return replace(root, q=q, multiplicity=count), exact
     return replace(root, q=q, multiplicity=count), False
+
+
+def _distance(target: Target, q: Array, other: Array) -> float:
+    """The largest difference of a joint [rad or arm lengths]."""
+    return float(np.max(np.abs(target.wrapped((q - other) / target.unit))))
 
 
 def _on(target: Target, found: list[ChainRoot], k: int, others: list[int]) -> set[int]:
@@ -267,7 +172,8 @@ def _on(target: Target, found: list[ChainRoot], k: int, others: list[int]) -> se
 def _merged_again(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
     """Without the copies of a multiple root that were moved to its middle."""
     q = np.array([root.q for root in found]).reshape(len(found), target.arm.size)
-    return [found[group[0]] for group in distinct(target, q)]
+    branches = [root.label for root in found]
+    return [found[group[0]] for group in distinct(target, q, branches)]
 
 
 # From the solutions of a chain to those of the robot: names of branches, loops, reasons.
@@ -317,14 +223,14 @@ def answer(question: Question, found: list[ChainRoot], method: str) -> Solutions
 
     Args:
         question: what was asked for.
-        found: the solutions of the chain.
+        found: the solutions of the chain, named.
         method: that gave them.
     """
     if not found:
         closest = nearest(question.target.arm, question.target.T)
         reason = unreachable(question.target, closest)
         return question.wishes.solutions([], method, reason, _whole(question, closest))
-    drafts = _drafts(question, _named(question, _shown(question, found)))
+    drafts = _drafts(question, found)
     if why_searched(question.chain.system, question.chain) is not None:
         method += ", loops by search"
     return question.wishes.solutions(drafts, method, "" if drafts else _NO_LOOP)
@@ -349,13 +255,27 @@ def _drafts(question: Question, found: list[ChainRoot]) -> list[RobotSolution]:
     ]
 
 
-def _named(question: Question, found: list[ChainRoot]) -> list[ChainRoot]:
-    """With the names of shoulder, elbow and wrist where the arm has them, else a number."""
+def named(
+    question: Question, found: list[ChainRoot], branches: tuple[str, ...] = ()
+) -> list[ChainRoot]:
+    """With the names of branches, else numbers; what proves to be one self-motion stands once.
+
+    Args:
+        question: what was asked for.
+        found: the solutions of the chain, some with the signs of the closed form.
+        branches: the names of all branches of the closed form, where there is one; others are
+            those of shoulder, elbow and wrist.
+    """
+    found = _shown(question, found)
     chain, arm = question.chain, question.target.arm
     key = ("anatomy", *chain.key, question.p.tobytes())
     has: Anatomy = chain.system.cached(key, lambda: anatomy(arm))
-    named = labels(arm, has, np.array([root.q for root in found]))
-    names = [name or root.label for name, root in zip(named, found, strict=True)]
+    names = labels(arm, has, np.array([root.q for root in found]).reshape(-1, arm.size))
+    # a branch that has but signs keeps them
+    names = [
+        root.label if root.label in branches else name or root.label
+        for name, root in zip(names, found, strict=True)
+    ]
     seen = dict[str, int]()
     result = []
     for k, (root, name) in enumerate(zip(found, names, strict=True)):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import casadi
@@ -240,9 +241,11 @@ _ROUNDING = 1e-9
 class InverseGeometry(ModelFunction):
     """A closed form ``igm(T, branch) -> q, valid``, and how its branches and steps are called."""
 
-    def __init__(self, function: Function, system: System, sequence: StepSequence, annotate: Any):
-        super().__init__(function, system, annotate)
-        self._sequence = sequence
+    def __init__(
+        self, function: Function, chain: FrameChain, sequence: StepSequence, annotate: Any
+    ):
+        super().__init__(function, chain.system, annotate)
+        self._chain, self._sequence = chain, sequence
 
     @property
     def branches(self) -> int:
@@ -251,6 +254,19 @@ class InverseGeometry(ModelFunction):
 
     @property
     def labels(self) -> tuple[str, ...]:
+        """The name of every branch, as in the answers of `solve`.
+
+        They are those of shoulder, elbow and wrist of an arm that has them, else `signs`; with
+        symbols among its lengths, on which names may depend, always `signs`.
+        """
+        from mbs.models.inverse_geometry.branches import branch_labels  # which samples branches
+
+        if self.system.parameters:
+            return self.signs
+        return branch_labels(self._chain, self._sequence, np.zeros(0))
+
+    @property
+    def signs(self) -> tuple[str, ...]:
         """The signs of every branch, such as "q3:+ q2:- q5:+"."""
         return tuple(self._sequence.label(b) for b in range(self.branches))
 
@@ -320,7 +336,7 @@ def function(
     def make() -> Function:
         key = ("igm", method, *chain.key)
         plain: Any = model_function(system, key, lambda: _built(chain, sequence))
-        return InverseGeometry(Function(plain), system, sequence, plain.annotated)
+        return InverseGeometry(Function(plain), chain, sequence, plain.annotated)
 
     made: Function = system.cached(("inverse geometry", method, *chain.key), make)
     return made
@@ -422,6 +438,41 @@ def all_branches(
     outputs = {name: casadi.densify(v) for name, v in zip(_OUTPUTS, values, strict=True)}
     every = [*inputs.values()], [*outputs.values()], [*inputs], [*outputs]
     return function_of(without_sines(graph_of(Function("igm_all", *every, {"cse": True}))))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseBatch:
+    """What `all_branches` gives for N poses.
+
+    Attributes:
+        q: (N, branches, n) positions of the chain's joints [rad or m].
+        residual, real, regular, mark: (N, branches).
+    """
+
+    q: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    real: NDArray[np.float64]
+    regular: NDArray[np.float64]
+    mark: NDArray[np.float64]
+
+
+def plain_branches(chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64]) -> Function:
+    """`all_branches` for numbers p, (np,); kept on the system."""
+    key = ("igm_all", sequence, *chain.key, p.tobytes())
+    plain: Function = chain.system.cached(key, lambda: all_branches(chain, sequence, p))
+    return plain
+
+
+def at_poses(plain: Function, T: NDArray[np.float64]) -> PoseBatch:
+    """What `all_branches` gives for poses T, (N, 4, 4), by the interpreter."""
+    n, branches = plain.size_out(0)
+    count = len(T)
+    if not count:
+        rows = [np.empty((0, branches)) for _ in range(4)]
+        return PoseBatch(np.empty((0, branches, n)), *rows)
+    columns = np.swapaxes(T, 1, 2).reshape(-1, 4).T
+    q, *parts = (np.array(part) for part in plain.map(count)(columns))
+    return PoseBatch(q.T.reshape(-1, branches, n), *(part.T for part in parts))
 
 
 def _column(chain: FrameChain, leaf: Leaf, T: SX, p: NDArray[np.float64] | None) -> list[SX]:

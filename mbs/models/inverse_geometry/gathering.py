@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi
 import numpy as np
 from casadi import DM, SX, Function
+from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Array
-from mbs.closed_forms.arm_search import General, general, general_of, polish, search
+from mbs.closed_forms.arm_search import (
+    General,
+    general,
+    general_of,
+    polish,
+    search,
+    wrapped,
+)
 from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.chain import FrameChain
@@ -18,7 +27,8 @@ from mbs.models.inverse_geometry.closed_form import (
     require_method,
     sequence_of,
 )
-from mbs.models.inverse_geometry.target import Target
+from mbs.models.inverse_geometry.target import SINGULAR, Target
+from mbs.numbers import NONZERO
 
 METHODS = ("auto", *CLOSED_FORMS, "general", "search")
 """The methods that `solve` knows."""
@@ -29,6 +39,8 @@ those that are not real miss by little, and all others that do not hold miss by 
 _DEGENERATE = 1e-5
 """Squared and free of units, below which a step loses digits and its other roots may be missed:
 five of sixteen in the square, half as many in the angle."""
+EXACT = 2e-15
+"""Residual, of max(1 m, the arm's length), that is rounding of the forward model."""
 ILL_CONDITIONED = 1e-9
 """Regularity of the general method below which it may miss solutions: seven digits are left of a
 root, of a double one three."""
@@ -102,6 +114,128 @@ def gather_further(chain: FrameChain, target: Target, gathered: Gathered, p: Arr
     )
 
 
+# Solutions at the far end of a valley: next to a singular configuration in which an arm could move
+# while its frame stays, it still nearly can, and another solution may lie a half turn away along
+# that motion, where the steps of a closed form meet and a search finds neither.
+
+
+_NEARLY_MOVES = 1e-6
+"""Residual, of max(1 m, the arm's length), at a distance along the null space below which the arm
+nearly moves there: next to a fold, where two solutions meet, it is some 1e-3."""
+_ALONG = 0.2
+"""Length of a step along a valley [rad or arm lengths], from which two Newton steps lead back; a
+solution draws what is nearer than a quarter turn."""
+_STEPS_ALONG = 32  # a whole turn
+_CROSSINGS = 8  # of false position: along a sine the digits double with each
+
+
+def along_valleys(target: Target, gathered: Gathered) -> Gathered:
+    """What was gathered, and the solutions along the motions that singular ones nearly allow."""
+    if not len(gathered.q) or target.arm.size != 6:
+        return gathered
+    singular = target.singular_values(gathered.q)[:, -1] < SINGULAR
+    found = _far_ends(target, gathered.q[singular] / target.unit) if np.any(singular) else []
+    if not found:
+        return gathered
+    q = wrapped(target.arm, np.concatenate(found) * target.unit)
+    q = q[target.residual(q) < target.tolerance]
+    return Gathered(
+        np.concatenate([gathered.q, q]),
+        gathered.labels + ("",) * len(q),
+        gathered.method,
+        gathered.doubtful,
+    )
+
+
+def _far_ends(target: Target, start: Array) -> list[Array]:
+    """Solutions x, (k, 6), along the valleys through singular ones, (m, 6)."""
+    here = _valley_at(target, start)._replace(x=start)
+    back = here._replace(along=-here.along)
+    valley = _Valley(*(np.concatenate(parts) for parts in zip(here, back, strict=True)))
+    scale, found = max(1.0, target.arm.length), list[Array]()
+    for _ in range(_STEPS_ALONG):
+        ahead = _valley_at(target, valley.x + _ALONG * valley.along).like(valley)
+        # a self-motion is described as such; where a valley ends, its walls are steep
+        going = (ahead.residual < _NEARLY_MOVES * scale) & (ahead.residual > target.tolerance)
+        going &= np.linalg.norm(ahead.x - valley.x, axis=1) < 2 * _ALONG
+        crossed = going & (ahead.height * valley.height < 0) & (valley.residual > target.tolerance)
+        if np.any(crossed):
+            found.append(_crossing(target, valley.of(crossed), ahead.of(crossed)))
+        valley = ahead.of(going)
+        if not len(valley.x):
+            break
+    return found
+
+
+class _Valley(NamedTuple):
+    """Points of valleys: all equations hold but that of the smallest singular value.
+
+    Attributes:
+        along: (m, 6) the direction of the valley.
+        across: (m, 6) of the equation that is left.
+        height: (m,) its value.
+        x: (m, 6) the points, see `Target`.
+        residual: (m,) of them.
+    """
+
+    along: Array
+    across: Array
+    height: Array
+    x: Array
+    residual: Array
+
+    def of(self, which: NDArray[np.bool_]) -> _Valley:
+        """Some of the points."""
+        return _Valley(*(part[which] for part in self))
+
+    def like(self, before: _Valley) -> _Valley:
+        """With directions that go on as those before."""
+        on = np.sign(np.sum(self.along * before.along, axis=1))
+        same = np.sign(np.sum(self.across * before.across, axis=1))
+        return self._replace(
+            along=on[:, None] * self.along,
+            across=same[:, None] * self.across,
+            height=same * self.height,
+        )
+
+
+def _valley_at(target: Target, x: Array) -> _Valley:
+    """The valleys beside x, (m, 6)."""
+    for last in (False, False, True):
+        e, J = target.excess(x)
+        U, s, Vt = np.linalg.svd(J)
+        if last:
+            break
+        amounts = np.einsum("mik,mi->mk", U[:, :, :5], e) / np.maximum(s[:, :5], NONZERO)
+        x = x - np.clip(np.einsum("mki,mk->mi", Vt[:, :5], amounts), -_ALONG, _ALONG)
+    across = U[:, :, 5]
+    height = np.sum(across * e, axis=1)
+    return _Valley(Vt[:, 5], across, height, x, target.residual(x * target.unit))
+
+
+def _crossing(target: Target, low: _Valley, high: _Valley) -> Array:
+    """(m, 6) where the equation that is left holds, between points where its signs differ.
+
+    By the rule of false position, in the manner of Illinois.
+    """
+    for _ in range(_CROSSINGS):
+        part = low.height / (low.height - high.height)
+        middle = _valley_at(target, low.x + part[:, None] * (high.x - low.x)).like(low)
+        beyond = middle.height * low.height < 0
+        low = low._replace(height=np.where(beyond, 0.5 * low.height, low.height))
+        high = high._replace(height=np.where(beyond, high.height, 0.5 * high.height))
+        low, high = (
+            _Valley(*(_where(~beyond, a, b) for a, b in zip(middle, low, strict=True))),
+            _Valley(*(_where(beyond, a, b) for a, b in zip(middle, high, strict=True))),
+        )
+    best = np.abs(low.height) < np.abs(high.height)
+    return _where(best, low.x, high.x)
+
+
+def _where(which: NDArray[np.bool_], yes: Array, no: Array) -> Array:
+    return np.where(which.reshape(-1, *[1] * (yes.ndim - 1)), yes, no)
+
+
 def _by_closed_form(
     chain: FrameChain, target: Target, sequence: StepSequence, p: Array
 ) -> Gathered:
@@ -110,7 +244,9 @@ def _by_closed_form(
     near = np.flatnonzero(error < _BRANCH_NEAR * max(1.0, target.arm.length))
     doubtful = bool(np.min(regular) < _DEGENERATE)
     labels = tuple(sequence.label(int(b)) for b in near)
-    return _polish(target, Gathered(q[near], labels, _name(chain, sequence, p), doubtful))
+    return _polish(
+        target, Gathered(q[near], labels, closed_form_name(chain, sequence, p), doubtful)
+    )
 
 
 def _leaves(chain: FrameChain, sequence: StepSequence, p: Array) -> Function:
@@ -132,7 +268,7 @@ def _leaves(chain: FrameChain, sequence: StepSequence, p: Array) -> Function:
     return function
 
 
-def _name(chain: FrameChain, sequence: StepSequence, p: Array) -> str:
+def closed_form_name(chain: FrameChain, sequence: StepSequence, p: Array) -> str:
     """Which of the closed forms a sequence is."""
     try:
         return "pieper" if sequence is sequence_of(chain, "pieper", p) else "paul"
@@ -155,10 +291,15 @@ def _polish(target: Target, gathered: Gathered) -> Gathered:
     """The solutions beside what was gathered."""
     if not len(gathered.q):
         return gathered
+    own = target.residual(gathered.q)
     better = polish(target.arm, target.T, gathered.q)
-    solved = np.flatnonzero(better.residual < target.tolerance)
+    # what rounding leaves stays: next to two singularities each step of a closed form is exact,
+    # and Newton's steps go astray along a valley
+    exact = own <= EXACT * max(1.0, target.arm.length)
+    q = np.where(exact[:, None], gathered.q, better.q)
+    solved = np.flatnonzero(exact | (better.residual < target.tolerance))
     labels = tuple(gathered.labels[k] for k in solved)
-    return Gathered(better.q[solved], labels, gathered.method, gathered.doubtful)
+    return Gathered(q[solved], labels, gathered.method, gathered.doubtful)
 
 
 def general_ready(chain: FrameChain, p: Array) -> General | None:

@@ -16,10 +16,13 @@ from mbs.closed_forms.arm import Arm, Array
 from mbs.closed_forms.arm_search import General, general_many, polish
 from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import NoClosedForm
+from mbs.models.inverse_geometry.branches import branch_labels
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_poses
 from mbs.models.inverse_geometry.closed_form import (
     CLOSED_FORMS,
-    all_branches,
+    PoseBatch,
+    at_poses,
+    plain_branches,
     require_method,
     sequence_of,
 )
@@ -32,8 +35,7 @@ from mbs.models.inverse_geometry.solutions import (
     bounds,
     leaves_out,
 )
-from mbs.models.inverse_geometry.solve import solve
-from mbs.models.inverse_geometry.target import NEARLY_SINGULAR, SOLVED, Target
+from mbs.models.inverse_geometry.target import SOLVED, Target, nearly_singular
 from mbs.native import compiled
 
 # The closed form of a chain at many poses: in machine code, several poses in vector lanes.
@@ -45,22 +47,6 @@ _MANY = 1000
 """Poses from which machine code is worth the second that a compiler takes."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PoseBatch:
-    """What `all_branches` gives for N poses.
-
-    Attributes:
-        q: (N, branches, n) positions of the chain's joints [rad or m].
-        residual, real, regular, mark: (N, branches).
-    """
-
-    q: Array
-    residual: Array
-    real: Array
-    regular: Array
-    mark: Array
-
-
 def batch(chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64], T: Array) -> PoseBatch:
     """All branches at poses T, (N, 4, 4).
 
@@ -70,31 +56,15 @@ def batch(chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64], T: 
         p: (np,) the parameters.
         T: the poses [m].
     """
-    plain = _plain(chain, sequence, p)
+    plain = plain_branches(chain, sequence, p)
     if len(T) < _MANY:
-        return _interpret(plain, T)
+        return at_poses(plain, T)
     key = ("machine code of igm_all", sequence, *chain.key, p.tobytes())
     return _by_machine(chain.system.cached(key, lambda: _machine_code(plain)), plain, T)
 
 
-def _plain(chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64]) -> Function:
-    key = ("igm_all", sequence, *chain.key, p.tobytes())
-    plain: Function = chain.system.cached(key, lambda: all_branches(chain, sequence, p))
-    return plain
-
-
 def _machine_code(plain: Function) -> Function:
     return compiled(plain.map(_COLUMNS), derivatives=0, fast=True)
-
-
-def _interpret(plain: Function, T: Array) -> PoseBatch:
-    """By the interpreter, which needs no compiler first."""
-    if not len(T):
-        return _by_machine(plain, plain, T)
-    columns = np.swapaxes(T, 1, 2).reshape(-1, 4).T
-    n, branches = plain.size_out(0)
-    q, *rows = (np.array(part) for part in plain.map(len(T))(columns))
-    return PoseBatch(q.T.reshape(-1, branches, n), *(row.T for row in rows))
 
 
 def _by_machine(call: Any, plain: Function, T: Array) -> PoseBatch:
@@ -121,6 +91,11 @@ Booleans = NDArray[np.bool_]
 _DOUBTFUL = 1e-6
 """Residual, of max(1 m, the arm's length), below which a solution may stand beside a
 configuration."""
+_EXACT = 1e-14
+"""Residual, of max(1 m, the arm's length), that polishing hardly betters."""
+_SUSPECT = 1e-3
+"""Radicands and regularity, free of units, from which on no solution is next to a singular one but
+of a quartic: next to those of the catalogue's arms they are below it."""
 _DEGENERATE = 1e-12
 """Squared and free of units, below which a pose is searched: its steps keep ten digits, and one
 that loses more is told by the residuals. For one pose alone, `gathering` is more careful."""
@@ -178,16 +153,32 @@ def draft_solutions(
     every = batch(chain, sequence, p, T)
     scale = max(1.0, arm.length)
     close = every.residual <= _DOUBTFUL * scale
-    # with a digit to spare, so that the processor does not decide what is polished and counts
-    doubtful = close & (every.residual > 0.1 * SOLVED * scale)
+    doubtful = close & (every.residual > _EXACT * scale)
     if np.any(doubtful):
         doubtful[doubtful] = _polish(arm, T, every, doubtful)
     valid = (every.residual <= SOLVED * scale) & (every.real >= -_FOLD) & ~doubtful
     doubtful = close & ~valid
     searched = np.any(doubtful | (every.regular < _DEGENERATE), axis=1)
     searched |= _merge(arm, every, valid)
-    labels = tuple(sequence.label(b) for b in range(sequence.branches))
+    searched |= _next_to_singular(arm, every, valid, suspect_of(sequence))
+    labels = branch_labels(chain, sequence, p)
     return BranchSolutions(every.q, valid, every.residual, labels, searched)
+
+
+def suspect_of(sequence: StepSequence) -> float:
+    """The value of `real` and `regular` from which on the Jacobian is not asked."""
+    quartic = any(step.kind == "quartic" for step in sequence.steps)
+    return np.inf if quartic else _SUSPECT
+
+
+def _next_to_singular(arm: Arm, every: PoseBatch, valid: Booleans, suspect: float) -> Booleans:
+    """At which poses a solution is next to a singular configuration."""
+    least = np.minimum(np.abs(every.real), every.regular)
+    asked = valid & (least < suspect)
+    near = np.zeros_like(valid)
+    near[asked] = nearly_singular(arm, every.q[asked])
+    found: Booleans = np.any(near, axis=1)
+    return found
 
 
 def _polish(arm: Arm, T: Array, every: PoseBatch, which: Booleans) -> Booleans:
@@ -282,9 +273,9 @@ def general_draft(general: General, T: Array) -> BranchSolutions:
     every, valid = np.zeros((*shape, arm.size)), np.zeros(shape, dtype=bool)
     residual, searched = np.full(shape, np.inf), np.zeros(len(T), dtype=bool)
     target = Target(arm, T[pose])
-    reached, least = target.residual(q), target.singular_values(q)[:, -1]
+    reached = target.residual(q)
     every[pose, column], valid[pose, column], residual[pose, column] = q, True, reached
-    unsure = (least < NEARLY_SINGULAR) | (reached > target.tolerance)
+    unsure = nearly_singular(arm, q) | (reached > target.tolerance)
     searched[pose[unsure]] = True
     return BranchSolutions(every, valid, residual, ("",) * shape[1], searched)
 
@@ -369,12 +360,14 @@ def solve_many(
         ModelError: a matrix is no rigid transform, a name is unknown, or more than six joints
             are free.
     """
+    from mbs.models.inverse_geometry.solve import solve_rigid  # it has the drafts of this module
+
     require_system(system)
     require_method(system, method, METHODS)
     poses, p = target_poses(system, T), np.array(system.parameter_values(parameters))
 
     def solved(pose: Array) -> Solutions:
-        return solve(system, pose, frame, method, given, locked=locked, parameters=parameters)
+        return solve_rigid(system, pose, frame, method, given, locked=locked, parameters=parameters)
 
     given = limits if system.is_closed else None
     if system.is_closed:

@@ -9,13 +9,21 @@ import numpy as np
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
+from mbs.closed_forms.arm import Array
 from mbs.errors import ModelError
-from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, roots
+from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, named, roots
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
-from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS
-from mbs.models.inverse_geometry.gathering import Gathered, gather, gather_further
+from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, require_method
+from mbs.models.inverse_geometry.gathering import (
+    METHODS,
+    Gathered,
+    along_valleys,
+    gather,
+    gather_further,
+)
+from mbs.models.inverse_geometry.kernel import kernel_of
 from mbs.models.inverse_geometry.solutions import Given, Solutions, Wishes, bounds, leaves_out
-from mbs.models.inverse_geometry.target import NEARLY_SINGULAR, Target
+from mbs.models.inverse_geometry.target import Target, nearly_singular
 from mbs.models.inverse_geometry.whole_robot import parallel
 
 
@@ -59,15 +67,50 @@ def solve(
         NoClosedForm: "pieper" or "paul" was asked for and does not fit.
     """
     require_system(system)
-    p = np.array(system.parameter_values(parameters))
     target = target_pose(system, T)
-    chain = _chain_or_none(system, frame, locked)
+    return solve_rigid(
+        system, target, frame, method, limits, seed, locked=locked, parameters=parameters
+    )
+
+
+def solve_rigid(
+    system: System,
+    target: Array,
+    frame: str | int | None,
+    method: str,
+    limits: bool | Given | None = None,
+    seed: Mapping[str, float] | Sequence[float] | None = None,
+    *,
+    locked: Mapping[str, float] | None,
+    parameters: Mapping[str, float] | None,
+) -> Solutions:
+    """`solve` for a transform that is rigid to the last digit: rounded twice it would be another.
+
+    Args:
+        system: as of `solve`.
+        target: (4, 4) as `target_pose` gives it.
+        frame: as of `solve`.
+        method: likewise.
+        limits: likewise.
+        seed: likewise.
+        locked: likewise.
+        parameters: likewise.
+    """
+    p = np.array(system.parameter_values(parameters))
+    chain = chain_or_none(system, frame, locked)
     wishes = _wishes(system, chain, limits, seed)
     if chain is None:
         return parallel(wishes, frame, target, p)
+    require_method(system, method, METHODS)
     question = Question(chain, Target(chain.arm(p), target), p, wishes)
+    kernel = kernel_of(chain, p, method)
+    draft = None if kernel is None else kernel.draft(target)
+    if kernel is not None and draft is not None and draft.certain:
+        labels = [kernel.labels[b] for b in draft.branch]
+        found = [ChainRoot(q, name, 1) for q, name in zip(draft.q, labels, strict=True)]
+        return answer(question, found, kernel.method)
     found, used = solved(question, method)
-    return answer(question, found, used)
+    return answer(question, named(question, found, kernel.labels if kernel else ()), used)
 
 
 def solved(question: Question, method: str) -> tuple[list[ChainRoot], str]:
@@ -80,11 +123,11 @@ def solved(question: Question, method: str) -> tuple[list[ChainRoot], str]:
     chain, target, p = question.chain, question.target, question.p
     gathered = gather(chain, target, method, p)
     if method in ("auto", *CLOSED_FORMS) and _is_doubtful(target, gathered):
-        gathered = gather_further(chain, target, gathered, p)
+        gathered = along_valleys(target, gather_further(chain, target, gathered, p))
     return roots(target, gathered, question.chain_indices), gathered.method
 
 
-def _chain_or_none(
+def chain_or_none(
     system: System, frame: str | int | None, locked: Mapping[str, float] | None
 ) -> FrameChain | None:
     """The chain to the frame; None where a robot with loops has none that can stand alone."""
@@ -102,7 +145,7 @@ def _is_doubtful(target: Target, gathered: Gathered) -> bool:
     """Whether a solution may be missing: none was found, or next to a singular configuration."""
     if gathered.doubtful or not len(gathered.q):
         return True
-    return bool(np.min(target.singular_values(gathered.q)[:, -1]) < NEARLY_SINGULAR)
+    return bool(np.any(nearly_singular(target.arm, gathered.q)))
 
 
 def _wishes(

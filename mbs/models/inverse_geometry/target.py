@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+import mbs.closed_forms.arm_core as core
 from mbs.closed_forms.arm import Arm, Array, gap_to
 from mbs.numbers import NONZERO
 
@@ -94,43 +97,85 @@ class Target:
         return x
 
 
+def nearly_singular(arm: Arm, q: Array) -> NDArray[np.bool_]:
+    """(m,) which of configurations q, (m, n), are next to a singular one."""
+    library = core.core_of(arm)
+    if library is not None:
+        return core.singular_by(library, arm, q, NEARLY_SINGULAR)
+    # of whatever pose
+    least = Target(arm, np.eye(4)).singular_values(q)[:, -1]
+    return np.asarray(least < NEARLY_SINGULAR)
+
+
 # Which of the configurations that were found are one solution.
 
 
-_SAME, _CLOSE, _BETWEEN = 1e-9, 1e-2, 1e-13
-"""Distances [rad or arm lengths] below which two solutions are one, and may be one; they are if the
-residual half way, of max(1 m, the length), is rounding: it grows with the square of the
-distance."""
+_SAME, _CLOSE = 1e-9, 1e-2
+"""Distances [rad or arm lengths] below which two solutions are one, and may be one."""
+_SPLIT = 1e-7
+"""The same of two branches of a closed form: rounding splits a double root by the root of 1e-16."""
+_FLOOR, _WORSE = 2e-15, 4.0
+"""Residual half way, of max(1 m, the length), that is rounding of the forward model, some units of
+2e-16; and of the worse of two solutions, whose own miss the half way may show. It grows with the
+square of the distance of two roots, so that they are told apart from 1e-7 on."""
+_ACROSS = 3  # Newton steps back into a bent valley: of 1e-2, 1e-4, 1e-8 from it rounding is left
 
 
-def distinct(target: Target, q: Array) -> list[list[int]]:
+def distinct(target: Target, q: Array, apart_from: Sequence[object] = ()) -> list[list[int]]:
     """The configurations in groups of equal ones, the groups and their members in the given order.
 
-    Two are one solution when they are closer than 1e-9, or closer than 1e-2 and the configuration
-    half way between solves too, as copies of a multiple root do. Whole turns do not count.
+    Two are one solution when they are closer than 1e-9, or closer than 1e-2 and a configuration
+    half way between solves too but for rounding, as between copies of a multiple root. Whole turns
+    do not count. The order decides nothing: those that a third one joins are one.
 
     Args:
         target: the pose they take.
         q: (m, n) solutions [rad or m].
+        apart_from: of each its branch of a closed form, or something false; those of different
+            branches are one only where they are closer than 1e-7.
     """
-    groups: list[list[int]] = []
-    x, scale = q / target.unit, max(1.0, target.arm.length)
+    x = q / target.unit
     apart = np.max(np.abs(target.wrapped(x[:, None] - x)), axis=2, initial=0.0)
-    if np.sum(apart < _CLOSE) == len(q):  # each is close to itself alone
+    first, second = np.nonzero(np.triu(apart < _CLOSE, 1))
+    if not len(first):  # each is close to itself alone
         return [[k] for k in range(len(q))]
-    for k in range(len(q)):
-        first = [group[0] for group in groups]
-        difference = target.wrapped(x[k] - x[first])
-        far = np.max(np.abs(difference), axis=1, initial=0.0)
-        near = np.flatnonzero(far < _CLOSE)
-        half = (x[[first[m] for m in near]] + 0.5 * difference[near]) * target.unit
-        between = target.residual(half) < _BETWEEN * scale if len(near) else np.zeros(0, bool)
-        same = near[(far[near] < _SAME) | between]
-        if len(same):
-            groups[int(same[np.argmin(far[same])])].append(k)
-        else:
-            groups.append([k])
-    return groups
+    limit = _FLOOR * max(1.0, target.arm.length)
+    own = target.residual(q)
+    limits = np.maximum(limit, _WORSE * np.maximum(own[first], own[second]))
+    joined = apart[first, second] < _SAME
+    i, j = first[~joined], second[~joined]
+    joined[~joined] = half_way(target, x[i], x[j]) < limits[~joined]
+    branch = list(apart_from) or [None] * len(q)
+    both = np.array([bool(branch[i] and branch[j]) for i, j in zip(first, second, strict=True)])
+    joined &= ~both | (apart[first, second] < _SPLIT)
+    # of two branches first; then copies go to what is nearest, and join no two branches
+    group, told = np.arange(len(q)), np.array([bool(name) for name in branch])
+    order = np.lexsort((apart[first, second], ~both))
+    for k in order[joined[order]]:
+        a, b = sorted((group[first[k]], group[second[k]]))
+        if a != b and (both[k] or not (np.any(told[group == a]) and np.any(told[group == b]))):
+            group[group == b] = a
+    return [list(map(int, np.flatnonzero(group == g))) for g in np.unique(group)]
+
+
+def half_way(target: Target, x: Array, other: Array) -> Array:
+    """(m,) residuals half way between configurations x and others, (m, n), see `Target`.
+
+    The configuration half way is moved across the line between the two, for the valley that joins
+    copies of a root may bend.
+    """
+    difference = target.wrapped(other - x)
+    middle = x + 0.5 * difference
+    best = target.residual(middle * target.unit)
+    along = difference / np.linalg.norm(difference, axis=1, keepdims=True)
+    for _ in range(_ACROSS):
+        e, J = target.excess(middle)
+        across = J - (J @ along[..., None]) * along[:, None, :]
+        # singular values that vanish but for rounding leave their directions alone
+        step = (np.linalg.pinv(across, rcond=1e-10) @ e[..., None])[..., 0]
+        middle = middle - step
+        best = np.fmin(best, target.residual(middle * target.unit))
+    return best
 
 
 # How many roots meet in a solution: the equations near it, reduced to the directions left free.
@@ -148,7 +193,7 @@ def distinct(target: Target, q: Array) -> list[list[int]]:
 SINGULAR = 2e-6
 """Singular values below it count as zero: two roots that lie 1e-6 apart are one double root."""
 
-_MEETING = 1e-13
+_MEETING = 1e-14
 """Terms of g, free of units, that are negligible: a tenth of what a solution may miss by."""
 # h [rad or arm lengths] at which g is fitted, each a fourth or fifth of the one before: the first
 # within which Newton's method converges and a polynomial of degree 8 is g but for rounding

@@ -33,7 +33,7 @@ double arm_unit(const arm *a, int joint) { return a->prismatic[joint] ? a->lengt
 void arm_wrap(const arm *a, double *q) {
     int k;
     for (k = 0; k < a->n; k++) {
-        if (a->prismatic[k]) continue;
+        if (a->prismatic[k] || (q[k] > -PI && q[k] <= PI)) continue;
         q[k] = remainder(q[k], 2.0 * PI);
         if (q[k] <= -PI) q[k] += 2.0 * PI;
     }

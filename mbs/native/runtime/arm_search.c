@@ -5,7 +5,7 @@
 
 #include "rigid.h"
 
-static const double SAME = 1e-6, CLOSE = 1e-2, BETWEEN = 1e-13; /* see arm_same */
+static const double SAME = 1e-9, CLOSE = 1e-2, BETWEEN = 1e-14; /* see arm_same */
 
 /* Source: Steele, Lea and Flood 2014, the generator SplitMix64, entered at its `position`. */
 static double uniform(unsigned long long seed, unsigned long long position) {

@@ -84,8 +84,8 @@ def test_label_says_which_sign_each_branch_takes():
     _, T = state(system, 4)
     q = [np.array(igm(T, b)[0]).ravel() for b in range(8)]
     order = [one.indices[0] for one in igm.steps]
-    for b, label in enumerate(igm.labels):
-        for other, theirs in enumerate(igm.labels):
+    for b, label in enumerate(igm.signs):
+        for other, theirs in enumerate(igm.signs):
             differ = [x for x, y in zip(label.split(), theirs.split(), strict=True) if x != y]
             if len(differ) == 1:
                 place = int(differ[0][1]) - 1

@@ -9,7 +9,7 @@ from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.models.inverse_geometry import solve
-from mbs.models.inverse_geometry.answer import Anatomy, anatomy, labels
+from mbs.models.inverse_geometry.branches import Anatomy, anatomy, labels
 from mbs.models.inverse_geometry.chain import frame_chain
 
 

@@ -1,0 +1,172 @@
+"""Names of the branches of an inverse geometric model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbs.closed_forms.arm import Arm, Array
+from mbs.closed_forms.sequence import StepSequence
+from mbs.models.inverse_geometry.chain import FrameChain
+from mbs.models.inverse_geometry.closed_form import at_poses, plain_branches
+
+# Names of the branches of an arm with a spherical wrist: shoulder, elbow, wrist.
+#
+# Source: Lee & Ziegler 1984, definitions of the arm, elbow and wrist indicators.
+
+
+_PARALLEL = 1e-9
+"""Sine or cosine between axes, or part of the arm's length, that counts as zero: products of six
+transforms leave 1e-15 of rounding, descriptions with twelve digits 1e-12."""
+_UNDECIDED = 1e-9
+"""Indicator of a branch, lengths in those of the arm, at which two branches meet: its sign is
+rounding there and names neither."""
+
+
+@dataclass(frozen=True, slots=True)
+class Anatomy:
+    """Which branches of an arm have a name.
+
+    Attributes:
+        shoulder: axes 1 and 2 are at right angles, so that the wrist centre is before or behind
+            the shoulder.
+        elbow: axes 2 and 3 are parallel, so that the elbow is above or below the line from the
+            shoulder to the wrist centre.
+        wrist: axes 4, 5 and 6 meet.
+    """
+
+    shoulder: bool
+    elbow: bool
+    wrist: bool
+
+
+def anatomy(arm: Arm) -> Anatomy:
+    """What an arm has of shoulder, elbow and wrist."""
+    if arm.size != 6 or any(arm.prismatic[3:]) or not _wrist_meets(arm):
+        return Anatomy(False, False, False)
+    axes, origins = arm.lines(np.zeros(6))
+    shoulder = not any(arm.prismatic[:2]) and abs(axes[0] @ axes[1]) < _PARALLEL
+    parallel = np.linalg.norm(np.cross(axes[1], axes[2])) < _PARALLEL
+    apart = np.linalg.norm(np.cross(axes[1], origins[2] - origins[1])) > _PARALLEL * arm.length
+    elbow = shoulder and not arm.prismatic[2] and bool(parallel and apart)
+    return Anatomy(bool(shoulder), elbow, True)
+
+
+def labels(arm: Arm, has: Anatomy, q: Array) -> list[str]:
+    """The names of configurations' branches, such as "shoulder right, elbow up, no flip".
+
+    A name is left out where the configuration stands between two branches; an arm without a
+    spherical wrist has none.
+
+    Args:
+        arm: its joints.
+        has: what it has of shoulder, elbow and wrist.
+        q: (m, n) configurations [rad or m].
+    """
+    if not has.wrist:
+        return [""] * len(q)
+    axes, points = arm.lines(q)
+    a, p = np.moveaxis(axes, 1, 0), np.moveaxis(points, 1, 0)
+    reach = _meeting(a[4], p[4], a[5], p[5]) - p[1]
+    right = _dot(a[0], np.cross(a[1], reach)) / arm.length
+    bend = _dot(a[1], np.cross(reach, p[2] - p[1])) / arm.length**2
+    turn = _dot(np.cross(a[3], a[5]), a[4])
+    return [_label(has, *three) for three in zip(right, bend, turn, strict=True)]
+
+
+def _label(has: Anatomy, right: float, bend: float, turn: float) -> str:
+    names = []
+    if has.shoulder and abs(right) > _UNDECIDED:
+        names.append("shoulder right" if right > 0 else "shoulder left")
+    if has.elbow:
+        names.append(_elbow(bend, right))
+    if abs(turn) > _UNDECIDED:
+        names.append("no flip" if turn > 0 else "flip")
+    return ", ".join(name for name in names if name)
+
+
+def _elbow(bend: float, right: float) -> str:
+    if abs(bend) <= _UNDECIDED:
+        return "elbow straight"
+    if abs(right) <= _UNDECIDED:
+        return ""
+    return "elbow up" if bend * right > 0 else "elbow down"
+
+
+def _wrist_meets(arm: Arm) -> bool:
+    """Whether axes 4, 5, 6 meet in one point; they do so in every configuration if in two."""
+    # any two [rad or m], at neither of which an axis is at zero or a half turn
+    return all(_meet(arm, q) for q in (np.full(6, 0.3), np.full(6, 1.1)))
+
+
+def _meet(arm: Arm, q: Array) -> bool:
+    axes, points = arm.lines(q)
+    if min(np.linalg.norm(np.cross(axes[k], axes[k + 1])) for k in (3, 4)) < _PARALLEL:
+        return False
+    centre = _meeting(axes[4], points[4], axes[5], points[5])
+    away = [np.linalg.norm(np.cross(axes[k], centre - points[k])) for k in (3, 4, 5)]
+    return bool(max(away) < _PARALLEL * arm.length)
+
+
+def _meeting(a: Array, p: Array, b: Array, r: Array) -> Array:
+    """The point of the line (p, a) nearest the line (r, b), (..., 3)."""
+    n = np.cross(a, b)
+    s = _dot(np.cross(r - p, b), n) / _dot(n, n)
+    return np.asarray(p + s[..., None] * a, dtype=float)
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray(np.sum(a * b, axis=-1), dtype=float)
+
+
+# Names of the branches of a closed form: those of shoulder, elbow and wrist where these are one to
+# one, else its signs.
+
+
+_SAMPLES, _SEED = 1000, 20261123
+"""Configurations at which branches are named: of eight branches each is met, and one whose name
+changes from place to place is met under both names."""
+
+
+def branch_labels(chain: FrameChain, sequence: StepSequence, p: Array) -> tuple[str, ...]:
+    """The names of all branches of a closed form; kept on the system.
+
+    They are those of shoulder, elbow and wrist where every branch has one of its own wherever the
+    arm is, else the signs, such as "q3:+ q2:- q5:+".
+
+    Args:
+        chain: what is solved for.
+        sequence: its steps, for the same p.
+        p: (np,) the parameters.
+    """
+
+    def named() -> tuple[str, ...]:
+        arm = chain.arm(p)
+        has = anatomy(arm)
+        names = _names_at_samples(chain, sequence, p, arm, has) if has.wrist else []
+        if names and len(set(names)) == len(names) and all(names):
+            return tuple(names)
+        return tuple(sequence.label(b) or "1" for b in range(sequence.branches))
+
+    found: tuple[str, ...] = chain.system.cached(
+        ("branch labels", sequence, *chain.key, p.tobytes()), named
+    )
+    return found
+
+
+def _names_at_samples(
+    chain: FrameChain, sequence: StepSequence, p: Array, arm: Arm, has: Anatomy
+) -> list[str]:
+    """The name that each branch has at all samples; "" where it has none, or several."""
+    rng = np.random.default_rng(_SEED)
+    spread = np.where(arm.prismatic, arm.length, np.pi)
+    T = arm.pose(rng.uniform(-1.0, 1.0, (_SAMPLES, arm.size)) * spread)
+    every = at_poses(plain_branches(chain, sequence, p), T)
+    # solutions, but for what rounding leaves of them
+    solved = every.residual < _UNDECIDED * max(1.0, arm.length)
+    names = []
+    for b in range(sequence.branches):
+        own = set(labels(arm, has, every.q[solved[:, b], b]))
+        names.append(own.pop() if len(own) == 1 else "")
+    return names

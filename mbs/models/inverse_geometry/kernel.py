@@ -1,0 +1,223 @@
+"""What a closed form or the general method gives for one pose, and whether that is certain."""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from casadi import SX, Function
+from numpy.typing import NDArray
+
+import mbs.closed_forms.arm_core as core
+from mbs.closed_forms.arm import Array
+from mbs.closed_forms.arm_search import General
+from mbs.closed_forms.sequence import StepSequence
+from mbs.errors import NoClosedForm
+from mbs.models.inverse_geometry.branches import branch_labels
+from mbs.models.inverse_geometry.chain import FrameChain
+from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, plain_branches, sequence_of
+from mbs.models.inverse_geometry.gathering import ILL_CONDITIONED, closed_form_name, general_ready
+from mbs.models.inverse_geometry.many import draft_solutions, general_draft, suspect_of
+from mbs.native.array_calls import array_builtin
+from mbs.native.compiled import MachineCode, machine_code
+
+CERTAIN, DOUBTFUL, NOT_RIGID, FAILED = range(4)
+"""What came of a pose, as in `pose.h`."""
+
+_CANDIDATES = 144
+"""ROTH_CONFIGURATIONS: those of the general method for one pose, at most."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseDraft:
+    """The configurations of a chain for one pose.
+
+    Attributes:
+        q: (m, n) positions of the chain's joints [rad or m], angles in (-pi, pi].
+        residual: (m,) largest difference of an element from the target pose.
+        branch: (m,) numbers of their branches.
+        certain: whether none is missing and none there twice; not so next to a singular one.
+    """
+
+    q: Array
+    residual: Array
+    branch: NDArray[np.int64]
+    certain: bool
+
+
+class PoseKernel:
+    """How one pose after the other is solved for a chain and numbers of its parameters.
+
+    Attributes:
+        chain: what is solved for.
+        p: (np,) the parameters.
+        method: "pieper", "paul" or "general".
+        labels: of the branches; of the general method numbers.
+    """
+
+    def __init__(
+        self, chain: FrameChain, p: Array, method: str, solves: StepSequence | General
+    ) -> None:
+        """Use `kernel_of`, which chooses how the chain is solved."""
+        self.chain, self.p, self.method = chain, p, method
+        self._solves, self._arm = solves, chain.arm(p)
+        if isinstance(solves, General):
+            self.labels = tuple(str(k + 1) for k in range(_CANDIDATES))
+        else:
+            self.labels = branch_labels(chain, solves, p)
+        self._handed = core.Handed(self._arm)
+        self._lock = threading.Lock()
+        self._code: _PoseCode | None = None
+
+    def code(self) -> _PoseCode | None:
+        """The compiled call; None where there is no C compiler, or it cannot be compiled."""
+        with self._lock:
+            if self._code is None:
+                self._code = _pose_code(self.chain, self.p, self._solves)
+            return self._code
+
+    def draft(self, T: Array) -> PoseDraft:
+        """The solutions for a rigid transform T, (4, 4)."""
+        if isinstance(self._solves, General):
+            return self._by_arrays(T) if core.core_of(self._arm) is None else self._by_code(T)
+        if self._code is not None:
+            return self._by_code(T)
+        return self._by_arrays(T)
+
+    def _by_code(self, T: Array) -> PoseDraft:
+        code = self.code()
+        found = None if code is None else code.call(T, code.solver)
+        if found is None:
+            return self._by_arrays(T)
+        q, residual, branch, told = found
+        count, state = (int(x) for x in told)
+        if state == FAILED:
+            return self._by_arrays(T)
+        own = q.T[:count, list(self.chain.indices)]
+        return PoseDraft(own, residual[:count], branch[:count].astype(int), state == CERTAIN)
+
+    def _by_arrays(self, T: Array) -> PoseDraft:
+        """In numpy."""
+        library = core.core_of(self._arm)
+        if isinstance(self._solves, General):
+            draft = general_draft(self._solves, T[None])
+        elif library is not None:
+            return self._settled(library, T, self._solves)
+        else:
+            draft = draft_solutions(self.chain, self._solves, self.p, self._arm, T[None])
+        valid = np.flatnonzero(draft.valid[0])
+        q = draft.q[0, valid]
+        turned = np.where(self._arm.prismatic | (np.abs(q) <= np.pi), q, self._arm.wrapped(q))
+        return PoseDraft(turned, draft.residual[0, valid], valid, not draft.searched[0])
+
+    def _settled(self, library: ctypes.CDLL, T: Array, sequence: StepSequence) -> PoseDraft:
+        """By the interpreter and the compiled core."""
+        plain = plain_branches(self.chain, sequence, self.p)
+        q, *rows = (part.full() for part in plain.call([T])[:4])
+        every = (np.ascontiguousarray(q.T), *(row.ravel() for row in rows))
+        handed = self._handed
+        found = core.settled_by(library, handed, T, every, suspect_of(sequence))
+        own, residual, branch, certain = found
+        return PoseDraft(own, residual, branch.astype(int), certain)
+
+
+def kernel_of(chain: FrameChain, p: Array, method: str = "auto") -> PoseKernel | None:
+    """How single poses are solved, kept on the system; None where only the slow methods hold.
+
+    Args:
+        chain: what is solved for.
+        p: (np,) the parameters.
+        method: "pieper", "paul", "general", "search", or "auto" for a closed form, else the
+            general method.
+
+    Raises:
+        NoClosedForm: "pieper" or "paul" was asked for and does not fit.
+    """
+
+    def made() -> PoseKernel | None:
+        if method in (*CLOSED_FORMS, "auto"):
+            try:
+                sequence = sequence_of(chain, method, p)
+                return PoseKernel(chain, p, closed_form_name(chain, sequence, p), sequence)
+            except NoClosedForm:
+                if method != "auto":
+                    raise
+        ready = None if method == "search" else general_ready(chain, p)
+        if ready is None or ready.prepared.regularity < ILL_CONDITIONED:
+            return None
+        return PoseKernel(chain, p, "general", ready)
+
+    kernel: PoseKernel | None = chain.system.cached(
+        ("pose kernel", method, *chain.key, p.tobytes()), made
+    )
+    return kernel
+
+
+# The compiled call: one builtin for all robots, which is handed what it needs to know of one.
+
+
+class _SolverStruct(ctypes.Structure):
+    """`pose_solver` of pose.h."""
+
+    _fields_ = (
+        *((name, ctypes.c_void_p) for name in ("arm", "loop", "evaluate", "checkout", "release")),
+        *((name, ctypes.c_longlong) for name in ("branches", "arguments", "results")),
+        *((name, ctypes.c_longlong) for name in ("integers", "reals")),
+        ("suspect", ctypes.c_double),
+        ("nq", ctypes.c_longlong),
+        *((name, ctypes.c_void_p) for name in ("indices", "others")),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _PoseCode:
+    """The compiled call of a kernel.
+
+    Attributes:
+        call: takes T and `solver`; gives q (nq, room), residual (room,), branch (room,) and
+            (count, state), or None for a T that it does not take.
+        solver: a `pose_solver` as doubles that are never looked at.
+        holds: what it points to.
+    """
+
+    call: Callable[..., Any]
+    solver: Array
+    holds: tuple[Any, ...]
+
+
+def _pose_code(chain: FrameChain, p: Array, solves: StepSequence | General) -> _PoseCode | None:
+    arm, nq = chain.arm(p), chain.system.nq
+    library = core.core_of(arm)
+    if library is None:
+        return None
+    plain = chain.indices == tuple(range(nq))
+    indices = np.array(chain.indices, dtype=np.int64)
+    others = np.array(chain.system.position(chain.locked))
+    end = (nq, None if plain else indices.ctypes.data, others.ctypes.data)
+    machine: MachineCode | None = None
+    if isinstance(solves, General):
+        handed, room, work = solves.handed.arm, _CANDIDATES, _CANDIDATES
+        own = _SolverStruct(handed.address, solves.handed.address, *[None] * 3, *[0] * 5, 0.0, *end)
+    else:
+        machine, handed = machine_code(plain_branches(chain, solves, p)), core.Handed(arm)
+        if machine is None:
+            return None
+        arguments, results, integers, reals = machine.work
+        room = solves.branches
+        work = arguments + results + integers + reals + 3 * room
+        addresses = (machine.evaluate, machine.checkout, machine.release)
+        sizes = (room, arguments, results, integers, reals)
+        own = _SolverStruct(handed.address, None, *addresses, *sizes, suspect_of(solves), *end)
+    solver = np.frombuffer(memoryview(own).cast("B"), dtype=np.float64)
+    inputs = [SX.sym("T", 4, 4), SX.sym("solver", solver.size)]
+    room = max(room, 2)  # one column alone would come as a vector
+    outputs = [SX.zeros(nq, room), SX.zeros(room), SX.zeros(room), SX.zeros(2)]
+    signature = Function("mbs_pose", inputs, outputs)
+    call = array_builtin(signature, core.path_of(library), finite=False, more=work)
+    if call is None:
+        return None
+    return _PoseCode(call, solver, (own, handed, indices, others, machine, solves))

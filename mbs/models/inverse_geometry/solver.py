@@ -1,0 +1,226 @@
+"""All configurations for one pose after the other, each from one compiled call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.model_function import require_system
+from mbs.closed_forms.arm import Array
+from mbs.closed_forms.arm_search import Nearest
+from mbs.models.inverse_geometry.chain import target_pose
+from mbs.models.inverse_geometry.closed_form import require_method
+from mbs.models.inverse_geometry.gathering import METHODS
+from mbs.models.inverse_geometry.kernel import CERTAIN, PoseKernel, kernel_of
+from mbs.models.inverse_geometry.solutions import Solutions
+from mbs.models.inverse_geometry.solve import chain_or_none, solve_rigid
+
+
+class PoseAnswer:
+    """The configurations for one pose.
+
+    Attributes:
+        q: (m, nq) configurations, angles in (-pi, pi] [rad or m].
+        residual: (m,) largest element of pose(q) - T [m or 1].
+        singular: whether the pose is next to a singular one, so that slower methods joined in;
+            copies are then merged, and `solutions` tells multiplicities and self-motions.
+    """
+
+    __slots__ = ("_T", "_branch", "_labels", "_solutions", "_solver", "q", "residual", "singular")
+
+    q: Array
+    residual: Array
+    singular: bool
+
+    def __init__(
+        self,
+        q: Array,
+        residual: Array,
+        labels: Mapping[int, str] | tuple[str, ...],
+        branch: Any,
+        solver: PoseSolver,
+        T: Any,
+        solutions: Solutions | None,
+    ) -> None:
+        """Made by a `PoseSolver`."""
+        self.q, self.residual, self.singular = q, residual, solutions is not None
+        self._labels, self._branch, self._solver, self._T = labels, branch, solver, T
+        self._solutions = solutions
+
+    def __len__(self) -> int:
+        """The number of configurations."""
+        return len(self.q)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The name of the branch of each."""
+        if self._branch is None:
+            return tuple(self._labels)  # type: ignore[arg-type]
+        return tuple([self._labels[b] for b in self._branch.tolist()])
+
+    @property
+    def solutions(self) -> Solutions:
+        """What `solve` says of the pose: singular values, families, limits; made when asked for."""
+        if self._solutions is None:
+            self._solutions = self._solver.solutions(self._T)
+        return self._solutions
+
+    @property
+    def reason(self) -> str:
+        """Why there is no configuration, "" where there is one; looked for when asked for."""
+        return "" if len(self.q) else self.solutions.reason
+
+    @property
+    def nearest(self) -> Nearest | None:
+        """The reachable pose nearest to the wanted one where there is no configuration."""
+        return None if len(self.q) else self.solutions.nearest
+
+    def __repr__(self) -> str:
+        note = ", next to a singular configuration" if self.singular else ""
+        return f"<PoseAnswer: {len(self)} configurations{note}>"
+
+
+class PoseSolver:
+    """``solver(T)`` gives all configurations that take a frame to a pose, in microseconds.
+
+    Attributes:
+        system: the robot.
+        frame: what is brought to the pose; None for the terminal frame.
+        locked: positions of joints that stay where they are, by name [rad or m].
+        parameters: values of symbols, by name.
+        method: as it was asked for.
+        used: the method that solves regular poses; "search" where there is none but that.
+        labels: of all branches of a closed form, in their order; else empty.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        frame: str | int | None,
+        locked: Mapping[str, float] | None,
+        parameters: Mapping[str, float] | None,
+        method: str,
+    ) -> None:
+        """Made by `solver`."""
+        self.system, self.frame, self.method = system, frame, method
+        self.locked = None if locked is None else dict(locked)
+        self.parameters = None if parameters is None else dict(parameters)
+        require_method(system, method, METHODS)
+        p = np.array(system.parameter_values(parameters))
+        chain = chain_or_none(system, frame, locked)
+        open_chain = None if chain is None or system.is_closed else chain
+        self._kernel: PoseKernel | None = None
+        if open_chain is not None:
+            self._kernel = kernel_of(open_chain, p, method)
+        self.used = self._kernel.method if self._kernel else "search"
+        closed_form = self._kernel is not None and self.used != "general"
+        self.labels = self._kernel.labels if self._kernel and closed_form else ()
+        # numbers of branches come as doubles, which equal integers as keys
+        self._names = dict(enumerate(self._kernel.labels)) if self._kernel else {}
+        code = self._kernel.code() if self._kernel else None
+        self._call = code.call if code else _decline
+        self._data = code.solver if code else None
+        turning = [c.kind == "revolute" for c in system.coordinates]
+        self._turning: NDArray[np.bool_] = np.array(turning, dtype=bool)
+
+    def __call__(self, T: Any) -> PoseAnswer:
+        """All configurations for a pose.
+
+        Args:
+            T: (4, 4) the pose of the frame seen from the base [m]: an array of any type and
+                order, or nested lists.
+
+        Raises:
+            ModelError: T is no rigid transform.
+        """
+        found = self._call(T, self._data)
+        if found is not None:
+            q, residual, branch, told = found
+            count, state = told.tolist()
+            if state == CERTAIN:
+                m = int(count)
+                own = T if m else np.array(T)
+                return PoseAnswer(q.T[:m], residual[:m], self._names, branch[:m], self, own, None)
+        return self._in_python(target_pose(self.system, T))
+
+    def _in_python(self, T: Array) -> PoseAnswer:
+        """Without compiled code, and next to singular configurations."""
+        draft = self._kernel.draft(T) if self._kernel else None
+        if draft is None or self._kernel is None or not draft.certain:
+            found = self._solve(T)
+            q = found.q
+            turned = self._turning & (np.abs(q) > np.pi)
+            q = np.where(turned, np.pi - np.mod(np.pi - q, 2 * np.pi), q)
+            residual = np.array([s.residual for s in found])
+            return PoseAnswer(q, residual, tuple(s.branch for s in found), None, self, T, found)
+        q = np.empty((len(draft.q), self.system.nq))
+        q[:] = self.system.position(self._kernel.chain.locked)
+        q[:, list(self._kernel.chain.indices)] = draft.q
+        return PoseAnswer(q, draft.residual, self._names, draft.branch, self, T, None)
+
+    def solutions(self, T: Any) -> Solutions:
+        """What `solve` gives for a pose (4, 4) [m]."""
+        return self._solve(target_pose(self.system, T))
+
+    def _solve(self, T: Array) -> Solutions:
+        return solve_rigid(
+            self.system,
+            T,
+            self.frame,
+            self.method,
+            locked=self.locked,
+            parameters=self.parameters,
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A pickle holds what it was made of, and is compiled where it is read."""
+        return _again, (self.system, self.frame, self.locked, self.parameters, self.method)
+
+    def __repr__(self) -> str:
+        return f"<PoseSolver {self.system.name}: {self.used}, {len(self.labels)} branches>"
+
+
+def _decline(*_: Any) -> None:
+    """The call where nothing is compiled."""
+
+
+def _again(system: System, frame: Any, locked: Any, parameters: Any, method: str) -> PoseSolver:
+    return solver(system, frame, locked=locked, parameters=parameters, method=method)
+
+
+def solver(
+    system: System,
+    frame: str | int | None = None,
+    *,
+    locked: Mapping[str, float] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    method: str = "auto",
+) -> PoseSolver:
+    """What gives all configurations for one pose after the other, for control loops and planners.
+
+    Everything that does not depend on the pose is done here, once: the steps of the closed form
+    are derived and compiled. A call then takes microseconds with a closed form, and a fraction of
+    a millisecond for a general arm of six joints. Next to singular configurations, and for robots
+    with loops, a call is one of `solve`, which takes milliseconds. Without a C compiler the
+    answers are the same, in a fraction of a millisecond.
+
+    Args:
+        system: as of `solve`.
+        frame: a body, a named frame, the number of a link, or None for the terminal frame.
+        locked: positions of joints that stay where they are, by name [rad or m].
+        parameters: values of symbols, the others at their defaults.
+        method: "auto", or one of "pieper", "paul", "general", "search".
+
+    Returns:
+        PoseSolver, to be called with poses; it can be pickled.
+
+    Raises:
+        ModelError: a name or a method is unknown, or more than six joints are free.
+        NoClosedForm: "pieper" or "paul" was asked for and does not fit.
+    """
+    require_system(system)
+    return PoseSolver(system, frame, locked, parameters, method)

@@ -4,6 +4,11 @@ from support.arms import general_6r, placements, slides_and_turns, spherical, th
 from support.catalogue_systems import catalogue_system
 
 from mbs.closed_forms.arm import Arm, gap_to, motion
+from mbs.closed_forms.raghavan_roth import (
+    candidates,
+    candidates_many,
+    prepare,
+)
 from mbs.closed_forms.raghavan_roth.numbers import (
     back_parts,
     half_parts,
@@ -13,11 +18,6 @@ from mbs.closed_forms.raghavan_roth.numbers import (
 )
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.chain import frame_chain
-from mbs.models.inverse_geometry.raghavan_roth import (
-    candidates,
-    candidates_many,
-    prepare,
-)
 
 ROBOTS = (
     "crx10",

@@ -5,9 +5,9 @@ from support.arms import general_6r, slides_and_turns
 from support.catalogue_systems import catalogue_system
 
 import mbs
+from mbs.closed_forms.raghavan_roth import characteristic
 from mbs.errors import NoClosedForm
 from mbs.models.inverse_geometry.chain import frame_chain
-from mbs.models.inverse_geometry.raghavan_roth import characteristic
 
 CHARACTERISTIC = {
     "puma560": lambda: catalogue_system("puma560"),

@@ -215,6 +215,24 @@ def compare_first_derivatives(system, name, derivatives):
         close(*(J(*x) for J in both))
 
 
+@pytest.mark.parametrize("way", ["always", "jacobians_alone"])
+@pytest.mark.parametrize("seed", [1, 3])
+def test_quaternions_are_loops_where_the_equations_normalise_them(seed, way, request):
+    request.getfixturevalue(way)
+    system = driven_tree(seed, n=4).assemble()
+    model = models.with_implicit_jacobian(system, models.direct_dynamics(system))
+    assert taken(model, 1) == (way == "always", True)
+    assert taken(models.direct_dynamics(system), 1) is None
+    f = compiled(model, fast=True)
+    q, v, tau = random_state(system, np.random.default_rng(seed))
+    close(f(q, v, tau), model(q, v, tau))
+    x = [MX.sym(f"s{k}", model.size_in(k)) for k in range(3)]
+    for part in range(3):
+        both = [Function("J", x, [ca.jacobian(g(*x), x[part])]) for g in (f, model)]
+        for scale in (1.0, 1.3):  # off unit length too
+            close(*(J(scale * q, v, tau) for J in both))
+
+
 def as_tuple(value):
     return value if isinstance(value, tuple) else (value,)
 

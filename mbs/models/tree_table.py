@@ -12,7 +12,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import default_in
 from mbs.assembly.tree import Link, quaternion_slices
 from mbs.components.joints import Motion
-from mbs.native.compiled import LoopCode
+from mbs.native.kernel import LoopCode
 from mbs.native.tree_core import (
     COMMON,
     ROWS,

@@ -467,7 +467,10 @@ def with_implicit_jacobian(system: System, ddm: Function) -> Function:
     }
     model = Function(ddm.name(), symbols, ddm.call(arguments), names, ddm.name_out(), options)
     like: Callable[[Function], Function] = getattr(ddm, "like", Function)
-    return like(model)
+    made = like(model)
+    if isinstance(made, ModelFunction):
+        made.loops = TreeLoops(system, "ddm", normalises=True)
+    return made
 
 
 def _check(system: System, ddm: Function) -> None:

@@ -12,7 +12,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import default_in
 from mbs.assembly.tree import Link, quaternion_slices
 from mbs.components.joints import Motion
-from mbs.native.compiled import LoopCode
+from mbs.native.kernel import LoopCode
 from mbs.native.tree_core import (
     COMMON,
     ROWS,
@@ -73,23 +73,26 @@ class TreeLoops:
     Attributes:
         system: the tree.
         name: of the model in the core.
+        normalises: whether the equations bring quaternions to unit length first, as the core does.
     """
 
     system: System
     name: str
+    normalises: bool = False
 
     def code(self, function: Function, derivatives: int) -> LoopCode | None:
         """C text of what loops do better than the equations; None where that is nothing.
 
-        Quaternions are left to the equations: off unit length these have other values, which
-        solvers that move q freely meet.
+        Quaternions are left to equations that do not normalise them: off unit length, where
+        solvers that move q freely come, these have other values.
 
         Args:
             function: the equations.
             derivatives: how often the answer will be differentiated.
         """
         system, name = self.system, self.name
-        if function.name() != name or quaternion_slices(system.tree) or unknown_to_core(system):
+        other = bool(quaternion_slices(system.tree)) and not self.normalises
+        if function.name() != name or other or unknown_to_core(system):
             return None
         longest = _longest_branch(system)
         many = function.n_instructions() > _MANY

@@ -5,7 +5,7 @@ import functools
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import casadi
 
@@ -21,28 +21,9 @@ from mbs.native.derivatives_on_demand import (
     source,
     write_record,
 )
-from mbs.native.kernel import FAST_FLAGS, index_key, indexed_library, kernel_library
+from mbs.native.kernel import LoopCode, index_key, indexed_library, kernel_library
 from mbs.native.patterns import pattern_source, patterns_source
 from mbs.text import in_c_comment, quoted
-
-
-class LoopCode(NamedTuple):
-    """C text by which a model loops over its links, in place of equations written out.
-
-    Attributes:
-        files: file name to text, for `FAST_FLAGS`.
-        common: of the C files, those that many libraries have.
-        value: whether it has the Function itself.
-        jacobian: whether it has its Jacobian `jac_f`.
-        by_parameters: whether that calls `byp_f` for the derivatives by the last input, which the
-            text does not have.
-    """
-
-    files: Mapping[str, str]
-    common: tuple[str, ...]
-    value: bool
-    jacobian: bool
-    by_parameters: bool
 
 
 def compiled(
@@ -87,8 +68,11 @@ def compiled(
     like: Any = getattr(function, "like", None)
     library = None
     if compiler_found():
-        library = _looped_library(function, derivatives) if fast and loops else None
-        library = library or _library(function, derivatives, fast)
+        offer: Any = getattr(function, "loops", None) if fast and loops else None
+        looped: LoopCode | None = None if offer is None else offer.code(function, derivatives)
+        if looped is not None and looped.value:
+            library = _looped_library(function, derivatives, looped)
+        library = library or _library(function, derivatives, fast, looped)
     if library is None:
         result: Any = with_array_calls(casadi.Function(function), None, like)
     else:
@@ -100,66 +84,68 @@ def compiled(
     return result  # type: ignore[no-any-return]
 
 
-def _library(function: casadi.Function, derivatives: int, fast: bool) -> Path | None:
-    """The library of a Function and its derivatives; None when they cannot be written as C."""
+def _library(
+    function: casadi.Function, derivatives: int, fast: bool, loops: LoopCode | None
+) -> Path | None:
+    """The library of a Function and its derivatives; None when they cannot be written as C.
+
+    Args:
+        function: is written as straight lines.
+        derivatives: how often it can be differentiated.
+        fast: of which kind the code is.
+        loops: what its Jacobian is made of; None for straight lines.
+    """
     if calls_machine_code([function]):
         return None
-    options = f"{'fast' if fast else 'exact'}, {derivatives} derivatives"
+    options = f"{'fast' if fast else 'exact'}, {derivatives} derivatives{_digest(loops)}"
     found = index_key(function, options)
     if found is None:
-        return _built(function, derivatives, fast, None)
+        return _built(function, derivatives, fast)
     key, text = found
-    every = derivatives_of(function.name(), derivatives)
-    record = write_record(key, text, every, fast) if derivatives else None
+    every = derivatives_of(function.name(), derivatives) if derivatives else []
+    if loops is not None and loops.by_parameters:
+        every.append(by_parameters(function.name()))
+    record = write_record(key, text, every, fast, loops) if derivatives else None
     if derivatives and record is None:  # nothing can be kept on disk: all at once
-        return _built(function, derivatives, fast, None)
-    return indexed_library(key, lambda: _built(function, derivatives, fast, record))
+        return _built(function, derivatives, fast)
+    later = {} if record is None else {"derivatives.c": source(every, record)}
+    return indexed_library(key, lambda: _compiled([function], fast, later))
 
 
-def _looped_library(function: casadi.Function, derivatives: int) -> Path | None:
-    """The library of a model that loops over its links; None where straight lines are better.
+def _looped_library(function: casadi.Function, derivatives: int, code: LoopCode) -> Path | None:
+    """The library of a model that loops over its links; None where its record cannot be kept.
 
-    What the loops do not have is in it as straight lines: the Function, or its derivatives, which
-    are made on demand.
+    Derivatives that the loops do not have are straight lines, made on demand.
     """
-    offer: Any = getattr(function, "loops", None)
-    code: LoopCode | None = None if offer is None else offer.code(function, derivatives)
-    if code is None:
-        return None
     name = function.name()
     every = derivatives_of(name, derivatives) if derivatives else []
     if code.jacobian:
         of_lines = {f"jac_{name}"}
-        if code.value and derivatives == 1:  # CasADi makes products of the Jacobian
+        if derivatives == 1:  # CasADi makes products of the Jacobian
             of_lines |= {f"fwd1_{name}", f"adj1_{name}"}
         every = [part for part in every if part.name not in of_lines]
         every += [by_parameters(name)] if code.by_parameters else []
-    if code.value and not every:
-        return cached_library(code.files, FAST_FLAGS, common=code.common)
-    digest = hashlib.sha256("\0".join(code.files.values()).encode()).hexdigest()
-    found = index_key(function, f"loops, {derivatives} derivatives, {digest}")
-    if found is None:
-        return None
-    key, text = found
-    record = write_record(key, text, every, True)
+    if not every:
+        return code.library({})
+    found = index_key(function, f"loops, {derivatives} derivatives{_digest(code)}")
+    record = None if found is None else write_record(*found, every, fast=True)
     if record is None:
         return None
-    files = {**code.files, "derivatives.c": source(every, record)}
-    if code.value:
-        return cached_library(files, FAST_FLAGS, common=code.common)
-    return indexed_library(key, lambda: kernel_library([function], files, code.common))
+    return code.library({"derivatives.c": source(every, record)})
 
 
-def _built(
-    function: casadi.Function, derivatives: int, fast: bool, record: Path | None
-) -> Path | None:
-    """The library of a Function, and of its derivatives, or of what makes them on demand."""
-    if record is None:
-        every = [function, *_all_derivatives(function, derivatives)]
-        known = _products(function) if derivatives == 2 else []
-        return _compiled(every, fast, {"patterns.c": patterns_source(known)} if known else {})
-    later = {"derivatives.c": source(derivatives_of(function.name(), derivatives), record)}
-    return _compiled([function], fast, later)
+def _digest(code: LoopCode | None) -> str:
+    """What distinguishes C text from other text of the same model, such as of another version."""
+    if code is None:
+        return ""
+    return f", {hashlib.sha256(repr(sorted(code.files.items())).encode()).hexdigest()}"
+
+
+def _built(function: casadi.Function, derivatives: int, fast: bool) -> Path | None:
+    """The library of a Function and its derivatives, all of them made at once."""
+    every = [function, *_all_derivatives(function, derivatives)]
+    known = _products(function) if derivatives == 2 else []
+    return _compiled(every, fast, {"patterns.c": patterns_source(known)} if known else {})
 
 
 def _compiled(
@@ -241,9 +227,13 @@ def fetch_derivatives(record: str, number: int, table: int) -> None:
         CompilerError: the file has gone, or the compiler refused the code.
         ModelError: it cannot be written as C.
     """
-    given, every, fast = read_record(Path(record))
+    given, every, fast, loops = read_record(Path(record))
     part = every[number]
     function = given(part)
+    if loops is not None and part.name == f"jac_{function.name()}":
+        own = [by_parameters(function.name())] if loops.by_parameters else []
+        later = {"derivatives.c": source(every, Path(record), own)} if own else {}
+        return fill(table, loops.library(later), every, number)
 
     def make() -> Path | None:
         if not part.pattern:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import json
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -24,6 +25,7 @@ import casadi
 from mbs.errors import CompilerError, ExportError
 from mbs.files import read_sealed, write_sealed
 from mbs.native.compiler import cache_dir
+from mbs.native.kernel import LoopCode
 
 _SUFFIX = ".function"
 
@@ -124,23 +126,28 @@ def derivatives_of(function: str, order: int) -> list[Derivative]:
     return every
 
 
-def source(every: Sequence[Derivative], record: Path) -> str:
+def source(
+    every: Sequence[Derivative], record: Path, own: Sequence[Derivative] | None = None
+) -> str:
     """C text that has the names of derivatives.
 
     Args:
         every: the derivatives.
         record: the file of the Function.
+        own: those of them whose names it has, all when left out.
     """
     head = resources.files("mbs.native").joinpath("runtime/on_demand.c").read_text("utf-8")
     path = os.fspath(record).replace("\\", "\\\\").replace('"', '\\"').replace("?", "\\?")
     count = sum(len(part.symbols()) for part in every)
     start = [f"#define COUNT {count}", f"#define PARTS {len(every)}", f'#define RECORD "{path}"']
-    return "\n".join([*start, head, *_lines(every)])
+    return "\n".join([*start, head, *_lines(every, every if own is None else own)])
 
 
-def _lines(every: Sequence[Derivative]) -> Iterator[str]:
+def _lines(every: Sequence[Derivative], own: Sequence[Derivative]) -> Iterator[str]:
     symbols = [(k, name, end) for k, part in enumerate(every) for name, end in part.symbols()]
     for index, (part, name, end) in enumerate(symbols):
+        if every[part] not in own:
+            continue
         kind, rest = _ENDS[end].split(", ", 1)
         at = f"{name}{end}, {index}, {part}, {'there' if end in _LATE else 'fetched'}"
         if kind == "void":
@@ -167,7 +174,9 @@ def fill(table: int, library: Path, every: Sequence[Derivative], made: int) -> N
             addresses[k] = ctypes.cast(code[name + end], ctypes.c_void_p).value
 
 
-def write_record(key: str, text: str, every: Sequence[Derivative], fast: bool) -> Path | None:
+def write_record(
+    key: str, text: str, every: Sequence[Derivative], fast: bool, loops: LoopCode | None = None
+) -> Path | None:
     """The file of a Function whose derivatives are made later; None where it cannot be written.
 
     Args:
@@ -175,10 +184,11 @@ def write_record(key: str, text: str, every: Sequence[Derivative], fast: bool) -
         text: the serialised Function.
         every: these derivatives.
         fast: of which kind their code is.
+        loops: what the Jacobian is made of, where it is not straight lines.
     """
     record = cache_dir() / f"{key}{_SUFFIX}"
     parts = (part.name + _ONLY_PATTERN * part.pattern for part in every)
-    content = f"{' '.join((str(int(fast)), *parts))}\n{text}".encode()
+    content = f"{' '.join((str(int(fast)), *parts))}\n{json.dumps(loops)}\n{text}".encode()
     with suppress(OSError, ValueError):
         if read_sealed(record) == content:
             return record
@@ -200,11 +210,13 @@ class Record(NamedTuple):
         function: gives the Function of that derivative.
         every: all of the derivatives.
         fast: of which kind their code is.
+        loops: what the Jacobian is made of, where it is not straight lines.
     """
 
     function: Callable[[Derivative], casadi.Function]
     every: Sequence[Derivative]
     fast: bool
+    loops: LoopCode | None = None
 
 
 _PROMISED: dict[Path, Record] = {}
@@ -230,13 +242,14 @@ def read_record(record: Path) -> Record:
     if record in _PROMISED:
         return _PROMISED[record]
     try:
-        options, _, text = read_sealed(record).decode().partition("\n")
+        options, code, text = read_sealed(record).decode().split("\n", 2)
         fast, *names = options.split()
         every = [
             Derivative(n.removesuffix(_ONLY_PATTERN), n.endswith(_ONLY_PATTERN)) for n in names
         ]
-        function = casadi.Function.deserialize(text)
-        return Record(lambda _: function, every, bool(int(fast)))
+        function, loops = casadi.Function.deserialize(text), json.loads(code)
+        by_loops = LoopCode(*loops) if loops else None
+        return Record(lambda _: function, every, bool(int(fast)), by_loops)
     except (OSError, ValueError, RuntimeError) as error:
         raise CompilerError(
             f"the derivatives of a compiled Function cannot be made: {record} has gone or is"

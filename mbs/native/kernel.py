@@ -8,7 +8,7 @@ import math
 import os
 import platform
 import tempfile
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib import resources
 from importlib.resources.abc import Traversable
 from itertools import accumulate
@@ -342,17 +342,41 @@ FAST_FLAGS = (
 """Contraction fuses multiplications and additions; nothing is assumed about infinities or NaN."""
 
 
+class LoopCode(NamedTuple):
+    """C text by which a model loops over its links, in place of equations written out.
+
+    Attributes:
+        files: file name to text, for `FAST_FLAGS`.
+        common: of the C files, those that many libraries have.
+        value: whether it has the Function itself.
+        jacobian: whether it has its Jacobian `jac_f`.
+        by_parameters: whether that calls `byp_f` for the derivatives by the last input, which the
+            text does not have.
+    """
+
+    files: Mapping[str, str]
+    common: Sequence[str]
+    value: bool
+    jacobian: bool
+    by_parameters: bool
+
+    def library(self, further: Mapping[str, str]) -> Path:
+        """The library of it and of other C files.
+
+        Raises:
+            CompilerError: there is no compiler, or it refused the code.
+        """
+        return cached_library({**self.files, **further}, FAST_FLAGS, common=self.common)
+
+
 def kernel_library(
-    functions: Sequence[Function],
-    further: Mapping[str, str] | None = None,
-    common: Collection[str] = (),
+    functions: Sequence[Function], further: Mapping[str, str] | None = None
 ) -> Path | None:
     """The library of fast code of Functions with different names.
 
     Args:
         functions: what to compile.
         further: file name to text of what else belongs to it.
-        common: of its C files, those that many libraries have.
 
     Returns:
         path of the library; None when some Function is not made of scalar operations that C has,
@@ -366,7 +390,7 @@ def kernel_library(
     except ModelError:
         return None
     notes = {"processor.h": f"/* {processor()} */\n"}
-    return cached_library({**files, **(further or {}), **notes}, FAST_FLAGS, common=common)
+    return cached_library({**files, **(further or {}), **notes}, FAST_FLAGS)
 
 
 @functools.cache

@@ -27,13 +27,13 @@ def cache(monkeypatch, tmp_path):
 def built(monkeypatch):
     """How often a text was written."""
     calls = []
-    make = MAKER._built
+    make = MAKER._compiled
 
     def counted(*arguments):
         calls.append(arguments)
         return make(*arguments)
 
-    monkeypatch.setattr(MAKER, "_built", counted)
+    monkeypatch.setattr(MAKER, "_compiled", counted)
     return calls
 
 

@@ -16,12 +16,13 @@ from typing import Any
 import casadi
 import numpy as np
 from casadi import DM, SX, Function
+from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.assembly.parts import AttachedPart
 from mbs.assembly.tables import EFFORT_UNIT
-from mbs.assembly.tree import position_rate
+from mbs.assembly.tree import position_rate, quaternion_slices
 from mbs.components.custom import Friction, OneWay, Stop
 from mbs.errors import ModelError
 from mbs.models.constrained_accelerations import (
@@ -36,14 +37,16 @@ from mbs.models.symbols import outputs_of, surroundings, symbols_of
 from mbs.recursions.composite_body import inertia_matrix
 from mbs.recursions.parts import PartsAt
 
+Array = NDArray[np.float64]
+
 CREEP = 1e-10
 """Velocity below which a coordinate does not move [rad/s or m/s]."""
 _BEYOND = 1e-9
 """How far beyond a limit a start may be by rounding, relative to the limit where it is large."""
 _ADHESION = 1e-9
 """Acceleration that a contact may pull with before it opens [rad/s^2 or m/s^2]."""
-_VANISHED = 1e-30
-"""Square of a row below which nothing moves it: levers shorter than 1e-15 m are rounding."""
+_CONFIGURATIONS, _SEED = 4, 20261124
+"""Where the typical levers of a row are looked for: one that vanishes here does not elsewhere."""
 KINDS = ("lower", "upper", "pulled", "pushed", "stopped")
 """Indicators of a coordinate: it meets a limit; the effort that constrains it is too far below
 zero, or above; it stops sliding."""
@@ -100,7 +103,6 @@ class ContactState:
 
     Attributes:
         rows: (k, nv) E, how the velocities of the contacts follow from v.
-        sizes: (k, 1) lengths of these rows.
         velocity: (k, 1) velocities of slip and of gaps, w = E v + what it is at rest.
         bias: (k, 1) dw/dt = E a + bias.
         measure: (k, 1) gaps, and velocities of what holds in one way; zero for friction alone.
@@ -108,7 +110,6 @@ class ContactState:
     """
 
     rows: SX
-    sizes: SX
     velocity: SX
     bias: SX
     measure: SX
@@ -127,6 +128,7 @@ class Contacts:
         velocities: indices in v where the row is that of a coordinate alone; None elsewhere.
         positions: indices in q where the gap is that of a coordinate alone; None elsewhere.
         groups: equal numbers for equal rows.
+        levers: (k, nv) typical magnitudes of the elements of E.
         stops, frictions: the elements, None where there is none.
         bounds: (k, 1) lower limits, then upper ones; zero where there is none.
         has_lower, has_upper, has_friction: (k, 1) 1 where there is one.
@@ -142,6 +144,7 @@ class Contacts:
     velocities: tuple[int | None, ...]
     positions: tuple[int | None, ...]
     groups: tuple[int, ...]
+    levers: Array
     stops: tuple[ContactElement | None, ...]
     frictions: tuple[ContactElement | None, ...]
     bounds: tuple[SX, SX]
@@ -171,14 +174,18 @@ class Contacts:
         (E,) = casadi.substitute([self.state.rows], [self.q], [casadi.densify(q)])
         return SX(E)
 
-    def unit_rows(self, q: SX) -> tuple[SX, SX]:
-        """(k, nv) the rows, brought to unit length; (k, 1) their lengths.
+    @property
+    def sizes(self) -> DM:
+        """(k, 1) typical lengths of the rows, 1 for those of coordinates.
 
-        Equations that weigh rows need them of one size, however short a lever is.
+        Equations that weigh rows take them in these units, however short a lever is. They are
+        constants, so that a row whose lever vanishes in some configuration vanishes there.
         """
-        rows, sizes = self.state.rows, self.state.sizes
-        E, found = casadi.substitute([rows, sizes], [self.q], [casadi.densify(q)])
-        return casadi.mtimes(casadi.diag(1 / found), E), found
+        return DM(np.linalg.norm(self.levers, axis=1))
+
+    def scaled_rows(self, q: SX) -> SX:
+        """(k, nv) E, each row divided by its typical length."""
+        return casadi.mtimes(casadi.diag(1 / self.sizes), self.rows(q))
 
     def velocity(self, q: SX, v: SX) -> SX:
         """(k, 1) velocities of slip and of gaps."""
@@ -380,6 +387,7 @@ def _contacts(system: System) -> Contacts:
         velocities=tuple(row.number for row in found),
         positions=tuple(_index(measure, q) for measure in measures),
         groups=tuple([row.key for row in found].index(row.key) for row in found),
+        levers=_levers(system, found, rows, q),
         stops=stops,
         frictions=frictions,
         bounds=(_column(stops, "lower"), _column(stops, "upper")),
@@ -394,12 +402,6 @@ def _contacts(system: System) -> Contacts:
         v=v,
         state=ContactState(
             rows=rows,
-            sizes=_stack(
-                SX(1)
-                if row.number is not None
-                else casadi.sqrt(casadi.fmax(casadi.sumsqr(row.E), _VANISHED))
-                for row in found
-            ),
             velocity=velocity,
             bias=SX(casadi.densify(casadi.jtimes(velocity, q, position_rate(system.tree, q, v)))),
             measure=_stack(SX(0) if x is None else x for x in measures),
@@ -455,6 +457,25 @@ def contact_velocity(system: System, law: Friction | Stop | OneWay, q: SX, v: SX
     if isinstance(law, Stop):
         return SX(casadi.jtimes(SX(law.gap), q, position_rate(system.tree, q, v)))
     return SX(law.slip if isinstance(law, Friction) else law.velocity)
+
+
+def _levers(system: System, found: Sequence[_ContactRow], rows: SX, q: SX) -> Array:
+    """(k, nv) the largest magnitudes of E as assembled and in some random configurations."""
+    rng = np.random.default_rng(_SEED)
+    p = [1.0 if x.default is None else x.default for x in system.parameters]
+    E = Function("E", [q, system.p], [casadi.densify(rows)])
+    configurations = [np.array(system.configuration)]
+    for _ in range(_CONFIGURATIONS):
+        other = rng.uniform(-1.0, 1.0, system.nq)
+        for part in quaternion_slices(system.tree):
+            other[part] /= np.linalg.norm(other[part])
+        configurations.append(other)
+    every = np.abs([np.array(E(x, p)) for x in configurations])
+    levers: Array = np.max(np.where(np.isfinite(every), every, 0.0), axis=0)
+    for j, row in enumerate(found):
+        if row.number is None and not levers[j].any():
+            levers[j] = 1.0  # nothing is known of it
+    return levers
 
 
 def _measure(row: _ContactRow) -> SX | None:
@@ -532,9 +553,9 @@ def switched_dynamics(system: System, driven: tuple[int, ...]) -> Function:
     def build() -> tuple[Named, Named]:
         s, k = symbols_of(system, "tree"), len(driven) + len(contacts)
         tau, a_p, acting = SX.sym("tau", system.nv), SX.sym("a_p", k), SX.sym("acting", k)
-        rows, sizes = contacts.unit_rows(s.q)
+        rows = contacts.scaled_rows(s.q)
         E = casadi.vertcat(unit_rows(system, driven), rows)
-        every = casadi.vertcat(SX.ones(len(driven)), sizes)
+        every = casadi.vertcat(DM.ones(len(driven)), contacts.sizes)
         a, _, tau_p = constrained_accelerations(
             system, s, tau, surroundings(system), E, a_p / every, acting
         )
@@ -542,7 +563,7 @@ def switched_dynamics(system: System, driven: tuple[int, ...]) -> Function:
         # a limited link may be massless: what a stop then counts on is a millionth of the others'
         least = SX(1e-6 * inertia_size(system, A, s))
         own = [
-            _row_inertia(A, rows[j, :]) / sizes[j] ** 2 if n is None else A[n, n]
+            _row_inertia(A, rows[j, :]) / contacts.sizes[j] ** 2 if n is None else A[n, n]
             for j, n in enumerate(contacts.velocities)
         ]
         inertia = casadi.vertcat(*(casadi.fmax(x, least) for x in own))
@@ -553,7 +574,7 @@ def switched_dynamics(system: System, driven: tuple[int, ...]) -> Function:
 
 
 def _row_inertia(A: SX, row: SX) -> SX:
-    """What moves along a row of unit length at a unit velocity."""
+    """What moves along a row of about unit length at a unit velocity."""
     return SX(casadi.mtimes(row, casadi.mtimes(A, row.T)))
 
 
@@ -664,9 +685,8 @@ def impact(system: System, driven: tuple[int, ...]) -> Function:
     def build() -> tuple[Named, Named]:
         s, k = symbols_of(system, "tree"), len(driven) + len(contacts)
         change, acting = SX.sym("dv_p", k), SX.sym("acting", k)
-        rows, sizes = contacts.unit_rows(s.q)
-        E = casadi.vertcat(unit_rows(system, driven), rows)
-        every = casadi.vertcat(SX.ones(len(driven)), sizes)
+        E = casadi.vertcat(unit_rows(system, driven), contacts.scaled_rows(s.q))
+        every = casadi.vertcat(DM.ones(len(driven)), contacts.sizes)
         A, (J, psi) = inertia_matrix(system.tree, s.poses), loop_rows(system, s)
         right = SX.zeros(system.nv), SX.zeros(psi.numel()), change / every
         dv, _, P = constrained(system, s, (A, J, E), right, acting)

@@ -10,7 +10,8 @@ rolling, where more positions are free than velocities.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi
 import numpy as np
@@ -26,7 +27,14 @@ from mbs.errors import ModelError
 from mbs.loops.closure import closure_rows, independent_closure
 from mbs.loops.configuration import Values, start
 from mbs.loops.velocity import velocity_rows
-from mbs.models.contacts import require_no_contacts
+from mbs.models.contacts import (
+    KINDS,
+    ContactEquations,
+    contact_equations,
+    contacts_of,
+    require_lasting_rows,
+    require_no_contacts,
+)
 from mbs.models.dae import driving, motors, start_efforts
 from mbs.models.direct_dynamics import independent_dynamics
 from mbs.models.joint_wrenches import shown_outputs
@@ -85,6 +93,9 @@ class Linearisation:
             inputs u of components and parameters p where there are any; tau (nv, 1) are the efforts
             of the tree.
         x, u, y: name and unit of states, inputs and outputs.
+        holds: of the inputs of `function`, what is zero and what is positive where contacts do what
+            was asked; None where there are none.
+        contacts: what the elements of both are, in words.
     """
 
     system: System
@@ -92,6 +103,8 @@ class Linearisation:
     x: tuple[Quantity, ...]
     u: tuple[Quantity, ...]
     y: tuple[Quantity, ...]
+    holds: Function | None = None
+    contacts: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
     def at(
         self,
@@ -114,7 +127,8 @@ class Linearisation:
             parameters: values of symbols, the others at their defaults.
 
         Raises:
-            ModelError: a name is unknown, or a symbol has no value.
+            ModelError: a name is unknown, a symbol has no value, or contacts do not do in this
+                state what `mode` says.
             Unclosable: the loops cannot be closed at q0.
         """
         system = self.system
@@ -128,25 +142,62 @@ class Linearisation:
             "u": by_name(system, "inputs", inputs, system.inputs, system.u_default),
             "p": system.parameter_values(parameters),
         }
+        if self.holds is not None:
+            self._require_mode(*(point[name] for name in self.holds.name_in()))
         found = self.function(*(point[name] for name in self.function.name_in()))
         A, B, C, D = (np.array(value) for value in found)
         return LinearModel(A, B, C, D, self.x, self.u, self.y)
 
+    def _require_mode(self, *point: Any) -> None:
+        """Refuse a state in which contacts slip, leave or meet what they should not."""
+        assert self.holds is not None
+        zero, positive = (np.array(value).ravel() for value in self.holds.call(point))
+        still, kept = self.contacts
+        for name, value in zip(still, zero, strict=True):
+            if not abs(value) <= _STILL:
+                raise ModelError(
+                    f"{self.system.name}: {name} is {value:.6g} in this state, and zero in the mode"
+                    " that was asked for; give another state or mode"
+                )
+        for name, value in zip(kept, positive, strict=True):
+            if not value > -_STILL:
+                raise ModelError(
+                    f"{self.system.name}: in this state it happens at once that {name}; give"
+                    " another state or mode"
+                )
 
-def linearise(system: System, outputs: Sequence[str] | None = None) -> Linearisation:
+
+_STILL = 1e-6
+"""Velocity of what sticks, and distance from a limit, in a state that a user writes with six
+digits."""
+
+
+def linearise(
+    system: System,
+    outputs: Sequence[str] | None = None,
+    mode: Mapping[str, float] | None = None,
+) -> Linearisation:
     """Linear equations of small motions about any state, loops and rolling discs included.
 
+    What sticks adds a velocity that stays zero, and an eigenvalue of zero with it.
+
     Args:
-        system: open or closed, without rigid stops and Coulomb friction.
+        system: open or closed.
         outputs: names of y: positions "j1.q", velocities "j1.v", accelerations "j1.a", what
             sensors read such as "tip.p.x", outputs of components such as "spring.force"; the
             positions and velocities of all coordinates when left out.
+        mode: what rigid stops and dry frictions do, by their names such as "clutch" or "belt.grip",
+            as their column `mode` of `mbs.simulate.run` says: of a friction the direction of
+            sliding, 0 where it sticks; of a stop -1 or 1 at a limit, 0 between. Those that are left
+            out are 0. Without it a system with contacts or events is refused.
 
     Raises:
-        ModelError: an output is unknown, or contacts act.
+        ModelError: an output or an element is unknown, or contacts act and no mode is given.
     """
     require_system(system)
-    require_no_contacts(system, "linearise")
+    if mode is None:
+        require_no_contacts(system, "linearise without mode=")
+    modes = _modes(system, mode or {})
     known = _output_units(system)
     names = list(known)[: system.nq + system.nv] if outputs is None else list(outputs)
     for name in names:
@@ -159,12 +210,28 @@ def linearise(system: System, outputs: Sequence[str] | None = None) -> Linearisa
     def build() -> tuple[Named, Named]:
         s = symbols_of(system)
         tau = SX.sym("tau", system.nv)
-        A, B, C, D = _matrices(system, s, tau, names)
+        A, B, C, D = _matrices(system, s, tau, names, modes)
         inputs = [("q", s.q), ("v" + s.suffix, s.v), ("tau", tau)]
         return inputs, [("A", A), ("B", B), ("C", C), ("D", D)]
 
+    def held() -> tuple[Named, Named]:
+        s = symbols_of(system)
+        tau = SX.sym("tau", system.nv)
+        found = _contact(system, s, tau + part_equations(system, s.q, s.v_tree)[0], modes)
+        assert found is not None
+        contact, (positive, stuck) = found
+        still = stuck * contact.state.velocity
+        away = contact.contacts.distance(s.q, SX(DM(modes[: len(contact.contacts)])))
+        inputs = [("q", s.q), ("v" + s.suffix, s.v), ("tau", tau)]
+        return inputs, [("zero", casadi.vertcat(still, away)), ("positive", positive)]
+
     check = configuration_check(system, "independent")
-    function = model_function(system, ("linear", *names), build, check)
+    function = model_function(system, ("linear", *modes, *names), build, check)
+    holds: Function | None = None
+    words: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+    if modes:
+        holds = model_function(system, ("holds", *modes), held, check)
+        words = _words(system)
     free = [system.speeds[k] for k in system.free]
     active = [system.speeds[k] for k in system.active]
     x = [(f"{row.name}.q", row.unit.removesuffix("/s")) for row in free]
@@ -177,7 +244,58 @@ def linearise(system: System, outputs: Sequence[str] | None = None) -> Linearisa
         (*x, *system.states),
         (*u, *system.inputs),
         tuple((name, known[name]) for name in names),
+        holds,
+        words,
     )
+
+
+def _modes(system: System, mode: Mapping[str, float]) -> tuple[float, ...]:
+    """The 2 k modes of k rows of contacts, limits and then directions of sliding."""
+    contacts = contacts_of(system)
+    require_lasting_rows(system, contacts)
+    elements = (*contacts.stops, *contacts.frictions)
+    names = [element.name for element in elements if element is not None]
+    for name, value in mode.items():
+        if name not in names:
+            raise ModelError(
+                f"{system.name}: mode has {quoted(name)}, which is no rigid stop or dry friction;"
+                f" {did_you_mean(str(name), names)}"
+            )
+        if value not in (-1, 0, 1):
+            raise ModelError(f"{system.name}: the mode of {name} is {value!r}; give -1, 0 or 1")
+    return tuple(float(mode.get(x.name, 0)) if x else 0.0 for x in elements)
+
+
+def _words(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What is zero, and what happens where a number is not positive."""
+    contacts = contacts_of(system)
+    still = [f"the velocity on which {name} acts" for name in contacts.names]
+    still += [f"the distance of {name} from its limit" for name in contacts.names]
+    told = {
+        "lower": "is below a limit",
+        "upper": "is above a limit",
+        "pulled": "must pull, or hold more than it can",
+        "pushed": "must push, or hold more than it can",
+        "stopped": "slides the other way",
+    }
+    return tuple(still), tuple(f"{name} {told[kind]}" for kind in KINDS for name in contacts.names)
+
+
+def _contact(
+    system: System, s: ModelSymbols, tau: SX, modes: Sequence[float]
+) -> tuple[ContactEquations, tuple[SX, SX]] | None:
+    """What contacts do in given modes, with numbers in place of their symbols.
+
+    Returns:
+        the equations, and what must be positive (5 k, 1) and what is stuck (k, 1); None where there
+        are no contacts.
+    """
+    found = contact_equations(system, s.q, s.v_tree, tau, {})
+    if found is None:
+        return None
+    values = [found.a, found.pushes, found.indicators, found.modes.stuck]
+    a, pushes, indicators, stuck = casadi.substitute(values, [found.values], [SX(DM(modes))])
+    return replace(found, a=a, pushes=pushes), (indicators, stuck)
 
 
 def _output_units(system: System) -> dict[str, str]:
@@ -190,15 +308,19 @@ def _output_units(system: System) -> dict[str, str]:
 
 
 def _matrices(
-    system: System, s: ModelSymbols, tau: SX, names: Sequence[str]
+    system: System, s: ModelSymbols, tau: SX, names: Sequence[str], modes: Sequence[float]
 ) -> tuple[SX, SX, SX, SX]:
     q, v_a, v = s.q, s.v, s.v_tree
     efforts, given, rates = driving(system, q, v)
     motor_efforts = efforts[: efforts.numel() - system.u.numel()]
     every = tau + given
     # the independent accelerations
-    pushed = s.reduced_effort(every) if s.reduction is not None else every
-    (a_a,) = outputs_of(system, independent_dynamics(system), q, v_a, pushed)
+    contact = _contact(system, s, every, modes)
+    if contact is None:
+        pushed = s.reduced_effort(every) if s.reduction is not None else every
+        (a_a,) = outputs_of(system, independent_dynamics(system), q, v_a, pushed)
+    else:
+        a_a, every = contact[0].a[list(system.active)], every + contact[0].pushes
     a = s.tree_acceleration(a_a)
     # how positions move: dq = T dxi for small displacements xi of the free coordinates
     speed = SX.sym("v", system.nv)

@@ -393,8 +393,9 @@ def test_a_free_box_falls_on_its_four_corners_and_rests():
     assert result.events[0][0] == pytest.approx(np.sqrt(2 * 0.2 / G), abs=1e-9)
     assert result["f.z.q"][-1] == pytest.approx(0.1, abs=1e-12)
     efforts = [result[f"c{k}.floor.effort"][-1] for k in range(4)]
-    # four stops for three freedoms: rows that depend on others share alike, to the regularisation
-    np.testing.assert_allclose(efforts, 2.0 * G / 4, rtol=1e-7)
+    # rows that depend on others share about alike; rigid bodies determine no shares
+    assert sum(efforts) == pytest.approx(2.0 * G, rel=1e-12)
+    np.testing.assert_allclose(efforts, 2.0 * G / 4, rtol=1e-2)
 
 
 def test_a_free_body_bounces_on_one_corner_without_loss(tmp_path):
@@ -471,6 +472,40 @@ def test_friction_between_points_of_a_closed_loop_takes_what_its_slip_says():
     total = result["kinetic_energy"] + result["potential_energy"] + result["line.heat"]
     assert result["line.heat"][-1] > 1.0
     assert np.ptp(total) < 1e-8  # J
+
+
+class Shoe(Rub):
+    """The brake shoe, with its heat."""
+
+    heat = custom.state("J")
+
+    def rates(self, at):
+        return {"heat": at.limit * casadi.fabs(at.point.v[0])}
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-10])
+def test_a_lever_that_vanishes_on_the_way_turns_the_friction_round(tolerance):
+    m = mbs.Mechanism("pendulum", gravity=(0, 0, -G))
+    bar = m.add(Body("bar", mass=1.2, com=(0, 0, -0.3), inertia=(0.05, 0.05, 0)))
+    m.connect(m.world, Revolute("j", axis="y"), bar)
+    m.add(Shoe("shoe", bar.at(0, 0, -0.6), limit=0.3))
+    result = run(m.assemble(), 4.0, v0={"j": 12.0}, tolerance=tolerance)
+    assert result["j.q"][-1] > 6 * np.pi  # past +-90 degrees, where the point moves across x
+    total = result["kinetic_energy"] + result["potential_energy"] + result["shoe.heat"]
+    assert np.ptp(total) < 10 * tolerance
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-10])
+def test_a_point_rubs_where_a_loop_passes_singular_configurations(tolerance):
+    """All bars lie on one line twice a revolution; levers vanish twice as well."""
+    m = mbs.load("n_four_bar")
+    bodies = list(m.bodies())
+    m.add(Shoe("shoe", bodies[1].at(0.05, 0.02, 0), limit=0.3))
+    result = run(m.assemble(), 5.0, v0={"a0": 4.0}, tolerance=tolerance)
+    assert result["a0.q"][-1] > 8 * np.pi
+    total = result["kinetic_energy"] + result["potential_energy"] + result["shoe.heat"]
+    # of 40 J; what is passed is projected
+    assert np.ptp(total) < 10 * max(tolerance, 1e-8)
 
 
 class Edge(Custom):

@@ -1,6 +1,7 @@
 """Brakes, clutches and freewheels that stick: common speeds, times of sticking, heat, FMUs."""
 
 import casadi
+import fmpy
 import numpy as np
 import pytest
 from support.messages import refused
@@ -265,6 +266,9 @@ def test_an_fmu_of_a_clutch_and_a_freewheel_moves_as_run_does(tmp_path, fmi, kin
     here = run(system, 2.0, v0=speeds, u={"clutch": 1.0}, step=0.01)
     assert [what for *_, what in here.events] == ["locks", "sticks"]
     path = mbs.export.fmu(system, tmp_path / "line.fmu", fmi=fmi)
+    modes = {v.name: v.description for v in fmpy.read_model_description(str(path)).modelVariables}
+    assert "direction of sliding" in modes["clutch.mode"]
+    assert "-1 where it is locked" in modes["free.mode"]
     there = mbs.simulate.fmu(
         path,
         2.0,

@@ -3,6 +3,7 @@
 import casadi
 import numpy as np
 import pytest
+from support.contact_mechanisms import four_bar
 from support.messages import refused
 
 import mbs
@@ -13,10 +14,18 @@ from mbs.components import (
     CoulombFriction,
     Custom,
     DCMotor,
+    ElasticShaft,
+    FixedFlange,
     Free,
     IdealGear,
     JointSensor,
+    PointMass,
+    Prismatic,
     Revolute,
+    RigidClutch,
+    RigidStop,
+    SampleHold,
+    ShaftInertia,
     Spherical,
     Spring,
     custom,
@@ -170,3 +179,71 @@ def test_what_is_refused():
     name = next(m.joints()).name
     m.add(CoulombFriction("friction", name, sliding=1.0))
     refused(ModelError, "linearise", by=lambda: linearise(m.assemble()))
+
+
+def clutched():
+    """Two inertias with a clutch between them, one of them on an elastic shaft."""
+    m = mbs.Mechanism("clutched", gravity=(0, 0, 0))
+    a, b = ShaftInertia("a", 0.2), ShaftInertia("b", 0.5)
+    clutch = RigidClutch("clutch", capacity=3.0)
+    shaft = ElasticShaft("shaft", stiffness=20.0, damping=0.1)
+    m.connect(shaft.flange_a, FixedFlange("wall").flange)
+    m.connect(shaft.flange_b, a.flange_a)
+    m.connect(a.flange_b, clutch.flange_a)
+    m.connect(clutch.flange_b, b.flange_a)
+    return m.assemble()
+
+
+def test_a_clutch_that_sticks_and_one_that_slips():
+    system = clutched()
+    sticks = linearise(system, mode={}).at(inputs={"clutch": 1.0})
+    w = np.sqrt(20 / 0.7 - (0.1 / 1.4) ** 2)
+    expected = [-0.1 / 1.4 - 1j * w, -0.1 / 1.4 + 1j * w, 0, 0]
+    np.testing.assert_allclose(sticks.eigenvalues, expected, atol=1e-7)
+    slips = linearise(system, mode={"clutch": -1}).at(inputs={"clutch": 1.0}, v0={"a": 2.0})
+    w = np.sqrt(20 / 0.2 - 0.25**2)
+    np.testing.assert_allclose(slips.eigenvalues, [-0.25 - 1j * w, -0.25 + 1j * w, 0, 0], atol=1e-7)
+    np.testing.assert_allclose(slips.B[:, 0], [0, 0, -3 / 0.2, 3 / 0.5], atol=1e-12)
+
+
+def test_friction_that_slides_in_a_loop_is_an_effort():
+    rubbed = four_bar(-9.81, CoulombFriction("dry", "a1", sliding=4.0))
+    model = linearise(rubbed, ["b1.a"], mode={"dry": 1}).at(v0={"a1": 1.0})
+    plain = linearise(four_bar(-9.81), ["b1.a"]).at(v0={"a1": 1.0}, tau0={"a1": -4.0})
+    for one, other in ((model.A, plain.A), (model.B, plain.B), (model.C, plain.C)):
+        np.testing.assert_allclose(one, other, atol=1e-9)
+
+
+def test_a_stop_that_holds_leaves_nothing_to_move():
+    system = four_bar(-9.81, RigidStop("end", "b1", upper=1.4))
+    model = linearise(system, mode={"end": 1}).at(q0={"b1": 1.4}, tau0={"a1": 30.0})
+    np.testing.assert_allclose(model.A, [[0, 1], [0, 0]], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("mode", "state", "told"),
+    [
+        ({}, {"v0": {"a": 2.0}}, "the velocity on which clutch acts is -2 in this state"),
+        ({"clutch": 1}, {"v0": {"a": 2.0}}, "at once that clutch slides the other way"),
+        ({}, {"q0": {"a": 3.0}}, "clutch must pull, or hold more than it can"),
+        ({"other": 1}, {}, "mode has 'other', which is no rigid stop or dry friction"),
+        ({"clutch": 3}, {}, "the mode of clutch is 3; give -1, 0 or 1"),
+    ],
+)
+def test_modes_that_do_not_hold_are_refused(mode, state, told):
+    system = clutched()
+    refused(
+        ModelError,
+        told,
+        by=lambda: linearise(system, mode=mode).at(inputs={"clutch": 1.0}, **state),
+    )
+
+
+def test_a_system_with_modes_of_its_own_between_events():
+    m = mbs.Mechanism("held", gravity=(0, 0, 0))
+    m.connect(m.world, Prismatic("x", axis="x", actuated=False), m.add(PointMass("mass", 2.0)))
+    hold = SampleHold("hold", period=0.1)
+    m.add(hold)
+    system = m.assemble()
+    refused(ModelError, "linearise without mode= has no events", by=lambda: linearise(system))
+    assert linearise(system, mode={}).at().A.shape[0] == 2 + len(system.states)

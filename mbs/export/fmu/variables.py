@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from mbs.assembly import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, RATE_UNIT, Coordinate
+from mbs.components.custom import Friction, OneWay
 from mbs.errors import ModelError
 from mbs.export.fmu.description import FmuVariable, Jumps, State, once
 from mbs.models.contacts import contacts_of
@@ -242,11 +243,14 @@ def jumps(system: System, state: MinimalState) -> Jumps | None:
     events = state.events
     if events is None:
         return None
-    stops = [stop for stop in contacts_of(system).stops if stop is not None]
+    contacts = contacts_of(system)
+    elements = [x for x in (*contacts.stops, *contacts.frictions) if x is not None]
     modes = []
-    for number, name in enumerate(element_names(contacts_of(system))):
+    for element, name in zip(elements, element_names(contacts), strict=True):
         text = "place: -1 at the lower limit, 1 at the upper one, 0 between them"
-        if number >= len(stops):
+        if isinstance(element.law, OneWay):
+            text = "-1 where it is locked, 0 where it is free"
+        elif isinstance(element.law, Friction):
             text = "direction of sliding, -1 or 1, and 0 where it sticks"
         described = f"of {name}, {text}"
         modes.append(FmuVariable(name=f"{name}.mode", min=-1, max=1, description=described))

@@ -69,13 +69,12 @@ def standstill(
         elif number in contacts.velocities:
             own = [j for j, other in enumerate(contacts.velocities) if other == number]
             may_move[k] = 1 - casadi.mmax(stuck[own])
-    every, sizes = contacts.unit_rows(motion.q)
-    E = every[rows, :]
+    E, sizes = contacts.scaled_rows(motion.q)[rows, :], contacts.sizes[rows]
     G = E[:, active] if motion.G is None else casadi.mtimes(E, motion.G)
     R = casadi.mtimes(casadi.diag(stuck[rows]), casadi.mtimes(G, casadi.diag(may_move)))
     S = casadi.mtimes(R, R.T) + casadi.diag(1 - stuck[rows]) + _SHARED * SX(DM.eye(len(rows)))
     D, LT, order = casadi.ldl(casadi.densify(S))
-    shares = casadi.ldl_solve(stuck[rows] * change[rows] / sizes[rows], D, LT, order)
+    shares = casadi.ldl_solve(stuck[rows] * change[rows] / sizes, D, LT, order)
     return casadi.densify(casadi.mtimes(R.T, shares))
 
 

@@ -61,8 +61,6 @@ _ASLEEP = 1e-6
 """What rows count in that case."""
 _SHARED = 1e-4
 """Square that is added to rows of contacts, which may depend on others: they converge as fast."""
-_SMALL = 1e-30
-"""Square of a row below which it vanishes: levers shorter than 1e-15 m are rounding."""
 _NEVER = 1e300
 """Pivot of a row that is left alone: what it would move, divided by this, is zero."""
 
@@ -145,19 +143,13 @@ def _touch(
     if touch is None:
         return SX(0, 1), SX(0, 1), SX(0, 1), SX(0, 1), SX(0, 1)
     contacts, modes = touch
-    E = casadi.mtimes(contacts.rows(q), casadi.diag(DM(columns)))
-    sizes = [
-        1 / casadi.sqrt(casadi.fmax(casadi.sumsqr(E[j, :]), _SMALL))
-        if k is None
-        else SX(1 / float(columns[k]))
-        for j, k in enumerate(contacts.velocities)
-    ]
+    sizes = DM(1 / np.linalg.norm(contacts.levers * columns, axis=1))
     return (
         contacts.distance(q, modes.limit),
         _switch(modes.limit**2),
         modes.stuck * contacts.velocity(q, v),
         _switch(modes.stuck),
-        casadi.vertcat(*sizes),
+        SX(sizes),
     )
 
 
@@ -216,8 +208,8 @@ def passage(
 ) -> Passage | None:
     """The functions of passages; None where nothing is lost.
 
-    They are None as well where rows bind velocities alone, and where contacts act on velocities
-    that are the rate of no known position.
+    They are None as well where rows bind velocities alone. Where a contact sticks on a velocity
+    that is the rate of no known position, every configuration counts as regular.
 
     Args:
         system: open or closed.
@@ -250,23 +242,22 @@ def passage(
         casadi.mtimes(casadi.diag(scale), J),
         -scale * bend,
     )
-    count, stuck = loops[0].numel(), SX(0, 1)
+    count, held = loops[0].numel(), list[int]()
     laws = [motion.law(t) for motion in motions]
     unit = SX(DM.eye(nv))
     drives = [m.velocity for m in motions]
     driven_rows = [q[number] - law[0] for number, law in zip(driven, laws, strict=True)]
     braked = SX(tau)
     anchors: list[SX] = []
-    E, bends = SX(0, nv), SX(0, 1)
+    E, bends, loose = SX(0, nv), SX(0, 1), list[int]()
     if contact is not None:
         modes, contacts = contact.modes, contact.contacts
-        places = [anchor for anchor in contacts.anchors if anchor is not None]
-        if len(places) < len(contacts):
-            return None
-        stuck, state = modes.stuck, contact.state
+        places = {j: x for j, x in enumerate(contacts.anchors) if x is not None}
+        held, stuck, state = list(places), modes.stuck[list(places)], contact.state
+        loose = [j for j in range(len(contacts)) if j not in places]
         p = casadi.vertcat(p, contact.values)
         braked -= casadi.mtimes(state.rows.T, modes.slide * state.sliding)
-        own = [contacts.state.rows, contacts.state.bias, *places]
+        own = [contacts.state.rows[held, :], contacts.state.bias[held], *places.values()]
         known: list[SX] = casadi.substitute(own, [contacts.q, contacts.v], [q, v])
         anchors = [stuck[j] * anchor for j, anchor in enumerate(known[2:])]
         E = casadi.mtimes(casadi.diag(stuck), known[0])
@@ -279,7 +270,7 @@ def passage(
     c = casadi.vertcat(loops[2], *(law[2] for law in laws), bends)
     has_quaternions = nq > nv  # else N is the unit matrix, and J are the slopes of `positions`
     rate = position_rate(system.tree, q, v)
-    rank = len(closure.rows) + len(motions) + (_count_stuck(contact) if contact else 0)
+    rank = len(closure.rows) + len(motions) + (_count_stuck(contact, held) if contact else 0)
     rows = [
         positions,
         casadi.jacobian(positions, q),
@@ -299,6 +290,10 @@ def passage(
         forces = with_inputs(system, forces, given_inputs)
     measure = _regularity(system, q, unit[drives, :])
     regularity = casadi.substitute(measure, q, at[0])
+    typical = _typical(system, q, measure)
+    if contact is not None and loose:  # what sticks without a position is for full steps
+        sticks = casadi.mmax(contact.modes.stuck[loose])
+        regularity = casadi.if_else(sticks, max(typical, 1.0), regularity)
     txp = [t, x, p] if inputs is None else [t, x, SX.sym("z", 0), inputs, p]
     sizes = (nq, nv, rates.numel(), positions.numel(), len(anchors))
     return Passage(
@@ -306,7 +301,7 @@ def passage(
         forces=_mostly_dense("forces", txp, forces),
         regularity=dense_function("regularity", txp, [regularity]),
         size=(*sizes, speeds.shape[0], int(bool(laws))),
-        typical=_typical(system, q, measure),
+        typical=typical,
     )
 
 
@@ -346,10 +341,11 @@ def _mostly_dense(name: str, inputs: Sequence[SX], outputs: Sequence[SX]) -> Fun
     return Function(name, list(inputs), values, {"cse": True})
 
 
-def _count_stuck(contact: ContactEquations) -> SX:
-    """How many rows are stuck, equal ones counted once."""
+def _count_stuck(contact: ContactEquations, rows: Sequence[int]) -> SX:
+    """How many of some rows are stuck, equal ones counted once."""
     groups, stuck = contact.contacts.groups, contact.modes.stuck
-    same = [[j for j, other in enumerate(groups) if other == k] for k in dict.fromkeys(groups)]
+    kept = dict.fromkeys(groups[j] for j in rows)
+    same = [[j for j in rows if groups[j] == k] for k in kept]
     return sum((casadi.mmax(stuck[rows]) for rows in same), SX(0))
 
 
@@ -443,7 +439,7 @@ def tree_state(
     )
     whole = [*point[:4], casadi.vertcat(system.p, contact.values) if contact else system.p]
     passes = through is not None
-    if through is None and (slips or contact):
+    if through is None and slips:
         through = _without_passages(system, (s.t, X, s.u, whole[4]))
     if through is None:
         return None

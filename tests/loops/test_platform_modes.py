@@ -10,7 +10,7 @@ from support.ring_loops import ring_loop
 
 import mbs
 import mbs.simulate
-from mbs.components import Body, Mechanism, Prismatic, Revolute
+from mbs.components import Body, Mechanism, Prismatic, Revolute, Rod
 from mbs.errors import LoopError, ModelError, NoClosedForm
 from mbs.loops import function, modes, solve
 
@@ -44,6 +44,19 @@ def test_plane_platforms(kind, seed):
     found = check(planar_platform(seed, legs, driven).assemble(), starts=60)
     assert found.proof == method
     assert len(found) in range(2, 7)
+
+
+def test_a_loop_behind_a_platform_follows():
+    """A rocker that a rod ties to the platform: two positions of it for each of the platform."""
+    m = planar_platform(1, ("RRR",) * 3, (0, 0, 0))
+    alone = modes(m.assemble())
+    platform = next(body for body in m.bodies() if body.name == "platform")
+    rocker = m.add(Body("rocker", mass=1, inertia=(1, 1, 1)))
+    m.connect(m.world.at(0.3, 0.2, 2.0, rotation=("x", 1.0)), Revolute("rocker.j"), rocker)
+    m.connect(rocker.at(1.0, 0.2), Rod("tie", length=2.5), platform.at(0.2, 0.1, 0.3))
+    system = m.assemble()
+    found = check(system, starts=200)
+    assert len(alone) <= len(found) <= 2 * len(alone)
 
 
 @pytest.mark.parametrize("kinds", ["RRRRRRR", "RRPRRPR", "RPRRRRP"])

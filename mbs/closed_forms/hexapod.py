@@ -391,6 +391,11 @@ hundredths at most there, and the root by as much as the root of that."""
 _CLOSED = 1e-11
 """Lengths of legs that fit, in parts of the size of the platform: Newton's method leaves 1e-15, and
 at a fold, where it is slow, 1e-13."""
+_REFINEMENTS = 60
+"""At a fold each halves the distance: as many as halvings of numbers of sixteen digits."""
+_NEARLY, _HALF, _LEAST = 1e-13, 0.3, 1e-4
+"""Errors of squares below which a second halving of the step is not tried, as rounding is all that
+is left, and the least part of a step that is tried elsewhere."""
 _EXACT, _LOOSE = 1e-16, 1e-12
 """Squares of lengths that are exact but for rounding, and relative singular values below which a
 pose is not moved along: those of folds."""
@@ -491,7 +496,7 @@ class _RealRoots(NamedTuple):
 
 def _real(a: Real, b: Real, square: Real, ends: Ends, t: Real) -> _RealRoots:
     """The real roots among the ends."""
-    near = ends.regular | ((t < 1) & (t > 1 - _FOLD))
+    near = t > 1 - _FOLD
     near &= np.linalg.norm(ends.x[:, :4], axis=1) > _FLAT**0.5
     order = np.argsort(~ends.regular[near], kind="stable")
     x, regular = ends.x[near][order], ends.regular[near][order]
@@ -519,23 +524,34 @@ def _is_same(e: Real, p: Real, other_e: Real, other_p: Real) -> bool:
 
 
 def _refined(a: Real, b: Real, square: Real, e: Real, p: Real) -> tuple[Real, Real, Real]:
-    """Newton's method on real poses, and the largest errors of squares of lengths (r,)."""
-    best_e, best_p, worst = e, p, np.full(len(e), np.inf)
-    for _ in range(30):
-        value, J = _slopes(a, b, e, p)
-        error = np.max(np.abs(value - square), axis=1, initial=0.0)
-        better = error < worst
-        best_e = np.where(better[:, None], e, best_e)
-        best_p = np.where(better[:, None], p, best_p)
-        worst = np.where(better, error, worst)
-        if not np.any(better & (error > _EXACT)):
+    """Newton's method on real poses, and the largest errors of squares of lengths (r,).
+
+    Steps that bring nothing are halved: at a fold they have no bounds.
+    """
+    share = np.ones(len(e))
+    value, J = _slopes(a, b, e, p)
+    worst = np.max(np.abs(value - square), axis=1, initial=0.0)
+    for _ in range(_REFINEMENTS):
+        going = (worst > _EXACT) & (share > np.where(worst < _NEARLY, _HALF, _LEAST))
+        if not np.any(going):
             break
         step = -np.linalg.pinv(2 * J, rcond=_LOOSE) @ (value - square)[..., None]
-        p = best_p + step[:, :3, 0]
-        turn = np.concatenate([np.ones((len(e), 1)), step[:, 3:, 0] / 2], axis=1)
-        e = _products(turn, best_e)
-        e = e / np.linalg.norm(e, axis=1, keepdims=True)
-    return best_e, best_p, worst
+        step = share[:, None] * step[..., 0]
+        turn = np.concatenate([np.ones((len(e), 1)), step[:, 3:] / 2], axis=1)
+        tried = _products(turn, e)
+        tried /= np.linalg.norm(tried, axis=1, keepdims=True)
+        place = p + step[:, :3]
+        other, slope = _slopes(a, b, tried, place)
+        error = np.max(np.abs(other - square), axis=1, initial=0.0)
+        better = error < worst
+        e, p = np.where(better[:, None], tried, e), np.where(better[:, None], place, p)
+        value, J = (
+            np.where(better[:, None], other, value),
+            np.where(better[:, None, None], slope, J),
+        )
+        worst = np.where(better, error, worst)
+        share = np.where(better, np.minimum(2 * share, 1), share / 2)
+    return e, p, worst
 
 
 def _products(e: Real, other: Real) -> Real:

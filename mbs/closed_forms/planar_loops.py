@@ -200,10 +200,14 @@ def _solve(loops: PlanarLoops) -> tuple[Real, Real, list[_Found]]:
     return np.concatenate([np.zeros((0, n)), *theta]), np.concatenate([np.zeros((0, m)), *s]), parts
 
 
+_LARGEST = 8
+"""Unknowns of a part: of four loops the determinant has seventy rows, of five 252."""
+
+
 def _smallest_part(loops: PlanarLoops) -> PlanarPart:
     n, m = loops.counts
     columns = np.concatenate([loops.angles, loops.slides], axis=1)
-    for size in range(1, n + m + 1):
+    for size in range(1, min(n + m, _LARGEST) + 1):
         for chosen in combinations(range(n + m), size):
             angles, slides = [k for k in chosen if k < n], [k - n for k in chosen if k >= n]
             if any(loops.carriers[j] not in (*angles, KNOWN) for j in slides):
@@ -212,7 +216,9 @@ def _smallest_part(loops: PlanarLoops) -> PlanarPart:
             own = _rank(rows @ columns[:, list(chosen)])
             if 2 * own >= size:
                 return PlanarPart(angles, slides, rows)
-    raise NoClosedForm("the loops do not determine all of their links")
+    raise NoClosedForm(
+        f"no {_LARGEST} or fewer of the {n + m} unknowns of plane loops follow from these alone"
+    )
 
 
 def _left_null(columns: Complex) -> Complex:
@@ -268,7 +274,7 @@ def _irreducible(loops: PlanarLoops) -> _Found:
         )
     theta, s, residual = refine(loops, found.theta, found.s)
     kept = residual < _OPEN
-    theta, s = _distinct(loops, theta[kept], s[kept])
+    theta, s = _distinct(loops, theta[kept], s[kept], residual[kept])
     return _Found(theta, s, found.method, found.singular)
 
 
@@ -332,18 +338,22 @@ def _angles_of(w: complex, value: float) -> list[float]:
 # Newton's method on all unknowns, many starts at once.
 
 
-_STEPS = 12
+_STEPS = 60
+"""At most: regular roots take two or three, folds halve the distance each."""
 _CLOSED = 1e-15
 """Rows that are exact but for rounding, lengths in parts of the size."""
+_NEARLY, _HALF, _LEAST = 1e-13, 0.3, 1e-4
+"""Rows below which a second halving of the step is not tried, as rounding is all that is left, and
+the least part of a step that is tried elsewhere."""
 _LOOSE = 1e-13
 """Relative singular value below which a root is not moved along: those of folds."""
-_SAME = 1e-6
+_SAME = 1e-4
 """Distance of two roots [rad, or parts of the size] below which they are one where the middle
-between them closes too: at a fold the two ends of Newton's method lie about a root of 1e-14 from
-it."""
-_BETWEEN = 1e-11
-"""Rows in that middle: at a fold the square of 1e-6, between two roots of their own a part of their
-distance."""
+between them closes as well as they do: at a fold Newton's method ends about the root of 1e-9, to
+which rows are judged, on both sides of it."""
+_BETWEEN = 1e-13
+"""Rows in that middle: of two roots of their own they are an eighth of the square of the distance,
+so that those 1e-6 apart are two."""
 
 
 def refine(loops: PlanarLoops, theta: Real, s: Real) -> tuple[Real, Real, Real]:
@@ -354,38 +364,49 @@ def refine(loops: PlanarLoops, theta: Real, s: Real) -> tuple[Real, Real, Real]:
     """
     n = theta.shape[1]
     x = np.concatenate([theta, s], axis=1)
-    best, worst = x.copy(), np.full(len(x), np.inf)
+    share = np.ones(len(x))
+    value, slope = loops.rows(x[:, :n], x[:, n:])
+    worst = np.max(np.abs(value), axis=1, initial=0.0)
     for _ in range(_STEPS):
-        value, slope = loops.rows(x[:, :n], x[:, n:])
-        residual = np.max(np.abs(value), axis=1, initial=0.0)
-        better = residual < worst
-        best[better], worst[better] = x[better], residual[better]
-        if not len(x) or np.all(worst < _CLOSED) or not np.any(better):
+        going = (worst > _CLOSED) & (share > np.where(worst < _NEARLY, _HALF, _LEAST))
+        if not np.any(going):
             break
         J = np.concatenate([slope.real, slope.imag], axis=1)
         r = np.concatenate([value.real, value.imag], axis=1)
         step = np.linalg.pinv(J, rcond=_LOOSE) @ r[:, :, None]
-        x = np.where(better[:, None], x - np.clip(step[:, :, 0], -0.5, 0.5), x)
-    best[:, :n] = pi - np.mod(pi - best[:, :n], 2 * pi)
-    return best[:, :n], best[:, n:], worst
+        tried = x - share[:, None] * step[:, :, 0]
+        other, other_slope = loops.rows(tried[:, :n], tried[:, n:])
+        error = np.max(np.abs(other), axis=1, initial=0.0)
+        better = error < worst
+        x = np.where(better[:, None], tried, x)
+        value = np.where(better[:, None], other, value)
+        slope = np.where(better[:, None, None], other_slope, slope)
+        worst = np.where(better, error, worst)
+        # at a fold steps have no bounds: those that bring nothing are halved
+        share = np.where(better, np.minimum(2 * share, 1), share / 2)
+    x[:, :n] = pi - np.mod(pi - x[:, :n], 2 * pi)
+    return x[:, :n], x[:, n:], worst
 
 
-def _distinct(loops: PlanarLoops, theta: Real, s: Real) -> tuple[Real, Real]:
+def _distinct(loops: PlanarLoops, theta: Real, s: Real, residual: Real) -> tuple[Real, Real]:
+    """The roots, each once: the best of those that are one."""
     kept = list[int]()
-    for k in range(len(theta)):
-        if not any(_is_same(loops, theta, s, k, other) for other in kept):
-            kept.append(k)
-    return theta[kept], s[kept]
+    for k in np.argsort(residual, kind="stable"):
+        if not any(
+            _is_same(loops, theta[[k, other]], s[[k, other]], residual[k]) for other in kept
+        ):
+            kept.append(int(k))
+    return theta[sorted(kept)], s[sorted(kept)]
 
 
-def _is_same(loops: PlanarLoops, theta: Real, s: Real, k: int, other: int) -> bool:
-    turn = pi - np.mod(pi - (theta[k] - theta[other]), 2 * pi)
-    slide = s[k] - s[other]
+def _is_same(loops: PlanarLoops, theta: Real, s: Real, residual: float) -> bool:
+    """Whether two roots are one, (2, n) angles and (2, m) displacements; the first is the worse."""
+    turn = pi - np.mod(pi - (theta[0] - theta[1]), 2 * pi)
+    slide = s[0] - s[1]
     if max(np.max(np.abs(turn), initial=0.0), np.max(np.abs(slide), initial=0.0)) > _SAME:
         return False
-    middle = theta[other] + turn / 2, s[other] + slide / 2
-    value, _ = loops.rows(middle[0][None], middle[1][None])
-    return bool(np.max(np.abs(value)) < _BETWEEN)
+    value, _ = loops.rows((theta[1] + turn / 2)[None], (s[1] + slide / 2)[None])
+    return bool(np.max(np.abs(value)) <= max(_BETWEEN, residual))
 
 
 # Revolute joints alone: L rows in 2 L directions, by Dixon's determinant.

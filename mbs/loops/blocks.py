@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import NamedTuple
 
 import casadi
@@ -178,18 +179,32 @@ holds by structure."""
 
 
 def planar_blocks(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
-    """Blocks of plane loops, each with all loops that share its unknown joints."""
+    """Blocks of plane loops: all that share unknown joints, then ever fewer of them."""
     links = {
         number: _unknown_links(work, number)
         for number in waiting
         if number < len(work.system.cuts) and _is_flat_kind(work, number)
     }
-    for numbers in _connected(links):
-        plane = _Plane.of(work, numbers, sorted(set().union(*(links[n] for n in numbers))))
-        if plane is not None:
-            cuts = [work.system.cuts[number].edge.joint.name for number in numbers]
-            indices = [work.system.tree.links[k].q.start for k in plane.links]
-            yield LoopBlock(", ".join(cuts), tuple(indices), plane.roots)
+    for together in _connected(links):
+        for numbers in _some(together, links):
+            plane = _Plane.of(work, numbers, sorted(set().union(*(links[n] for n in numbers))))
+            if plane is not None:
+                cuts = [work.system.cuts[number].edge.joint.name for number in numbers]
+                indices = [work.system.tree.links[k].q.start for k in plane.links]
+                yield LoopBlock(", ".join(cuts), tuple(indices), plane.roots)
+
+
+_MOST = 6
+"""Loops of which every choice is tried, 63 at most; of more all together alone."""
+
+
+def _some(numbers: list[int], links: dict[int, set[int]]) -> Iterator[list[int]]:
+    """All of some loops, then every choice of fewer that share unknown joints."""
+    yield numbers
+    for count in range(len(numbers) - 1, 0, -1) if len(numbers) <= _MOST else ():
+        for chosen in combinations(numbers, count):
+            if len(_connected({number: links[number] for number in chosen})) == 1:
+                yield list(chosen)
 
 
 def _is_flat_kind(work: PlanWork, number: int) -> bool:

@@ -167,10 +167,21 @@ def _of_blocks(system: System, steps: Sequence[Step], start: Vector, p: Vector) 
     locked = tuple(k for k in independent_indices(system) if k < system.nq)
     closing = Closing(system, p, locked)
     found = _distinct(_checked(system, _refined(closing, q[: system.nq]), (), p) for q in every)
+    complete = all(roots.complete for roots in told)
+    proofs = list(dict.fromkeys(roots.proof for roots in told))
+    if not complete:
+        searched = closed_configurations(closing, start[: system.nq])
+        more = [q for q in searched if not any(_near(system, q, mode) for mode in found)]
+        found += _distinct(_checked(system, q, (), p) for q in more)
+        proofs.append(f"a search from random starts found {len(more)} more")
     for mode in found:
         _require_locked(closing, np.array(mode.q))
-    proofs = dict.fromkeys(roots.proof for roots in told)
-    return ModeList(found, complete=all(roots.complete for roots in told), proof="; ".join(proofs))
+    return ModeList(found, complete=complete, proof="; ".join(proofs))
+
+
+def _near(system: System, q: Vector, mode: Mode) -> bool:
+    gap = difference(system, q, np.array(mode.q))
+    return bool(np.max(np.abs(gap), initial=0.0) < _SAME_START)
 
 
 def _every(steps: Sequence[Step], q: Vector, p: Vector, told: list[Roots]) -> Iterator[Vector]:

@@ -118,6 +118,16 @@ def test_similar_hexagons_hold_nothing():
     )
 
 
+def test_a_platform_that_moves_is_not_said_to_be_complete():
+    """Congruent ends and equal legs: it may be carried along a sphere. Nearly equal: not so."""
+    a = np.random.default_rng(0).normal(size=(6, 3))
+    found = poses(a, a, np.full(6, 1.3))
+    assert not found.complete
+    assert found.proof.startswith("homotopy, certified: 0 of 24 paths")
+    assert len(found.e) > 0
+    assert poses(a, a, np.array([1.3] * 5 + [1.3001])).complete
+
+
 def test_what_is_kept_are_forty_roots():
     for number in (0, 1):
         start = kept_start(number)

@@ -31,6 +31,14 @@ def test_three_loops(seed):
     assert missed(loops, roots, searched(loops, 1000, seed)) == 0
 
 
+def test_four_loops():
+    loops = closed_loops(np.random.default_rng(1), 4)
+    roots = planar_roots(loops)
+    assert roots.methods == ("Dixon's determinant of degree 70",)
+    assert len(roots.theta) == 10
+    assert missed(loops, roots, searched(loops, 600, 1)) == 0
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_sparse_loops_are_split(seed):
     """A triad, and behind it a dyad on its platform: no equation holds all six links."""
@@ -65,7 +73,7 @@ def test_rows_that_contradict_each_other_have_no_roots():
     assert len(planar_roots(more).theta) == 0
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(200 if EVERY_CASE else 20))
 def test_a_fold_is_kept(seed):
     """Legs in line with the normals of the curve of the platform: two roots meet."""
     rng = np.random.default_rng(seed)
@@ -83,7 +91,7 @@ def test_a_fold_is_kept(seed):
     folded = PlanarLoops(angles, loops.slides, loops.carriers, constant)
     roots = planar_roots(folded)
     gap = np.abs(np.exp(1j * roots.theta) - np.exp(1j * theta)).max(axis=1)
-    assert gap.min() < 1e-4
+    assert gap.min() < 1e-5
 
 
 def test_equal_legs_of_a_congruent_platform_move():
@@ -100,7 +108,7 @@ def test_what_is_not_known_is_said():
     rng = np.random.default_rng(1)
     with pytest.raises(NoClosedForm, match="hold 1 unknown prismatic joints"):
         planar_roots(closed_loops(rng, 3, slides=1))
-    with pytest.raises(NoClosedForm, match="do not determine all of their links"):
+    with pytest.raises(NoClosedForm, match="no 8 or fewer of the 3 unknowns"):
         planar_roots(PlanarLoops(np.ones((1, 3)), np.zeros((1, 0)), np.zeros(0, int), np.ones(1)))
     with pytest.raises(LoopError, match="a dyad of equal links"):
         planar_roots(PlanarLoops(np.ones((1, 2)), np.zeros((1, 0)), np.zeros(0, int), np.zeros(1)))

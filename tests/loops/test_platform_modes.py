@@ -10,7 +10,7 @@ from support.ring_loops import ring_loop
 
 import mbs
 import mbs.simulate
-from mbs.components import Body, Mechanism, Prismatic, Revolute
+from mbs.components import Body, Mechanism, Prismatic, Revolute, Rod
 from mbs.errors import LoopError, ModelError, NoClosedForm
 from mbs.loops import function, modes, solve
 
@@ -44,6 +44,19 @@ def test_plane_platforms(kind, seed):
     found = check(planar_platform(seed, legs, driven).assemble(), starts=60)
     assert found.proof == method
     assert len(found) in range(2, 7)
+
+
+def test_a_loop_behind_a_platform_follows():
+    """A rocker that a rod ties to the platform: two positions of it for each of the platform."""
+    m = planar_platform(1, ("RRR",) * 3, (0, 0, 0))
+    alone = modes(m.assemble())
+    platform = next(body for body in m.bodies() if body.name == "platform")
+    rocker = m.add(Body("rocker", mass=1, inertia=(1, 1, 1)))
+    m.connect(m.world.at(0.3, 0.2, 2.0, rotation=("x", 1.0)), Revolute("rocker.j"), rocker)
+    m.connect(rocker.at(1.0, 0.2), Rod("tie", length=2.5), platform.at(0.2, 0.1, 0.3))
+    system = m.assemble()
+    found = check(system, starts=200)
+    assert len(alone) <= len(found) <= 2 * len(alone)
 
 
 @pytest.mark.parametrize("kinds", ["RRRRRRR", "RRPRRPR", "RPRRRRP"])
@@ -180,3 +193,33 @@ def test_a_platform_on_similar_hexagons_has_other_independent_joints():
     assert len([k for k in system.active if system.speeds[k].name.startswith("leg")]) == 5
     with pytest.raises(NoClosedForm):
         modes(system)
+
+
+@pytest.mark.parametrize("moved", [0.0, 0.06])
+def test_the_catalogues_delta(moved):
+    """Six rods: beside the upright platform, above and below, fourteen that are rotated."""
+    system = mbs.load("delta").assemble()
+    q_a = active(system) + moved * np.array([1, -0.5, 1.4])
+    found = modes(system, q_a)
+    assert (len(found), found.complete) == (16, True)
+    for q in searched(system, q_a, starts=60):
+        assert any(same(system, q, mode.q) for mode in found)
+
+
+def test_a_platform_that_moves_on_locked_legs_is_refused():
+    """Ends that are congruent and legs that are equal: every leg may be carried along a sphere."""
+    rng = np.random.default_rng(0)
+    a = rng.uniform(-1, 1, (6, 3))
+    system = hexapod(1, "UPS", (a, a)).assemble()
+    free = np.array([np.linalg.norm(x) for x in _leg_vectors(system, a)])
+    refused(
+        LoopError,
+        "can move while the independent joints stay; modes cannot be counted there",
+        by=lambda: modes(system, 1.4 - free),
+    )
+
+
+def _leg_vectors(system, a):
+    """From the ends on the ground to those on the platform, where the system was assembled."""
+    T = np.array(mbs.models.transform(system, "platform")(system.configuration))
+    return T[:3, 3] + a @ T[:3, :3].T - a

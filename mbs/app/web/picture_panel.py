@@ -126,7 +126,11 @@ class JointSliders:
             return
         self._modes = found
         now = self._shown_mode = mode_of(found, q)
-        options = {k: ", ".join(mode.branch) or "the only one" for k, mode in enumerate(found)}
+        # modes of loops that are solved together have no labels
+        others = [
+            f"number {k + 1}" if len(found) > 1 else "the only one" for k in range(len(found))
+        ]
+        options = {k: ", ".join(mode.branch) or others[k] for k, mode in enumerate(found)}
         self._mode.set_visibility(bool(found))
         self._mode.set_options(options, value=now)
         self._mode_note.set_text(f"{len(found)} with these joints" if found else "")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+import mbs.models.inverse_geometry.core as core
 from mbs.closed_forms.arm import Array
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry.target import Target, TargetReduction
@@ -159,6 +160,12 @@ class _Way:
     def _walk(self, start: Array, tangent: Array) -> tuple[list[Array], bool]:
         """Configurations from the start on, and whether they come back to it."""
         points, step, target = [start], _STEP, self.target
+        library = core.core_of(target.arm)
+        if library is not None and type(target) is Target:
+            found, closed = core.walked_by(
+                library, target.arm, target.T, start, tangent, self.limit, self.most
+            )
+            return list(found), closed
         while len(points) < self.most and step > _SMALLEST_STEP:
             x = _step(target, points[-1], tangent, step)
             moved = x - points[-1]
@@ -337,7 +344,10 @@ class _SelfMotion:
         else:
             held = along[:, None, :]
             found = target.corrected(start, held, np.sum(along * x, axis=1, keepdims=True), 12)
-        return np.asarray(np.linalg.norm(found - x, axis=1) < _SAME)
+        met = np.linalg.norm(found - x, axis=1) < _SAME
+        if not self.curve.slope.size:  # from farther off they may lead to another curve through x
+            met &= np.linalg.norm(start - x, axis=1) < _STEP
+        return np.asarray(met)
 
 
 def family(

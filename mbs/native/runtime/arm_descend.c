@@ -138,15 +138,82 @@ static void turn(const arm *a, const double *x, const double *before, double *al
     for (k = 0; k < a->n; k++) along[k] = part < 10.0 ? tangent[k] / part : before[k];
 }
 
+/* Which way round a curve is seen at x: the sign of det [[J, left], [along', 0]], with the direction
+ * `left` of the equations that the joints do not change, which is continued. It changes where two curves
+ * cross, and nowhere else (Allgower and Georg 1990, chapter 8). 0 for fewer than six joints. */
+static int side(const arm *a, const double *x, const double *along, double *left) {
+    static const double none[6] = {0.0}, home[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    configuration p, turned;
+    double B[7][7], size = 0.0;
+    int i, j, k, sign = 1;
+    if (a->n != 6) return 0;
+    for (k = 0; k < 6; k++) p.q[k] = arm_unit(a, k) * x[k];
+    arm_examine(a, home, &p);
+    for (i = 0; i < 6; i++)
+        for (k = 0; k < 6; k++) turned.J[k][i] = p.J[i][k];
+    held_step(a, &turned, none, left, 1.0, ZERO, left);
+    for (k = 0; k < 6; k++) size += left[k] * left[k];
+    for (i = 0; i < 6; i++) {
+        left[i] /= sqrt(size);
+        for (k = 0; k < 6; k++) B[i][k] = p.J[k][i];
+        B[i][6] = left[i];
+        B[6][i] = along[i];
+    }
+    B[6][6] = 0.0;
+    for (k = 0; k < 7; k++) { /* elimination, rows exchanged */
+        int best = k;
+        for (i = k + 1; i < 7; i++)
+            if (fabs(B[i][k]) > fabs(B[best][k])) best = i;
+        if (best != k) sign = -sign;
+        for (j = k; j < 7; j++) {
+            double swap = B[k][j];
+            B[k][j] = B[best][j];
+            B[best][j] = swap;
+        }
+        if (B[k][k] == 0.0) return 0;
+        if (B[k][k] < 0.0) sign = -sign;
+        for (i = k + 1; i < 7; i++)
+            for (j = 6; j >= k; j--) B[i][j] -= B[i][k] / B[k][k] * B[k][j];
+    }
+    return sign;
+}
+
+/* The equations' direction that the joints do not change at x, from the best of six guesses. */
+static void left_direction(const arm *a, const double *x, double *left) {
+    double least = HUGE_VAL, along[ARM_JOINTS] = {0.0};
+    int k, m;
+    for (k = 0; k < 6; k++) {
+        configuration p, turned;
+        double guess[ARM_JOINTS] = {0.0}, found[ARM_JOINTS], size = 0.0;
+        static const double none[6] = {0.0},
+                            home[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+        guess[k] = 1.0;
+        for (m = 0; m < 6; m++) p.q[m] = arm_unit(a, m) * x[m];
+        arm_examine(a, home, &p);
+        for (m = 0; m < 36; m++) turned.J[m / 6][m % 6] = p.J[m % 6][m / 6];
+        held_step(a, &turned, none, guess, 1.0, ZERO, found);
+        for (m = 0; m < 6; m++) size += found[m] * found[m];
+        if (!(size < least)) continue;
+        least = size;
+        for (m = 0; m < 6; m++) along[m] = found[m] / sqrt(size);
+    }
+    memcpy(left, along, 6 * sizeof(double));
+}
+
 long long arm_walk(const arm *a, const double *target, const double *tangent, double limit,
                    long long most, double *points, int *closed) {
-    const double longest = 0.1, shortest = 1e-3; /* steps [rad or arm lengths] */
+    const double longest = 0.1, shortest = 1e-5; /* steps [rad or arm lengths] */
     double along[ARM_JOINTS], x[ARM_JOINTS], moved[ARM_JOINTS], q[ARM_JOINTS], T[16];
     double step = longest;
     long long count = 1;
-    int k, n = a->n;
+    double left[ARM_JOINTS] = {0.0}, beyond[ARM_JOINTS], on[ARM_JOINTS];
+    int k, n = a->n, seen = 0;
     *closed = 0;
     memcpy(along, tangent, (size_t)n * sizeof(double));
+    if (n == 6) {
+        left_direction(a, points, left);
+        seen = side(a, points, along, left);
+    }
     while (count < most && step > shortest) {
         const double *last = points + (count - 1) * n;
         double value = 0.0, far = 0.0, away = 0.0, ahead = 0.0;
@@ -167,7 +234,16 @@ long long arm_walk(const arm *a, const double *target, const double *tangent, do
             continue;
         }
         for (k = 0; k < n; k++) moved[k] /= far;
-        turn(a, x, moved, along);
+        turn(a, x, moved, on);
+        memcpy(beyond, left, sizeof beyond);
+        k = side(a, x, on, beyond);
+        if (k != seen && step > 2.0 * shortest) { /* onto another curve that passes close by */
+            step *= 0.5;
+            continue;
+        }
+        seen = k;
+        memcpy(left, beyond, sizeof left);
+        memcpy(along, on, (size_t)n * sizeof(double));
         memcpy(points + count * n, x, (size_t)n * sizeof(double));
         count++;
         step = fmin(2.0 * step, longest);

@@ -45,6 +45,16 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
         _integer,
         (_pointer, _pointer, _pointer, _integer, _integer, _pointer, _pointer, _pointer, _pointer),
     ),
+    "mbs_correct": (
+        None,
+        (_pointer, _pointer, _integer, _integer, _pointer, _pointer, ctypes.c_int, _pointer),
+    ),
+    "mbs_residual": (None, (_pointer, _pointer, _integer, _integer, _pointer, _pointer)),
+    "mbs_examine": (None, (_pointer, _pointer, _integer, _integer, *[_pointer] * 3)),
+    "mbs_walk": (
+        _integer,
+        (_pointer, _pointer, _pointer, _real, _integer, _pointer, _pointer),
+    ),
     "mbs_singular": (None, (_pointer, _real, _integer, _pointer, _pointer)),
     "mbs_settle": (
         ctypes.c_int,
@@ -111,7 +121,7 @@ def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Arr
     """
     own, residual, _ = _rooms(len(q), arm.size)
     own[:] = q
-    target = _wanted(T, *((4, 4) if np.ndim(T) == 2 else (len(q), 4, 4)))
+    target = _targets(T, len(q))
     stride, handed = 16 if target.ndim == 3 else 0, Handed(arm)
     library.mbs_polish(handed.address, _at(target), stride, len(q), _at(own), _at(residual))
     return own, residual
@@ -156,6 +166,86 @@ def singular_by(library: ctypes.CDLL, arm: Arm, q: Array, bound: float) -> NDArr
     handed = Handed(arm)
     library.mbs_singular(handed.address, bound, len(q), _at(own), singular.ctypes.data)
     return singular
+
+
+def corrected_by(
+    library: ctypes.CDLL, arm: Arm, T: Array, x: Array, held: Array, value: Array, iterations: int
+) -> Array:
+    """Solutions (m, n) near x = q / unit, (m, n), at which held . x = value.
+
+    Args:
+        library: the core.
+        arm: whose configurations.
+        T: (4, 4) target pose of all, or (m, 4, 4) of each.
+        x: first guesses.
+        held: (m, n) or (n,).
+        value: (m,).
+        iterations: at most.
+    """
+    m, n = len(x), arm.size
+    own = np.array(np.broadcast_to(x, (m, n)), dtype=float, order="C")
+    target = _targets(T, m)
+    stride, handed = 16 if target.ndim == 3 else 0, Handed(arm)
+    rows, right = _wanted(held, m, n), _wanted(value, m)
+    library.mbs_correct(
+        handed.address, _at(target), stride, m, _at(rows), _at(right), iterations, _at(own)
+    )
+    return own
+
+
+def residual_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> Array:
+    """(m,) largest element of pose(q) - T, T (4, 4) or (m, 4, 4), at q, (m, n)."""
+    own, target, residual = _wanted(q, *q.shape), _targets(T, len(q)), np.empty(len(q))
+    handed = Handed(arm)
+    stride = 16 if target.ndim == 3 else 0
+    library.mbs_residual(handed.address, _at(target), stride, len(q), _at(own), _at(residual))
+    return residual
+
+
+def examined_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
+    """Gaps (m, 6) to T and Jacobians (m, 6, n), lengths in arm lengths, at q, (m, n)."""
+    m, n = q.shape
+    own, target = _wanted(q, m, n), _targets(T, m)
+    gap, J = np.empty((m, 6)), np.empty((m, n, 6))
+    handed = Handed(arm)
+    stride = 16 if target.ndim == 3 else 0
+    library.mbs_examine(handed.address, _at(target), stride, m, _at(own), _at(gap), _at(J))
+    return gap, np.swapaxes(J, 1, 2)
+
+
+def walked_by(
+    library: ctypes.CDLL,
+    arm: Arm,
+    T: Array,
+    start: Array,
+    tangent: Array,
+    limit: float,
+    most: int,
+) -> tuple[Array, bool]:
+    """Points (k, n) of a self-motion, in x = q / unit, and whether it closes.
+
+    Args:
+        library: the core.
+        arm: whose configurations.
+        T: (4, 4) the pose that is held.
+        start: (n,) the first point.
+        tangent: (n,) where it leads to.
+        limit: of the residuals.
+        most: points.
+    """
+    points, target = np.empty((most + 1, arm.size)), _wanted(T, 4, 4)
+    points[0] = start
+    along, closed, handed = _wanted(tangent, arm.size), ctypes.c_int(0), Handed(arm)
+    count = library.mbs_walk(
+        handed.address,
+        _at(target),
+        _at(along),
+        limit,
+        most,
+        _at(points),
+        ctypes.addressof(closed),
+    )
+    return points[:count].copy(), bool(closed.value)
 
 
 def settled_by(
@@ -203,6 +293,11 @@ class Handed:
 def _wanted(T: Array, *shape: int) -> Array:
     """Poses as C reads them; a wrong shape is refused, for C would read beyond the array."""
     return np.ascontiguousarray(np.broadcast_to(np.asarray(T, dtype=float), shape))
+
+
+def _targets(T: Array, count: int) -> Array:
+    """One target pose of all configurations, or one of each."""
+    return _wanted(T, *((4, 4) if np.ndim(T) == 2 else (count, 4, 4)))
 
 
 def _rooms(count: int, n: int) -> tuple[Array, Array, Hits]:

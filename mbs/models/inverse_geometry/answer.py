@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,6 +97,26 @@ def roots(target: Target, gathered: Gathered, chain: ChainIndices) -> list[Chain
             dropped.add(k)
         dropped |= _on(target, found, k, [m for m in unsettled if m != k])
     return _merged_again(target, [root for k, root in enumerate(found) if k not in dropped])
+
+
+def new_among(target: Target, found: list[ChainRoot], more: Gathered) -> Gathered:
+    """What was gathered besides without copies of known solutions and points of self-motions.
+
+    Args:
+        target: the target pose.
+        found: the known solutions.
+        more: solutions.
+    """
+    known = np.zeros(len(more.q), dtype=bool)
+    for root in found:
+        if root.family is None:
+            away = target.wrapped((more.q - root.q) / target.unit)
+            known |= np.max(np.abs(away), axis=1, initial=0.0) < _ONE_ROOT
+        elif root.family.dimension == 1:
+            asked = np.flatnonzero(~known)
+            known[asked] = root.family.meets(more.q[asked])
+    q, labels = more.q[~known], tuple(compress(more.labels, ~known))
+    return Gathered(q, labels, more.method, more.doubtful)
 
 
 def _merge(target: Target, gathered: Gathered) -> list[ChainRoot]:

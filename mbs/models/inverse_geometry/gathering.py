@@ -87,7 +87,7 @@ def gather(chain: FrameChain, target: Target, method: str, p: Array) -> Gathered
             if method != "auto":
                 raise
     if method == "search":
-        return _by_search(target)
+        return by_search(target)
     ready = general_ready(chain, p)
     if ready is None and method == "general":
         raise ModelError(
@@ -95,23 +95,21 @@ def gather(chain: FrameChain, target: Target, method: str, p: Array) -> Gathered
             f" {', '.join(chain.names)}: it is for six joints, and not for all with prismatic ones;"
             " use method='search'"
         )
-    return _by_search(target) if ready is None else _by_general(target, ready)
+    return by_search(target) if ready is None else _by_general(target, ready)
 
 
 def gather_further(chain: FrameChain, target: Target, gathered: Gathered, p: Array) -> Gathered:
-    """What was gathered, and what the general method and the search add to it."""
-    parts = [gathered]
+    """What was gathered, what the general method adds to it, and what lies along valleys."""
     ready = general_ready(chain, p)
-    if gathered.method != "general" and ready is not None:
-        parts.append(_by_general(target, ready))
-    if gathered.method != "search":
-        parts.append(_by_search(target))
-    return Gathered(
-        np.concatenate([part.q for part in parts]),
-        tuple(label for part in parts for label in part.labels),
-        gathered.method,
-        False,
-    )
+    if gathered.method not in ("general", "search") and ready is not None:
+        gathered = joined(gathered, _by_general(target, ready))
+    return along_valleys(target, gathered)
+
+
+def joined(gathered: Gathered, more: Gathered) -> Gathered:
+    """What was gathered, and more; certain from now on."""
+    q, labels = np.concatenate([gathered.q, more.q]), gathered.labels + more.labels
+    return Gathered(q, labels, gathered.method, False)
 
 
 # Solutions at the far end of a valley: next to a singular configuration in which an arm could move
@@ -123,7 +121,7 @@ _NEARLY_MOVES = 1e-6
 """Residual, of max(1 m, the arm's length), at a distance along the null space below which the arm
 nearly moves there: next to a fold, where two solutions meet, it is some 1e-3."""
 _ALONG = 0.2
-"""Length of a step along a valley [rad or arm lengths], from which two Newton steps lead back; a
+"""Length of a step along a valley [rad or arm lengths], from which four Newton steps lead back; a
 solution draws what is nearer than a quarter turn."""
 _STEPS_ALONG = 32  # a whole turn
 _CROSSINGS = 8  # of false position: along a sine the digits double with each
@@ -139,12 +137,7 @@ def along_valleys(target: Target, gathered: Gathered) -> Gathered:
         return gathered
     q = wrapped(target.arm, np.concatenate(found) * target.unit)
     q = q[target.residual(q) < target.tolerance]
-    return Gathered(
-        np.concatenate([gathered.q, q]),
-        gathered.labels + ("",) * len(q),
-        gathered.method,
-        gathered.doubtful,
-    )
+    return joined(gathered, Gathered(q, ("",) * len(q), "", False))
 
 
 def _far_ends(target: Target, start: Array) -> list[Array]:
@@ -201,7 +194,7 @@ class _Valley(NamedTuple):
 
 def _valley_at(target: Target, x: Array) -> _Valley:
     """The valleys beside x, (m, 6)."""
-    for last in (False, False, True):
+    for last in (False, False, False, False, True):
         e, J = target.excess(x)
         U, s, Vt = np.linalg.svd(J)
         if last:
@@ -282,7 +275,8 @@ def _by_general(target: Target, ready: General) -> Gathered:
     return _polish(target, Gathered(q, ("",) * len(q), "general", doubtful))
 
 
-def _by_search(target: Target) -> Gathered:
+def by_search(target: Target) -> Gathered:
+    """The solutions of the search."""
     q = search(target.arm, target.T, _STARTS)
     return _polish(target, Gathered(q, ("",) * len(q), "search", False))
 

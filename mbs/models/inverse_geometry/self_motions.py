@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+import mbs.models.inverse_geometry.core as core
 from mbs.closed_forms.arm import Array
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry.target import Target, TargetReduction
@@ -17,9 +19,9 @@ from mbs.numbers import NONZERO
 # Self-motions of an arm whose frame is held: where they start, and the configurations along them.
 
 
-_STEP, _SMALLEST_STEP = 0.1, 1e-3
+_STEP, _SMALLEST_STEP = 0.1, 1e-5
 """Lengths of a step along a self-motion [rad or arm lengths]: 63 to a turn, and the shortest: a
-curve that even this does not follow ends there."""
+curve that even this does not follow ends there, and one that is nearer is crossed."""
 _MOST_STEPS, _FEW_STEPS = 2000, 60
 _SHORTEST = 1.0
 _AWAY = 0.05
@@ -159,6 +161,13 @@ class _Way:
     def _walk(self, start: Array, tangent: Array) -> tuple[list[Array], bool]:
         """Configurations from the start on, and whether they come back to it."""
         points, step, target = [start], _STEP, self.target
+        library = core.core_of(target.arm)
+        if library is not None:
+            found, closed = core.walked_by(
+                library, target.arm, target.T, start, tangent, self.limit, self.most
+            )
+            return list(found), closed
+        side = _Side.at(target, start, tangent, None)
         while len(points) < self.most and step > _SMALLEST_STEP:
             x = _step(target, points[-1], tangent, step)
             moved = x - points[-1]
@@ -166,7 +175,12 @@ class _Way:
             if far or target.residual(x * target.unit) > self.limit:
                 step /= 2
                 continue
-            tangent = _tangent(target, x, moved / np.linalg.norm(moved))
+            ahead = _tangent(target, x, moved / np.linalg.norm(moved))
+            there = _Side.at(target, x, ahead, side.left)
+            if there.sign != side.sign and step > 2 * _SMALLEST_STEP:
+                step /= 2  # onto another curve that passes close by
+                continue
+            tangent, side = ahead, there
             points.append(x)
             step = min(2 * step, _STEP)
             home = target.wrapped(start - x)
@@ -175,6 +189,32 @@ class _Way:
             if len(points) > 3 and near and 0 < home @ tangent <= step:
                 return [*points, x + home], True
         return points, False
+
+
+class _Side(NamedTuple):
+    """Which way round a curve is seen: it changes where two curves cross, and nowhere else.
+
+    It is the sign of det [[J, left], [tangent', 0]], kept along a curve of regular points.
+    Source: Allgower & Georg 1990, chapter 8.
+
+    Attributes:
+        left: (6,) the direction of the equations that the joints do not change.
+        sign: 1 or -1; 0 for arms of fewer than six joints.
+    """
+
+    left: Array
+    sign: float
+
+    @classmethod
+    def at(cls, target: Target, x: Array, tangent: Array, before: Array | None) -> _Side:
+        """At a configuration x, (n,), the direction on the same side as the one before."""
+        if x.size != 6:
+            return cls(np.zeros(6), 0.0)
+        J = target.excess(x)[1]
+        left = np.linalg.svd(J)[0][:, -1]
+        left = -left if before is not None and left @ before < 0 else left
+        bordered = np.block([[J, left[:, None]], [tangent[None, :], np.zeros((1, 1))]])
+        return cls(left, float(np.sign(np.linalg.det(bordered))))
 
 
 def _step(target: Target, x: Array, tangent: Array, step: float) -> Array:
@@ -337,7 +377,10 @@ class _SelfMotion:
         else:
             held = along[:, None, :]
             found = target.corrected(start, held, np.sum(along * x, axis=1, keepdims=True), 12)
-        return np.asarray(np.linalg.norm(found - x, axis=1) < _SAME)
+        met = np.linalg.norm(found - x, axis=1) < _SAME
+        if not self.curve.slope.size:  # from farther off they may lead to another curve through x
+            met &= np.linalg.norm(start - x, axis=1) < _STEP
+        return np.asarray(met)
 
 
 def family(

@@ -11,15 +11,16 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Array
 from mbs.errors import ModelError
-from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, named, roots
+from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, named, new_among, roots
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, require_method
 from mbs.models.inverse_geometry.gathering import (
     METHODS,
     Gathered,
-    along_valleys,
+    by_search,
     gather,
     gather_further,
+    joined,
 )
 from mbs.models.inverse_geometry.kernel import kernel_of
 from mbs.models.inverse_geometry.solutions import Given, Solutions, Wishes, bounds, leaves_out
@@ -122,9 +123,17 @@ def solved(question: Question, method: str) -> tuple[list[ChainRoot], str]:
     """
     chain, target, p = question.chain, question.target, question.p
     gathered = gather(chain, target, method, p)
-    if method in ("auto", *CLOSED_FORMS) and _is_doubtful(target, gathered):
-        gathered = along_valleys(target, gather_further(chain, target, gathered, p))
-    return roots(target, gathered, question.chain_indices), gathered.method
+    if method not in ("auto", *CLOSED_FORMS) or not _is_doubtful(target, gathered):
+        return roots(target, gathered, question.chain_indices), gathered.method
+    gathered = gather_further(chain, target, gathered, p)
+    found = roots(target, gathered, question.chain_indices)
+    if gathered.method == "search":
+        return found, gathered.method
+    # where an arm moves, a search gives points of what is known already
+    more = new_among(target, found, by_search(target))
+    if len(more.q):
+        found = roots(target, joined(gathered, more), question.chain_indices)
+    return found, gathered.method
 
 
 def chain_or_none(

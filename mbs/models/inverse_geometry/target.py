@@ -55,10 +55,19 @@ class Target:
 
     def residual(self, q: Array) -> Array:
         """(...) largest element of pose(q) - T at configurations q, (..., n)."""
-        return self.arm.residual(q, self.T)
+        library = core.core_of(self.arm)
+        if library is None or (self.T.ndim > 2 and q.ndim != 2):
+            return self.arm.residual(q, self.T)
+        flat = np.asarray(q, dtype=float).reshape(-1, self.arm.size)
+        return core.residual_by(library, self.arm, self.T, flat).reshape(q.shape[:-1])
 
     def excess(self, x: Array) -> tuple[Array, Array]:
         """The equations e(x) = 0, (..., 6), and their derivative to first order, (..., 6, n)."""
+        library = core.core_of(self.arm)
+        if library is not None and (self.T.ndim == 2 or x.ndim == 2):
+            q = (x * self.unit).reshape(-1, self.arm.size)
+            gap, slope = core.examined_by(library, self.arm, self.T, q)
+            return -gap.reshape(*x.shape[:-1], 6), slope.reshape(*x.shape[:-1], 6, self.arm.size)
         unit, rows = self.unit, np.array([self.arm.length] * 3 + [1.0] * 3)
         T, J = self.arm.pose_and_jacobian(x * unit)
         return -gap_to(self.T, T) / rows, J * unit / rows[:, None]
@@ -84,6 +93,14 @@ class Target:
         Returns:
             (..., n) the last iterates; whether they solve the equations is left to the residual.
         """
+        library = core.core_of(self.arm)
+        if library is not None and held.shape[-2] == 1 and type(self) is Target:
+            every = np.broadcast_to(x, np.broadcast_shapes(x.shape, held.shape[:-2] + x.shape[-1:]))
+            flat = every.reshape(-1, x.shape[-1])
+            rows = np.broadcast_to(held[..., 0, :], every.shape).reshape(flat.shape)
+            right = np.broadcast_to(values[..., 0], every.shape[:-1]).ravel()
+            found = core.corrected_by(library, self.arm, self.T, flat, rows, right, iterations)
+            return found.reshape(every.shape)
         for _ in range(iterations):
             e, J = self.excess(x)
             further = (held @ x[..., None])[..., 0] - values
@@ -168,14 +185,9 @@ def half_way(target: Target, x: Array, other: Array) -> Array:
     middle = x + 0.5 * difference
     best = target.residual(middle * target.unit)
     along = difference / np.linalg.norm(difference, axis=1, keepdims=True)
-    for _ in range(_ACROSS):
-        e, J = target.excess(middle)
-        across = J - (J @ along[..., None]) * along[:, None, :]
-        # singular values that vanish but for rounding leave their directions alone
-        step = (np.linalg.pinv(across, rcond=1e-10) @ e[..., None])[..., 0]
-        middle = middle - step
-        best = np.fmin(best, target.residual(middle * target.unit))
-    return best
+    held, values = along[:, None, :], np.sum(along * middle, axis=1, keepdims=True)
+    moved = target.corrected(middle, held, values, _ACROSS)
+    return np.fmin(best, target.residual(moved * target.unit))
 
 
 # How many roots meet in a solution: the equations near it, reduced to the directions left free.

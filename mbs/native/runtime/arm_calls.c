@@ -16,6 +16,46 @@ EXPORT void mbs_polish(const arm *a, const double *target, long long stride, lon
         residual[i] = arm_polish(a, target + i * stride, q + i * a->n);
 }
 
+/* Corrects x (count, n), with held (count, n) and value (count,), see arm_correct; targets likewise. */
+EXPORT void mbs_correct(const arm *a, const double *target, long long stride, long long count,
+                        const double *held, const double *value, int iterations, double *x) {
+    long long i;
+    for (i = 0; i < count; i++)
+        arm_correct(a, target + i * stride, held + i * a->n, value[i], iterations, x + i * a->n);
+}
+
+/* residual (count,) of q (count, n), see arm_residual; targets as above. */
+EXPORT void mbs_residual(const arm *a, const double *target, long long stride, long long count,
+                         const double *q, double *residual) {
+    double T[16];
+    long long i;
+    for (i = 0; i < count; i++) {
+        arm_pose(a, q + i * a->n, T);
+        residual[i] = arm_residual(target + i * stride, T);
+    }
+}
+
+/* gap (count, 6) and J (count, n, 6) of q (count, n), see configuration; targets as above. */
+EXPORT void mbs_examine(const arm *a, const double *target, long long stride, long long count,
+                        const double *q, double *gap, double *J) {
+    configuration p;
+    long long i;
+    int k, m;
+    for (i = 0; i < count; i++) {
+        for (k = 0; k < a->n; k++) p.q[k] = q[i * a->n + k];
+        arm_examine(a, target + i * stride, &p);
+        for (m = 0; m < 6; m++) gap[6 * i + m] = p.gap[m];
+        for (k = 0; k < a->n; k++)
+            for (m = 0; m < 6; m++) J[(i * a->n + k) * 6 + m] = p.J[k][m];
+    }
+}
+
+/* See arm_walk. */
+EXPORT long long mbs_walk(const arm *a, const double *target, const double *tangent, double limit,
+                          long long most, double *points, int *closed) {
+    return arm_walk(a, target, tangent, limit, most, points, closed);
+}
+
 /* Fills q (starts, n), residual and hits (starts,); gives how many configurations were found. */
 EXPORT long long mbs_search(const arm *a, const double *target, long long starts,
                             unsigned long long seed, double *q, double *residual,

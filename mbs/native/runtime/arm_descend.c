@@ -3,11 +3,17 @@
 #include <math.h>
 #include <string.h>
 
-enum { STALLS = 3, ROWS = 6 + ARM_JOINTS };
+#include "rigid.h"
+
+enum { STALLS = 3, ROWS = 7 + ARM_JOINTS };
 static const double FINE = 1e-26;   /* costs below it are those of solutions but for rounding */
 static const double FINEST = 1e-31; /* nothing is left to gain */
 static const double WEAK = 1e-8;    /* pivots of squares below it are taken for rounding */
 static const double LEAST = 1e-31;  /* damping, so that no matrix is singular */
+static const double DEPENDENT = 1e-12; /* singular values below it are rounding, and damped */
+static const double ZERO = 1e-7;       /* those of a self-motion, known to the root of rounding */
+static const double LONGEST = 0.3;     /* step [rad or arm lengths] in which all is nearly linear */
+static const double SETTLED = 1e-12;   /* step that is hardly more than rounding, likewise */
 
 /* (J' J + shift) dx = J' gap by Cholesky. 0: too close to singular. */
 static int normal_step(const arm *a, const configuration *p, double shift, double *dx) {
@@ -70,6 +76,191 @@ static void orthogonal_step(const arm *a, const configuration *p, double shift, 
         for (k = j + 1; k < n; k++) dx[j] -= A[k][j] * dx[k];
         dx[j] /= A[j][j];
     }
+}
+
+/* Least squares of [J; held] dx = [right; value] by reflections, damped by rows of `damping`. */
+static void held_step(const arm *a, const configuration *p, const double *right, const double *held,
+                      double value, double damping, double *dx) {
+    double A[ARM_JOINTS + 1][ROWS] = {{0.0}};
+    int j, k, n = a->n;
+    for (j = 0; j < n; j++) {
+        memcpy(A[j], p->J[j], sizeof p->J[j]);
+        A[j][6] = held[j];
+        A[j][7 + j] = damping;
+    }
+    memcpy(A[n], right, 6 * sizeof(double));
+    A[n][6] = value;
+    for (j = 0; j < n; j++) reflect(A, j, n, 7 + n);
+    for (j = n - 1; j >= 0; j--) {
+        dx[j] = A[n][j];
+        for (k = j + 1; k < n; k++) dx[j] -= A[k][j] * dx[k];
+        dx[j] /= A[j][j];
+    }
+}
+
+void arm_correct(const arm *a, const double *target, const double *held, double value,
+                 int iterations, double *x) {
+    configuration p;
+    double dx[ARM_JOINTS];
+    int k, step;
+    for (step = 0; step < iterations; step++) {
+        double rest = value, size = 0.0, part;
+        for (k = 0; k < a->n; k++) {
+            rest -= held[k] * x[k];
+            p.q[k] = arm_unit(a, k) * x[k];
+        }
+        arm_examine(a, target, &p);
+        held_step(a, &p, p.gap, held, rest, DEPENDENT, dx);
+        for (k = 0; k < a->n; k++) size += dx[k] * dx[k];
+        size = sqrt(size);
+        part = size > LONGEST ? LONGEST / size : 1.0;
+        for (k = 0; k < a->n; k++) x[k] += part * dx[k];
+        if (!(size >= SETTLED)) return;
+    }
+}
+
+void arm_tangent(const arm *a, const double *x, const double *before, double *tangent) {
+    static const double none[6] = {0.0}, home[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    configuration p;
+    int k;
+    for (k = 0; k < a->n; k++) p.q[k] = arm_unit(a, k) * x[k];
+    arm_examine(a, home, &p);
+    held_step(a, &p, none, before, 1.0, ZERO, tangent);
+}
+
+/* From the direction before to that of a self-motion; straight on where it has turned by 84 degrees. */
+static void turn(const arm *a, const double *x, const double *before, double *along) {
+    double tangent[ARM_JOINTS], part = 0.0;
+    int k;
+    arm_tangent(a, x, before, tangent);
+    for (k = 0; k < a->n; k++) part += tangent[k] * tangent[k];
+    part = sqrt(part); /* one over the cosine between them */
+    for (k = 0; k < a->n; k++) along[k] = part < 10.0 ? tangent[k] / part : before[k];
+}
+
+/* Which way round a curve is seen at x: the sign of det [[J, left], [along', 0]], with the direction
+ * `left` of the equations that the joints do not change, which is continued. It changes where two curves
+ * cross, and nowhere else (Allgower and Georg 1990, chapter 8). 0 for fewer than six joints. */
+static int side(const arm *a, const double *x, const double *along, double *left) {
+    static const double none[6] = {0.0}, home[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    configuration p, turned;
+    double B[7][7], size = 0.0;
+    int i, j, k, sign = 1;
+    if (a->n != 6) return 0;
+    for (k = 0; k < 6; k++) p.q[k] = arm_unit(a, k) * x[k];
+    arm_examine(a, home, &p);
+    for (i = 0; i < 6; i++)
+        for (k = 0; k < 6; k++) turned.J[k][i] = p.J[i][k];
+    held_step(a, &turned, none, left, 1.0, ZERO, left);
+    for (k = 0; k < 6; k++) size += left[k] * left[k];
+    for (i = 0; i < 6; i++) {
+        left[i] /= sqrt(size);
+        for (k = 0; k < 6; k++) B[i][k] = p.J[k][i];
+        B[i][6] = left[i];
+        B[6][i] = along[i];
+    }
+    B[6][6] = 0.0;
+    for (k = 0; k < 7; k++) { /* elimination, rows exchanged */
+        int best = k;
+        for (i = k + 1; i < 7; i++)
+            if (fabs(B[i][k]) > fabs(B[best][k])) best = i;
+        if (best != k) sign = -sign;
+        for (j = k; j < 7; j++) {
+            double swap = B[k][j];
+            B[k][j] = B[best][j];
+            B[best][j] = swap;
+        }
+        if (B[k][k] == 0.0) return 0;
+        if (B[k][k] < 0.0) sign = -sign;
+        for (i = k + 1; i < 7; i++)
+            for (j = 6; j >= k; j--) B[i][j] -= B[i][k] / B[k][k] * B[k][j];
+    }
+    return sign;
+}
+
+/* The equations' direction that the joints do not change at x, from the best of six guesses. */
+static void left_direction(const arm *a, const double *x, double *left) {
+    double least = HUGE_VAL, along[ARM_JOINTS] = {0.0};
+    int k, m;
+    for (k = 0; k < 6; k++) {
+        configuration p, turned;
+        double guess[ARM_JOINTS] = {0.0}, found[ARM_JOINTS], size = 0.0;
+        static const double none[6] = {0.0},
+                            home[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+        guess[k] = 1.0;
+        for (m = 0; m < 6; m++) p.q[m] = arm_unit(a, m) * x[m];
+        arm_examine(a, home, &p);
+        for (m = 0; m < 36; m++) turned.J[m / 6][m % 6] = p.J[m % 6][m / 6];
+        held_step(a, &turned, none, guess, 1.0, ZERO, found);
+        for (m = 0; m < 6; m++) size += found[m] * found[m];
+        if (!(size < least)) continue;
+        least = size;
+        for (m = 0; m < 6; m++) along[m] = found[m] / sqrt(size);
+    }
+    memcpy(left, along, 6 * sizeof(double));
+}
+
+long long arm_walk(const arm *a, const double *target, const double *tangent, double limit,
+                   long long most, double *points, int *closed) {
+    const double longest = 0.1, shortest = 1e-5; /* steps [rad or arm lengths] */
+    double along[ARM_JOINTS], x[ARM_JOINTS], moved[ARM_JOINTS], q[ARM_JOINTS], T[16];
+    double step = longest;
+    long long count = 1;
+    double left[ARM_JOINTS] = {0.0}, beyond[ARM_JOINTS], on[ARM_JOINTS];
+    int k, n = a->n, seen = 0;
+    *closed = 0;
+    memcpy(along, tangent, (size_t)n * sizeof(double));
+    if (n == 6) {
+        left_direction(a, points, left);
+        seen = side(a, points, along, left);
+    }
+    while (count < most && step > shortest) {
+        const double *last = points + (count - 1) * n;
+        double value = 0.0, far = 0.0, away = 0.0, ahead = 0.0;
+        for (k = 0; k < n; k++) {
+            x[k] = last[k] + step * along[k];
+            value += along[k] * x[k];
+        }
+        arm_correct(a, target, along, value, 12, x);
+        for (k = 0; k < n; k++) {
+            moved[k] = x[k] - last[k];
+            far += moved[k] * moved[k];
+            q[k] = arm_unit(a, k) * x[k];
+        }
+        far = sqrt(far);
+        arm_pose(a, q, T);
+        if (!(far <= 1.5 * step && far > 0.0 && arm_residual(target, T) <= limit)) {
+            step *= 0.5;
+            continue;
+        }
+        for (k = 0; k < n; k++) moved[k] /= far;
+        turn(a, x, moved, on);
+        memcpy(beyond, left, sizeof beyond);
+        k = side(a, x, on, beyond);
+        if (k != seen && step > 2.0 * shortest) { /* onto another curve that passes close by */
+            step *= 0.5;
+            continue;
+        }
+        seen = k;
+        memcpy(left, beyond, sizeof left);
+        memcpy(along, on, (size_t)n * sizeof(double));
+        memcpy(points + count * n, x, (size_t)n * sizeof(double));
+        count++;
+        step = fmin(2.0 * step, longest);
+        for (k = 0; k < n; k++) { /* the way home */
+            moved[k] = points[k] - x[k];
+            if (!a->prismatic[k]) moved[k] = remainder(moved[k], 2.0 * PI);
+            away += moved[k] * moved[k];
+            ahead += moved[k] * along[k];
+        }
+        /* the start lies within the next step, and a tenth for the bend of the curve */
+        if (count > 3 && sqrt(away) <= 1.1 * step && ahead > 0.0 && ahead <= step) {
+            for (k = 0; k < n; k++) points[count * n + k] = x[k] + moved[k];
+            *closed = 1;
+            return count + 1;
+        }
+    }
+    return count;
 }
 
 /* The configuration after one step. */

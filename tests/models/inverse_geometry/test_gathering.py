@@ -8,7 +8,7 @@ from support.catalogue_systems import catalogue_system
 
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.chain import frame_chain
-from mbs.models.inverse_geometry.gathering import gather, gather_further
+from mbs.models.inverse_geometry.gathering import by_search, gather, gather_further, joined
 from mbs.models.inverse_geometry.target import Target
 
 NONE = np.zeros(0)
@@ -39,7 +39,7 @@ def test_a_degenerate_pose_is_doubtful():
     aim = target("puma560", [0.3, -0.5, 0.7, 0.4, 0.0, 0.2])
     found = gather(way("puma560"), aim, "pieper", NONE)
     assert found.doubtful
-    more = gather_further(way("puma560"), aim, found, NONE)
+    more = joined(gather_further(way("puma560"), aim, found, NONE), by_search(aim))
     assert len(more.q) > len(found.q)
     assert more.labels[: len(found.labels)] == found.labels
     assert np.max(aim.residual(more.q)) < aim.tolerance

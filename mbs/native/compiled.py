@@ -5,7 +5,7 @@ import functools
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi
 
@@ -196,7 +196,7 @@ def machine_code(function: casadi.Function) -> MachineCode | None:
         CompilerError: CC names no compiler, or the compiler refused the code.
     """
     require_function(function)
-    path = _library(function, 0, True) if compiler_found() else None
+    path = _library(function, 0, True, None) if compiler_found() else None
     if path is None:
         return None
     name, library = function.name(), ctypes.CDLL(str(path))

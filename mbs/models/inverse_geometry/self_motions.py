@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-import mbs.models.inverse_geometry.core as core
+import mbs.closed_forms.arm_core as core
 from mbs.closed_forms.arm import Array
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry.target import Target, TargetReduction

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
+from mbs.closed_forms.arm import Array
 from mbs.errors import ModelError
-from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, roots
+from mbs.models.inverse_geometry.answer import Question, answer, roots
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS
 from mbs.models.inverse_geometry.gathering import Gathered, gather, gather_further
+from mbs.models.inverse_geometry.redundancy import Redundant, Samples, samples_of
 from mbs.models.inverse_geometry.solutions import Given, Solutions, Wishes, bounds, leaves_out
 from mbs.models.inverse_geometry.target import NEARLY_SINGULAR, Target
 from mbs.models.inverse_geometry.whole_robot import parallel
@@ -28,6 +31,7 @@ def solve(
     seed: Mapping[str, float] | Sequence[float] | None = None,
     *,
     locked: Mapping[str, float] | None = None,
+    redundant: Redundant | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Solutions:
     """Every configuration that takes a frame to a pose.
@@ -48,6 +52,9 @@ def solve(
             from it and wound towards it, and it places the joints that the frame does not depend
             on.
         locked: positions of joints that stay where they are, by name [rad or m].
+        redundant: by the name of a joint beyond the six that a pose determines how many positions
+            it takes, from limit to limit or over a turn, or (S,) these [rad or m]; the solutions
+            of all of them are given, of several joints those of all combinations.
         parameters: values of symbols, the others at their defaults.
 
     Returns:
@@ -61,37 +68,76 @@ def solve(
     require_system(system)
     p = np.array(system.parameter_values(parameters))
     target = target_pose(system, T)
-    chain = _chain_or_none(system, frame, locked)
-    wishes = _wishes(system, chain, limits, seed)
+    samples = samples_of(system, locked, redundant, limits, 1)
+    chain = _chain_or_none(system, frame, samples)
     if chain is None:
-        return parallel(wishes, frame, target, p)
-    question = Question(chain, Target(chain.arm(p), target), p, wishes)
-    found, used = solved(question, method)
-    return answer(question, found, used)
+        return parallel(_wishes(system, None, limits, seed), frame, target, p)
+    answers = [solve_at(chain, r, target, method, p, limits, seed) for r in samples.r[0]]
+    if redundant is None:
+        return answers[0]
+    return _joined(answers, samples, None if seed is None else np.array(system.position(seed)))
 
 
-def solved(question: Question, method: str) -> tuple[list[ChainRoot], str]:
-    """The solutions of a chain, and the method that gave them.
+def solve_at(
+    chain: FrameChain,
+    r: Array,
+    T: Array,
+    method: str,
+    p: Array,
+    limits: bool | Given | None = None,
+    seed: Mapping[str, float] | Sequence[float] | None = None,
+) -> Solutions:
+    """The solutions with the varied joints of a chain at one position.
 
     Args:
-        question: the chain and the pose.
+        chain: whose closed form serves all of these positions.
+        r: (k,) positions of its varied joints [rad or m].
+        T: (4, 4) the pose of its frame [m].
         method: as in `solve`.
+        p: (np,) parameters.
+        limits: as in `solve`.
+        seed: as in `solve`.
     """
-    chain, target, p = question.chain, question.target, question.p
-    gathered = gather(chain, target, method, p)
-    if method in ("auto", *CLOSED_FORMS) and _is_doubtful(target, gathered):
-        gathered = gather_further(chain, target, gathered, p)
-    return roots(target, gathered, question.chain_indices), gathered.method
+    own = chain.locked_at(r) if chain.varied else chain
+    wishes = _wishes(chain.system, own, limits, seed)
+    question = Question(own, Target(own.arm(p), T), p, wishes)
+    gathered = gather(chain, question.target, method, p, r)
+    if method in ("auto", *CLOSED_FORMS) and _is_doubtful(question.target, gathered):
+        gathered = gather_further(own, question.target, gathered, p)
+    found = roots(question.target, gathered, question.chain_indices)
+    return answer(question, found, gathered.method)
 
 
-def _chain_or_none(
-    system: System, frame: str | int | None, locked: Mapping[str, float] | None
-) -> FrameChain | None:
+def _joined(answers: list[Solutions], samples: Samples, near: Array | None) -> Solutions:
+    """The solutions of all positions of redundant joints."""
+    every = [solution for answer in answers for solution in answer]
+    if near is not None:
+        every.sort(key=lambda solution: float(np.linalg.norm(solution.q - near)))
+    # one that has solutions, else the nearest to have some, else one left empty by limits
+    away = [_away(answer) for answer in answers]
+    best = int(np.argmin(away))
+    reason = ""
+    if not every:
+        at = ", ".join(
+            f"{name} = {x:.6g}" for name, x in zip(samples.varied, samples.r[0, best], strict=True)
+        )
+        reason = f"none at {len(answers)} positions of redundant joints; at {at}: "
+        reason += answers[best].reason
+    return replace(answers[best], solutions=tuple(every), reason=reason)
+
+
+def _away(answer: Solutions) -> float:
+    if len(answer):
+        return -1.0
+    return np.inf if answer.nearest is None else answer.nearest.distance + answer.nearest.angle
+
+
+def _chain_or_none(system: System, frame: str | int | None, samples: Samples) -> FrameChain | None:
     """The chain to the frame; None where a robot with loops has none that can stand alone."""
     try:
-        return frame_chain(system, frame, locked)
+        return frame_chain(system, frame, samples.locked, samples.varied)
     except ModelError:
-        if locked or not system.is_closed:
+        if samples.locked or samples.varied or not system.is_closed:
             raise
         if frame is not None:
             system.frame(frame)

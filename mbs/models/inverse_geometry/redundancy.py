@@ -156,5 +156,6 @@ def _spread(system: System, name: str, number: int, limits: bool | Given | None)
             f"{system.name}: joint {quoted(name)} has no limits between which {number} positions"
             " lie; give the positions themselves, or limits="
         )
-    parts = np.linspace(0.0, 1.0, number) if number > 1 else np.array([0.5])
-    return np.asarray(low * (1 - parts) + high * parts, dtype=float)
+    if number == 1:
+        return np.array([(low + high) / 2])
+    return np.array(np.linspace(low, high, number), dtype=np.float64)

@@ -465,7 +465,8 @@ def _given_slope(
                 f"{led.system.name}: the function given as redundancy returned {quoted(found)};"
                 f" return the gradient of a cost, {start.size} finite numbers"
             )
-        return led.scaled(found) * led.scale**2
+        scaled: Array = found[list(led.indices)] * led.scale
+        return scaled
 
     return slope
 
@@ -528,7 +529,7 @@ class Path:
         def pose(u: float) -> Array:
             number = math.ceil(u)
             if number == u and number >= 0:
-                return self.poses[number]
+                return np.asarray(self.poses[number])
             if self.function is not None and number > 0:
                 return self.function(u / (self.count - 1))
             if number not in lines:
@@ -571,7 +572,7 @@ def straight(before: Array, after: Array) -> Callable[[float], Array]:
 
 
 def moved(T: Array, gap: Array) -> Array:
-    """The pose (4, 4) moved by a translation [m] and a rotation vector [rad], (6,), see `gap_to`."""
+    """The pose T (4, 4) moved by a translation [m] and a rotation vector [rad], (6,)."""
     pose = T.copy()
     pose[:3, :3] = _turn(gap[3:]) @ T[:3, :3]
     pose[:3, 3] += gap[:3]
@@ -831,7 +832,10 @@ def _leap_along(
         if behind is not None and tracker.may(behind):
             ratio = _added(predicted, behind, np.asarray(x[-1]))
         if behind is not None and ratio < _FAIR and ratio < max(_LITTLE, _SMOOTH * before):
-            return _landed(led, poses, [*nodes, to], np.array([*x, behind]), number)
+            every = np.array([*x, behind])
+            numbers = range(number, math.floor(to) + 1)
+            passed = _passed(led, poses, [*nodes, to], every, numbers)
+            return None if passed is None else Leap(passed, to, behind)
         way, before = way / 2, ratio if ratio < _FAIR else 1.0
     return None
 
@@ -859,20 +863,18 @@ def _configuration_at(
     return last.x if reached == 1.0 else None
 
 
-def _landed(
-    led: Follower, poses: Path, nodes: Sequence[float], x: Array, number: int
-) -> Leap | None:
-    """The poses from a number on that a leap passes, between configurations x at nodes."""
+def _passed(
+    led: Follower, poses: Path, nodes: Sequence[float], x: Array, numbers: range
+) -> Array | None:
+    """(k, n) configurations at poses between those, (m, n), at nodes; None where one has none."""
     passed = list[Array]()
-    for k in range(number, math.floor(nodes[-1]) + 1):
-        if k in nodes:
-            passed.append(x[list(nodes).index(k)])
-            continue
-        settled = _settled(led, _lagrange(nodes, x, float(k)), poses.poses[k])
-        if settled is None or not led.tracker.may(settled):
+    for k in numbers:
+        own = [y for u, y in zip(nodes, x, strict=True) if u == k]
+        y = own[0] if own else _settled(led, _lagrange(nodes, x, float(k)), poses.poses[k])
+        if y is None or not led.tracker.may(y):
             return None
-        passed.append(settled)
-    return Leap(np.array(passed).reshape(len(passed), x.shape[1]), nodes[-1], x[-1])
+        passed.append(y)
+    return np.array(passed).reshape(len(passed), x.shape[1])
 
 
 def _settled(led: Follower, x: Array, T: Array) -> Array | None:
@@ -903,43 +905,55 @@ def _leap_between(
     stopped: bool,
 ) -> Leap | None:
     """From the poses before a singular configuration to those behind it."""
-    if number == 0 or led.chain is None:
-        return None
     tracker, at = led.tracker, trail[-1][0]
+    before = _before(trail, found, number)
+    if before is None:
+        return None
+    nodes, x = before
     # the next pose may be the singular one itself
     to = number + 1 if stopped and number - at < _AT_POSE else number
-    nodes, x = (
-        [float(k) for k in range(max(0, number - 3), number)],
-        found[max(0, number - 3) : number],
-    )
-    if number == 1:
-        inner = min((one for one in trail if one[0] >= 0), key=lambda one: abs(one[0] - at / 2))
-        if not 0 < inner[0] < at:
-            return None
-        nodes, x = [0.0, inner[0]], np.array([found[0], inner[1].x])
     predicted = _lagrange(nodes, x, float(min(to, poses.count - 1)))
     if to >= poses.count:  # the path ends at the singular configuration
         last = _settled(led, predicted, poses.poses[-1])
         if last is None or _added(predicted, last, x[-1]) > _FAIR or not tracker.may(last):
             return None
         return Leap(last[None], number, last)
-    behind = _nearest_solution(led, predicted, poses.poses[to])
-    if behind is None or _added(predicted, behind, x[-1]) > _HALF or not tracker.may(behind):
+    behind = _smooth_solution(led, poses, predicted, to, x[-1])
+    if behind is None or not tracker.may(behind):
         return None
     nodes, x = [*nodes[-2:], float(to)], np.vstack([x[-2:], behind])
+    beyond = None
     if to + 1 < poses.count:
-        predicted = _lagrange(nodes, x, to + 1.0)
-        beyond = _nearest_solution(led, predicted, poses.poses[to + 1])
-        if beyond is not None and _added(predicted, beyond, behind) < _HALF:
-            nodes, x = [*nodes, to + 1.0], np.vstack([x, beyond])
+        beyond = _smooth_solution(led, poses, _lagrange(nodes, x, to + 1.0), to + 1, behind)
+    if beyond is not None:
+        nodes, x = [*nodes, to + 1.0], np.vstack([x, beyond])
     if not _is_fair(led, poses, curve, nodes, x, number, to):
         return None
-    inside = [k for k, u in enumerate(nodes) if u <= to]
-    leap = _landed(led, poses, [nodes[k] for k in inside], x[inside], number)
-    if leap is None or len(nodes) == len(inside):
-        return leap
-    full = _landed(led, poses, nodes, x, number)
-    return leap if full is None else Leap(full.x[: len(leap.x)], leap.u, leap.end)
+    passed = _passed(led, poses, nodes, x, range(number, to + 1))
+    return None if passed is None else Leap(passed, float(to), behind)
+
+
+def _before(
+    trail: list[tuple[float, PathPoint]], found: Array, number: int
+) -> tuple[list[float], Array] | None:
+    """Two or three configurations before a pose, and their numbers; None where there is one."""
+    if number >= 2:
+        first = max(0, number - 3)
+        return [float(k) for k in range(first, number)], found[first:number]
+    at = trail[-1][0]
+    inner = [one for one in trail if 0 < one[0] < at]
+    if number == 0 or not inner:
+        return None
+    u, point = min(inner, key=lambda one: abs(one[0] - at / 2))
+    return [0.0, u], np.array([found[0], point.x])
+
+
+def _smooth_solution(
+    led: Follower, poses: Path, predicted: Array, number: int, last: Array
+) -> Array | None:
+    """(n,) the configuration at a pose that is near the prediction, measured by the way to it."""
+    found = _nearest_solution(led, predicted, poses.poses[number])
+    return None if found is None or _added(predicted, found, last) > _HALF else found
 
 
 def _nearest_solution(led: Follower, x: Array, T: Array) -> Array | None:
@@ -951,7 +965,8 @@ def _nearest_solution(led: Follower, x: Array, T: Array) -> Array | None:
     if not len(q):
         return None
     away = led.chain.arm(p).wrapped(q / led.scale - x)
-    return x + away[int(np.argmin(np.linalg.norm(away, axis=1)))]
+    nearest: Array = x + away[int(np.argmin(np.linalg.norm(away, axis=1)))]
+    return nearest
 
 
 def _is_fair(
@@ -1023,8 +1038,29 @@ def stop_reason(led: Follower, poses: Path, number: int, q: Array, at: float) ->
     nearest, left = _nearest(led, x, T)
     if left > _REACHED:
         return f"{title} is out of reach: {_miss(led, led.whole(q, nearest), T)}"
-    where = f"between poses {number - 1} and {number}" if number else "between the start and pose 0"
-    return f"stopped {where} of {poses.count}: singular configuration, {_singular(led, q)}"
+    where = f"between the start and pose 0 of {poses.count}"
+    if number:
+        part = (number - 1 + at) / (poses.count - 1)
+        where = (
+            f"between poses {number - 1} and {number} of {poses.count}, at {part:.4g} of the path"
+        )
+    behind = _jump(led, x, poses.poses[min(number + (1 - at < _AT_POSE), poses.count - 1)])
+    return f"stopped {where}: singular configuration, {_singular(led, q)}{behind}"
+
+
+def _jump(led: Follower, x: Array, T: Array) -> str:
+    """The joint that is farthest from where it would have to be behind a singular configuration."""
+    behind = None if led.redundant else _nearest_solution(led, x, T)
+    if behind is None:
+        return ""
+    farthest = int(np.argmax(np.abs(behind - x)))
+    coordinate = led.system.coordinates[led.indices[farthest]]
+    move = abs(float(behind[farthest] - x[farthest])) * float(led.scale[farthest])
+    far = f"{math.degrees(move):.4g} degrees" if coordinate.unit == "rad" else f"{move:.4g} m"
+    return (
+        "; no configuration behind it goes on smoothly, in the nearest one"
+        f" {coordinate.name} is {far} away"
+    )
 
 
 def _miss(led: Follower, q: Array, T: Array) -> str:
@@ -1092,8 +1128,7 @@ class Conditioning:
         if self.arm is None:
             return self.values
         J = _arm_rows(self.arm, self.arm.units)(self.values, np.eye(4))[1]
-        smallest: Array = np.linalg.svd(J, compute_uv=False)[:, -1]
-        return smallest
+        return np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1], dtype=float)
 
 
 @dataclass(frozen=True, eq=False)
@@ -1194,7 +1229,7 @@ def _follow(led: Follower, poses: Path, q: Array) -> Followed:
         way: list[tuple[float, PathPoint]] = []
         allowed = not led.redundant or tracker.may(point.x)
         segment = _segment(curve, u, number)
-        last, at, step = point, 0.0, step
+        last, at = point, 0.0
         if allowed:
             last, at, step = carried(tracker, point, segment, min(1.0, step), way)
         trail = trail[-_TRAIL:] + [(u + s * (number - u), passed) for s, passed in way]
@@ -1220,21 +1255,15 @@ def _follow(led: Follower, poses: Path, q: Array) -> Followed:
         point = last
         whole = led.whole(q, point.x)
         if stopped:
-            reason = stop_reason(led, poses, number, whole, at)
+            reason = stop_reason(led, poses, number, whole, u - number + 1)
             break
         found[number], residual[number] = point.x, led.residual(whole, poses.poses[number])
         number += 1
     rows = np.tile(q, (number, 1))
     rows[:, list(led.indices)] = found[:number] * led.scale
-    last_q = led.whole(q, point.x)
-    return Followed(
-        rows,
-        number - 1,
-        reason,
-        residual[:number],
-        last_q,
-        _conditioning(led, poses, found[:number]),
-    )
+    last_q, x = led.whole(q, point.x), found[:number]
+    conditioning = _conditioning(led, poses, x)
+    return Followed(rows, number - 1, reason, residual[:number], last_q, conditioning)
 
 
 def _conditioning(led: Follower, poses: Path, x: Array) -> Conditioning:

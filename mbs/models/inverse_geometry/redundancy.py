@@ -150,7 +150,8 @@ def _spread(system: System, name: str, number: int, limits: bool | Given | None)
     if revolute and high - low >= _TURN:
         # a turn ends where it begins; also of limits that are infinite
         first = -math.pi if math.isinf(low) else low
-        return first + np.arange(number) * (_TURN / number)
+        turn: Array = np.arange(number, dtype=np.float64) * (_TURN / number)
+        return first + turn
     if math.isinf(high - low):
         raise ModelError(
             f"{system.name}: joint {quoted(name)} has no limits between which {number} positions"
@@ -158,4 +159,5 @@ def _spread(system: System, name: str, number: int, limits: bool | Given | None)
         )
     if number == 1:
         return np.array([(low + high) / 2])
-    return np.array(np.linspace(low, high, number), dtype=np.float64)
+    found: Array = np.linspace(low, high, number, dtype=np.float64)
+    return found

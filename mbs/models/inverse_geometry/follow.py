@@ -21,6 +21,7 @@ from mbs.loops.pose import Goal, goal
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose, target_poses
 from mbs.models.inverse_geometry.closed_form import sequence_of
+from mbs.models.inverse_geometry.gathering import NOT_VARIED
 from mbs.models.inverse_geometry.many import batch
 from mbs.models.inverse_geometry.search import polish
 from mbs.models.inverse_geometry.solutions import WITHIN, CoordinateLimits, Given, apart, bounds
@@ -961,7 +962,7 @@ def _nearest_solution(led: Follower, x: Array, T: Array) -> Array | None:
     if led.chain is None:
         return None
     p = led.target.closing.p
-    q = solve_at(led.chain, np.zeros(0), T, "auto", p).q[:, list(led.indices)]
+    q = solve_at(led.chain, NOT_VARIED, T, "auto", p).q[:, list(led.indices)]
     if not len(q):
         return None
     away = led.chain.arm(p).wrapped(q / led.scale - x)

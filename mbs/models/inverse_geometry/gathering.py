@@ -33,6 +33,8 @@ five of sixteen in the square, half as many in the angle."""
 ILL_CONDITIONED = 1e-9
 """Regularity of the general method below which it may miss solutions: seven digits are left of a
 root, of a double one three."""
+NOT_VARIED = np.zeros(0)
+"""Positions of the varied joints of a chain that has none."""
 _STARTS = 300
 _KEPT = 256
 """Arms kept ready, one for every position of a locked joint, of tens of kilobytes each."""
@@ -56,7 +58,9 @@ class Gathered:
     doubtful: bool
 
 
-def gather(chain: FrameChain, target: Target, method: str, p: Array, r: Array) -> Gathered:
+def gather(
+    chain: FrameChain, target: Target, method: str, p: Array, r: Array = NOT_VARIED
+) -> Gathered:
     """The solutions by one method, or by the first that holds for the chain.
 
     Args:

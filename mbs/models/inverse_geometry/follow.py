@@ -1249,6 +1249,7 @@ def _follow(led: Follower, poses: Path, q: Array) -> Followed:
                 led.residual(led.whole(q, x), T)
                 for x, T in zip(leap.x, poses.poses[passed], strict=True)
             ]
+            # next to the singular configuration steps are short: a hundredth of the next segment
             number, u, step = number + len(leap.x), leap.u, 1e-2
             point = point_at(tracker, leap.end, curve(u))
             trail = _known(tracker, poses, found, number - 1) if u == number - 1 else [(u, point)]

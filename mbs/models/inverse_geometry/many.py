@@ -23,7 +23,7 @@ from mbs.models.inverse_geometry.closed_form import (
     sequence_of,
 )
 from mbs.models.inverse_geometry.gathering import ILL_CONDITIONED, METHODS, general_ready
-from mbs.models.inverse_geometry.redundancy import Locked, Redundant, Samples, samples_of
+from mbs.models.inverse_geometry.redundancy import Locked, LockedSamples, Redundant, samples_of
 from mbs.models.inverse_geometry.search import General, Polished, general_many, polish
 from mbs.models.inverse_geometry.solutions import (
     WITHIN,
@@ -495,7 +495,7 @@ def solve_many(
     return _gather_samples(found, samples)
 
 
-def _gather_samples(many: ManySolutions, samples: Samples) -> ManySolutions:
+def _gather_samples(many: ManySolutions, samples: LockedSamples) -> ManySolutions:
     """The rows of all positions of a pose in one row."""
     count, number, _ = samples.r.shape
     if number == 1:

@@ -22,11 +22,11 @@ Locked: TypeAlias = Mapping[str, Any]
 
 _TURN = 2 * math.pi
 _MOST = 10_000_000
-"""Samples of one call: their configurations take some gigabytes."""
+"""LockedSamples of one call: their configurations take some gigabytes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Samples:
+class LockedSamples:
     """Where joints are locked, at each of N poses S times.
 
     Attributes:
@@ -46,7 +46,7 @@ def samples_of(
     redundant: Redundant | None,
     limits: bool | Given | None,
     count: int,
-) -> Samples:
+) -> LockedSamples:
     """Where joints are locked at each of so many poses.
 
     Args:
@@ -90,7 +90,7 @@ def samples_of(
         repeat = math.prod(other.shape[1] for other in columns[k + 1 :])
         spread = np.repeat(column, repeat, axis=1)
         r[:, :, len(moving) + k] = np.tile(spread, number // max(spread.shape[1], 1))
-    return Samples(fixed, varied, r)
+    return LockedSamples(fixed, varied, r)
 
 
 def _one_per_pose(system: System, name: str, value: Any, count: int) -> Array:

@@ -16,7 +16,7 @@ from mbs.models.inverse_geometry.answer import Question, answer, roots
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS
 from mbs.models.inverse_geometry.gathering import Gathered, gather, gather_further
-from mbs.models.inverse_geometry.redundancy import Redundant, Samples, samples_of
+from mbs.models.inverse_geometry.redundancy import LockedSamples, Redundant, samples_of
 from mbs.models.inverse_geometry.solutions import Given, Solutions, Wishes, bounds, leaves_out
 from mbs.models.inverse_geometry.target import NEARLY_SINGULAR, Target
 from mbs.models.inverse_geometry.whole_robot import parallel
@@ -108,7 +108,7 @@ def solve_at(
     return answer(question, found, gathered.method)
 
 
-def _joined(answers: list[Solutions], samples: Samples, near: Array | None) -> Solutions:
+def _joined(answers: list[Solutions], samples: LockedSamples, near: Array | None) -> Solutions:
     """The solutions of all positions of redundant joints."""
     every = [solution for answer in answers for solution in answer]
     if near is not None:
@@ -132,7 +132,9 @@ def _away(answer: Solutions) -> float:
     return np.inf if answer.nearest is None else answer.nearest.distance + answer.nearest.angle
 
 
-def _chain_or_none(system: System, frame: str | int | None, samples: Samples) -> FrameChain | None:
+def _chain_or_none(
+    system: System, frame: str | int | None, samples: LockedSamples
+) -> FrameChain | None:
     """The chain to the frame; None where a robot with loops has none that can stand alone."""
     try:
         return frame_chain(system, frame, samples.locked, samples.varied)

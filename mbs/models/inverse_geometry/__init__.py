@@ -2,6 +2,7 @@
 
 from mbs.models.inverse_geometry.closed_form import InverseGeometry, function
 from mbs.models.inverse_geometry.follow import Followed, follow
+from mbs.models.inverse_geometry.free_orientation import FreeOrientation, free_orientation
 from mbs.models.inverse_geometry.many import ManySolutions, solve_many
 from mbs.models.inverse_geometry.search import Nearest
 from mbs.models.inverse_geometry.self_motions import Family
@@ -12,12 +13,14 @@ from mbs.models.inverse_geometry.solve import solve
 __all__ = [
     "Family",
     "Followed",
+    "FreeOrientation",
     "InverseGeometry",
     "ManySolutions",
     "Nearest",
     "Solution",
     "Solutions",
     "follow",
+    "free_orientation",
     "function",
     "solve",
     "solve_many",

@@ -478,9 +478,9 @@ def _from_limits(low: Array, high: Array) -> Callable[[Array], Array]:
     Source: Liegeois 1977.
     """
     limited = np.isfinite(low) & np.isfinite(high) & (high > low)
-    middle = np.where(limited, (low + high) / 2, 0.0)
+    low, high = np.where(limited, low, 0.0), np.where(limited, high, 0.0)
     half = np.where(limited, (high - low) / 2, np.inf)
-    return lambda x: (x - middle) / half**2
+    return lambda x: (x - (low + high) / 2) / half**2
 
 
 def _to_manipulability(led: Follower) -> Callable[[Array], Array]:

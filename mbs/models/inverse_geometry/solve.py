@@ -12,7 +12,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Array
 from mbs.errors import ModelError
-from mbs.models.inverse_geometry.answer import Question, answer, roots
+from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, roots
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS
 from mbs.models.inverse_geometry.gathering import Gathered, gather, gather_further
@@ -101,11 +101,26 @@ def solve_at(
     own = chain.locked_at(r) if chain.varied else chain
     wishes = _wishes(chain.system, own, limits, seed)
     question = Question(own, Target(own.arm(p), T), p, wishes)
-    gathered = gather(chain, question.target, method, p, r)
-    if method in ("auto", *CLOSED_FORMS) and _is_doubtful(question.target, gathered):
-        gathered = gather_further(own, question.target, gathered, p)
-    found = roots(question.target, gathered, question.chain_indices)
-    return answer(question, found, gathered.method)
+    found, used = solved(question, method, chain, r)
+    return answer(question, found, used)
+
+
+def solved(
+    question: Question, method: str, varied: FrameChain, r: Array
+) -> tuple[list[ChainRoot], str]:
+    """The solutions of a chain, and the method that gave them.
+
+    Args:
+        question: the chain and the pose.
+        method: as in `solve`.
+        varied: the chain with some joints at positions that are symbols.
+        r: (k,) these positions in the question [rad or m].
+    """
+    chain, target, p = question.chain, question.target, question.p
+    gathered = gather(varied, target, method, p, r)
+    if method in ("auto", *CLOSED_FORMS) and _is_doubtful(target, gathered):
+        gathered = gather_further(chain, target, gathered, p)
+    return roots(target, gathered, question.chain_indices), gathered.method
 
 
 def _joined(answers: list[Solutions], samples: LockedSamples, near: Array | None) -> Solutions:

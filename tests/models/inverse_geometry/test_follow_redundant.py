@@ -113,6 +113,12 @@ def test_a_joint_stays_at_its_limit_while_the_others_go_on(panda, circle):
     assert both.reason == f"joint q1 passes its limit 0.2 before pose {before} of 201"
 
 
+def test_joints_without_limits_have_no_middle(panda, circle):
+    plain = follow(panda, circle, START, samples=11, limits=False)
+    same = follow(panda, circle, START, samples=11, limits=False, redundancy="limits")
+    np.testing.assert_allclose(same.q, plain.q, atol=1e-12)
+
+
 def test_a_start_beyond_its_limits_is_told(panda, circle):
     found = follow(panda, circle, START, limits={"q1": (0.15, 0.2)})
     assert found.reached == -1

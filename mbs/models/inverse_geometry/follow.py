@@ -602,10 +602,12 @@ def _turn(vector: Array) -> Array:
 
 _BLOCK = 20_000
 """Poses that are solved at once: some megabytes for each branch."""
-_SHORT = 100
-"""Poses below which steps are quicker than the equations of a new robot are derived."""
+_SHORT = 20
+"""Poses below which steps, of a millisecond or two, are quicker than equations of a new robot."""
 _RATIO = 2.0
 """Between two poses, of what vanishes where branches meet: `_CHANGE` of it."""
+_NEARER = 0.25
+"""Times the distance of the next configuration from a prediction, within which one is meant."""
 _ON = 1e-6
 """Difference [rad or arm lengths] between a configuration that was followed and its branch: the
 first is found to 1e-9 or better."""
@@ -663,6 +665,25 @@ class Runs:
         within = np.all((led >= low - WITHIN) & (led <= high + WITHIN), axis=1)
         count = count if np.all(within) else int(np.argmin(within))
         return led[:count], self.residual[row + 1 : row + 1 + count, branch]
+
+    def nearest(self, number: int, x: Array) -> tuple[Array, float] | None:
+        """The configuration (n,) at a pose that is much nearer to x than all others.
+
+        Returns:
+            It and by how much it misses the pose; None where there is none, or the pose is beyond
+            the block.
+        """
+        row = number - self.first
+        if not 0 <= row < len(self.q) or not np.any(self.good[row]):
+            return None
+        branches = np.flatnonzero(self.good[row])
+        away = self.arm.wrapped(self.q[row, branches] - x)
+        distance = np.linalg.norm(away, axis=1)
+        best = int(np.argmin(distance))
+        others = distance[np.linalg.norm(away - away[best], axis=1) > _ON]
+        if distance[best] > _NEARER * np.min(others, initial=np.inf):
+            return None
+        return x + away[best], float(self.residual[row, branches[best]])
 
 
 def _no_run(joints: int) -> tuple[Array, Array]:
@@ -749,6 +770,34 @@ class Leap:
     x: Array
     u: float
     end: Array
+
+
+def _smooth_step(
+    led: Follower,
+    poses: Path,
+    curve: Callable[[float], Array],
+    runs: Runs,
+    found: Array,
+    number: int,
+) -> tuple[Array, float] | None:
+    """The configuration at the next pose, where joints go on smoothly there by a closed form.
+
+    Returns:
+        It and by how much it misses the pose; None where that is in doubt.
+    """
+    if number < 3:
+        return None
+    nodes, x = [float(k) for k in range(number - 3, number)], found[number - 3 : number]
+    predicted = _lagrange(nodes, x, float(number))
+    own = runs.nearest(number, predicted)
+    if own is None or _added(predicted, own[0], x[-1]) > _FAIR or not led.tracker.may(own[0]):
+        return None
+    nodes, x = [*nodes[1:], float(number)], np.vstack([x[1:], own[0]])
+    predicted = _lagrange(nodes, x, number + 1.0)
+    beyond = runs.nearest(number + 1, predicted)
+    if beyond is not None and _added(predicted, beyond[0], own[0]) <= _FAIR:
+        nodes, x = [*nodes, number + 1.0], np.vstack([x, beyond[0]])
+    return own if _is_fair(led, poses, curve, nodes, x, number, number) else None
 
 
 def _known(
@@ -1223,6 +1272,14 @@ def _follow(led: Follower, poses: Path, q: Array) -> Followed:
                 found[number : number + len(run)] = run
                 residual[number : number + len(run)] = missed
                 number += len(run)
+                u, trail = number - 1.0, _known(tracker, poses, found, number - 1)
+                point = trail[-1][1]
+                continue
+            # next to a singular configuration pose by pose, as smoothly as before
+            smooth = None if runs is None else _smooth_step(led, poses, curve, runs, found, number)
+            if smooth is not None:
+                found[number], residual[number] = smooth
+                number += 1
                 u, trail = number - 1.0, _known(tracker, poses, found, number - 1)
                 point = trail[-1][1]
                 continue

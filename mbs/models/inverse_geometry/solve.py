@@ -17,6 +17,7 @@ from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_po
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS
 from mbs.models.inverse_geometry.gathering import Gathered, gather, gather_further
 from mbs.models.inverse_geometry.redundancy import LockedSamples, Redundant, samples_of
+from mbs.models.inverse_geometry.search import nearest
 from mbs.models.inverse_geometry.solutions import Given, Solutions, Wishes, bounds, leaves_out
 from mbs.models.inverse_geometry.target import NEARLY_SINGULAR, Target
 from mbs.models.inverse_geometry.whole_robot import parallel
@@ -72,10 +73,10 @@ def solve(
     chain = _chain_or_none(system, frame, samples)
     if chain is None:
         return parallel(_wishes(system, None, limits, seed), frame, target, p)
-    answers = [solve_at(chain, r, target, method, p, limits, seed) for r in samples.r[0]]
     if redundant is None:
-        return answers[0]
-    return _joined(answers, samples, None if seed is None else np.array(system.position(seed)))
+        return solve_at(chain, samples.r[0, 0], target, method, p, limits, seed)
+    asked = [_asked(chain, r, target, method, p, limits, seed) for r in samples.r[0]]
+    return _joined(asked, samples, None if seed is None else np.array(system.position(seed)))
 
 
 def solve_at(
@@ -98,11 +99,26 @@ def solve_at(
         limits: as in `solve`.
         seed: as in `solve`.
     """
+    return answer(*_asked(chain, r, T, method, p, limits, seed))
+
+
+_Asked = tuple[Question, list[ChainRoot], str]
+"""A question, the solutions of its chain, and the method that gave them."""
+
+
+def _asked(
+    chain: FrameChain,
+    r: Array,
+    T: Array,
+    method: str,
+    p: Array,
+    limits: bool | Given | None,
+    seed: Mapping[str, float] | Sequence[float] | None,
+) -> _Asked:
     own = chain.locked_at(r) if chain.varied else chain
     wishes = _wishes(chain.system, own, limits, seed)
     question = Question(own, Target(own.arm(p), T), p, wishes)
-    found, used = solved(question, method, chain, r)
-    return answer(question, found, used)
+    return question, *solved(question, method, chain, r)
 
 
 def solved(
@@ -123,28 +139,28 @@ def solved(
     return roots(target, gathered, question.chain_indices), gathered.method
 
 
-def _joined(answers: list[Solutions], samples: LockedSamples, near: Array | None) -> Solutions:
-    """The solutions of all positions of redundant joints."""
-    every = [solution for answer in answers for solution in answer]
+def _joined(asked: list[_Asked], samples: LockedSamples, near: Array | None) -> Solutions:
+    """The solutions of all positions of redundant joints; else why there is none at the best."""
+    reached = [k for k, (_, found, _) in enumerate(asked) if found]
+    if not reached:
+        reached = [int(np.argmin([_away(question) for question, _, _ in asked]))]
+    answers = [answer(*asked[k]) for k in reached]
+    every = [solution for own in answers for solution in own]
     if near is not None:
         every.sort(key=lambda solution: float(np.linalg.norm(solution.q - near)))
-    # one that has solutions, else the nearest to have some, else one left empty by limits
-    away = [_away(answer) for answer in answers]
-    best = int(np.argmin(away))
-    reason = ""
-    if not every:
-        at = ", ".join(
-            f"{name} = {x:.6g}" for name, x in zip(samples.varied, samples.r[0, best], strict=True)
-        )
-        reason = f"none at {len(answers)} positions of redundant joints; at {at}: "
-        reason += answers[best].reason
-    return replace(answers[best], solutions=tuple(every), reason=reason)
+    if every:
+        return replace(answers[0], solutions=tuple(every), reason="", nearest=None)
+    position = zip(samples.varied, samples.r[0, reached[0]], strict=True)
+    at = ", ".join(f"{name} = {x:.6g}" for name, x in position)
+    reason = f"none at {len(asked)} positions of redundant joints; at {at}: {answers[0].reason}"
+    return replace(answers[0], reason=reason)
 
 
-def _away(answer: Solutions) -> float:
-    if len(answer):
-        return -1.0
-    return np.inf if answer.nearest is None else answer.nearest.distance + answer.nearest.angle
+def _away(question: Question) -> float:
+    """How far the nearest reachable pose is [arm lengths and rad]."""
+    arm = question.target.arm
+    found = nearest(arm, question.target.T)
+    return found.distance / arm.length + found.angle
 
 
 def _chain_or_none(

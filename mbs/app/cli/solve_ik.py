@@ -21,6 +21,7 @@ EXAMPLES = examples(
     "mbs solve-ik rx90 --q q1=0.3 --q q2=0.5 --q q5=1",
     'mbs solve-ik scara --pose "1 0 0 0.4  0 1 0 0.2  0 0 1 0.1"',
     "mbs solve-ik panda --q q2=0.4 --locked q3=0 --json",
+    "mbs solve-ik panda --q q2=0.4 --redundant q7=16",
 )
 
 Triple = tuple[str, str, str]
@@ -82,6 +83,14 @@ Locked = Annotated[
         show_default=False,
     ),
 ]
+Redundant = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME=COUNT",
+        help="Joint beyond six that takes so many positions, from limit to limit; may be repeated.",
+        show_default=False,
+    ),
+]
 
 
 def solve_ik(
@@ -95,6 +104,7 @@ def solve_ik(
     method: Method = "auto",
     seed: Seed = None,
     locked: Locked = None,
+    redundant: Redundant = None,
     parameter: Parameters = None,
     json: Json = False,
 ) -> None:
@@ -115,6 +125,7 @@ def solve_ik(
         method,
         seed=numbers(seed, "--seed") or None,
         locked=numbers(locked, "--locked") or None,
+        redundant=_counts(redundant),
     )
     if json:
         print_json({**_data(found), "pose": wanted})
@@ -123,6 +134,16 @@ def solve_ik(
     if not found.rows:
         note(f"mbs: {_reason(found)}")
         raise typer.Exit(1)
+
+
+def _counts(texts: list[str] | None) -> dict[str, int] | None:
+    """How many positions joints take, by name."""
+    counts = dict[str, int]()
+    for name, value in numbers(texts, "--redundant").items():
+        if value != int(value):
+            raise ModelError(f"--redundant {name}: {value:g} is no whole number of positions")
+        counts[name] = int(value)
+    return counts or None
 
 
 def _frame(text: str | None) -> str | int | None:

@@ -200,6 +200,7 @@ class ConfigurationList:
         names: of the coordinates.
         units: of the coordinates.
         locked: joints that stayed, with their positions.
+        redundant: joints that took many positions, with their number.
         method: that found them.
         reason: why there is none; "" where there is one.
         rows: the configurations, those near the seed first.
@@ -213,6 +214,7 @@ class ConfigurationList:
     names: tuple[str, ...]
     units: tuple[str, ...]
     locked: tuple[tuple[str, float], ...]
+    redundant: tuple[tuple[str, int], ...]
     method: str
     reason: str
     rows: tuple[Configuration, ...]
@@ -236,6 +238,7 @@ def configurations(
     *,
     seed: Seed = None,
     locked: Mapping[str, float] | None = None,
+    redundant: Mapping[str, int] | None = None,
     parameters: Values = None,
 ) -> ConfigurationList:
     """Every configuration that takes a frame to a pose, with and without loops.
@@ -247,7 +250,9 @@ def configurations(
         method: one of `METHODS`. The general method is for six joints; of another chain "general"
             takes the search.
         seed: a configuration from which distances count and that places joints beside the chain.
-        locked: positions of joints that stay, by name; `locked_by_default` when left out.
+        locked: positions of joints that stay, by name; `locked_by_default` when left out, less
+            one for each redundant joint.
+        redundant: by the name of a joint how many positions it takes, from limit to limit.
         parameters: values of symbols, the others at their defaults.
 
     Raises:
@@ -255,10 +260,23 @@ def configurations(
         NoClosedForm: Pieper's or Paul's method does not fit the mechanism.
     """
     name = terminal_frame(system) if frame is None else frame
-    held = dict(locked_by_default(system, name, seed) if locked is None else locked)
-    way = _method(system, name, method, held)
+    many = dict(redundant or {})
+    if locked is None:
+        held = locked_by_default(system, name, seed)
+        for _ in many:  # one less for each
+            held.pop(next((joint for joint in held if joint in many), next(iter(held), "")), None)
+    else:
+        held = dict(locked)
+    way = _method(system, name, method, {**held, **many})
     found = inverse_geometry.solve(
-        system, T, name, way, seed=seed, locked=held or None, parameters=parameters
+        system,
+        T,
+        name,
+        way,
+        seed=seed,
+        locked=held or None,
+        redundant=many or None,
+        parameters=parameters,
     )
     limits = bounds(system)
     return ConfigurationList(
@@ -268,6 +286,7 @@ def configurations(
         names=found.names,
         units=tuple(c.unit for c in system.coordinates),
         locked=tuple(held.items()),
+        redundant=tuple(many.items()),
         method=found.method,
         reason=found.reason,
         rows=tuple(_row(one, limits) for one in found),

@@ -3,6 +3,7 @@
 from mbs.closed_forms.arm_search import Nearest
 from mbs.models.inverse_geometry.closed_form import InverseGeometry, function
 from mbs.models.inverse_geometry.follow import Followed, follow
+from mbs.models.inverse_geometry.free_orientation import FreeOrientation, free_orientation
 from mbs.models.inverse_geometry.many import ManySolutions, solve_many
 from mbs.models.inverse_geometry.self_motions import Family
 from mbs.models.inverse_geometry.sheet import text
@@ -13,6 +14,7 @@ from mbs.models.inverse_geometry.solver import PoseAnswer, PoseSolver, solver
 __all__ = [
     "Family",
     "Followed",
+    "FreeOrientation",
     "InverseGeometry",
     "ManySolutions",
     "Nearest",
@@ -21,6 +23,7 @@ __all__ = [
     "Solution",
     "Solutions",
     "follow",
+    "free_orientation",
     "function",
     "solve",
     "solve_many",

@@ -133,21 +133,24 @@ def branch_labels(chain: FrameChain, sequence: StepSequence, p: Array) -> tuple[
     """The names of all branches of a closed form; kept on the system.
 
     They are those of shoulder, elbow and wrist where every branch has one of its own wherever the
-    arm is, else the signs, such as "q3:+ q2:- q5:+".
+    arm is, else the signs, such as "q3:+ q2:- q5:+"; with joints at positions that vary the signs.
 
     Args:
         chain: what is solved for.
         sequence: its steps, for the same p.
         p: (np,) the parameters.
     """
+    signs = tuple(sequence.label(b) or "1" for b in range(sequence.branches))
 
     def named() -> tuple[str, ...]:
+        if chain.varied:
+            return signs
         arm = chain.arm(p)
         has = anatomy(arm)
         names = _names_at_samples(chain, sequence, p, arm, has) if has.wrist else []
         if names and len(set(names)) == len(names) and all(names):
             return tuple(names)
-        return tuple(sequence.label(b) or "1" for b in range(sequence.branches))
+        return signs
 
     found: tuple[str, ...] = chain.system.cached(
         ("branch labels", sequence, *chain.key, p.tobytes()), named

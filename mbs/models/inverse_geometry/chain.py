@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Container, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tree import Link
-from mbs.closed_forms.arm import Arm, arm_of
+from mbs.closed_forms.arm import Arm, arm_of, motion
 from mbs.closed_forms.ring import PARAMETERS
 from mbs.closed_forms.sequence import Problem
 from mbs.components.joints import Motion
@@ -27,6 +27,8 @@ from mbs.text import did_you_mean, quoted
 
 _SAMPLES, _SEED = 4, 20260105
 _LARGEST = 6
+_KEPT = 1024
+"""Chains and arms kept, one for every position of a locked joint."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,12 +41,16 @@ class FrameChain:
         chain: free joints, each with its index in q, and what is between them, of parameters p;
             locked joints are in the gaps.
         locked: positions of the other joints on the path by name [rad or m].
+        varied: further locked joints, whose positions are symbols.
+        symbols: (k, 1) these symbols [rad or m].
     """
 
     system: System
     frame: str | int
     chain: Chain
     locked: Mapping[str, float]
+    varied: tuple[str, ...] = ()
+    symbols: SX = field(default_factory=lambda: SX(0, 1))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -64,14 +70,39 @@ class FrameChain:
     @property
     def key(self) -> tuple[object, ...]:
         """What tells chains of one system apart."""
-        return self.frame, tuple(self.locked.items())
+        return self.frame, tuple(self.locked.items()), self.varied
+
+    @property
+    def varied_indices(self) -> tuple[int, ...]:
+        """The indices in q of the joints whose positions are symbols."""
+        starts = {link.name: link.q.start for link in self.system.tree.links}
+        return tuple(starts[name] for name in self.varied)
 
     def arm(self, p: NDArray[np.float64]) -> Arm:
         """The chain in numbers for parameters p, (np,); kept on the system."""
-        arm: Arm = self.system.cached(
-            ("arm", *self.key, p.tobytes()), lambda: arm_of(self.chain, self.system.p, p)
+        key = (*self.key, p.tobytes())
+        arm: Arm = self.system.recent(
+            "arm", key, lambda: arm_of(self.chain, self.system.p, p), _KEPT
         )
         return arm
+
+    def gaps(self, p: NDArray[np.float64], r: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(N, n + 1, 4, 4) what is between the joints, for N positions r (N, k) of the varied."""
+        free = frame_chain(self.system, self.frame, self.locked, most=len(self.system.tree.links))
+        arm = free.arm(p)
+        gaps = [np.broadcast_to(arm.gaps[0], (len(r), 4, 4))]
+        for k, name in enumerate(free.names):
+            if name not in self.varied:
+                gaps.append(np.broadcast_to(arm.gaps[k + 1], (len(r), 4, 4)))
+                continue
+            way = motion(r[:, self.varied.index(name)], bool(arm.prismatic[k]))
+            gaps[-1] = gaps[-1] @ way @ arm.gaps[k + 1]
+        return np.stack(gaps, axis=1)
+
+    def locked_at(self, r: NDArray[np.float64]) -> FrameChain:
+        """The chain with the varied joints locked at positions r, (k,) [rad or m]."""
+        values = dict(zip(self.varied, r.tolist(), strict=True))
+        return frame_chain(self.system, self.frame, {**self.locked, **values})
 
     def at(self, p: NDArray[np.float64] | None = None) -> Chain:
         """The chain with numbers p, (np,), in the place of the parameters, where they are given."""
@@ -92,10 +123,11 @@ class FrameChain:
             p: (np,) numbers in the place of the parameters; symbols stay symbols when left out.
 
         Returns:
-            Problem whose `given` is the parameters, where they are symbols, then the first three
-            rows of the pose T, column by column.
+            Problem whose `given` is the parameters, where they are symbols, the positions of the
+            varied joints, then the first three rows of the pose T, column by column.
         """
         n, symbols = len(self.names), self.system.p if p is None else SX(0, 1)
+        symbols = casadi.vertcat(symbols, self.symbols)
         t = casadi.vertcat(*(SX.sym(f"T{r}{c}") for c in range(1, 5) for r in range(1, 4)))
         T = Pose(casadi.reshape(t[0:9], 3, 3), t[9:12])
         gaps = self.at(p).gaps
@@ -120,9 +152,13 @@ class FrameChain:
             q = np.where(self.prismatic, rng.uniform(0.2, 1.2, len(self.names)), 0.0)
             turns = rng.uniform(-np.pi, np.pi, len(self.names))
             q = np.where(self.prismatic, q, turns)
-            arm = arm_of(self.chain, self.system.p, own) if p is None else self.arm(p)
+            # the same numbers serve a varied turn and a varied slide
+            r = rng.uniform(0.2, 1.2, len(self.varied))
+            symbols = casadi.vertcat(self.system.p, self.symbols)
+            plain = p is not None and not self.varied
+            arm = self.arm(own) if plain else arm_of(self.chain, symbols, np.append(own, r))
             T = arm.pose(q)[:3].ravel(order="F")
-            samples.append((q, np.concatenate([own if p is None else np.zeros(0), T])))
+            samples.append((q, np.concatenate([own if p is None else np.zeros(0), r, T])))
         return samples
 
 
@@ -130,6 +166,8 @@ def frame_chain(
     system: System,
     frame: str | int | None = None,
     locked: Mapping[str, float] | None = None,
+    varied: tuple[str, ...] = (),
+    most: int = _LARGEST,
 ) -> FrameChain:
     """The joints from the base to a frame; kept on the system.
 
@@ -137,19 +175,23 @@ def frame_chain(
         system: open or closed; of a closed one the joints of its tree.
         frame: a body, a named frame, the number of a link, or None for the terminal frame.
         locked: positions of joints that stay where they are, by name [rad or m].
+        varied: joints that are locked too, at positions that stay symbols.
+        most: how many joints may be free.
 
     Raises:
         ModelError: there is no such frame or joint, a joint of the chain is a ball or free, or
-            none or more than six are free to move.
+            none or more than `most` are free to move.
     """
     require_system(system)
     name = _terminal_frame(system) if frame is None else frame
     number = system.frame(name)[0]
     links = [system.tree.links[k] for k in system.tree.path(number)]
     locked_positions = _locked(system, links, locked)
-    key = ("chain", name, tuple(locked_positions.items()))
-    found: FrameChain = system.cached(
-        key, lambda: _frame_chain(system, name, links, locked_positions)
+    _require_on_path(system, links, varied, "redundant")
+    _require_few(system, name, links, (*locked_positions, *varied), most)
+    key = (name, tuple(locked_positions.items()), varied)
+    found: FrameChain = system.recent(
+        "chain", key, lambda: _frame_chain(system, name, links, locked_positions, varied), _KEPT
     )
     return found
 
@@ -160,14 +202,21 @@ def _terminal_frame(system: System) -> str | int:
 
 
 def _frame_chain(
-    system: System, name: str | int, links: list[Link], locked_positions: Mapping[str, float]
+    system: System,
+    name: str | int,
+    links: list[Link],
+    locked_positions: Mapping[str, float],
+    varied: tuple[str, ...],
 ) -> FrameChain:
-    _require_few(system, name, links, locked_positions)
-    known = [link.q.start for link in links if link.name in locked_positions]
+    starts = {link.name: link.q.start for link in links}
+    known = [starts[link] for link in starts if link in locked_positions or link in varied]
     q = SX(DM(system.position(locked_positions)))
+    symbols = SX(casadi.vertcat(*(SX.sym(other) for other in varied)))
+    q[[starts[other] for other in varied]] = symbols
     chain = tree_chain(system.tree, system.frame("base"), system.frame(name), known, q)
     poses = (Gap(gap.pose) for gap in chain.gaps)  # a locked joint is no pivot
-    return FrameChain(system, name, replace(chain, gaps=tuple(poses)), locked_positions)
+    chain = replace(chain, gaps=tuple(poses))
+    return FrameChain(system, name, chain, locked_positions, varied, symbols)
 
 
 def _locked(system: System, links: list[Link], given: object) -> dict[str, float]:
@@ -178,15 +227,19 @@ def _locked(system: System, links: list[Link], given: object) -> dict[str, float
         raise ModelError(
             f"{system.name}: locked is {quoted(given)}; give a dict of joint names to positions"
         )
+    _require_on_path(system, links, given, "locked")
+    positions = system.position(given)
+    return {link.name: positions[link.q.start] for link in links if link.name in given}
+
+
+def _require_on_path(system: System, links: list[Link], given: Iterable[str], what: str) -> None:
     names = [link.name for link in links]
     for name in given:
         if name not in names:
             raise ModelError(
                 f"{system.name}: joint {quoted(name)} is not between the base and the frame, so"
-                f" that it cannot be locked; {did_you_mean(name, names)}"
+                f" that it cannot be {what}; {did_you_mean(name, names)}"
             )
-    positions = system.position(given)
-    return {link.name: positions[link.q.start] for link in links if link.name in given}
 
 
 def _require_simple(system: System, link: Link) -> None:
@@ -199,11 +252,11 @@ def _require_simple(system: System, link: Link) -> None:
 
 
 def _require_few(
-    system: System, frame: str | int, links: list[Link], locked_positions: Mapping[str, float]
+    system: System, frame: str | int, links: list[Link], locked: Container[str], most: int
 ) -> None:
     for link in links:
         _require_simple(system, link)
-    free = [link for link in links if link.name not in locked_positions]
+    free = [link for link in links if link.name not in locked]
     if not links:
         raise ModelError(f"{system.name}: no joint moves frame {frame!r}; name another frame")
     if not free:
@@ -211,23 +264,31 @@ def _require_few(
             f"{system.name}: every joint between the base and frame {frame!r} is locked; leave one"
             " of them free"
         )
-    if len(free) > _LARGEST:
+    if len(free) > most:
         surplus = len(free) - _LARGEST
+        chosen = _proposal(free, surplus)
+        at = ", ".join(
+            f"{link.name!r}: {system.configuration[link.q.start]:.6g}" for link in chosen
+        )
+        among = ", ".join(f"{link.name!r}: {_PROPOSED}" for link in chosen)
         raise ModelError(
             f"{system.name}: {len(free)} joints are free between the base and frame {frame!r},"
-            f" and a pose determines {_LARGEST}; lock {surplus} of them with"
-            f" locked={{{_proposal(system, free, surplus)}}}"
+            f" and a pose determines {_LARGEST}; lock {surplus} of them with locked={{{at}}}, or"
+            f" ask for many positions of them with redundant={{{among}}}"
         )
 
 
-def _proposal(system: System, free: list[Link], surplus: int) -> str:
-    """Joints before the middle of the chain, where they are in the assembled configuration.
+_PROPOSED = 64
+"""Positions of a redundant joint that a message proposes: every five degrees or so."""
+
+
+def _proposal(free: list[Link], surplus: int) -> list[Link]:
+    """Joints before the middle of the chain.
 
     An arm of seven joints keeps its elbow, without which it has one length alone.
     """
     first = (len(free) - surplus - 1) // 2
-    chosen = free[first : first + surplus]
-    return ", ".join(f"{link.name!r}: {system.configuration[link.q.start]:.6g}" for link in chosen)
+    return free[first : first + surplus]
 
 
 # Poses as a user gives them: one, or many at once.

@@ -88,9 +88,10 @@ def require_method(system: System, method: str, known: tuple[str, ...]) -> None:
         )
 
 
-def given_of(chain: FrameChain, T: SX) -> SX:
-    """What a sequence of symbolic parameters takes for a pose T, (4, 4)."""
-    return SX(casadi.vertcat(chain.system.p, casadi.vec(T[:3, :])))
+def given_of(chain: FrameChain, T: SX, p: Numbers = None) -> SX:
+    """What a sequence for p, of symbolic parameters where left out, takes for a pose T, (4, 4)."""
+    parameters = chain.system.p if p is None else SX(0, 1)
+    return SX(casadi.vertcat(parameters, chain.symbols, casadi.vec(T[:3, :])))
 
 
 def _keep(chain: FrameChain, method: str, p: Numbers) -> StepSequence | str:
@@ -418,7 +419,7 @@ def all_branches(
     """``igm_all(T) -> q, residual, real, regular, mark``: a column for every branch.
 
     Args:
-        chain: what is solved for.
+        chain: what is solved for; positions of its varied joints are the last input r.
         sequence: its steps, for the same p.
         p: (np,) numbers in the place of the parameters; else they are a second input p.
 
@@ -429,12 +430,13 @@ def all_branches(
         (branches, 1), a number that is the same for equal configurations, and hardly for others.
     """
     T = SX.sym("T", 4, 4)
-    given = given_of(chain, T) if p is None else SX(casadi.vec(T[:3, :]))
+    given = given_of(chain, T, p)
     leaves = sequence.leaves(given)
     columns = [_column(chain, leaf, T, p) for leaf in leaves]
     values = [casadi.horzcat(*(leaf.x for leaf in leaves))]
     values += [casadi.vertcat(*column) for column in zip(*columns, strict=True)]
     inputs = {"T": T} | ({"p": chain.system.p} if p is None and chain.system.parameters else {})
+    inputs |= {"r": chain.symbols} if chain.varied else {}
     outputs = {name: casadi.densify(v) for name, v in zip(_OUTPUTS, values, strict=True)}
     every = [*inputs.values()], [*outputs.values()], [*inputs], [*outputs]
     return function_of(without_sines(graph_of(Function("igm_all", *every, {"cse": True}))))
@@ -463,15 +465,24 @@ def plain_branches(chain: FrameChain, sequence: StepSequence, p: NDArray[np.floa
     return plain
 
 
-def at_poses(plain: Function, T: NDArray[np.float64]) -> PoseBatch:
-    """What `all_branches` gives for poses T, (N, 4, 4), by the interpreter."""
+def at_poses(
+    plain: Function, T: NDArray[np.float64], r: NDArray[np.float64] | None = None
+) -> PoseBatch:
+    """What `all_branches` gives for poses, by the interpreter, which needs no compiler first.
+
+    Args:
+        plain: `all_branches`.
+        T: (N, 4, 4) the poses [m].
+        r: (N, k) positions of varied joints [rad or m], where there are any.
+    """
     n, branches = plain.size_out(0)
     count = len(T)
     if not count:
         rows = [np.empty((0, branches)) for _ in range(4)]
         return PoseBatch(np.empty((0, branches, n)), *rows)
     columns = np.swapaxes(T, 1, 2).reshape(-1, 4).T
-    q, *parts = (np.array(part) for part in plain.map(count)(columns))
+    varied = [DM(r.T)] if r is not None and r.shape[1] else []
+    q, *parts = (np.array(part) for part in plain.map(count)(columns, *varied))
     return PoseBatch(q.T.reshape(-1, branches, n), *(part.T for part in parts))
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+import functools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +14,19 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, gap_to
+from mbs.closed_forms.arm_search import polish
 from mbs.closed_forms.ring import spin_indices
-from mbs.errors import ModelError
+from mbs.errors import ModelError, NoClosedForm
 from mbs.loops.plan import regular_configuration, undetermined_beside
 from mbs.loops.pose import Goal, goal
 from mbs.models.geometry import terminal_frame
-from mbs.models.inverse_geometry.chain import frame_chain, target_pose, target_poses
+from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose, target_poses
+from mbs.models.inverse_geometry.closed_form import sequence_of
+from mbs.models.inverse_geometry.gathering import NOT_VARIED
+from mbs.models.inverse_geometry.many import batch
 from mbs.models.inverse_geometry.solutions import WITHIN, CoordinateLimits, Given, apart, bounds
+from mbs.models.inverse_geometry.solve import solve_at
+from mbs.models.inverse_geometry.target import SOLVED
 from mbs.numbers import NONZERO
 from mbs.solvers.least_squares import gauss_newton, levenberg_marquardt
 from mbs.solvers.rank import null_space
@@ -55,6 +63,9 @@ _SMALLEST_STEP = 1e-12
 """Part of the way between two poses that is not halved any more: next to one, 1e-16 is rounding."""
 _MOST_STEPS = 200
 """Between two poses; a joint that turns all the way round takes some tens."""
+_GAIN = 10.0
+"""Part of the slope that redundant joints go down per rad or arm length of the frame's way: a cost
+whose second derivative is of about one is lowered within a tenth of the arm's length."""
 _NOISE = 1e-14
 """Rounding of a row: some tens of 1e-16 from products of transforms; the step that it makes is as
 much larger as the inverse of the Jacobian is."""
@@ -66,16 +77,30 @@ class Tracker:
 
     Attributes:
         rows: what is missing, lengths and slides measured so that they compare with turns.
-        slack: directions that no row sees, such as rods that spin.
+        slack: directions that no row sees, such as rods that spin, and those that redundant joints
+            leave free.
         exact: whether every pose can be reached nearby, so that rows are brought to zero between
             the given poses as well; elsewhere they are made as small as they can be.
-        may: None, or whether a configuration is allowed.
+        low, high: (n,) limits of the configuration, infinite where there are none.
+        redundant: how many of the slack directions move joints that can keep within limits.
+        slope: None, or the gradient (n,) of a cost that redundant joints lower at x.
     """
 
     rows: Rows
     slack: int
     exact: bool
-    may: Callable[[Array], bool]
+    low: Array
+    high: Array
+    redundant: int = 0
+    slope: Callable[[Array], Array] | None = None
+
+    def may(self, x: Array) -> bool:
+        """Whether a configuration is within the limits."""
+        return not np.any(self.beyond(x))
+
+    def beyond(self, x: Array) -> NDArray[np.bool_]:
+        """(n,) which joints are beyond their limits."""
+        return np.asarray((x < self.low - WITHIN) | (x > self.high + WITHIN))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +119,11 @@ class PathPoint:
 
 
 def carried(
-    tracker: Tracker, start: PathPoint, pose: Callable[[float], Array], step: float
+    tracker: Tracker,
+    start: PathPoint,
+    pose: Callable[[float], Array],
+    step: float,
+    trail: list[tuple[float, PathPoint]] | None = None,
 ) -> tuple[PathPoint, float, float]:
     """The configuration carried on from the pose at 0 towards the pose at 1.
 
@@ -103,6 +132,7 @@ def carried(
         start: at 0.
         pose: the path of the pose, of a number between 0 and 1.
         step: first one to try.
+        trail: where the configurations on the way are left, each with its number.
 
     Returns:
         Where it ended, at which number, and the last step tried; the number is 1 unless it stopped
@@ -118,6 +148,8 @@ def carried(
             step = (to - at) / 2
         else:
             point, at, step = found, to, 2 * (to - at)
+            if trail is not None:
+                trail.append((at, point))
     return point, at, step
 
 
@@ -134,29 +166,71 @@ def smallest(tracker: Tracker, J: Array) -> float:
 
 
 def _step(tracker: Tracker, point: PathPoint, T: Array) -> PathPoint | None:
-    """The configuration at the next pose; None where the step is too long."""
-    back, _ = _pseudo_inverse(tracker, point.J)
-    led = point.x + back @ tracker.rows(point.x, T)[0]
-    found = _correct(tracker, led, T)
+    """The configuration at the next pose; None where the step is too long.
+
+    Of redundant joints those that would pass a limit stop there, and the others move instead.
+    """
+    r, _ = tracker.rows(point.x, T)
+    free = np.ones(point.x.size, dtype=bool)
+    aim = point.x.copy()
+    for _ in range(tracker.redundant + 1):
+        led, back = _predicted(tracker, point, r, free, aim)
+        found = _correct(tracker, led, T, free)
+        reached = led if found is None else found.x
+        beyond = tracker.beyond(reached) & free
+        if not np.any(beyond):
+            break
+        free &= ~beyond
+        aim = np.clip(reached, tracker.low, tracker.high)
+        found = None
     if found is None or not tracker.may(found.x):
         return None
     ahead, miss = np.linalg.norm(led - point.x), np.linalg.norm(found.x - led)
     near = np.max(np.abs(found.x - point.x)) < _LARGEST and miss <= _CHANGE * ahead + _SMALL
-    change = np.max(np.abs(np.linalg.eigvals(back @ (found.J - point.J))))
+    change = np.max(np.abs(np.linalg.eigvals(back @ (found.J - point.J)[:, free])))
     return found if near and change <= _CHANGE else None
 
 
-def _correct(tracker: Tracker, x: Array, T: Array) -> PathPoint | None:
+def _predicted(
+    tracker: Tracker, point: PathPoint, r: Array, free: NDArray[np.bool_], aim: Array
+) -> tuple[Array, Array]:
+    """The first guess of a step, and the inverse of the free joints' Jacobian.
+
+    Args:
+        tracker: what follows.
+        point: the configuration before.
+        r: what is missing from it to the next pose.
+        free: (n,) joints that are not stopped at a limit.
+        aim: (n,) positions of those that are.
+    """
+    J, move = point.J[:, free], np.where(free, 0.0, aim - point.x)
+    back, _ = _pseudo_inverse(tracker, J, int(np.sum(~free)))
+    move[free] = back @ (r - point.J @ move)
+    if tracker.slope is not None and np.sum(~free) < tracker.redundant:
+        downhill = -_GAIN * float(np.linalg.norm(r)) * tracker.slope(point.x)[free]
+        still = downhill - back @ (J @ downhill)
+        # not longer than what the path asks for, so that the step stays one along the path
+        most, length = float(np.linalg.norm(move)), float(np.linalg.norm(still))
+        move[free] += still * min(1.0, most / max(length, NONZERO))
+    return point.x + move, back
+
+
+def _correct(
+    tracker: Tracker, x: Array, T: Array, free: NDArray[np.bool_] | None = None
+) -> PathPoint | None:
     """Newton's method; None where it does not contract, or leaves rows that should vanish."""
-    before = np.inf
+    before, free = np.inf, np.ones(x.size, dtype=bool) if free is None else free
+    stopped = int(np.sum(~free))
+    x = x.copy()
     r, J = tracker.rows(x, T)
     for _ in range(_ITERATIONS):
-        back, gain = _pseudo_inverse(tracker, J)
+        back, gain = _pseudo_inverse(tracker, J[:, free], stopped)
         move, noise = back @ r, _NOISE * gain
         length = float(np.linalg.norm(move))
         if length > max(_CONTRACTION * before, noise):
             return None
-        x, before = x + move, length
+        x[free] += move
+        before = length
         r, J = tracker.rows(x, T)
         if length < noise:
             break
@@ -164,10 +238,10 @@ def _correct(tracker: Tracker, x: Array, T: Array) -> PathPoint | None:
     return None if tracker.exact and left > _SMALL else PathPoint(x, J, left)
 
 
-def _pseudo_inverse(tracker: Tracker, J: Array) -> tuple[Array, float]:
-    """The inverse of J, and its norm."""
+def _pseudo_inverse(tracker: Tracker, J: Array, stopped: int = 0) -> tuple[Array, float]:
+    """The inverse of J, of which some columns are left out, and its norm."""
     U, values, V = np.linalg.svd(J, full_matrices=False)
-    kept = J.shape[1] - tracker.slack
+    kept = J.shape[1] - max(tracker.slack - stopped, 0)
     inverse = 1 / np.maximum(values[:kept], NONZERO)
     back: Array = (V[:kept].T * inverse) @ U[:, :kept].T
     return back, float(inverse[-1])
@@ -177,6 +251,7 @@ def _pseudo_inverse(tracker: Tracker, J: Array) -> tuple[Array, float]:
 
 
 _WHOLE = 6
+_TURN = 2 * math.pi
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -188,9 +263,12 @@ class Follower:
         indices: indices in q of the joints that move.
         scale: (n,) what one stands for in each [m]; 1 for angles.
         rows: what is missing to a pose, and how the joints change it.
-        slack: directions that no row sees.
+        slack: directions that no row sees, redundant ones included.
         exact: whether any pose nearby can be taken.
         bounds: limits of the coordinates; None where none holds them.
+        chain: the joints in numbers, where they are those of an open chain.
+        redundant: how many more freedoms there are than a pose determines.
+        slope: None, or the gradient (n,) of a cost that these lower.
     """
 
     target: Goal
@@ -200,6 +278,9 @@ class Follower:
     slack: int
     exact: bool
     bounds: CoordinateLimits | None
+    chain: FrameChain | None = None
+    redundant: int = 0
+    slope: Callable[[Array], Array] | None = None
 
     @property
     def system(self) -> System:
@@ -209,7 +290,20 @@ class Follower:
     @property
     def tracker(self) -> Tracker:
         """The numbers of it."""
-        return Tracker(self.rows, self.slack, self.exact, self._may)
+        low, high = self.limits
+        return Tracker(self.rows, self.slack, self.exact, low, high, self.redundant, self.slope)
+
+    @property
+    def length(self) -> float:
+        """By which lengths are measured [m]."""
+        return 1.0 if self.chain is None else self.chain.arm(self.target.closing.p).length
+
+    @property
+    def limits(self) -> tuple[Array, Array]:
+        """(n,) lowest and highest positions of the joints that move, scaled."""
+        if self.bounds is None:
+            return np.full(len(self.indices), -np.inf), np.full(len(self.indices), np.inf)
+        return self.scaled(self.bounds.low), self.scaled(self.bounds.high)
 
     def scaled(self, q: Array) -> Array:
         """(n,) the joints that move in a configuration (nq,)."""
@@ -245,15 +339,13 @@ class Follower:
                 return index, low
         return None
 
-    def _may(self, x: Array) -> bool:
-        return self.passed(x, -WITHIN) is None
-
 
 def follower(
     target: Goal,
     start: Array,
     locked: Mapping[str, float] | None,
     limits: bool | Given | None,
+    redundancy: Redundancy | None = None,
 ) -> Follower:
     """What follows the poses of a frame.
 
@@ -262,21 +354,25 @@ def follower(
         start: (nq,) configuration, in which joints that do not follow stay.
         locked: by name, joints that stay where they are.
         limits: as in `follow`.
+        redundancy: as in `follow`.
 
     Raises:
-        ModelError: a name is unknown, or the chain has more than six free joints.
+        ModelError: a name or a criterion is unknown.
     """
     system, frame = target.closing.system, target.frame
     ends = None if limits is False else bounds(system, limits)
     path = system.tree.path(system.frame(frame)[0])
     simple = all(system.tree.links[k].motion.nq == 1 for k in path)
     if simple and not system.is_closed:
-        found = frame_chain(system, frame, locked)
+        found = frame_chain(system, frame, locked, most=len(path))
         arm = found.arm(target.closing.p)
-        scale = arm.units
-        exact = arm.size == _WHOLE
-        return Follower(target, found.indices, scale, _arm_rows(arm, scale), 0, exact, ends)
-    return _closed_follower(target, start, list(locked or {}), ends)
+        more, exact = max(0, arm.size - _WHOLE), arm.size >= _WHOLE
+        rows = _arm_rows(arm, arm.units)
+        led = Follower(target, found.indices, arm.units, rows, more, exact, ends, found, more)
+    else:
+        led = _closed_follower(target, start, list(locked or {}), ends)
+    slope = _slope_of(led, start, redundancy)
+    return replace(led, slope=slope) if led.redundant else led
 
 
 def _closed_follower(
@@ -298,6 +394,7 @@ def _closed_follower(
     moving = tuple(k for k in range(system.nq) if k not in held)
     slack = len(spin_indices(system))
     free = null_space(target.closing.rows(q)[1][:, moving]).shape[1] - slack
+    more = max(0, free - _WHOLE)
 
     def rows(x: Array, T: Array) -> tuple[Array, Array]:
         at = start.copy()
@@ -305,7 +402,8 @@ def _closed_follower(
         r, J = target.at(T).residual(at)
         return -r, J[:, moving]
 
-    return Follower(target, moving, np.ones(len(moving)), rows, slack, free == _WHOLE, ends)
+    exact, scale = free >= _WHOLE, np.ones(len(moving))
+    return Follower(target, moving, scale, rows, slack + more, exact, ends, None, more)
 
 
 def _arm_rows(arm: Arm, scale: Array) -> Rows:
@@ -316,6 +414,93 @@ def _arm_rows(arm: Arm, scale: Array) -> Rows:
         return gap_to(T, pose) / lengths, J * scale / lengths[:, None]
 
     return rows
+
+
+# What redundant joints do beside following: a cost that they lower, by its gradient.
+#
+# dx = J+ dr - k (1 - J+ J) grad H: the joints move as little as they can, and in the directions
+# that the frame does not see down the slope of a cost.
+#
+# Source: Liegeois 1977; Yoshikawa 1985 (manipulability). The motion does not repeat itself on
+# closed paths: Klein & Huang 1983.
+
+
+CRITERIA = ("minimum velocity", "limits", "manipulability")
+"""What redundant joints may be asked for by name."""
+Redundancy: TypeAlias = str | Callable[[Array], Array]
+"""One of `CRITERIA`, or the gradient (nq,) of a cost at a configuration (nq,)."""
+
+_DIFFERENCE = 1e-5
+"""Move of a joint [rad or arm lengths] for differences of log manipulability, whose second
+derivative is of about one but next to singular configurations."""
+
+
+def _slope_of(
+    led: Follower, start: Array, redundancy: Redundancy | None
+) -> Callable[[Array], Array] | None:
+    """The gradient of the cost that redundant joints lower, in scaled positions.
+
+    Raises:
+        ModelError: there is no such criterion.
+    """
+    if callable(redundancy):
+        return _given_slope(led, start, redundancy)
+    if redundancy is not None and redundancy not in CRITERIA:
+        raise ModelError(
+            f"{led.system.name}: redundancy is {quoted(redundancy)};"
+            f" {did_you_mean(redundancy, CRITERIA)}, or give a function of q that returns the"
+            " gradient of a cost"
+        )
+    if redundancy == "limits":
+        return _from_limits(*led.limits)
+    return _to_manipulability(led) if redundancy == "manipulability" else None
+
+
+def _given_slope(
+    led: Follower, start: Array, gradient: Callable[[Array], Array]
+) -> Callable[[Array], Array]:
+    def slope(x: Array) -> Array:
+        found = np.asarray(gradient(led.whole(start, x)), dtype=float)
+        if found.shape != (start.size,) or not np.all(np.isfinite(found)):
+            raise ModelError(
+                f"{led.system.name}: the function given as redundancy returned {quoted(found)};"
+                f" return the gradient of a cost, {start.size} finite numbers"
+            )
+        scaled: Array = found[list(led.indices)] * led.scale
+        return scaled
+
+    return slope
+
+
+def _from_limits(low: Array, high: Array) -> Callable[[Array], Array]:
+    """The gradient of half the squares of distances from the middle, in half ranges.
+
+    Source: Liegeois 1977.
+    """
+    limited = np.isfinite(low) & np.isfinite(high) & (high > low)
+    low, high = np.where(limited, low, 0.0), np.where(limited, high, 0.0)
+    half = np.where(limited, (high - low) / 2, np.inf)
+    return lambda x: (x - (low + high) / 2) / half**2
+
+
+def _to_manipulability(led: Follower) -> Callable[[Array], Array]:
+    """The gradient of minus the logarithm of the manipulability, the product of singular values.
+
+    Source: Yoshikawa 1985.
+    """
+    T = np.eye(4)  # the Jacobian does not depend on the target
+
+    def value(x: Array) -> float:
+        values = np.linalg.svd(led.rows(x, T)[1], compute_uv=False)
+        kept = values[: x.size - led.slack]
+        return -float(np.sum(np.log(np.maximum(kept, NONZERO))))
+
+    def slope(x: Array) -> Array:
+        moves = _DIFFERENCE * np.eye(x.size)
+        rises = [value(x + move) - value(x - move) for move in moves]
+        return np.array(rises) / (2 * _DIFFERENCE)
+
+    return slope
 
 
 # A path of poses: given one by one, or as a function of a number between 0 and 1.
@@ -338,12 +523,23 @@ class Path:
         """How many poses."""
         return len(self.poses)
 
-    def segment(self, number: int, before: Array) -> Callable[[float], Array]:
-        """The pose, of a number from 0 to 1, from the pose before (4, 4) to that of the number."""
-        after, function = self.poses[number], self.function
-        if function is None or number == 0:
-            return straight(before, after)
-        return lambda s: after if s == 1.0 else function((number - 1 + s) / (self.count - 1))
+    def curve(self, first: Array) -> Callable[[float], Array]:
+        """The pose, of a number from -1, where it is `first` (4, 4), over 0 to count - 1."""
+        lines = dict[int, Callable[[float], Array]]()
+
+        def pose(u: float) -> Array:
+            number = math.ceil(u)
+            if number == u and number >= 0:
+                return np.asarray(self.poses[number])
+            if self.function is not None and number > 0:
+                return self.function(u / (self.count - 1))
+            if number not in lines:
+                lines.clear()
+                before = self.poses[number - 1] if number > 0 else first
+                lines[number] = straight(before, self.poses[max(number, 0)])
+            return lines[number](u - number + 1)
+
+        return pose
 
 
 def path_of(system: System, path: Any, samples: int) -> Path:
@@ -373,14 +569,14 @@ def straight(before: Array, after: Array) -> Callable[[float], Array]:
     """The pose moved along a straight line and turned about a fixed axis, of a number 0 to 1."""
     gap = gap_to(after, before)
 
-    def pose(s: float) -> Array:
-        if s == 1.0:
-            return after
-        T = before.copy()
-        T[:3, :3] = _turn(s * gap[3:]) @ before[:3, :3]
-        T[:3, 3] = before[:3, 3] + s * gap[:3]
-        return T
+    return lambda s: after if s == 1.0 else moved(before, s * gap)
 
+
+def moved(T: Array, gap: Array) -> Array:
+    """The pose T (4, 4) moved by a translation [m] and a rotation vector [rad], (6,)."""
+    pose = T.copy()
+    pose[:3, :3] = _turn(gap[3:]) @ T[:3, :3]
+    pose[:3, 3] += gap[:3]
     return pose
 
 
@@ -394,6 +590,465 @@ def _turn(vector: Array) -> Array:
     K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     turned: Array = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
     return turned
+
+
+# Many poses at once, on one branch of a closed form.
+#
+# A branch is a continuous function of the pose as long as none of its roots becomes double and no
+# joint is left undetermined: as long as none of the numbers that tell so vanishes. They do not
+# between two poses at which the least of them is nearly the same, before and after as well; what
+# is told otherwise is followed step by step.
+
+
+_BLOCK = 20_000
+"""Poses that are solved at once: some megabytes for each branch."""
+_SHORT = 20
+"""Poses below which steps, of a millisecond or two, are quicker than equations of a new robot."""
+_RATIO = 2.0
+"""Between two poses, of what vanishes where branches meet: `_CHANGE` of it."""
+_NEARER = 0.25
+"""Times the distance of the next configuration from a prediction, within which one is meant."""
+_ON = 1e-6
+"""Difference [rad or arm lengths] between a configuration that was followed and its branch: the
+first is found to 1e-9 or better."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Runs:
+    """All branches at a block of poses.
+
+    Attributes:
+        first: number of the first pose.
+        q: (N, branches, n) configurations, scaled.
+        residual: (N, branches) by how much each misses the pose.
+        good: (N, branches) whether each takes the pose and is no double root.
+        size: (N, branches) what vanishes where branches meet.
+        arm: the joints.
+        limits: lowest and highest positions, scaled.
+    """
+
+    first: int
+    q: Array
+    residual: Array
+    good: NDArray[np.bool_]
+    size: Array
+    arm: Arm
+    limits: tuple[Array, Array]
+
+    def after(self, number: int, x: Array) -> tuple[Array, Array]:
+        """Configurations (k, n) at as many poses after a number as are certain, from x there.
+
+        Returns:
+            These, and (k,) by how much they miss the poses.
+        """
+        row = number - self.first
+        apart = np.max(np.abs(self.arm.wrapped(self.q[row] - x)), axis=1)
+        branch = int(np.argmin(apart))
+        if apart[branch] > _ON:
+            return _no_run(x.size)
+        # from the pair of poses before on: what vanishes half way between two is told by the others
+        first = max(row - 1, 0)
+        q, size = self.q[first:, branch], self.size[first:, branch]
+        good = self.good[first:, branch]
+        move = self.arm.wrapped(np.diff(q, axis=0))
+        even = good[:-1] & good[1:] & (np.max(np.abs(move), axis=1) < _LARGEST)
+        even &= np.maximum(size[:-1], size[1:]) <= _RATIO * np.minimum(size[:-1], size[1:])
+        certain = even.copy()
+        certain[1:] &= even[:-1]
+        certain[:-1] &= even[1:]
+        q, move, certain = q[row - first :], move[row - first :], certain[row - first :]
+        count = int(np.argmin(certain)) if not np.all(certain) else len(certain)
+        led = x + np.cumsum(move[:count], axis=0)
+        turns = np.where(self.arm.prismatic, 0.0, np.round((led - q[1 : count + 1]) / _TURN))
+        led = q[1 : count + 1] + _TURN * turns
+        low, high = self.limits
+        within = np.all((led >= low - WITHIN) & (led <= high + WITHIN), axis=1)
+        count = count if np.all(within) else int(np.argmin(within))
+        return led[:count], self.residual[row + 1 : row + 1 + count, branch]
+
+    def nearest(self, number: int, x: Array) -> tuple[Array, float] | None:
+        """The configuration (n,) at a pose that is much nearer to x than all others.
+
+        Returns:
+            It and by how much it misses the pose; None where there is none, or the pose is beyond
+            the block.
+        """
+        row = number - self.first
+        if not 0 <= row < len(self.q) or not np.any(self.good[row]):
+            return None
+        branches = np.flatnonzero(self.good[row])
+        away = self.arm.wrapped(self.q[row, branches] - x)
+        distance = np.linalg.norm(away, axis=1)
+        best = int(np.argmin(distance))
+        others = distance[np.linalg.norm(away - away[best], axis=1) > _ON]
+        if distance[best] > _NEARER * np.min(others, initial=np.inf):
+            return None
+        return x + away[best], float(self.residual[row, branches[best]])
+
+
+def _no_run(joints: int) -> tuple[Array, Array]:
+    return np.empty((0, joints)), np.empty(0)
+
+
+def _runs(led: Follower, poses: Path, number: int, known: Runs | None) -> Runs | None:
+    """The branches at the poses from a number on; None where there is no closed form for them."""
+    if known is not None and known.first <= number < known.first + len(known.q) - 1:
+        return known
+    last = number == poses.count - 1
+    if led.chain is None or led.redundant or last or poses.function is not None:
+        return None
+    if poses.count < _SHORT and known is None:
+        return None
+    p = led.target.closing.p
+    try:
+        sequence = sequence_of(led.chain, "auto", p)
+    except NoClosedForm:
+        return None
+    T = poses.poses[number : number + _BLOCK]
+    every = batch(led.chain, sequence, p, T, np.zeros((len(T), 0)))
+    arm = led.chain.arm(p)
+    good = every.residual <= SOLVED * max(1.0, arm.length)
+    size = np.minimum(every.real, every.regular)
+    good &= size > 0
+    return Runs(number, every.q / led.scale, every.residual, good, size, arm, led.limits)
+
+
+# Behind a singular configuration: the joints that go on as they came.
+#
+# On a smooth curve of poses the joints before the singular configuration predict those behind it.
+# Newton's method leads from the prediction to the pose there. What it has to add, beside the way
+# from one side to the other, vanishes with this way if the joints are smooth there; if they have a
+# corner it is in proportion, and where another branch would have to be taken it does not vanish.
+#
+# Of poses that are given one by one, it is open how the frame moves between two of them. A smooth
+# curve through the joints is taken where it leaves the straight line by no more than a smooth curve
+# through the poses does.
+
+
+_TRAIL = 40
+"""Configurations on the way that are kept: from step to step the way left is halved."""
+_NEAREST = 1e-4
+"""Of the way between two poses, before a singular configuration: rounding, magnified there, is
+still far below the way itself."""
+_SMOOTH = 0.4
+"""Of what is added to the prediction, relative to the way, when this is halved: a quarter if the
+joints are smooth, the same or more if they have a corner or jump."""
+_LITTLE = 1e-6
+"""Of the way, added to the prediction: the joints are smooth but for rounding."""
+_FAIR, _HALF = 0.1, 0.5
+"""Of the way, added to the prediction, at most: along the curve itself, and from pose to pose."""
+_LONGEST_LEAP = 0.5
+"""Way to either side of a singular configuration, in those between two poses, tried first."""
+_BESIDE = 0.1
+"""Move [rad or arm lengths] of a configuration between two sides of a leap to one that solves."""
+_AT_POSE = 1e-3
+"""Of the way between two poses, before a pose, at which it may be the singular one itself."""
+_WATCHED = 1e-4
+"""Smallest singular value above which no way ends at a singular configuration: it ends at a limit
+or out of reach."""
+_UNCERTAIN = 0.25
+"""Of the distance between the straight line and a smooth curve through the poses, by which joints
+may leave the curve: they are as smooth as the poses."""
+_TURN_OFF = 0.05
+"""Times the step before, by which a step misses what was predicted, from which it is asked whether
+joints that go through a singular configuration would go on more smoothly."""
+_NEAR_STEPS = 3.0
+"""Steps within which the smallest singular value, which is of the size of the distance to a
+singular configuration, may vanish."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Leap:
+    """A way past a singular configuration.
+
+    Attributes:
+        x: (k, n) configurations at the next k poses.
+        u: number at which it ends; between two poses it is broken.
+        end: (n,) the configuration there.
+    """
+
+    x: Array
+    u: float
+    end: Array
+
+
+def _smooth_step(
+    led: Follower,
+    poses: Path,
+    curve: Callable[[float], Array],
+    runs: Runs,
+    found: Array,
+    number: int,
+) -> tuple[Array, float] | None:
+    """The configuration at the next pose, where joints go on smoothly there by a closed form.
+
+    Returns:
+        It and by how much it misses the pose; None where that is in doubt.
+    """
+    if number < 3:
+        return None
+    nodes, x = [float(k) for k in range(number - 3, number)], found[number - 3 : number]
+    predicted = _lagrange(nodes, x, float(number))
+    own = runs.nearest(number, predicted)
+    if own is None or _added(predicted, own[0], x[-1]) > _FAIR or not led.tracker.may(own[0]):
+        return None
+    nodes, x = [*nodes[1:], float(number)], np.vstack([x[1:], own[0]])
+    predicted = _lagrange(nodes, x, number + 1.0)
+    beyond = runs.nearest(number + 1, predicted)
+    if beyond is not None and _added(predicted, beyond[0], own[0]) <= _FAIR:
+        nodes, x = [*nodes, number + 1.0], np.vstack([x, beyond[0]])
+    return own if _is_fair(led, poses, curve, nodes, x, number, number) else None
+
+
+def _known(
+    tracker: Tracker, poses: Path, found: Array, number: int
+) -> list[tuple[float, PathPoint]]:
+    """The last poses up to a number."""
+    numbers = range(max(0, number - 2), number + 1)
+    return [(float(k), point_at(tracker, found[k], poses.poses[k])) for k in numbers]
+
+
+def _turns_off(tracker: Tracker, found: Array, number: int, point: PathPoint) -> bool:
+    """Whether a step next to a singular configuration is another one than those before lead to."""
+    if number < 2:
+        return False
+    first = max(0, number - 3)
+    known = found[first:number]
+    predicted = _lagrange(range(first, number), known, number)
+    before = float(np.linalg.norm(known[-1] - known[-2]))
+    if float(np.linalg.norm(point.x - predicted)) <= max(_TURN_OFF * before, _SMALL):
+        return False
+    longest = max(before, float(np.linalg.norm(point.x - known[-1])))
+    return smallest(tracker, point.J) < _NEAR_STEPS * longest
+
+
+def _leap(
+    led: Follower,
+    poses: Path,
+    curve: Callable[[float], Array],
+    trail: list[tuple[float, PathPoint]],
+    found: Array,
+    number: int,
+    stopped: bool,
+) -> Leap | None:
+    """The joints behind a singular configuration; None where they do not go on smoothly.
+
+    Args:
+        led: what follows.
+        poses: the path.
+        curve: the same as a function.
+        trail: the last configurations on the way.
+        found: (N, n) configurations at the poses before `number`.
+        number: of the next pose.
+        stopped: whether the way ends before it.
+    """
+    if led.redundant:
+        return None
+    near = trail[-1][1]
+    if stopped and smallest(led.tracker, near.J) > _WATCHED:
+        return None
+    if poses.function is None and led.chain is not None:
+        between = _leap_between(led, poses, curve, trail, found, number, stopped)
+        if between is not None:
+            return between
+    return _leap_along(led, poses, curve, trail, number) if stopped else None
+
+
+def _leap_along(
+    led: Follower,
+    poses: Path,
+    curve: Callable[[float], Array],
+    trail: list[tuple[float, PathPoint]],
+    number: int,
+) -> Leap | None:
+    """Along the curve itself, from one side of the singular configuration to the other."""
+    tracker, at, end = led.tracker, trail[-1][0], float(poses.count - 1)
+    # lines between given poses have corners there
+    start = max(trail[0][0], number - 1.0 if poses.function is None else min(0.0, at - 1.0))
+    way, before = min((at - start) / 3, _LONGEST_LEAP), np.inf
+    while way > _NEAREST:
+        nodes = [at - 3 * way, at - 2 * way, at - way]
+        x = [_configuration_at(tracker, curve, trail, u) for u in nodes]
+        if any(one is None for one in x):
+            return None
+        to = min(at + way, end)
+        predicted = _lagrange(nodes, np.array(x), to)
+        if to - at < _NEAREST:  # the path ends at the singular configuration
+            behind = _settled(led, predicted, poses.poses[-1])
+        else:
+            corrected = _correct(tracker, predicted, curve(to))
+            behind = None if corrected is None else corrected.x
+        ratio = np.inf
+        if behind is not None and tracker.may(behind):
+            ratio = _added(predicted, behind, np.asarray(x[-1]))
+        if behind is not None and ratio < _FAIR and ratio < max(_LITTLE, _SMOOTH * before):
+            every = np.array([*x, behind])
+            numbers = range(number, math.floor(to) + 1)
+            passed = _passed(led, poses, [*nodes, to], every, numbers)
+            return None if passed is None else Leap(passed, to, behind)
+        way, before = way / 2, ratio if ratio < _FAIR else 1.0
+    return None
+
+
+def _added(predicted: Array, found: Array, last: Array) -> float:
+    """What was added to a prediction, relative to the way."""
+    way = max(float(np.linalg.norm(found - last)), NONZERO)
+    return float(np.linalg.norm(found - predicted)) / way
+
+
+def _configuration_at(
+    tracker: Tracker,
+    curve: Callable[[float], Array],
+    trail: list[tuple[float, PathPoint]],
+    u: float,
+) -> Array | None:
+    """(n,) the configuration at a number on the way that was followed."""
+    known = [one for one in trail if one[0] <= u]
+    if not known:
+        return None
+    at, point = known[-1]
+    if at == u:
+        return point.x
+    last, reached, _ = carried(tracker, point, lambda s: curve(at + s * (u - at)), 1.0)
+    return last.x if reached == 1.0 else None
+
+
+def _passed(
+    led: Follower, poses: Path, nodes: Sequence[float], x: Array, numbers: range
+) -> Array | None:
+    """(k, n) configurations at poses between those, (m, n), at nodes; None where one has none."""
+    passed = list[Array]()
+    for k in numbers:
+        own = [y for u, y in zip(nodes, x, strict=True) if u == k]
+        y = own[0] if own else _settled(led, _lagrange(nodes, x, float(k)), poses.poses[k])
+        if y is None or not led.tracker.may(y):
+            return None
+        passed.append(y)
+    return np.array(passed).reshape(len(passed), x.shape[1])
+
+
+def _settled(led: Follower, x: Array, T: Array) -> Array | None:
+    """(n,) the configuration beside x that takes a pose, also a singular one; None if it is not."""
+    if led.chain is not None:
+        arm = led.chain.arm(led.target.closing.p)
+        better = polish(arm, T, (x * led.scale)[None])
+        good = float(better.residual[0]) <= SOLVED * max(1.0, arm.length)
+        y = x + arm.wrapped(better.q[0] / led.scale - x)
+    else:
+
+        def residual(z: Array) -> tuple[Array, Array]:
+            r, J = led.rows(z, T)
+            return -r, J
+
+        y = levenberg_marquardt(residual, x).x
+        good = float(np.max(np.abs(led.rows(y, T)[0]))) <= _OFF
+    return y if good and float(np.max(np.abs(y - x))) < _BESIDE else None
+
+
+def _leap_between(
+    led: Follower,
+    poses: Path,
+    curve: Callable[[float], Array],
+    trail: list[tuple[float, PathPoint]],
+    found: Array,
+    number: int,
+    stopped: bool,
+) -> Leap | None:
+    """From the poses before a singular configuration to those behind it."""
+    tracker, at = led.tracker, trail[-1][0]
+    before = _before(trail, found, number)
+    if before is None:
+        return None
+    nodes, x = before
+    # the next pose may be the singular one itself
+    to = number + 1 if stopped and number - at < _AT_POSE else number
+    predicted = _lagrange(nodes, x, float(min(to, poses.count - 1)))
+    if to >= poses.count:  # the path ends at the singular configuration
+        last = _settled(led, predicted, poses.poses[-1])
+        if last is None or _added(predicted, last, x[-1]) > _FAIR or not tracker.may(last):
+            return None
+        return Leap(last[None], number, last)
+    behind = _smooth_solution(led, poses, predicted, to, x[-1])
+    if behind is None or not tracker.may(behind):
+        return None
+    nodes, x = [*nodes[-2:], float(to)], np.vstack([x[-2:], behind])
+    beyond = None
+    if to + 1 < poses.count:
+        beyond = _smooth_solution(led, poses, _lagrange(nodes, x, to + 1.0), to + 1, behind)
+    if beyond is not None:
+        nodes, x = [*nodes, to + 1.0], np.vstack([x, beyond])
+    if not _is_fair(led, poses, curve, nodes, x, number, to):
+        return None
+    passed = _passed(led, poses, nodes, x, range(number, to + 1))
+    return None if passed is None else Leap(passed, float(to), behind)
+
+
+def _before(
+    trail: list[tuple[float, PathPoint]], found: Array, number: int
+) -> tuple[list[float], Array] | None:
+    """Two or three configurations before a pose, and their numbers; None where there is one."""
+    if number >= 2:
+        first = max(0, number - 3)
+        return [float(k) for k in range(first, number)], found[first:number]
+    at = trail[-1][0]
+    inner = [one for one in trail if 0 < one[0] < at]
+    if number == 0 or not inner:
+        return None
+    u, point = min(inner, key=lambda one: abs(one[0] - at / 2))
+    return [0.0, u], np.array([found[0], point.x])
+
+
+def _smooth_solution(
+    led: Follower, poses: Path, predicted: Array, number: int, last: Array
+) -> Array | None:
+    """(n,) the configuration at a pose that is near the prediction, measured by the way to it."""
+    found = _nearest_solution(led, predicted, poses.poses[number])
+    return None if found is None or _added(predicted, found, last) > _HALF else found
+
+
+def _nearest_solution(led: Follower, x: Array, T: Array) -> Array | None:
+    """(n,) the configuration nearest to x of all that take a pose."""
+    if led.chain is None:
+        return None
+    p = led.target.closing.p
+    q = solve_at(led.chain, NOT_VARIED, T, "auto", p).q[:, list(led.indices)]
+    if not len(q):
+        return None
+    away = led.chain.arm(p).wrapped(q / led.scale - x)
+    nearest: Array = x + away[int(np.argmin(np.linalg.norm(away, axis=1)))]
+    return nearest
+
+
+def _is_fair(
+    led: Follower,
+    poses: Path,
+    curve: Callable[[float], Array],
+    nodes: Sequence[float],
+    x: Array,
+    number: int,
+    to: int,
+) -> bool:
+    """Whether a smooth curve through joints leaves the path as little as one through the poses."""
+    before, middle = number - 1, (number - 1 + to) / 2
+    T = poses.poses[before]
+    rows = np.array([gap_to(curve(u), T) for u in nodes])
+    middle_pose = moved(T, _lagrange(nodes, rows, middle))
+    if to > number:
+        middle_pose = poses.poses[number]
+    line = straight(T, poses.poses[to])(0.5)
+    units = np.array([led.length] * 3 + [1.0] * 3)
+    chord = float(np.max(np.abs(gap_to(line, middle_pose) / units)))
+    gap = float(np.max(np.abs(led.rows(_lagrange(nodes, x, middle), middle_pose)[0])))
+    return gap <= _UNCERTAIN * chord + _OFF
+
+
+def _lagrange(nodes: Sequence[float] | range, values: Array, u: float) -> Array:
+    """The polynomial through values (k, n) at k nodes, at u."""
+    total = np.zeros(values.shape[1])
+    for k, own in enumerate(nodes):
+        others = [other for m, other in enumerate(nodes) if m != k]
+        total += values[k] * math.prod((u - other) / (own - other) for other in others)
+    return total
 
 
 # Why a path could not be followed any further, in words and figures.
@@ -433,8 +1088,29 @@ def stop_reason(led: Follower, poses: Path, number: int, q: Array, at: float) ->
     nearest, left = _nearest(led, x, T)
     if left > _REACHED:
         return f"{title} is out of reach: {_miss(led, led.whole(q, nearest), T)}"
-    where = f"between poses {number - 1} and {number}" if number else "between the start and pose 0"
-    return f"stopped {where} of {poses.count}: singular configuration, {_singular(led, q)}"
+    where = f"between the start and pose 0 of {poses.count}"
+    if number:
+        part = (number - 1 + at) / (poses.count - 1)
+        where = (
+            f"between poses {number - 1} and {number} of {poses.count}, at {part:.4g} of the path"
+        )
+    behind = _jump(led, x, poses.poses[min(number + (1 - at < _AT_POSE), poses.count - 1)])
+    return f"stopped {where}: singular configuration, {_singular(led, q)}{behind}"
+
+
+def _jump(led: Follower, x: Array, T: Array) -> str:
+    """The joint that is farthest from where it would have to be behind a singular configuration."""
+    behind = None if led.redundant else _nearest_solution(led, x, T)
+    if behind is None:
+        return ""
+    farthest = int(np.argmax(np.abs(behind - x)))
+    coordinate = led.system.coordinates[led.indices[farthest]]
+    move = abs(float(behind[farthest] - x[farthest])) * float(led.scale[farthest])
+    far = f"{math.degrees(move):.4g} degrees" if coordinate.unit == "rad" else f"{move:.4g} m"
+    return (
+        "; no configuration behind it goes on smoothly, in the nearest one"
+        f" {coordinate.name} is {far} away"
+    )
 
 
 def _miss(led: Follower, q: Array, T: Array) -> str:
@@ -486,6 +1162,26 @@ configurations rounding is larger."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Conditioning:
+    """What the smallest singular values on a path are computed from.
+
+    Attributes:
+        arm: the joints; None where the values are known.
+        values: (k, n) their configurations, scaled; or (k,) the values.
+    """
+
+    arm: Arm | None
+    values: Array
+
+    def smallest(self) -> Array:
+        """(k,) the values."""
+        if self.arm is None:
+            return self.values
+        J = _arm_rows(self.arm, self.arm.units)(self.values, np.eye(4))[1]
+        return np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1], dtype=float)
+
+
+@dataclass(frozen=True, eq=False)
 class Followed:
     """How far a path was followed.
 
@@ -494,7 +1190,6 @@ class Followed:
         reached: number of the last pose reached, counted from 0; -1 for none.
         reason: why it stopped there; empty where the path was followed to its end.
         residual: (k,) largest element by which the pose is missed, and row by which a loop is open.
-        singular_values: (k,) the smallest of the Jacobian, lengths measured by the arm's.
         stopped_at: (nq,) the last configuration on the way, between two poses where it stopped.
     """
 
@@ -502,8 +1197,13 @@ class Followed:
     reached: int
     reason: str
     residual: Array
-    singular_values: Array
     stopped_at: Array
+    _conditioning: Conditioning = field(repr=False)
+
+    @functools.cached_property
+    def singular_values(self) -> Array:
+        """(k,) the smallest of the Jacobian, lengths measured by the arm's."""
+        return self._conditioning.smallest()
 
 
 def follow(
@@ -515,6 +1215,7 @@ def follow(
     samples: int = 101,
     locked: Mapping[str, float] | None = None,
     limits: bool | Given | None = None,
+    redundancy: Redundancy | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Followed:
     """The configurations along a path of poses, on the branch of the first one.
@@ -536,41 +1237,105 @@ def follow(
         locked: positions of joints that stay where they are, by name [rad or m].
         limits: (lowest, highest) by name replaces limits of the description, None for a joint
             without; False leaves all out of account.
+        redundancy: what joints beyond the six that a pose determines do: "minimum velocity", which
+            is taken when left out; "limits", to stay far from these; "manipulability", far from
+            singular configurations; or a function that gives the gradient (nq,) of a cost at q.
         parameters: values of symbols, the others at their defaults.
 
     Returns:
         The configurations up to the last pose reached, and why it is not the last of the path.
 
     Raises:
-        ModelError: a pose, a name or the start is not understood, or the chain has more than six
-            free joints.
+        ModelError: a pose, a name, a criterion or the start is not understood.
     """
     require_system(system)
     name = terminal_frame(system) if frame is None else frame
     poses = path_of(system, path, samples)
     q = _start(system, start, locked)
     target = goal(system, name, np.eye(4), None, parameters)
-    return _follow(follower(target, q, locked, limits), poses, q)
+    return _follow(follower(target, q, locked, limits, redundancy), poses, q)
 
 
 def _follow(led: Follower, poses: Path, q: Array) -> Followed:
-    tracker, x, T = led.tracker, led.scaled(q), led.pose(q)
-    point, step = point_at(tracker, x, T), 1.0
-    kept, reason = list[tuple[Array, float, float]](), ""
-    for number in range(poses.count):
-        segment = poses.segment(number, T)
-        point, at, step = carried(tracker, point, segment, min(1.0, step))
-        whole, T = led.whole(q, point.x), segment(1.0)
-        if at < 1.0 or point.left > _OFF:
-            reason = stop_reason(led, poses, number, whole, at)
-            break
+    tracker, x = led.tracker, led.scaled(q)
+    curve = poses.curve(led.pose(q))
+    point, step, reason = point_at(tracker, x, curve(-1.0)), 1.0, ""
+    trail, u, number = [(-1.0, point)], -1.0, 0
+    found, residual = np.empty((poses.count, x.size)), np.empty(poses.count)
+    runs: Runs | None = None
+    while number < poses.count:
+        # a run of poses on one branch of the closed form
+        if u == number - 1 and number > 0:
+            runs = _runs(led, poses, number - 1, runs)
+            run, missed = _no_run(x.size) if runs is None else runs.after(number - 1, point.x)
+            if len(run):
+                found[number : number + len(run)] = run
+                residual[number : number + len(run)] = missed
+                number += len(run)
+                u, trail = number - 1.0, _known(tracker, poses, found, number - 1)
+                point = trail[-1][1]
+                continue
+            # next to a singular configuration pose by pose, as smoothly as before
+            smooth = None if runs is None else _smooth_step(led, poses, curve, runs, found, number)
+            if smooth is not None:
+                found[number], residual[number] = smooth
+                number += 1
+                u, trail = number - 1.0, _known(tracker, poses, found, number - 1)
+                point = trail[-1][1]
+                continue
+        # else step by step towards the next pose
+        way: list[tuple[float, PathPoint]] = []
+        allowed = not led.redundant or tracker.may(point.x)
+        segment = _segment(curve, u, number)
+        last, at = point, 0.0
+        if allowed:
+            last, at, step = carried(tracker, point, segment, min(1.0, step), way)
+        trail = trail[-_TRAIL:] + [(u + s * (number - u), passed) for s, passed in way]
+        u = float(number) if at == 1.0 else u + at * (number - u)
         # a part of the next segment: after a narrow passage ten doublings lead back to all of it
         step = max(step, 1e-3)
-        kept.append((whole, led.residual(whole, T), smallest(tracker, point.J)))
-    rows = np.array([whole for whole, _, _ in kept]).reshape(len(kept), q.size)
-    numbers = np.array([other for _, *other in kept]).reshape(len(kept), 2)
-    last = led.whole(q, point.x)
-    return Followed(rows, len(kept) - 1, reason, numbers[:, 0], numbers[:, 1], last)
+        stopped = at < 1.0 or last.left > _OFF
+        # behind a singular configuration, where the joints go on smoothly
+        leap = None
+        if allowed and (stopped or _turns_off(tracker, found, number, last)):
+            leap = _leap(led, poses, curve, trail, found, number, stopped)
+        if leap is not None:
+            passed = slice(number, number + len(leap.x))
+            found[passed] = leap.x
+            residual[passed] = [
+                led.residual(led.whole(q, x), T)
+                for x, T in zip(leap.x, poses.poses[passed], strict=True)
+            ]
+            # next to the singular configuration steps are short: a hundredth of the next segment
+            number, u, step = number + len(leap.x), leap.u, 1e-2
+            point = point_at(tracker, leap.end, curve(u))
+            trail = _known(tracker, poses, found, number - 1) if u == number - 1 else [(u, point)]
+            continue
+        point = last
+        whole = led.whole(q, point.x)
+        if stopped:
+            reason = stop_reason(led, poses, number, whole, u - number + 1)
+            break
+        found[number], residual[number] = point.x, led.residual(whole, poses.poses[number])
+        number += 1
+    rows = np.tile(q, (number, 1))
+    rows[:, list(led.indices)] = found[:number] * led.scale
+    last_q, x = led.whole(q, point.x), found[:number]
+    conditioning = _conditioning(led, poses, x)
+    return Followed(rows, number - 1, reason, residual[:number], last_q, conditioning)
+
+
+def _conditioning(led: Follower, poses: Path, x: Array) -> Conditioning:
+    """What tells the singular values at configurations x, (k, n), when they are asked for."""
+    if led.chain is not None:
+        return Conditioning(led.chain.arm(led.target.closing.p), x)
+    J = [led.rows(one, T)[1] for one, T in zip(x, poses.poses, strict=False)]
+    return Conditioning(None, np.array([smallest(led.tracker, one) for one in J]))
+
+
+def _segment(curve: Callable[[float], Array], u: float, number: int) -> Callable[[float], Array]:
+    """The poses from u to that of a number, of a number between 0 and 1."""
+    return lambda s: curve(float(number) if s == 1.0 else u + s * (number - u))
 
 
 def _start(system: System, start: Any, locked: Mapping[str, float] | None) -> Array:

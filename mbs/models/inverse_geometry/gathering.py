@@ -24,6 +24,7 @@ from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.closed_form import (
     CLOSED_FORMS,
+    given_of,
     require_method,
     sequence_of,
 )
@@ -44,7 +45,11 @@ EXACT = 2e-15
 ILL_CONDITIONED = 1e-9
 """Regularity of the general method below which it may miss solutions: seven digits are left of a
 root, of a double one three."""
+NOT_VARIED = np.zeros(0)
+"""Positions of the varied joints of a chain that has none."""
 _STARTS = 300
+_KEPT = 256
+"""Arms kept ready, one for every position of a locked joint, of tens of kilobytes each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,15 +70,18 @@ class Gathered:
     doubtful: bool
 
 
-def gather(chain: FrameChain, target: Target, method: str, p: Array) -> Gathered:
+def gather(
+    chain: FrameChain, target: Target, method: str, p: Array, r: Array = NOT_VARIED
+) -> Gathered:
     """The solutions by one method, or by the first that holds for the chain.
 
     Args:
         chain: what is solved for.
-        target: the target pose, of the chain in numbers.
+        target: the target pose, of the chain in numbers, its varied joints at r.
         method: "pieper", "paul", "general", "search"; "auto" for a closed form, else the general
             method for six joints, else the search.
         p: (np,) the parameters.
+        r: (k,) positions of the chain's varied joints [rad or m].
 
     Raises:
         NoClosedForm: "pieper" or "paul" was asked for and does not fit.
@@ -82,13 +90,13 @@ def gather(chain: FrameChain, target: Target, method: str, p: Array) -> Gathered
     require_method(chain.system, method, METHODS)
     if method in (*CLOSED_FORMS, "auto"):
         try:
-            return _by_closed_form(chain, target, sequence_of(chain, method, p), p)
+            return _by_closed_form(chain, target, sequence_of(chain, method, p), p, r)
         except NoClosedForm:
             if method != "auto":
                 raise
     if method == "search":
         return by_search(target)
-    ready = general_ready(chain, p)
+    ready = general_ready(chain.locked_at(r) if chain.varied else chain, p)
     if ready is None and method == "general":
         raise ModelError(
             f"{chain.system.name}: the general method does not hold for the joints"
@@ -230,9 +238,9 @@ def _where(which: NDArray[np.bool_], yes: Array, no: Array) -> Array:
 
 
 def _by_closed_form(
-    chain: FrameChain, target: Target, sequence: StepSequence, p: Array
+    chain: FrameChain, target: Target, sequence: StepSequence, p: Array, r: Array
 ) -> Gathered:
-    q, regular = (np.array(part).T for part in _leaves(chain, sequence, p)(DM(target.T)))
+    q, regular = (np.array(part).T for part in _leaves(chain, sequence, p)(DM(target.T), DM(r)))
     error = target.residual(q)
     near = np.flatnonzero(error < _BRANCH_NEAR * max(1.0, target.arm.length))
     doubtful = bool(np.min(regular) < _DEGENERATE)
@@ -243,7 +251,7 @@ def _by_closed_form(
 
 
 def _leaves(chain: FrameChain, sequence: StepSequence, p: Array) -> Function:
-    """``leaves(T) -> q, regular``: a column for every branch, kept on the system.
+    """``leaves(T, r) -> q, regular``: a column for every branch, kept on the system.
 
     q (n, branches) are configurations [rad or m], regular (1, branches) the least of the quantities
     that must not vanish, and 1.
@@ -251,11 +259,11 @@ def _leaves(chain: FrameChain, sequence: StepSequence, p: Array) -> Function:
 
     def build() -> Function:
         T = SX.sym("T", 4, 4)
-        every = sequence.leaves(SX(casadi.vec(T[:3, :])))
+        every = sequence.leaves(given_of(chain, T, p))
         q = casadi.horzcat(*(leaf.x for leaf in every))
         least = [casadi.mmin(casadi.vertcat(SX(1), casadi.fabs(leaf.regular))) for leaf in every]
         outputs = [casadi.densify(q), casadi.densify(casadi.horzcat(*least))]
-        return Function("leaves", [T], outputs, {"cse": True})
+        return Function("leaves", [T, chain.symbols], outputs, {"cse": True})
 
     function: Function = chain.system.cached(("leaves", sequence), build)
     return function
@@ -305,5 +313,6 @@ def general_ready(chain: FrameChain, p: Array) -> General | None:
         except (ModelError, NoClosedForm):
             return None
 
-    ready: General | None = chain.system.cached(("general", *chain.key, p.tobytes()), build)
+    key = (*chain.key, p.tobytes())
+    ready: General | None = chain.system.recent("general", key, build, _KEPT)
     return ready

@@ -108,7 +108,7 @@ class PoseKernel:
         elif library is not None:
             return self._settled(library, T, self._solves)
         else:
-            draft = draft_solutions(self.chain, self._solves, self.p, self._arm, T[None])
+            draft = draft_solutions(self.chain, self._solves, self.p, T[None], np.zeros((1, 0)))
         valid = np.flatnonzero(draft.valid[0])
         q = draft.q[0, valid]
         turned = np.where(self._arm.prismatic | (np.abs(q) <= np.pi), q, self._arm.wrapped(q))

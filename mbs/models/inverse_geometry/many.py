@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, Array
-from mbs.closed_forms.arm_search import General, general_many, polish
+from mbs.closed_forms.arm_search import General, Polished, general_many, polish
 from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import NoClosedForm
 from mbs.models.inverse_geometry.branches import branch_labels
@@ -27,6 +27,7 @@ from mbs.models.inverse_geometry.closed_form import (
     sequence_of,
 )
 from mbs.models.inverse_geometry.gathering import ILL_CONDITIONED, METHODS, general_ready
+from mbs.models.inverse_geometry.redundancy import Locked, LockedSamples, Redundant, samples_of
 from mbs.models.inverse_geometry.solutions import (
     WITHIN,
     CoordinateLimits,
@@ -44,10 +45,13 @@ from mbs.native import compiled
 _COLUMNS = 32
 """Poses in one call: more make the code longer, fewer the calls felt."""
 _MANY = 1000
-"""Poses from which machine code is worth the second that a compiler takes."""
+"""Poses from which machine code is worth the second that a compiler takes; those of earlier calls
+count."""
 
 
-def batch(chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64], T: Array) -> PoseBatch:
+def batch(
+    chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64], T: Array, r: Array
+) -> PoseBatch:
     """All branches at poses T, (N, 4, 4).
 
     Args:
@@ -55,31 +59,37 @@ def batch(chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64], T: 
         sequence: its steps, for the same p.
         p: (np,) the parameters.
         T: the poses [m].
+        r: (N, k) positions of the chain's varied joints [rad or m].
     """
     plain = plain_branches(chain, sequence, p)
-    if len(T) < _MANY:
-        return at_poses(plain, T)
     key = ("machine code of igm_all", sequence, *chain.key, p.tobytes())
-    return _by_machine(chain.system.cached(key, lambda: _machine_code(plain)), plain, T)
+    asked: list[int] = chain.system.cached(("poses", *key), lambda: [0])
+    asked[0] += len(T)
+    if asked[0] < _MANY:
+        return at_poses(plain, T, r)
+    return _by_machine(chain.system.cached(key, lambda: _machine_code(plain)), plain, T, r)
 
 
 def _machine_code(plain: Function) -> Function:
     return compiled(plain.map(_COLUMNS), derivatives=0, fast=True)
 
 
-def _by_machine(call: Any, plain: Function, T: Array) -> PoseBatch:
+def _by_machine(call: Any, plain: Function, T: Array, r: Array) -> PoseBatch:
     """By machine code for so many columns at a time, straight into the arrays."""
     n, branches = plain.size_out(0)
     count = len(T)
     padded = -(-count // _COLUMNS) * _COLUMNS
     columns = np.empty((padded, 4, 4))
     columns[:count], columns[count:] = np.swapaxes(T, 1, 2), np.eye(4)
+    varied = np.zeros((padded, r.shape[1]))
+    varied[:count] = r
     q = np.empty((padded, branches, n))
     rows = [np.empty((padded, branches)) for _ in range(4)]
     for first in range(0, padded, _COLUMNS):
         part = slice(first, first + _COLUMNS)
         out = (q[part].reshape(-1, n).T, *(row[part].T for row in rows))
-        call(columns[part].reshape(-1, 4).T, out=out)
+        more = (varied[part].T,) if r.shape[1] else ()
+        call(columns[part].reshape(-1, 4).T, *more, out=out)
     return PoseBatch(q[:count], *(row[:count] for row in rows))
 
 
@@ -131,15 +141,73 @@ class BranchSolutions:
     searched: Booleans
 
 
-def nothing(arm: Arm, count: int) -> BranchSolutions:
+def nothing(joints: int, count: int) -> BranchSolutions:
     """So many poses without a closed form."""
     shape = count, 0
-    empty = np.empty((*shape, arm.size)), np.zeros(shape, dtype=bool), np.empty(shape)
+    empty = np.empty((*shape, joints)), np.zeros(shape, dtype=bool), np.empty(shape)
     return BranchSolutions(*empty, (), np.ones(count, dtype=bool))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ArmRows:
+    """A chain in numbers at N poses: one arm, or one for the positions of the varied joints.
+
+    Attributes:
+        first: the arm; of several any, which tells joints and units alone.
+        gaps: (N, n + 1, 4, 4) of every arm; None where there is one.
+    """
+
+    first: Arm
+    gaps: Array | None
+
+    @property
+    def scale(self) -> Array:
+        """(N, 1) or (1, 1) max(1 m, length), by which residuals are measured."""
+        if self.gaps is None:
+            return np.full((1, 1), max(1.0, self.first.length))
+        length = np.sum(np.linalg.norm(self.gaps[:, :, :3, 3], axis=2), axis=1)
+        return np.asarray(np.maximum(1.0, length)[:, None])
+
+    def at(self, k: int) -> Arm:
+        """The arm of pose number k."""
+        if self.gaps is None:
+            return self.first
+        return Arm(self.first.names, self.first.prismatic, self.gaps[k])
+
+    def polish(self, T: Array, rows: NDArray[np.intp], q: Array) -> Polished:
+        """Better configurations (m, n) of poses whose numbers are `rows`, (m,)."""
+        if self.gaps is None:
+            return polish(self.first, T[rows], q)
+        better = Polished(np.empty_like(q), np.empty(len(q)))
+        for k in np.unique(rows):
+            own = rows == k
+            found = polish(self.at(int(k)), T[k], q[own])
+            better.q[own], better.residual[own] = found.q, found.residual
+        return better
+
+    def nearly_singular(self, rows: NDArray[np.intp], q: Array) -> Booleans:
+        """(m,) which of configurations q, (m, n), of poses `rows` are next to a singular one."""
+        if self.gaps is None:
+            return nearly_singular(self.first, q)
+        near = np.empty(len(q), dtype=bool)
+        for k in np.unique(rows):
+            own = rows == k
+            near[own] = nearly_singular(self.at(int(k)), q[own])
+        return near
+
+
+def arm_rows(chain: FrameChain, p: Array, r: Array) -> ArmRows:
+    """The chain in numbers for parameters p, (np,), and positions r, (N, k), of varied joints."""
+    if not chain.varied:
+        return ArmRows(chain.arm(p), None)
+    some = r if len(r) else np.zeros((1, r.shape[1]))
+    gaps = chain.gaps(p, some)
+    prismatic = np.array(chain.prismatic, dtype=bool)
+    return ArmRows(Arm(chain.names, prismatic, gaps[0]), gaps)
+
+
 def draft_solutions(
-    chain: FrameChain, sequence: StepSequence, p: Array, arm: Arm, T: Array
+    chain: FrameChain, sequence: StepSequence, p: Array, T: Array, r: Array
 ) -> BranchSolutions:
     """The solutions by a closed form.
 
@@ -147,20 +215,20 @@ def draft_solutions(
         chain: what is solved for.
         sequence: its steps, for the same p.
         p: (np,) the parameters.
-        arm: the chain in numbers.
         T: (N, 4, 4) poses [m].
+        r: (N, k) positions of the chain's varied joints [rad or m].
     """
-    every = batch(chain, sequence, p, T)
-    scale = max(1.0, arm.length)
+    every, arms = batch(chain, sequence, p, T, r), arm_rows(chain, p, r)
+    arm, scale = arms.first, arms.scale
     close = every.residual <= _DOUBTFUL * scale
     doubtful = close & (every.residual > _EXACT * scale)
     if np.any(doubtful):
-        doubtful[doubtful] = _polish(arm, T, every, doubtful)
+        doubtful[doubtful] = _polish(arms, T, every, doubtful)
     valid = (every.residual <= SOLVED * scale) & (every.real >= -_FOLD) & ~doubtful
     doubtful = close & ~valid
     searched = np.any(doubtful | (every.regular < _DEGENERATE), axis=1)
     searched |= _merge(arm, every, valid)
-    searched |= _next_to_singular(arm, every, valid, suspect_of(sequence))
+    searched |= _next_to_singular(arms, every, valid, suspect_of(sequence))
     labels = branch_labels(chain, sequence, p)
     return BranchSolutions(every.q, valid, every.residual, labels, searched)
 
@@ -171,22 +239,23 @@ def suspect_of(sequence: StepSequence) -> float:
     return np.inf if quartic else _SUSPECT
 
 
-def _next_to_singular(arm: Arm, every: PoseBatch, valid: Booleans, suspect: float) -> Booleans:
+def _next_to_singular(arms: ArmRows, every: PoseBatch, valid: Booleans, suspect: float) -> Booleans:
     """At which poses a solution is next to a singular configuration."""
     least = np.minimum(np.abs(every.real), every.regular)
     asked = valid & (least < suspect)
     near = np.zeros_like(valid)
-    near[asked] = nearly_singular(arm, every.q[asked])
+    near[asked] = arms.nearly_singular(np.nonzero(asked)[0], every.q[asked])
     found: Booleans = np.any(near, axis=1)
     return found
 
 
-def _polish(arm: Arm, T: Array, every: PoseBatch, which: Booleans) -> Booleans:
+def _polish(arms: ArmRows, T: Array, every: PoseBatch, which: Booleans) -> Booleans:
     """Improve some configurations, (m,), and tell which of them moved far."""
     before = every.q[which]
-    better = polish(arm, T[np.nonzero(which)[0]], before)
+    better = arms.polish(T, np.nonzero(which)[0], before)
     every.q[which], every.residual[which] = better.q, better.residual
-    far: Booleans = np.max(np.abs(arm.wrapped(better.q - before)), axis=-1) > _MEETING
+    moved = np.abs(arms.first.wrapped(better.q - before))
+    far: Booleans = np.max(moved, axis=-1) > _MEETING
     return far
 
 
@@ -280,6 +349,23 @@ def general_draft(general: General, T: Array) -> BranchSolutions:
     return BranchSolutions(every, valid, residual, ("",) * shape[1], searched)
 
 
+def general_draft_varied(chain: FrameChain, p: Array, T: Array, r: Array) -> BranchSolutions:
+    """Likewise where the varied joints are at r, (N, k): each of their positions makes an arm."""
+    draft = nothing(len(chain.names), len(T))
+    positions, which = np.unique(r, axis=0, return_inverse=True)
+    for number, position in enumerate(positions):
+        general = ready(chain.locked_at(position), p)
+        if general is None:
+            continue
+        rows = np.flatnonzero(which.ravel() == number)
+        part = general_draft(general, T[rows])
+        draft = _widen(draft, part.valid.shape[1])
+        columns = slice(0, part.valid.shape[1])
+        draft.q[rows, columns], draft.valid[rows, columns] = part.q, part.valid
+        draft.residual[rows, columns], draft.searched[rows] = part.residual, part.searched
+    return draft
+
+
 # Inverse geometric models of many poses at once.
 
 
@@ -291,15 +377,19 @@ Repair = Callable[[Arm, Array], Array]
 class ManySolutions:
     """The solutions of N poses: a row for every pose, in it a column for every branch.
 
+    With S positions of redundant joints the columns are those of the first position, then those of
+    the second, and so on: `q.reshape(N, S, -1, nq)` tells them apart.
+
     Attributes:
-        q: (N, branches, nq) configurations [rad or m]; where there is no solution any finite
+        q: (N, S branches, nq) configurations [rad or m]; where there is no solution any finite
             numbers.
-        valid: (N, branches) whether there is a solution.
-        residual: (N, branches) largest difference of an element between the pose of q and the
+        valid: (N, S branches) whether there is a solution.
+        residual: (N, S branches) largest difference of an element between the pose of q and the
             wanted one, in m and 1; infinite where a column is not used.
-        labels: of the branches; empty texts where no closed form tells them apart.
-        searched: (N,) whether the pose was solved by itself: its configurations stand in the
-            columns of the nearest branches.
+        labels: of the columns; empty texts where no closed form tells branches apart.
+        searched: (N,) whether the pose was solved by itself, with some position of redundant
+            joints: its configurations stand in the columns of the nearest branches.
+        samples: S, how many positions of redundant joints every pose was solved for; 1 without.
     """
 
     q: Array
@@ -307,6 +397,7 @@ class ManySolutions:
     residual: Array
     labels: tuple[str, ...]
     searched: Booleans
+    samples: int = 1
 
     def __len__(self) -> int:
         """The number of poses."""
@@ -330,8 +421,9 @@ def solve_many(
     frame: str | int | None = None,
     method: str = "auto",
     limits: bool | Given | None = None,
-    locked: Mapping[str, float] | None = None,
+    locked: Locked | None = None,
     *,
+    redundant: Redundant | None = None,
     parameters: Mapping[str, float] | None = None,
     repair: Repair | None = None,
 ) -> ManySolutions:
@@ -348,7 +440,11 @@ def solve_many(
         method: "pieper", "paul", "auto" for the cheaper of them that fits, "general", "search".
         limits: None leaves out no solution; True leaves out those beyond the limits of the
             description; (lowest, highest) by name replaces these [rad or m].
-        locked: positions of joints that stay where they are, by name [rad or m].
+        locked: positions of joints that stay where they are, by name; one for all poses, or (N,)
+            one for each [rad or m].
+        redundant: by the name of a joint beyond the six that a pose determines how many positions
+            it takes, from limit to limit or over a turn, or the positions: (S,) for every pose, or
+            (N, S) for each [rad or m]. Several joints take all combinations, the last one fastest.
         parameters: values of symbols, the others at their defaults.
         repair: what solves single poses of a serial robot, `solve` when left out.
 
@@ -357,32 +453,65 @@ def solve_many(
 
     Raises:
         NoClosedForm: "pieper" or "paul" was asked for and does not fit.
-        ModelError: a matrix is no rigid transform, a name is unknown, or more than six joints
-            are free.
+        ModelError: a matrix is no rigid transform, a name is unknown, positions are not what they
+            should be, or more than six joints are free.
     """
-    from mbs.models.inverse_geometry.solve import solve_rigid  # it has the drafts of this module
+    from mbs.models.inverse_geometry.solve import solve_rigid  # it takes drafts from here
 
     require_system(system)
     require_method(system, method, METHODS)
     poses, p = target_poses(system, T), np.array(system.parameter_values(parameters))
-
-    def solved(pose: Array) -> Solutions:
-        return solve_rigid(system, pose, frame, method, given, locked=locked, parameters=parameters)
-
-    given = limits if system.is_closed else None
+    samples = samples_of(system, locked, redundant, limits, len(poses))
     if system.is_closed:
-        return _stack(system, [solved(pose) for pose in poses])
-    robot = _robot(frame_chain(system, frame, locked), method, p)
-    draft = robot.draft(poses)
+        answers = [
+            solve_rigid(
+                system,
+                pose,
+                frame,
+                method,
+                limits,
+                locked={**samples.locked, **dict(zip(samples.varied, at, strict=True))},
+                parameters=parameters,
+            )
+            for pose, own in zip(poses, samples.r.tolist(), strict=True)
+            for at in own
+        ]
+        return _gather_samples(_stack(system, answers), samples)
+    robot = _robot(frame_chain(system, frame, samples.locked, samples.varied), method, p)
+    count, number, joints = samples.r.shape
+    r = samples.r.reshape(count * number, joints)
+    many = poses if number == 1 else np.repeat(poses, number, axis=0)
+    draft = robot.draft(many, r)
     for k in np.flatnonzero(draft.searched):
-        pose = poses[k]
-        q = repair(robot.arm, pose) if repair else solved(pose).q[:, list(robot.chain.indices)]
-        draft = with_configurations(draft, int(k), robot.arm, q, pose)
-    q, valid = robot.whole(draft.q), draft.valid
+        chain, pose = robot.chain.locked_at(r[k]), many[k]
+        arm = chain.arm(p)
+        q = repair(arm, pose) if repair else robot.solved(pose, r[k])
+        draft = with_configurations(draft, int(k), arm, q, pose)
+    q, valid = robot.whole(draft.q, r), draft.valid
     if leaves_out(limits):
-        q, within = _unwind(bounds(system, limits, robot.chain.indices), q)
+        names, indices = list(redundant or {}), list(robot.chain.indices)
+        indices += [k for k, c in enumerate(system.coordinates) if c.name in names]
+        q, within = _unwind(bounds(system, limits, indices), q)
         valid = valid & within
-    return ManySolutions(q, valid, draft.residual, draft.labels, draft.searched)
+    found = ManySolutions(q, valid, draft.residual, draft.labels, draft.searched)
+    return _gather_samples(found, samples)
+
+
+def _gather_samples(many: ManySolutions, samples: LockedSamples) -> ManySolutions:
+    """The rows of all positions of a pose in one row."""
+    count, number, _ = samples.r.shape
+    if number == 1:
+        return many
+    columns = many.valid.shape[1]
+    shape = count, number * columns
+    return ManySolutions(
+        many.q.reshape(*shape, many.q.shape[2]),
+        many.valid.reshape(shape),
+        many.residual.reshape(shape),
+        many.labels * number,
+        np.any(many.searched.reshape(count, number), axis=1),
+        number,
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -391,19 +520,29 @@ class _Robot:
 
     chain: FrameChain
     p: Array
-    arm: Arm
+    method: str
     sequence: StepSequence | None
-    general: General | None
 
-    def draft(self, T: Array) -> BranchSolutions:
+    def draft(self, T: Array, r: Array) -> BranchSolutions:
         """The solutions by a closed form, else by the general method."""
         if self.sequence is not None:
-            return draft_solutions(self.chain, self.sequence, self.p, self.arm, T)
-        if self.general is not None:
-            return general_draft(self.general, T)
-        return nothing(self.arm, len(T))
+            return draft_solutions(self.chain, self.sequence, self.p, T, r)
+        if self.method in ("auto", "general"):
+            if self.chain.varied:
+                return general_draft_varied(self.chain, self.p, T, r)
+            general = ready(self.chain, self.p)
+            if general is not None:
+                return general_draft(general, T)
+        return nothing(len(self.chain.names), len(T))
 
-    def whole(self, q: Array) -> Array:
+    def solved(self, pose: Array, r: Array) -> Array:
+        """(m, n) all configurations at one pose, the varied joints at r, (k,)."""
+        from mbs.models.inverse_geometry.solve import solve_at  # it takes drafts from here
+
+        found = solve_at(self.chain, r, pose, self.method, self.p)
+        return found.q[:, list(self.chain.indices)]
+
+    def whole(self, q: Array, r: Array) -> Array:
         """(N, branches, nq) positions of all joints, those outside the chain as assembled."""
         system = self.chain.system
         if self.chain.indices == tuple(range(system.nq)):
@@ -411,14 +550,12 @@ class _Robot:
         every = np.empty((*q.shape[:2], system.nq))
         every[...] = system.position(self.chain.locked)
         every[..., list(self.chain.indices)] = q
+        every[..., list(self.chain.varied_indices)] = r[:, None]
         return every
 
 
 def _robot(chain: FrameChain, method: str, p: Array) -> _Robot:
-    sequence, general = _sequence(chain, method, p), None
-    if sequence is None and method in ("auto", "general"):
-        general = ready(chain, p)
-    return _Robot(chain, p, chain.arm(p), sequence, general)
+    return _Robot(chain, p, method, _sequence(chain, method, p))
 
 
 def _sequence(chain: FrameChain, method: str, p: Array) -> StepSequence | None:

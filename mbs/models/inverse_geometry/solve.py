@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,12 @@ import numpy as np
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Array
-from mbs.errors import ModelError
+from mbs.closed_forms.arm_search import nearest
+from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, named, new_among, roots
+from mbs.models.inverse_geometry.branches import branch_labels
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
-from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, require_method
+from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, require_method, sequence_of
 from mbs.models.inverse_geometry.gathering import (
     METHODS,
     Gathered,
@@ -23,6 +26,7 @@ from mbs.models.inverse_geometry.gathering import (
     joined,
 )
 from mbs.models.inverse_geometry.kernel import kernel_of
+from mbs.models.inverse_geometry.redundancy import LockedSamples, Redundant, samples_of
 from mbs.models.inverse_geometry.solutions import Given, Solutions, Wishes, bounds, leaves_out
 from mbs.models.inverse_geometry.target import Target, nearly_singular
 from mbs.models.inverse_geometry.whole_robot import parallel
@@ -37,6 +41,7 @@ def solve(
     seed: Mapping[str, float] | Sequence[float] | None = None,
     *,
     locked: Mapping[str, float] | None = None,
+    redundant: Redundant | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Solutions:
     """Every configuration that takes a frame to a pose.
@@ -57,6 +62,9 @@ def solve(
             from it and wound towards it, and it places the joints that the frame does not depend
             on.
         locked: positions of joints that stay where they are, by name [rad or m].
+        redundant: by the name of a joint beyond the six that a pose determines how many positions
+            it takes, from limit to limit or over a turn, or (S,) these [rad or m]; the solutions
+            of all of them are given, of several joints those of all combinations.
         parameters: values of symbols, the others at their defaults.
 
     Returns:
@@ -70,7 +78,15 @@ def solve(
     require_system(system)
     target = target_pose(system, T)
     return solve_rigid(
-        system, target, frame, method, limits, seed, locked=locked, parameters=parameters
+        system,
+        target,
+        frame,
+        method,
+        limits,
+        seed,
+        locked=locked,
+        redundant=redundant,
+        parameters=parameters,
     )
 
 
@@ -83,6 +99,7 @@ def solve_rigid(
     seed: Mapping[str, float] | Sequence[float] | None = None,
     *,
     locked: Mapping[str, float] | None,
+    redundant: Redundant | None = None,
     parameters: Mapping[str, float] | None,
 ) -> Solutions:
     """`solve` for a transform that is rigid to the last digit: rounded twice it would be another.
@@ -95,34 +112,96 @@ def solve_rigid(
         limits: likewise.
         seed: likewise.
         locked: likewise.
+        redundant: likewise.
         parameters: likewise.
     """
     p = np.array(system.parameter_values(parameters))
-    chain = chain_or_none(system, frame, locked)
-    wishes = _wishes(system, chain, limits, seed)
+    samples = samples_of(system, locked, redundant, limits, 1)
+    chain = chain_or_none(system, frame, samples.locked, samples.varied)
     if chain is None:
-        return parallel(wishes, frame, target, p)
-    require_method(system, method, METHODS)
-    question = Question(chain, Target(chain.arm(p), target), p, wishes)
+        return parallel(_wishes(system, None, limits, seed), frame, target, p)
+    if redundant is None:
+        return solve_at(chain, samples.r[0, 0], target, method, p, limits, seed)
+    asked = [_asked(chain, r, target, method, p, limits, seed) for r in samples.r[0]]
+    return _joined(asked, samples, None if seed is None else np.array(system.position(seed)))
+
+
+def solve_at(
+    chain: FrameChain,
+    r: Array,
+    T: Array,
+    method: str,
+    p: Array,
+    limits: bool | Given | None = None,
+    seed: Mapping[str, float] | Sequence[float] | None = None,
+) -> Solutions:
+    """The solutions with the varied joints of a chain at one position.
+
+    Args:
+        chain: whose closed form serves all of these positions.
+        r: (k,) positions of its varied joints [rad or m].
+        T: (4, 4) the pose of its frame [m].
+        method: as in `solve`.
+        p: (np,) parameters.
+        limits: as in `solve`.
+        seed: as in `solve`.
+    """
+    return answer(*_asked(chain, r, T, method, p, limits, seed))
+
+
+_Asked = tuple[Question, list[ChainRoot], str]
+"""A question, the solutions of its chain, and the method that gave them."""
+
+
+def _asked(
+    chain: FrameChain,
+    r: Array,
+    T: Array,
+    method: str,
+    p: Array,
+    limits: bool | Given | None,
+    seed: Mapping[str, float] | Sequence[float] | None,
+) -> _Asked:
+    require_method(chain.system, method, METHODS)
+    own = chain.locked_at(r) if chain.varied else chain
+    wishes = _wishes(chain.system, own, limits, seed)
+    question = Question(own, Target(own.arm(p), T), p, wishes)
+    if chain.varied:  # one closed form serves all positions
+        found, used = solved(question, method, chain, r)
+        return question, named(question, found, _signs(chain, method, p)), used
     kernel = kernel_of(chain, p, method)
-    draft = None if kernel is None else kernel.draft(target)
+    draft = None if kernel is None else kernel.draft(T)
     if kernel is not None and draft is not None and draft.certain:
         labels = [kernel.labels[b] for b in draft.branch]
-        found = [ChainRoot(q, name, 1) for q, name in zip(draft.q, labels, strict=True)]
-        return answer(question, found, kernel.method)
-    found, used = solved(question, method)
-    return answer(question, named(question, found, kernel.labels if kernel else ()), used)
+        certain = [ChainRoot(q, name, 1) for q, name in zip(draft.q, labels, strict=True)]
+        return question, certain, kernel.method
+    found, used = solved(question, method, chain, r)
+    return question, named(question, found, kernel.labels if kernel else ()), used
 
 
-def solved(question: Question, method: str) -> tuple[list[ChainRoot], str]:
+def _signs(chain: FrameChain, method: str, p: Array) -> tuple[str, ...]:
+    """The names of the branches of a closed form, where there is one."""
+    if method not in ("auto", *CLOSED_FORMS):
+        return ()
+    try:
+        return branch_labels(chain, sequence_of(chain, method, p), p)
+    except NoClosedForm:
+        return ()
+
+
+def solved(
+    question: Question, method: str, varied: FrameChain, r: Array
+) -> tuple[list[ChainRoot], str]:
     """The solutions of a chain, and the method that gave them.
 
     Args:
         question: the chain and the pose.
         method: as in `solve`.
+        varied: the chain with some joints at positions that are symbols.
+        r: (k,) these positions in the question [rad or m].
     """
     chain, target, p = question.chain, question.target, question.p
-    gathered = gather(chain, target, method, p)
+    gathered = gather(varied, target, method, p, r)
     if method not in ("auto", *CLOSED_FORMS) or not _is_doubtful(target, gathered):
         return roots(target, gathered, question.chain_indices), gathered.method
     gathered = gather_further(chain, target, gathered, p)
@@ -136,14 +215,41 @@ def solved(question: Question, method: str) -> tuple[list[ChainRoot], str]:
     return found, gathered.method
 
 
+def _joined(asked: list[_Asked], samples: LockedSamples, near: Array | None) -> Solutions:
+    """The solutions of all positions of redundant joints; else why there is none at the best."""
+    reached = [k for k, (_, found, _) in enumerate(asked) if found]
+    if not reached:
+        reached = [int(np.argmin([_away(question) for question, _, _ in asked]))]
+    answers = [answer(*asked[k]) for k in reached]
+    every = [solution for own in answers for solution in own]
+    if near is not None:
+        every.sort(key=lambda solution: float(np.linalg.norm(solution.q - near)))
+    if every:
+        return replace(answers[0], solutions=tuple(every), reason="", nearest=None)
+    position = zip(samples.varied, samples.r[0, reached[0]], strict=True)
+    at = ", ".join(f"{name} = {x:.6g}" for name, x in position)
+    reason = f"none at {len(asked)} positions of redundant joints; at {at}: {answers[0].reason}"
+    return replace(answers[0], reason=reason)
+
+
+def _away(question: Question) -> float:
+    """How far the nearest reachable pose is [arm lengths and rad]."""
+    arm = question.target.arm
+    found = nearest(arm, question.target.T)
+    return found.distance / arm.length + found.angle
+
+
 def chain_or_none(
-    system: System, frame: str | int | None, locked: Mapping[str, float] | None
+    system: System,
+    frame: str | int | None,
+    locked: Mapping[str, float] | None,
+    varied: tuple[str, ...] = (),
 ) -> FrameChain | None:
     """The chain to the frame; None where a robot with loops has none that can stand alone."""
     try:
-        return frame_chain(system, frame, locked)
+        return frame_chain(system, frame, locked, varied)
     except ModelError:
-        if locked or not system.is_closed:
+        if locked or varied or not system.is_closed:
             raise
         if frame is not None:
             system.frame(frame)

@@ -134,6 +134,12 @@ def test_a_redundant_arm_needs_a_joint_that_stays(command) -> None:
     answer = command(*pose, "--method", "pieper")
     assert answer.code == 1
     assert answer.err.startswith("mbs: ")
+    data = json.loads(command(*pose, "--redundant", "q7=3", "--json").out)
+    assert {row["q"]["q7"] for row in data["solutions"]} <= {-2.8973, 0.0, 2.8973}
+    assert len(data["solutions"]) > 2
+    wrong = command(*pose, "--redundant", "q7=2.5")
+    assert wrong.code == 1
+    assert "--redundant q7: 2.5 is no whole number of positions" in wrong.err
 
 
 def test_of_a_motion_that_stops_what_it_has_is_written(command, tmp_path: Path) -> None:

@@ -86,6 +86,19 @@ def test_seven_joints_keep_one_where_it_is():
     assert np.allclose(found.rows[0].q, q, atol=1e-8)
 
 
+def test_seven_joints_take_many_positions_of_one():
+    panda = catalogue_system("panda")
+    q = [0.1, 0.3, -0.2, -1.5, 0.2, 1.4, 0.3]
+    found = configurations(panda, pose_of(panda, q), seed=q, redundant={"q7": 3})
+    assert found.locked == ()
+    assert found.redundant == (("q7", 3),)
+    assert {row.q[6] for row in found.rows} <= {-2.8973, 0.0, 2.8973}
+    assert len(found.rows) > 0
+    assert max(row.residual for row in found.rows) < 1e-12
+    fixed = configurations(panda, pose_of(panda, q), seed=q, locked={"q3": -0.2})
+    assert fixed.redundant == ()
+
+
 def test_limits_are_told_joint_by_joint():
     puma = catalogue_system("puma560")
     found = configurations(puma, pose_of(puma, [0.3, 0.2, 0.4, 0.1, 0.5, 0.2]))

@@ -52,35 +52,115 @@ def test_angles_go_on_beyond_half_a_turn(puma):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_branch_is_kept(puma, seed):
-    """The determinant of the Jacobian keeps its sign, and the end is the start when walked back."""
+def test_there_and_back(puma, seed):
+    """On one of the ways the wrist becomes straight, and joints go on as they moved; else the
+    determinant of the Jacobian keeps its sign."""
     rng = np.random.default_rng(seed)
     start = ELBOW_UP + rng.uniform(-0.2, 0.2, 6)
-    path = poses(puma, 6, line(start, start + rng.uniform(-0.9, 0.9, 6), 12))
-    path = np.concatenate([path, path[-2::-1]])
-    found = follow(puma, path, start, limits=False)
+    way = line(start, start + rng.uniform(-0.9, 0.9, 6), 12)
+    way = np.concatenate([way, way[-2::-1]])
+    found = follow(puma, poses(puma, 6, way), start, limits=False)
+    assert found.reason == ""
+    np.testing.assert_allclose(found.q[-1], start, atol=1e-10)
     arm = frame_chain(puma, 6).arm(np.zeros(0))
     signs = np.sign(np.linalg.det(arm.pose_and_jacobian(found.q)[1]))
-    assert np.all(signs == signs[0])
-    if found.reason == "":
-        np.testing.assert_allclose(found.q[-1], start, atol=1e-10)
-    else:
-        assert "singular" in found.reason
+    if np.any(signs != signs[0]):
+        np.testing.assert_allclose(found.q, way, atol=1e-10)
 
 
 @pytest.mark.parametrize("count", [3, 20, 21])
-def test_through_the_wrist_singularity_it_stops(puma, count):
+@pytest.mark.parametrize("function", [False, True])
+def test_through_a_straight_wrist_it_goes_on(puma, count, function):
     """A pose in which the wrist is straight may be among the poses, or between two of them."""
     end = ELBOW_UP.copy()
     end[4] = -0.6
-    found = follow(puma, poses(puma, 6, line(ELBOW_UP, end, count)), ELBOW_UP)
-    last = (count - 1) // 2 - count % 2
+    path = line(ELBOW_UP, end, count)
+    T = poses(puma, 6, path)
+    dgm = mbs.models.transform(puma, 6)
+
+    def pose(s):
+        return np.array(dgm(ELBOW_UP + s * (end - ELBOW_UP)))
+
+    found = follow(puma, pose if function else T, ELBOW_UP, samples=count)
+    assert found.reason == ""
+    np.testing.assert_allclose(found.q, path, atol=1e-7)
+    assert found.residual.max() < 1e-12
+    least = found.singular_values[count // 2]
+    assert least < 1e-6 if count % 2 else least > 1e-3
+
+
+def smooth_motion(seed, count):
+    """Joints on curves along which the wrist is straight once or oftener."""
+    rng = np.random.default_rng(seed)
+    slope, wave, phase = rng.uniform(-1, 1, 6), rng.uniform(-0.6, 0.6, 6), rng.uniform(0, 6, 6)
+    s = np.linspace(0, 1, count)[:, None]
+    return [0.3, -0.8, 0.4, 0.2, 0.1, 0.1] + slope * (s - 0.5) + wave * np.sin(2 * s + phase)
+
+
+@pytest.mark.parametrize("robot", ["puma560", "ur5"])
+@pytest.mark.parametrize("count", [18, 40, 300])
+@pytest.mark.parametrize("seed", [0, 2, 4])
+def test_joints_that_move_smoothly_are_found_again(robot, count, seed):
+    """Step by step, and in runs of a closed form; of the UR5 the elbow is stretched too."""
+    system = catalogue_system(robot)
+    path = smooth_motion(seed, count)
+    assert np.ptp(np.sign(path[:, 4])) > 0
+    found = follow(system, poses(system, 6, path), path[0], limits=False)
+    assert found.reason == ""
+    np.testing.assert_allclose(found.q, path, atol=1e-6)
+    assert found.residual.max() < 1e-12
+
+
+@pytest.mark.parametrize("count", [9, 40])
+def test_a_jump_is_told(puma, count):
+    """Behind the straight wrist the path leads aside: joint 4 would have to turn by 80 degrees."""
+    straight, aside = ELBOW_UP.copy(), ELBOW_UP.copy()
+    straight[4] = 0.0
+    turned_wrist = straight + np.array([0, 0, 0, 1.4, 0, -1.4])
+    aside = turned_wrist + np.array([0, 0, 0, 0, 0.5, 0])
+    path = np.concatenate([line(ELBOW_UP, straight, count), line(turned_wrist, aside, count)[1:]])
+    found = follow(puma, poses(puma, 6, path), ELBOW_UP)
+    last, every = count - 2, 2 * count - 1
     assert found.reached == last
-    assert found.reason.startswith(f"stopped between poses {last} and {last + 1} of {count}: singu")
-    assert "q5 = 0.000, smallest singular value " in found.reason
-    assert float(found.reason.rsplit(" ", 1)[1]) < 1e-6
+    where = f"stopped between poses {last} and {last + 1} of {every}, at 0.5 of the path: singular"
+    assert found.reason.startswith(f"{where} configuration, q5 = 0.000, smallest singular value ")
+    assert "no configuration behind it goes on smoothly, in the nearest one q" in found.reason
+    assert " 80.21 degrees away" in found.reason
     assert abs(found.stopped_at[4]) < 1e-5
-    np.testing.assert_allclose(found.q[:, 3], ELBOW_UP[3], atol=1e-9)
+
+
+@pytest.mark.parametrize("robot", ["puma560", "ur5"])
+def test_many_poses_are_followed_as_few(robot):
+    """A circle, from its closed form in runs, and step by step as a function."""
+    system = catalogue_system(robot)
+    start = np.array([0.3, -0.8, -0.4, 0.2, 0.6, 0.1])
+    if robot == "ur5":
+        start = np.array([0.3, -1.2, 1.8, -0.5, 1.0, 0.1])
+    T0 = poses(system, 6, [start])[0]
+
+    def circle(s):
+        T = T0.copy()
+        T[:2, 3] += 0.08 * np.array([np.cos(2 * np.pi * s) - 1, np.sin(2 * np.pi * s)])
+        return T
+
+    T = [circle(s) for s in np.linspace(0, 1, 401)]
+    many = follow(system, T, start, limits=False)
+    few = follow(system, circle, start, samples=41, limits=False)
+    assert many.reason == few.reason == ""
+    np.testing.assert_allclose(many.q[::10], few.q, atol=1e-11)
+    np.testing.assert_allclose(many.singular_values[::10], few.singular_values, rtol=1e-9)
+    np.testing.assert_allclose(many.q[-1], start, atol=1e-11)
+    assert many.residual.max() < 1e-12
+    path = line(start, start + np.array([9, 0, 0, 0, 0, 0]), 400)
+    turned_round = follow(system, poses(system, 6, path), start, limits=False)
+    assert turned_round.q[-1, 0] == pytest.approx(start[0] + 9)
+
+
+def test_a_limit_stops_a_run(puma):
+    end = ELBOW_UP + np.array([0, 2.0, 0, 0, 0, 0])
+    found = follow(puma, poses(puma, 6, line(ELBOW_UP, end, 401)), ELBOW_UP)
+    assert found.reason == "joint q2 passes its limit 0.785398 before pose 318 of 401"
+    assert np.all(found.q[:, 1] < np.pi / 4)
 
 
 @pytest.mark.parametrize("beside", [1e-4, 1e-2])

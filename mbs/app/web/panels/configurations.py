@@ -17,6 +17,7 @@ from mbs.app.tasks.configurations import (
     Configuration,
     ConfigurationList,
     configurations,
+    locked_by_default,
     pose_from,
     pose_from_text,
     pose_of,
@@ -38,6 +39,8 @@ from mbs.app.web.panels.layout import (
 from mbs.app.web.panels.text_view import column
 from mbs.assembly import System
 from mbs.errors import MbsError
+from mbs.expressions import number as number_of
+from mbs.models.catalogue.configurations import surplus_joints
 from mbs.models.geometry import terminal_frame
 
 # The configurations that solve the inverse geometry as a table whose rows move the picture.
@@ -137,6 +140,8 @@ def _headline(made: ConfigurationList) -> str:
     told += f" by {made.method}"
     if made.locked:
         told += "; locked: " + ", ".join(f"{name} = {x:.4g}" for name, x in made.locked)
+    for name, taken in made.redundant:
+        told += f"; {taken} positions of {name}"
     return told + (f"; {outside} outside of limits" if outside else "")
 
 
@@ -265,6 +270,14 @@ _MEANINGS = {
     "search": "search from random starts",
 }
 
+_PRESENT, _GIVEN = "present", "given"
+_POSITIONS = {
+    _PRESENT: "stays as in the picture",
+    _GIVEN: "stays at [rad or m]",
+    "16": "takes 16 positions",
+    "64": "takes 64 positions",
+}
+
 
 async def open_configurations(app: App, key: str = "igm-general") -> None:
     """Open the panel, with the pose that the frame has now.
@@ -301,6 +314,12 @@ class _ConfigurationsPanel:
             self._frame.props(FIELD).style("flex: 1 1 90px").mark("frame")
             self._method = ui.select(_MEANINGS, label="method", value=entry(key).solver or "auto")
             self._method.props(FIELD).style("flex: 2 1 190px").mark("method")
+        with left, ui.element("div").classes("app-form") as self._surplus:
+            self._many = ui.select(_POSITIONS, value=_PRESENT, on_change=self._surplus_changed)
+            self._many.props(FIELD).style("flex: 2 1 190px").mark("positions")
+            self._at = ui.input("position").props(FIELD).mark("position")
+            self._at.style("flex: 1 1 90px")
+        self._surplus_changed()
         with left:
             self._pose = PoseFields()
             with in_a_row():
@@ -322,6 +341,34 @@ class _ConfigurationsPanel:
         names = _frames(system)
         value = self._frame.value if self._frame.value in names else terminal_frame(system)
         self._frame.set_options(names, value=value)
+        self._surplus_changed()
+
+    def _surplus_joint(self) -> str:
+        """The joint beyond six that a visitor places; "" where there is none."""
+        frame = self._frame.value
+        return next(iter(surplus_joints(self._app.system(), frame)), "") if frame else ""
+
+    def _surplus_changed(self) -> None:
+        """Offer positions for the joint beyond six, where there is one."""
+        joint = self._surplus_joint()
+        self._surplus.set_visibility(bool(joint))
+        self._many.props(f'label="redundant joint {joint}"')
+        self._at.set_visibility(self._many.value == _GIVEN)
+
+    def _redundant(self) -> dict[str, Any]:
+        """What is asked of the joint beyond six, for `configurations`.
+
+        Raises:
+            MbsError: its position has no value.
+        """
+        joint, many = self._surplus_joint(), self._many.value
+        if not joint or many == _PRESENT:
+            return {}
+        if many != _GIVEN:
+            return {"redundant": {joint: int(many)}}
+        system = self._app.system()
+        locked = locked_by_default(system, self._frame.value, self._app.q)
+        return {"locked": {**locked, joint: number_of(str(self._at.value or "0"), joint)}}
 
     async def take_present(self) -> None:
         """Write the pose that the frame has in the picture into the fields."""
@@ -335,12 +382,16 @@ class _ConfigurationsPanel:
     async def solve(self) -> None:
         """List every configuration that takes the frame to the pose."""
         try:
-            T = self._pose.T
+            T, redundant = self._pose.T, self._redundant()
         except MbsError as error:
             self._app.complain(error)
             return
         task = partial(
-            configurations, frame=self._frame.value, method=self._method.value, seed=self._app.q
+            configurations,
+            frame=self._frame.value,
+            method=self._method.value,
+            seed=self._app.q,
+            **redundant,
         )
         show = partial(show_configurations, self._app)
         asking = Asking(self._app, self._button, self._shown, show)
@@ -349,6 +400,7 @@ class _ConfigurationsPanel:
     async def _framed(self) -> None:
         notes = cast(dict[str, Any], self._app.session.notes[KEY])
         notes["frame"] = self._frame.value
+        self._surplus_changed()
         await self.take_present()
 
     async def _equations(self, key: str) -> None:

@@ -34,7 +34,7 @@ from mbs.result import Result, optional_module
 from mbs.simulate.fmu import fmu
 from mbs.simulate.fmu_variables import numbers_of
 from mbs.simulate.run import Simulator, run
-from mbs.text import did_you_mean, quoted
+from mbs.text import did_you_mean, one_line, quoted
 
 # The cases of a parameter study, and the folder that keeps their results.
 
@@ -205,7 +205,13 @@ def study_of(
 
 def _system(system: System) -> tuple[str, bytes]:
     """Its name, and all that it holds, to the last digit."""
-    return system.name, repr(content_of(system)).encode()
+    try:
+        return system.name, repr(content_of(system)).encode()
+    except (AttributeError, TypeError, pickle.PicklingError) as error:
+        raise ModelError(
+            f"sweep: {system.name} cannot be sent to other processes: {one_line(str(error))};"
+            " define the classes of its components in a module, not in a function"
+        ) from error
 
 
 def _fmu(path: object) -> tuple[str, bytes]:

@@ -183,6 +183,9 @@ def test_a_class_in_a_function_is_simulated_and_not_kept(made, disk):
     assert ends == pytest.approx([1.5, 1.5], abs=1e-12)
     assert len(made) == 2
     assert not list(disk.glob("*.pickle"))
+    told = "m cannot be sent to other processes: .*Local.*; define the classes .* in a module"
+    with pytest.raises(mbs.errors.ModelError, match=told):
+        mbs.simulate.sweep(pushed(Local), [{"z.q": 0.0}], duration=0.5, quiet=True)
 
 
 def flipped(content):

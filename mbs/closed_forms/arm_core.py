@@ -53,7 +53,7 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "mbs_examine": (None, (_pointer, _pointer, _integer, _integer, *[_pointer] * 3)),
     "mbs_walk": (
         _integer,
-        (_pointer, _pointer, _pointer, _real, _integer, _pointer, _pointer),
+        (_pointer, _pointer, _pointer, _real, _integer, ctypes.c_int, _pointer, _pointer),
     ),
     "mbs_singular": (None, (_pointer, _real, _integer, _pointer, _pointer)),
     "mbs_settle": (
@@ -221,6 +221,7 @@ def walked_by(
     tangent: Array,
     limit: float,
     most: int,
+    sided: bool,
 ) -> tuple[Array, bool]:
     """Points (k, n) of a self-motion, in x = q / unit, and whether it closes.
 
@@ -232,6 +233,7 @@ def walked_by(
         tangent: (n,) where it leads to.
         limit: of the residuals.
         most: points.
+        sided: whether it stays on one of two curves that pass close by.
     """
     points, target = np.empty((most + 1, arm.size)), _wanted(T, 4, 4)
     points[0] = start
@@ -242,6 +244,7 @@ def walked_by(
         _at(along),
         limit,
         most,
+        sided,
         _at(points),
         ctypes.addressof(closed),
     )

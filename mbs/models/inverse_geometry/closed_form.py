@@ -295,15 +295,29 @@ class InverseGeometry(ModelFunction):
             )
 
 
+class AllBranches(InverseGeometry):
+    """A closed form ``igm_all(T) -> q, valid`` of all branches, a column each."""
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Evaluate it as any model; a pose given in numbers must be one."""
+        T = kwargs.get("T", args[0] if args else None)
+        if isinstance(T, (DM, np.ndarray, list, tuple)) and np.shape(np.array(T)) == (4, 4):
+            target_pose(self.system, T)
+        return ModelFunction.__call__(self, *args, **kwargs)
+
+
 def function(
     system: System,
     method: str = "auto",
     frame: str | int | None = None,
     locked: Mapping[str, float] | None = None,
+    *,
+    branches: str = "one",
 ) -> Function:
     """``igm(T, branch) -> q, valid``: the joint positions of one branch, without iteration.
 
-    One graph serves all branches. It can be differentiated with respect to T and to the
+    One graph serves all branches; with ``branches="all"`` it is ``igm_all(T) -> q, valid``, a
+    column for each, which share their common steps. It can be differentiated with respect to T and to the
     parameters wherever the configuration is not singular.
 
     Source: Pieper 1968; Paul 1981; Khalil & Creusot 1997, section 3.3.
@@ -314,20 +328,22 @@ def function(
             ``igm_characteristic(T) -> M0, M1, M2`` of the method of Raghavan and Roth.
         frame: a body, a named frame, the number of a link, or None for the terminal frame.
         locked: positions of joints that stay where they are, by name [rad or m].
+        branches: "one", whose number is an input, or "all" in one call.
 
     Returns:
         InverseGeometry, a Function of T (4, 4) [m], the pose of the frame seen from the base, and
         of the number of the branch; q (nq, 1) [rad or m], finite for every T, joints outside the
         chain as in the assembled configuration; valid, 1 where q gives T back within 1e-9 of the
-        size of the robot, else 0.
+        size of the robot, else 0. AllBranches has no number; q (nq, branches), valid (branches, 1).
 
     Raises:
         NoClosedForm: no closed form is known; the message says what stood in the way.
         ModelError: there is no such method, frame or joint, more than six joints are free, or
-            the system is closed.
+            the system is closed; or all branches of the general method are asked for.
     """
     require_system(system)
     require_method(system, method, METHODS)
+    _require_branches(system, method, branches)
     chain = frame_chain(system, frame, locked)
     if method == "general":
         return characteristic_function(chain)
@@ -335,12 +351,26 @@ def function(
     sequence = sequence_of(chain, method)
 
     def make() -> Function:
+        if branches == "all":
+            key: tuple[object, ...] = ("igm_all", method, *chain.key)
+            found: Any = model_function(system, key, lambda: _all_built(chain, sequence))
+            return AllBranches(Function(found), chain, sequence, found.annotated)
         key = ("igm", method, *chain.key)
         plain: Any = model_function(system, key, lambda: _built(chain, sequence))
         return InverseGeometry(Function(plain), chain, sequence, plain.annotated)
 
-    made: Function = system.cached(("inverse geometry", method, *chain.key), make)
+    made: Function = system.cached(("inverse geometry", method, branches, *chain.key), make)
     return made
+
+
+def _require_branches(system: System, method: str, branches: object) -> None:
+    if branches not in ("one", "all"):
+        raise ModelError(f"{system.name}: branches is {quoted(branches)}; use 'one' or 'all'")
+    if branches == "all" and method == "general":
+        raise ModelError(
+            f"{system.name}: the configurations of the general method are eigenvalues and no"
+            " branches of a Function; use mbs.models.inverse_geometry.solver"
+        )
 
 
 def _require_open(system: System) -> None:
@@ -357,6 +387,16 @@ def _built(chain: FrameChain, sequence: StepSequence) -> tuple[Named, Named, Nam
     q = whole_configuration(chain, leaf.x)
     outputs: Named = [("q", q), ("valid", _valid(chain, sequence, leaf, T, branch))]
     return [("T", T), ("branch", branch)], outputs, _names(chain, sequence, leaf, branch)
+
+
+def _all_built(chain: FrameChain, sequence: StepSequence) -> tuple[Named, Named]:
+    T = SX.sym("T", 4, 4)
+    every = all_branches(chain, sequence)
+    q, residual, real = every.call([T, chain.system.p][: every.n_in()])[:3]
+    columns = [whole_configuration(chain, x) for x in casadi.horzsplit(q)]
+    reached = casadi.logic_and(real >= -_ROUNDING, residual <= _ROUNDING * size(chain))
+    outputs: Named = [("q", casadi.horzcat(*columns)), ("valid", SX(reached))]
+    return [("T", T)], outputs
 
 
 def signs_of(sequence: StepSequence, branch: SX) -> SX:

@@ -120,7 +120,8 @@ def curve(
             next to a singular configuration those of no self-motion hold it nearly.
     """
     steps = _MOST_STEPS if dimension == 1 else _FEW_STEPS
-    way = _Way(target, strictness * target.tolerance, steps)
+    # what holds the pose but within the tolerance has valleys that cross, and no sides
+    way = _Way(target, strictness * target.tolerance, steps, strictness < 1.0)
     along = direction / np.linalg.norm(direction)
     start = q / target.unit
     x = target.corrected(start, along[None, :], along[None, :] @ start)
@@ -129,11 +130,12 @@ def curve(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Way:
-    """How a self-motion is followed: largest residual, and number of steps."""
+    """How a self-motion is followed: largest residual, number of steps, whether it keeps sides."""
 
     target: Target
     limit: float
     most: int
+    sided: bool
 
     def straight(self, x: Array, direction: Array) -> ConfigurationCurve | None:
         """The self-motion whose joints move in constant proportions."""
@@ -164,7 +166,7 @@ class _Way:
         library = core.core_of(target.arm)
         if library is not None:
             found, closed = core.walked_by(
-                library, target.arm, target.T, start, tangent, self.limit, self.most
+                library, target.arm, target.T, start, tangent, self.limit, self.most, self.sided
             )
             return list(found), closed
         side = _Side.at(target, start, tangent, None)
@@ -177,7 +179,7 @@ class _Way:
                 continue
             ahead = _tangent(target, x, moved / np.linalg.norm(moved))
             there = _Side.at(target, x, ahead, side.left)
-            if there.sign != side.sign and step > 2 * _SMALLEST_STEP:
+            if self.sided and there.sign != side.sign and step > 2 * _SMALLEST_STEP:
                 step /= 2  # onto another curve that passes close by
                 continue
             tangent, side = ahead, there
@@ -342,6 +344,9 @@ class _SelfMotion:
             near = wanted
         else:
             near = x[k] + (np.mod(wanted - x[k] + np.pi, 2 * np.pi) - np.pi)
+        # samples are no farther apart; beyond the end of a curve another one may go on
+        if not self.curve.slope.size and abs(near - x[k]) > 2 * _STEP:
+            return None
         found = target.corrected(x, held, np.array([near]))
         solved = target.residual(found * target.unit) < target.tolerance
         # solved to 1e-12 [rad or arm lengths]; where the free joint does not get, it is far off

@@ -56,11 +56,11 @@ void arm_correct(const arm *a, const double *target, const double *held, double 
 /* What of a direction the pose does not feel at x = q / unit, divided by the square of its part. */
 void arm_tangent(const arm *a, const double *x, const double *before, double *tangent);
 
-/* Follows a self-motion from points[0], in x = q / unit, along a tangent while residuals are within the
- * limit; gives how many points there are, *closed where the last is the first again. There must be
- * room for one more than the most. */
+/* Follows a self-motion from points[0], in x = q / unit, along a tangent while residuals are within
+ * the limit, and on its side of curves that pass close by if `sided`; gives how many points there are,
+ * *closed where the last is the first again. There must be room for one more than the most. */
 long long arm_walk(const arm *a, const double *target, const double *tangent, double limit,
-                   long long most, double *points, int *closed);
+                   long long most, int sided, double *points, int *closed);
 
 /* The solution beside q, or q itself where nothing better was found; gives its residual. */
 double arm_polish(const arm *a, const double *target, double *q);

@@ -52,8 +52,8 @@ EXPORT void mbs_examine(const arm *a, const double *target, long long stride, lo
 
 /* See arm_walk. */
 EXPORT long long mbs_walk(const arm *a, const double *target, const double *tangent, double limit,
-                          long long most, double *points, int *closed) {
-    return arm_walk(a, target, tangent, limit, most, points, closed);
+                          long long most, int sided, double *points, int *closed) {
+    return arm_walk(a, target, tangent, limit, most, sided, points, closed);
 }
 
 /* Fills q (starts, n), residual and hits (starts,); gives how many configurations were found. */

@@ -11,7 +11,7 @@ static const double FINEST = 1e-31; /* nothing is left to gain */
 static const double WEAK = 1e-8;    /* pivots of squares below it are taken for rounding */
 static const double LEAST = 1e-31;  /* damping, so that no matrix is singular */
 static const double DEPENDENT = 1e-12; /* singular values below it are rounding, and damped */
-static const double ZERO = 1e-7;       /* those of a self-motion, known to the root of rounding */
+static const double ZERO = 2e-6;       /* those of a self-motion, known to the root of 1e-12 */
 static const double LONGEST = 0.3;     /* step [rad or arm lengths] in which all is nearly linear */
 static const double SETTLED = 1e-12;   /* step that is hardly more than rounding, likewise */
 
@@ -201,8 +201,9 @@ static void left_direction(const arm *a, const double *x, double *left) {
 }
 
 long long arm_walk(const arm *a, const double *target, const double *tangent, double limit,
-                   long long most, double *points, int *closed) {
-    const double longest = 0.1, shortest = 1e-5; /* steps [rad or arm lengths] */
+                   long long most, int sided, double *points, int *closed) {
+    /* steps [rad or arm lengths]; where curves that cross are not told, none winds past another */
+    const double longest = 0.1, shortest = sided ? 1e-5 : 1e-3;
     double along[ARM_JOINTS], x[ARM_JOINTS], moved[ARM_JOINTS], q[ARM_JOINTS], T[16];
     double step = longest;
     long long count = 1;
@@ -210,7 +211,8 @@ long long arm_walk(const arm *a, const double *target, const double *tangent, do
     int k, n = a->n, seen = 0;
     *closed = 0;
     memcpy(along, tangent, (size_t)n * sizeof(double));
-    if (n == 6) {
+    sided = sided && n == 6;
+    if (sided) {
         left_direction(a, points, left);
         seen = side(a, points, along, left);
     }
@@ -236,7 +238,7 @@ long long arm_walk(const arm *a, const double *target, const double *tangent, do
         for (k = 0; k < n; k++) moved[k] /= far;
         turn(a, x, moved, on);
         memcpy(beyond, left, sizeof beyond);
-        k = side(a, x, on, beyond);
+        k = sided ? side(a, x, on, beyond) : 0;
         if (k != seen && step > 2.0 * shortest) { /* onto another curve that passes close by */
             step *= 0.5;
             continue;

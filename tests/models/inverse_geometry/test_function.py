@@ -14,7 +14,7 @@ import mbs
 from mbs.errors import ModelError, NoClosedForm
 from mbs.export.languages import LANGUAGES
 from mbs.models.inverse_geometry.closed_form import InverseGeometry, function
-from mbs.native import compile_library, compiled
+from mbs.native import c_source, compile_library, compiled
 from mbs.robots.rows import frame, robot
 
 ROBOTS = ("puma560", "rx90", "stanford", "scara", "planar_2r")
@@ -248,3 +248,39 @@ def test_wrong_questions():
 def test_general_arm_has_no_closed_form():
     with pytest.raises(NoClosedForm, match=r"pieper: .*paul: .*use mbs\.models\.inverse_geometry"):
         function(general_6r(0))
+
+
+@pytest.mark.parametrize("name", ["puma560", "ur5", "scara"])
+def test_all_branches_in_one_function(name):
+    """Column b is branch b; compiled and as C it gives the same."""
+    system = assembled(name)
+    one, every = function(system), function(system, branches="all")
+    assert every.name() == "igm_all"
+    assert every.labels == one.labels
+    assert every.size_out(0) == (system.nq, one.branches)
+    q = np.array([0.3, -0.5, 0.7, 0.4, 0.9, 0.2])[: system.nq]
+    T = np.array(mbs.models.direct_geometry(system)(q))
+    found, valid = (np.array(part) for part in every(T))
+    machine = compiled(every)
+    for b in range(one.branches):
+        own, own_valid = (np.array(part).ravel() for part in one(T, b))
+        assert bool(own_valid) == bool(valid[b])
+        if own_valid:
+            assert found[:, b] == pytest.approx(own, abs=1e-12)
+    assert np.min(np.max(np.abs(found - q[:, None]), axis=0)) < 1e-12
+    assert np.array_equal(machine(T)[0], found)
+    far = T.copy()
+    far[:3, 3] += 9.0
+    assert not np.any(np.array(every(far)[1]))
+    assert np.all(np.isfinite(np.array(every(far)[0])))
+    assert "igm_all" in c_source(every)
+
+
+def test_branches_that_are_not_known_are_refused():
+    system = assembled("puma560")
+    with pytest.raises(ModelError, match="branches is 'both'; use 'one' or 'all'"):
+        function(system, branches="both")
+    with pytest.raises(ModelError, match="eigenvalues"):
+        function(system, "general", branches="all")
+    with pytest.raises(ModelError):
+        function(system, branches="all")(np.diag([1, 1, 2.0, 1]))

@@ -23,7 +23,13 @@ from mbs.models.tree_table import shapes_of, table_of, unknown_to_core
 from mbs.native import compiled
 from mbs.native.array_calls import with_array_calls
 from mbs.native.compiler import cache_dir, cached_library
-from mbs.native.derivatives_on_demand import Derivative, Record, by_parameters, promise, source
+from mbs.native.derivatives_on_demand import (
+    Derivative,
+    DerivativeSource,
+    by_parameters,
+    promise,
+    source,
+)
 from mbs.native.kernel import FAST_FLAGS
 from mbs.native.tree_core import COMMON, tree_files
 
@@ -148,7 +154,7 @@ def _by_parameters(system: System, files: Mapping[str, str]) -> str:
         values = f.call([normalised(system.tree, q), *others])
         return Function(f.name(), [q, *others], values, f.name_in(), f.name_out())
 
-    promise(record, Record(equations, _BY_PARAMETERS, fast=True))
+    promise(record, DerivativeSource(equations, _BY_PARAMETERS, fast=True))
     return source(_BY_PARAMETERS, record)
 
 

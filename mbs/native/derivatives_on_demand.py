@@ -203,7 +203,7 @@ def write_record(
 _ONLY_PATTERN = "*"
 
 
-class Record(NamedTuple):
+class DerivativeSource(NamedTuple):
     """What derivatives are made of.
 
     Attributes:
@@ -219,10 +219,10 @@ class Record(NamedTuple):
     loops: LoopCode | None = None
 
 
-_PROMISED: dict[Path, Record] = {}
+_PROMISED: dict[Path, DerivativeSource] = {}
 
 
-def promise(record: Path, content: Record) -> None:
+def promise(record: Path, content: DerivativeSource) -> None:
     """Have derivatives made in this process without a file, in which the equations would stand.
 
     Args:
@@ -233,7 +233,7 @@ def promise(record: Path, content: Record) -> None:
 
 
 @functools.lru_cache(maxsize=1)  # one derivative is often followed by another
-def read_record(record: Path) -> Record:
+def read_record(record: Path) -> DerivativeSource:
     """The Function, its derivatives and the kind of their code.
 
     Raises:
@@ -249,7 +249,7 @@ def read_record(record: Path) -> Record:
         ]
         function, loops = casadi.Function.deserialize(text), json.loads(code)
         by_loops = LoopCode(*loops) if loops else None
-        return Record(lambda _: function, every, bool(int(fast)), by_loops)
+        return DerivativeSource(lambda _: function, every, bool(int(fast)), by_loops)
     except (OSError, ValueError, RuntimeError) as error:
         raise CompilerError(
             f"the derivatives of a compiled Function cannot be made: {record} has gone or is"

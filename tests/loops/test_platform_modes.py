@@ -10,6 +10,7 @@ from support.ring_loops import ring_loop
 
 import mbs
 import mbs.simulate
+from mbs import Parameter
 from mbs.components import Body, Mechanism, Prismatic, Revolute, Rod
 from mbs.errors import LoopError, ModelError, NoClosedForm
 from mbs.loops import function, modes, solve
@@ -131,15 +132,16 @@ def test_a_triangle_carries_its_weight():
     )
 
 
-def congruent():
-    """A platform congruent to the ground on three telescopic legs."""
+def congruent(width=1.0):
+    """A platform congruent to the ground, but for its width, on three telescopic legs."""
     m = Mechanism("congruent", guess={"foot0": 0.4, "leg1": 0.1})
     platform = m.add(Body("platform", mass=1, inertia=(1, 1, 1)))
-    for k, (x, y) in enumerate([(0.0, 0.0), (1.0, 0.1), (0.3, 0.8)]):
+    for k, (x, y) in enumerate([(0.0, 0.0), (width, 0.1), (0.3, 0.8)]):
         low, high = (m.add(Body(f"{n}{k}", mass=1, inertia=(1, 1, 1))) for n in ("low", "high"))
         m.connect(m.world.at(x, y), Revolute(f"foot{k}"), low)
         m.connect(low, Prismatic(f"leg{k}", axis="x", actuated=True), high)
-        m.connect(high.at(0.7), Revolute(f"head{k}"), platform.at(x, y))
+        end = platform.at(1.0 if k == 1 else x, y)
+        m.connect(high.at(0.7), Revolute(f"head{k}"), end)
     return m.assemble()
 
 
@@ -152,6 +154,19 @@ def test_a_motion_of_its_own_is_told():
         "congruent: foot0, head0, foot1, foot2 can move while the independent joints stay; modes",
         by=lambda: modes(system, [0.1, 0.1, 0.1]),
     )
+
+
+def test_parameters():
+    """The modes of a symbol's value are those of the number."""
+    wide, symbolic = congruent(1.2), congruent(Parameter("width", 1.0))
+    legs = [0.3, 0.5, 0.4]
+    found = modes(symbolic, legs, parameters={"width": 1.2})
+    expected = modes(wide, legs)
+    assert len(found) == len(expected) >= 2
+    for mode in expected:
+        assert any(same(wide, mode.q, other.q) for other in found)
+    # with equal widths the equation is another one
+    assert not any(same(wide, expected[0].q, other.q) for other in modes(symbolic, legs))
 
 
 @pytest.mark.parametrize("leg", ["UPS", "RUS", "R rod", "SPS"])

@@ -5,7 +5,7 @@ import pytest
 from support.configurations import active, same, searched
 from support.flat_loops import flat_loop
 from support.messages import refused
-from support.platforms import hexapod, planar_platform
+from support.platforms import hexapod, planar_linkage, planar_platform
 from support.ring_loops import ring_loop
 
 import mbs
@@ -45,6 +45,31 @@ def test_plane_platforms(kind, seed):
     found = check(planar_platform(seed, legs, driven).assemble(), starts=60)
     assert found.proof == method
     assert len(found) in range(2, 7)
+
+
+LINKAGES = {
+    "two ternary links": (("OA", "OB", "AC", "CB", "AD", "DB"), (), 6),
+    "platform behind a four-bar": (
+        ("OA", "AP", "OB", "BP", "PC", "CQ", "OD", "DQ", "OE", "EQ"),
+        ("OA",),
+        6,
+    ),
+    # coupler curves of degree six meet in 36 points, 18 of them at infinity
+    "two four-bars with a common coupler point": (
+        ("OA", "AP", "OB", "BP", "PQ", "QC", "OC", "QD", "OD"),
+        (),
+        18,
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", LINKAGES)
+@pytest.mark.parametrize("seed", range(3))
+def test_plane_linkages(kind, seed):
+    joints, driven, degree = LINKAGES[kind]
+    found = check(planar_linkage(seed, joints, driven).assemble(), starts=150)
+    assert found.proof == f"Dixon's determinant of degree {degree}"
+    assert len(found) in range(1, 2 * degree + 1)  # the four-bar has two modes
 
 
 def test_a_loop_behind_a_platform_follows():

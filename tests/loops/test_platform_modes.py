@@ -117,6 +117,10 @@ def test_a_triad_without_motors(legs):
     found = check(system, starts=60)
     assert len(found) >= 1
     np.testing.assert_array_equal(solve(system), system.configuration)
+    names = [c.name for c in system.coordinates]
+    for mode in found:
+        guess = dict(zip(names, np.add(mode.q, 0.01), strict=True))
+        assert same(system, solve(system, guess=guess), mode.q)
     refused(
         ModelError,
         "is given, but the loops leave no motion (mobility 0); leave q_active out",

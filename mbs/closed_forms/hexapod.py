@@ -221,7 +221,10 @@ class Ends:
 
 
 def certify(legs: Legs, x: Complex, t: Real) -> Ends:
-    """The ends of the paths, refined, and which of them are certified."""
+    """The ends of the paths, refined, and which of them are certified.
+
+    Source: Blum, Cucker, Shub & Smale 1998, chapter 8; in floating point, with room for rounding.
+    """
     path = Homotopy(np.array([legs.forms(), np.zeros((_ROWS, _SIZE, _SIZE))])[[0, 1, 1]])
     regular = t >= 1
     for _ in range(3):

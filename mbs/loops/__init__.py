@@ -4,7 +4,7 @@ from mbs.loops.closure import closure
 from mbs.loops.configuration import solve
 from mbs.loops.examine import ConfigurationState, examine
 from mbs.loops.function import function
-from mbs.loops.modes import Mode, WorkingMode, modes, working_modes
+from mbs.loops.modes import Mode, ModeList, WorkingMode, modes, working_modes
 from mbs.loops.pose import solve_pose
 from mbs.loops.reduction import reduction_matrix
 from mbs.loops.velocity import closure_jacobian
@@ -12,6 +12,7 @@ from mbs.loops.velocity import closure_jacobian
 __all__ = [
     "ConfigurationState",
     "Mode",
+    "ModeList",
     "WorkingMode",
     "closure",
     "closure_jacobian",

@@ -618,11 +618,11 @@ _BALL = Freedom(Motion.SPHERICAL)
 def _edges(work: PlanWork, numbers: list[int], links: list[int]) -> tuple[list[_Edge], Function]:
     """The joints of a block, and Function of all positions and p: their frames, side by side."""
     groups, system = _groups(work), work.system
-    edges, poses = list[_Edge](), [Pose.identity()]
+    edges, placed = list[_Edge](), [Pose.identity()]
 
     def frame(pose: Pose) -> int:
-        poses.append(pose)
-        return len(poses) - 1
+        placed.append(pose)
+        return len(placed) - 1
 
     for k in links:
         ends = (groups.joints[k].parent, k)
@@ -644,7 +644,7 @@ def _edges(work: PlanWork, numbers: list[int], links: list[int]) -> tuple[list[_
         ball = isinstance(joint, Spherical)
         freedoms = () if cut.welded else (_BALL,) if ball else tuple(joint.freedoms)
         edges.append(_Edge(ends, freedoms, (a, b)))
-    values = casadi.horzcat(*(casadi.densify(pose.matrix) for pose in poses))
+    values = casadi.horzcat(*(casadi.densify(pose.matrix) for pose in placed))
     return edges, Function("frames", [work.q, system.p], [values])
 
 

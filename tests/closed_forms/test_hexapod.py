@@ -1,5 +1,7 @@
 """Platforms on six legs: certified paths, against search, published and degenerate platforms."""
 
+from importlib import resources
+
 import numpy as np
 import pytest
 from support.leg_platforms import (
@@ -25,6 +27,7 @@ from mbs.closed_forms.hexapod import (
     monodromy,
     own_start,
     poses,
+    text_of,
 )
 from mbs.errors import LoopError
 
@@ -133,6 +136,8 @@ def test_what_is_kept_are_forty_roots():
         start = kept_start(number)
         ends = certify(start.legs, start.x.copy(), np.ones(len(start.x)))
         assert len(start.x) == DEGREE == np.sum(ends.regular)
+        file = resources.files("mbs.closed_forms") / "hexapod_starts" / f"{number}.json"
+        assert file.read_text(encoding="utf-8") == text_of(start) + "\n"
 
 
 def test_what_is_kept_can_be_made_anew():

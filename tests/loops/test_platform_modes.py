@@ -5,11 +5,12 @@ import pytest
 from support.configurations import active, same, searched
 from support.flat_loops import flat_loop
 from support.messages import refused
-from support.platforms import hexapod, planar_platform
+from support.platforms import hexapod, planar_linkage, planar_platform
 from support.ring_loops import ring_loop
 
 import mbs
 import mbs.simulate
+from mbs import Parameter
 from mbs.components import Body, Mechanism, Prismatic, Revolute, Rod
 from mbs.errors import LoopError, ModelError, NoClosedForm
 from mbs.loops import function, modes, solve
@@ -44,6 +45,31 @@ def test_plane_platforms(kind, seed):
     found = check(planar_platform(seed, legs, driven).assemble(), starts=60)
     assert found.proof == method
     assert len(found) in range(2, 7)
+
+
+LINKAGES = {
+    "two ternary links": (("OA", "OB", "AC", "CB", "AD", "DB"), (), 6),
+    "platform behind a four-bar": (
+        ("OA", "AP", "OB", "BP", "PC", "CQ", "OD", "DQ", "OE", "EQ"),
+        ("OA",),
+        6,
+    ),
+    # coupler curves of degree six meet in 36 points, 18 of them at infinity
+    "two four-bars with a common coupler point": (
+        ("OA", "AP", "OB", "BP", "PQ", "QC", "OC", "QD", "OD"),
+        (),
+        18,
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", LINKAGES)
+@pytest.mark.parametrize("seed", range(3))
+def test_plane_linkages(kind, seed):
+    joints, driven, degree = LINKAGES[kind]
+    found = check(planar_linkage(seed, joints, driven).assemble(), starts=150)
+    assert found.proof == f"Dixon's determinant of degree {degree}"
+    assert len(found) in range(1, 2 * degree + 1)  # the four-bar has two modes
 
 
 def test_a_loop_behind_a_platform_follows():
@@ -91,6 +117,10 @@ def test_a_triad_without_motors(legs):
     found = check(system, starts=60)
     assert len(found) >= 1
     np.testing.assert_array_equal(solve(system), system.configuration)
+    names = [c.name for c in system.coordinates]
+    for mode in found:
+        guess = dict(zip(names, np.add(mode.q, 0.01), strict=True))
+        assert same(system, solve(system, guess=guess), mode.q)
     refused(
         ModelError,
         "is given, but the loops leave no motion (mobility 0); leave q_active out",
@@ -131,15 +161,16 @@ def test_a_triangle_carries_its_weight():
     )
 
 
-def congruent():
-    """A platform congruent to the ground on three telescopic legs."""
+def congruent(width=1.0):
+    """A platform congruent to the ground, but for its width, on three telescopic legs."""
     m = Mechanism("congruent", guess={"foot0": 0.4, "leg1": 0.1})
     platform = m.add(Body("platform", mass=1, inertia=(1, 1, 1)))
-    for k, (x, y) in enumerate([(0.0, 0.0), (1.0, 0.1), (0.3, 0.8)]):
+    for k, (x, y) in enumerate([(0.0, 0.0), (width, 0.1), (0.3, 0.8)]):
         low, high = (m.add(Body(f"{n}{k}", mass=1, inertia=(1, 1, 1))) for n in ("low", "high"))
         m.connect(m.world.at(x, y), Revolute(f"foot{k}"), low)
         m.connect(low, Prismatic(f"leg{k}", axis="x", actuated=True), high)
-        m.connect(high.at(0.7), Revolute(f"head{k}"), platform.at(x, y))
+        end = platform.at(1.0 if k == 1 else x, y)
+        m.connect(high.at(0.7), Revolute(f"head{k}"), end)
     return m.assemble()
 
 
@@ -152,6 +183,19 @@ def test_a_motion_of_its_own_is_told():
         "congruent: foot0, head0, foot1, foot2 can move while the independent joints stay; modes",
         by=lambda: modes(system, [0.1, 0.1, 0.1]),
     )
+
+
+def test_parameters():
+    """The modes of a symbol's value are those of the number."""
+    wide, symbolic = congruent(1.2), congruent(Parameter("width", 1.0))
+    legs = [0.3, 0.5, 0.4]
+    found = modes(symbolic, legs, parameters={"width": 1.2})
+    expected = modes(wide, legs)
+    assert len(found) == len(expected) >= 2
+    for mode in expected:
+        assert any(same(wide, mode.q, other.q) for other in found)
+    # with equal widths the equation is another one
+    assert not any(same(wide, expected[0].q, other.q) for other in modes(symbolic, legs))
 
 
 @pytest.mark.parametrize("leg", ["UPS", "RUS", "R rod", "SPS"])

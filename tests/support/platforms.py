@@ -38,6 +38,27 @@ def planar_platform(seed, legs, driven=()):
     return m
 
 
+def planar_linkage(seed, joints, driven=()):
+    """Links of a plane that revolute joints connect at random points, the plane oblique.
+
+    Args:
+        seed: of the points and of the plane.
+        joints: for each the letters of the links that it connects; "O" is the ground.
+        driven: those of them that have motors.
+    """
+    rng = np.random.default_rng(seed)
+    m = Mechanism(f"linkage{seed}")
+    here = m.world.at(*rng.uniform(-1, 1, 3), rotation=random_rotation(rng))
+    names = sorted({name for joint in joints for name in joint} - {"O"})
+    frames = {name: m.add(random_body(rng, name)).at() for name in names} | {"O": here}
+    for a, b in joints:
+        point = (*rng.uniform(-1, 1, 2), 0.0)
+        motor = True if a + b in driven else None
+        joint = Revolute(f"{a}{b}", axis="z", actuated=motor)
+        m.connect(frames[a].at(*point), joint, frames[b].at(*point))
+    return m
+
+
 def hexapod(seed, leg, ends=None):
     """A platform on six legs with random ends, assembled where the legs reach.
 

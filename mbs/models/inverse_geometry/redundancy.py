@@ -77,11 +77,7 @@ def samples_of(
         columns.append(_positions(system, name, value, limits, count))
     varied = (*moving, *(redundant or {}))
     number = math.prod(column.shape[1] for column in columns)
-    if number * count > _MOST:
-        raise ModelError(
-            f"{system.name}: {number} positions of {', '.join(redundant or {})} at each of {count}"
-            f" poses are more than {_MOST} in all; ask for fewer"
-        )
+    _require_few(system, ", ".join(redundant or {}), number, count)
     r = np.empty((count, number, len(varied)))
     for k, one in enumerate(moving.values()):
         r[:, :, k] = one[:, None]
@@ -91,6 +87,14 @@ def samples_of(
         spread = np.repeat(column, repeat, axis=1)
         r[:, :, len(moving) + k] = np.tile(spread, number // max(spread.shape[1], 1))
     return LockedSamples(fixed, varied, r)
+
+
+def _require_few(system: System, names: str, number: int, count: int) -> None:
+    if number * count > _MOST:
+        raise ModelError(
+            f"{system.name}: {number} positions of {names} at each of {count} poses are more than"
+            f" {_MOST} in all; ask for fewer"
+        )
 
 
 def _one_per_pose(system: System, name: str, value: Any, count: int) -> Array:
@@ -110,6 +114,7 @@ def _positions(
 ) -> Array:
     """(N, S) positions of a joint [rad or m]."""
     if isinstance(value, int | np.integer) and not isinstance(value, bool):
+        _require_few(system, name, int(value), count)
         return np.tile(_spread(system, name, int(value), limits), (count, 1))
     found = _numbers(value)
     if found is not None and found.ndim == 1 and found.size:

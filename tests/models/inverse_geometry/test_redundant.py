@@ -166,7 +166,7 @@ def test_singular_samples_are_solved_by_themselves(panda):
         ({"redundant": {"q9": [0.1]}}, "'q9' is not between the base and the frame"),
         ({"redundant": "q7"}, "redundant is 'q7'; give a dict"),
         ({"redundant": {"q7": 4}, "locked": {"q7": 0.1}}, "'q7' is both locked and redundant"),
-        ({"redundant": {"q7": 10**8}}, "are more than 10000000 in all"),
+        ({"redundant": {"q7": 10**12}}, "are more than 10000000 in all"),
         ({"locked": {"q7": [0.1, 0.2]}}, "give one number, or one for each of the 1 poses"),
     ],
 )

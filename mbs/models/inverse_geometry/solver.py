@@ -143,7 +143,7 @@ class PoseSolver:
             count, state = told.tolist()
             if state == CERTAIN:
                 m = int(count)
-                own = T if m else np.array(T)
+                own = np.array(T)  # the caller may write the next pose over it
                 return PoseAnswer(q.T[:m], residual[:m], self._names, branch[:m], self, own, None)
         return self._in_python(target_pose(self.system, T))
 

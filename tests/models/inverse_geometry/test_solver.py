@@ -236,3 +236,11 @@ def _chain(system):
     from mbs.models.inverse_geometry.chain import frame_chain
 
     return frame_chain(system), np.array(system.parameter_values(None))
+
+
+def test_an_answer_keeps_its_pose():
+    system = mbs.robots.ur5().assemble()
+    T = np.array(mbs.models.transform(system, 6)([0.3, -0.8, 1.1, 0.4, 0.9, -0.2]))
+    answer = solver(system)(T)
+    T[:3, 3] = 0.0
+    assert len(answer.solutions) == len(answer.q) == 8

@@ -316,8 +316,8 @@ def function(
     """``igm(T, branch) -> q, valid``: the joint positions of one branch, without iteration.
 
     One graph serves all branches; with ``branches="all"`` it is ``igm_all(T) -> q, valid``, a
-    column for each, which share their common steps. It can be differentiated with respect to T and to the
-    parameters wherever the configuration is not singular.
+    column for each, which share their common steps. It can be differentiated with respect to T and
+    to the parameters wherever the configuration is not singular.
 
     Source: Pieper 1968; Paul 1981; Khalil & Creusot 1997, section 3.3.
 

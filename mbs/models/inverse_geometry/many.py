@@ -100,8 +100,8 @@ configuration."""
 _EXACT = 1e-14
 """Residual, of max(1 m, the arm's length), that polishing hardly betters."""
 _SUSPECT = 1e-9
-"""Radicands and regularity, squared and free of units, from which on the roots of equations with two
-lie farther apart than 1e-5, however small a singular value is."""
+"""Radicands and regularity, squared and free of units, from which on the roots of equations with
+two lie farther apart than 1e-5, however small a singular value is."""
 _DEGENERATE = 1e-12
 """Squared and free of units, below which a pose is searched: its steps keep ten digits, and one
 that loses more is told by the residuals. For one pose alone, `gathering` is more careful."""

@@ -20,7 +20,7 @@ from support.arm_search import plain_arm
 import mbs
 from mbs.assembly import System
 from mbs.closed_forms.arm_core import core
-from mbs.models.inverse_geometry import solve
+from mbs.models.inverse_geometry import solve, solver
 from mbs.models.inverse_geometry.many import solve_many
 
 _SHARE = 0.03
@@ -56,7 +56,7 @@ class Contender:
 
 def speed_table(robots: Sequence[str], rounds: int) -> str:
     """Microseconds of a pose, contenders in turns, and peers as ratios to `solve_many`."""
-    names = ["solve_many", "solve", "EAIK batch", "EAIK", "ikdh", "ssik", "ssik prebuilt"]
+    names = ["solve_many", "solve", "solver", "EAIK batch", "EAIK", "ikdh", "ssik", "ssik prebuilt"]
     lines = []
     for robot in robots:
         contenders = _contenders(robot)
@@ -79,9 +79,13 @@ def _contenders(robot: str) -> dict[str, Contender]:
     system = _system(robot)
     arm = plain_arm(system)
     T = arm.pose(arm.random(np.random.default_rng(0), _MOST))
+    solved, single = solver(system), [pose.copy() for pose in T[:200]]
     found = {
         "solve_many": Contender("solve_many", lambda: solve_many(system, T), _MOST),
         "solve": Contender("solve", lambda: [solve(system, pose) for pose in T[:4]], 4),
+        "solver": Contender(
+            "solver", lambda: [solved(pose).labels for pose in single], len(single)
+        ),
     }
     makers: dict[str, Callable[[], Any]] = {
         "EAIK batch": lambda: PEERS["EAIK"](arm),

@@ -58,7 +58,7 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "mbs_singular": (None, (_pointer, _real, _integer, _pointer, _pointer)),
     "mbs_settle": (
         ctypes.c_int,
-        (_pointer, _pointer, _integer, *[_pointer] * 4, _real, _pointer, _pointer),
+        (_pointer, _pointer, _integer, *[_pointer] * 4, _real, _real, _pointer, _pointer),
     ),
     "mbs_nearest": (_real, (_pointer, _pointer, _integer, ctypes.c_ulonglong, _pointer)),
 }
@@ -252,7 +252,11 @@ def walked_by(
 
 
 def settled_by(
-    library: ctypes.CDLL, handed: Handed, T: Array, every: tuple[Array, ...], suspect: float
+    library: ctypes.CDLL,
+    handed: Handed,
+    T: Array,
+    every: tuple[Array, ...],
+    bounds: tuple[float, float],
 ) -> tuple[Array, Array, Array, bool]:
     """The solutions among the branches of a closed form for one pose.
 
@@ -261,7 +265,8 @@ def settled_by(
         handed: the arm.
         T: (4, 4) a rigid transform [m].
         every: (branches, n) q and (branches,) residual, which are written over, real and regular.
-        suspect: of the last two, from which on the Jacobian is not asked.
+        bounds: of the last two, from which on the Jacobian is not asked, and of singular values,
+            below which solutions may be missing.
 
     Returns:
         (m, n) configurations, (m,) residuals, (m,) numbers of branches, and whether none may be
@@ -275,7 +280,7 @@ def settled_by(
         _at(target),
         len(residual),
         *map(_at, every),
-        suspect,
+        *bounds,
         _at(number),
         ctypes.addressof(count),
     )

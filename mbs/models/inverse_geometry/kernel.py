@@ -21,7 +21,8 @@ from mbs.models.inverse_geometry.branches import branch_labels
 from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, plain_branches, sequence_of
 from mbs.models.inverse_geometry.gathering import ILL_CONDITIONED, closed_form_name, general_ready
-from mbs.models.inverse_geometry.many import draft_solutions, general_draft, suspect_of
+from mbs.models.inverse_geometry.many import bounds_of, draft_solutions, general_draft
+from mbs.models.inverse_geometry.target import NEARLY_SINGULAR
 from mbs.native.array_calls import array_builtin
 from mbs.native.compiled import MachineCode, machine_code
 
@@ -120,7 +121,7 @@ class PoseKernel:
         q, *rows = (part.full() for part in plain.call([T])[:4])
         every = (np.ascontiguousarray(q.T), *(row.ravel() for row in rows))
         handed = self._handed
-        found = core.settled_by(library, handed, T, every, suspect_of(sequence))
+        found = core.settled_by(library, handed, T, every, bounds_of(sequence))
         own, residual, branch, certain = found
         return PoseDraft(own, residual, branch.astype(int), certain)
 
@@ -168,6 +169,7 @@ class _SolverStruct(ctypes.Structure):
         *((name, ctypes.c_longlong) for name in ("branches", "arguments", "results")),
         *((name, ctypes.c_longlong) for name in ("integers", "reals")),
         ("suspect", ctypes.c_double),
+        ("nearly", ctypes.c_double),
         ("nq", ctypes.c_longlong),
         *((name, ctypes.c_void_p) for name in ("indices", "others")),
     )
@@ -201,7 +203,9 @@ def _pose_code(chain: FrameChain, p: Array, solves: StepSequence | General) -> _
     machine: MachineCode | None = None
     if isinstance(solves, General):
         handed, room, work = solves.handed.arm, _CANDIDATES, _CANDIDATES
-        own = _SolverStruct(handed.address, solves.handed.address, *[None] * 3, *[0] * 5, 0.0, *end)
+        own = _SolverStruct(
+            handed.address, solves.handed.address, *[None] * 3, *[0] * 5, 0.0, NEARLY_SINGULAR, *end
+        )
     else:
         machine, handed = machine_code(plain_branches(chain, solves, p)), core.Handed(arm)
         if machine is None:
@@ -211,7 +215,7 @@ def _pose_code(chain: FrameChain, p: Array, solves: StepSequence | General) -> _
         work = arguments + results + integers + reals + 3 * room
         addresses = (machine.evaluate, machine.checkout, machine.release)
         sizes = (room, arguments, results, integers, reals)
-        own = _SolverStruct(handed.address, None, *addresses, *sizes, suspect_of(solves), *end)
+        own = _SolverStruct(handed.address, None, *addresses, *sizes, *bounds_of(solves), *end)
     solver = np.frombuffer(memoryview(own).cast("B"), dtype=np.float64)
     inputs = [SX.sym("T", 4, 4), SX.sym("solver", solver.size)]
     room = max(room, 2)  # one column alone would come as a vector

@@ -36,7 +36,13 @@ from mbs.models.inverse_geometry.solutions import (
     bounds,
     leaves_out,
 )
-from mbs.models.inverse_geometry.target import SOLVED, Target, nearly_singular
+from mbs.models.inverse_geometry.target import (
+    NEARLY_SINGULAR,
+    SINGULAR,
+    SOLVED,
+    Target,
+    nearly_singular,
+)
 from mbs.native import compiled
 
 # The closed form of a chain at many poses: in machine code, several poses in vector lanes.
@@ -103,9 +109,9 @@ _DOUBTFUL = 1e-6
 configuration."""
 _EXACT = 1e-14
 """Residual, of max(1 m, the arm's length), that polishing hardly betters."""
-_SUSPECT = 1e-3
-"""Radicands and regularity, free of units, from which on no solution is next to a singular one but
-of a quartic: next to those of the catalogue's arms they are below it."""
+_SUSPECT = 1e-9
+"""Radicands and regularity, squared and free of units, from which on the roots of equations with
+two lie farther apart than 1e-5, however small a singular value is."""
 _DEGENERATE = 1e-12
 """Squared and free of units, below which a pose is searched: its steps keep ten digits, and one
 that loses more is told by the residuals. For one pose alone, `gathering` is more careful."""
@@ -185,14 +191,14 @@ class ArmRows:
             better.q[own], better.residual[own] = found.q, found.residual
         return better
 
-    def nearly_singular(self, rows: NDArray[np.intp], q: Array) -> Booleans:
+    def nearly_singular(self, rows: NDArray[np.intp], q: Array, bound: float) -> Booleans:
         """(m,) which of configurations q, (m, n), of poses `rows` are next to a singular one."""
         if self.gaps is None:
-            return nearly_singular(self.first, q)
+            return nearly_singular(self.first, q, bound)
         near = np.empty(len(q), dtype=bool)
         for k in np.unique(rows):
             own = rows == k
-            near[own] = nearly_singular(self.at(int(k)), q[own])
+            near[own] = nearly_singular(self.at(int(k)), q[own], bound)
         return near
 
 
@@ -228,23 +234,33 @@ def draft_solutions(
     doubtful = close & ~valid
     searched = np.any(doubtful | (every.regular < _DEGENERATE), axis=1)
     searched |= _merge(arm, every, valid)
-    searched |= _next_to_singular(arms, every, valid, suspect_of(sequence))
+    searched |= _next_to_singular(arms, every, valid, bounds_of(sequence))
     labels = branch_labels(chain, sequence, p)
     return BranchSolutions(every.q, valid, every.residual, labels, searched)
 
 
-def suspect_of(sequence: StepSequence) -> float:
-    """The value of `real` and `regular` from which on the Jacobian is not asked."""
-    quartic = any(step.kind == "quartic" for step in sequence.steps)
-    return np.inf if quartic else _SUSPECT
+def bounds_of(sequence: StepSequence) -> tuple[float, float]:
+    """What tells whether solutions may be missing next to a singular configuration.
+
+    Returns:
+        the value of `real` and `regular` from which on the Jacobian is not asked, and the singular
+        value below which others may be missing. Two-root equations lose none as long as two roots
+        do not count as one; quartics lose them as the general method does.
+    """
+    if any(step.kind == "quartic" for step in sequence.steps):
+        return np.inf, NEARLY_SINGULAR
+    return _SUSPECT, SINGULAR
 
 
-def _next_to_singular(arms: ArmRows, every: PoseBatch, valid: Booleans, suspect: float) -> Booleans:
+def _next_to_singular(
+    arms: ArmRows, every: PoseBatch, valid: Booleans, limits: tuple[float, float]
+) -> Booleans:
     """At which poses a solution is next to a singular configuration."""
     least = np.minimum(np.abs(every.real), every.regular)
+    suspect, nearly = limits
     asked = valid & (least < suspect)
     near = np.zeros_like(valid)
-    near[asked] = arms.nearly_singular(np.nonzero(asked)[0], every.q[asked])
+    near[asked] = arms.nearly_singular(np.nonzero(asked)[0], every.q[asked], nearly)
     found: Booleans = np.any(near, axis=1)
     return found
 

@@ -53,6 +53,16 @@ class CoordinateLimits:
         """The names of the coordinates that no whole number of turns brings within limits."""
         return [self.names[k] for k in range(q.size) if not self._options(k, q[k], 0.0)]
 
+    def wound(self, q: Array, near: Array) -> tuple[Array, Array]:
+        """`wrap_to_limits`, and the `windings` of what it gives."""
+        options = [self._options(k, q[k], near[k]) for k in range(q.size)]
+        first = self._first(options, q, near)
+        if all(len(option) == 1 for option in options):
+            return first, first[None].copy()
+        if not all(options):
+            return first, np.empty((0, q.size))
+        return first, self.windings(first, near)
+
     def windings(self, q: Array, near: Array) -> Array:
         """Configurations that differ from q by whole turns and are within the limits.
 
@@ -75,6 +85,12 @@ class CoordinateLimits:
     def wrap_to_limits(self, q: Array, near: Array) -> Array:
         """(nq,) q changed by whole turns: each coordinate within limits if it can, near `near`."""
         options = [self._options(k, q[k], near[k]) for k in range(q.size)]
+        return self._first(options, q, near)
+
+    def _first(self, options: list[list[float]], q: Array, near: Array) -> Array:
+        """The first option of each coordinate, near `near` where there is none."""
+        if all(options):
+            return np.array([option[0] for option in options])
         plain = np.where(self.turns, near + _remainder(q - near), q)
         return np.array([o[0] if o else x for o, x in zip(options, plain, strict=True)])
 
@@ -85,9 +101,12 @@ class CoordinateLimits:
             return [value] if low <= value <= high else []
         if math.isinf(low) and math.isinf(high):
             return [value + _TURN * round((near - value) / _TURN)]
-        first, last = np.ceil((low - value) / _TURN), np.floor((high - value) / _TURN)
+        first = -math.inf if math.isinf(low) else math.ceil((low - value) / _TURN)
+        last = math.inf if math.isinf(high) else math.floor((high - value) / _TURN)
         if first > last:
             return []
+        if first == last:
+            return [value + _TURN * first]
         nearest = min(max(round((near - value) / _TURN), first), last)
         turns = range(int(max(first, nearest - _TURNS)), int(min(last, nearest + _TURNS)) + 1)
         return sorted((value + _TURN * m for m in turns), key=lambda x: abs(x - near))
@@ -435,8 +454,7 @@ class Wishes:
         return Solutions(self.system.name, names, tuple(kept), method, reason, nearest, self.bounds)
 
     def _solution(self, draft: RobotSolution) -> Solution:
-        q = self.bounds.wrap_to_limits(draft.q, self.near)
-        windings = self.bounds.windings(q, self.near)
+        q, windings = self.bounds.wound(draft.q, self.near)
         return Solution(
             q,
             draft.branch,

@@ -114,14 +114,14 @@ class Target:
         return x
 
 
-def nearly_singular(arm: Arm, q: Array) -> NDArray[np.bool_]:
-    """(m,) which of configurations q, (m, n), are next to a singular one."""
+def nearly_singular(arm: Arm, q: Array, bound: float = NEARLY_SINGULAR) -> NDArray[np.bool_]:
+    """(m,) which of configurations q, (m, n), have a singular value below a bound."""
     library = core.core_of(arm)
     if library is not None:
-        return core.singular_by(library, arm, q, NEARLY_SINGULAR)
+        return core.singular_by(library, arm, q, bound)
     # of whatever pose
     least = Target(arm, np.eye(4)).singular_values(q)[:, -1]
-    return np.asarray(least < NEARLY_SINGULAR)
+    return np.asarray(least < bound)
 
 
 # Which of the configurations that were found are one solution.

@@ -19,7 +19,6 @@ static const double FOLD = 1e-9;       /* radicand below zero of a root real but
 static const double DEGENERATE = 1e-12; /* squared, of a step that leaves a joint undetermined */
 static const double SAME = 1e-9;       /* between configurations that are one [rad or lengths] */
 static const double MEETING = 1e-5;    /* between those near a double root, likewise */
-static const double NEARLY = 1e-4;     /* singular value below which a solution may be missing */
 
 /* Source: Higham 2008, chapter 8, the Newton-Schulz iteration for the polar factor. */
 int pose_round(double *T) {
@@ -107,17 +106,18 @@ static double apart(const arm *a, const double *q, const double *other) {
 }
 
 /* Whether a configuration is far enough from all singular ones, and its residual. */
-static int is_certain(const arm *a, const double *T, const double *q, double *residual) {
+static int is_certain(const arm *a, const double *T, const double *q, double nearly,
+                      double *residual) {
     configuration p;
     memcpy(p.q, q, (size_t)a->n * sizeof(double));
     arm_examine(a, T, &p);
     *residual = arm_residual(T, p.T);
-    return !is_near_singular(a, &p, NEARLY);
+    return !is_near_singular(a, &p, nearly);
 }
 
 long long pose_settle(const arm *a, const double *T, long long branches, double *q,
                       double *residual, const double *real, const double *regular,
-                      double suspect, double *number, int *doubtful) {
+                      double suspect, double nearly, double *number, int *doubtful) {
     const double scale = fmax(1.0, a->length);
     const size_t bytes = (size_t)a->n * sizeof(double);
     long long b, i, count = 0;
@@ -135,7 +135,7 @@ long long pose_settle(const arm *a, const double *T, long long branches, double 
             *doubtful = 1;
             continue;
         }
-        if (near && !is_certain(a, T, own, &residual[b])) *doubtful = 1;
+        if (near && !is_certain(a, T, own, nearly, &residual[b])) *doubtful = 1;
         for (i = 0; i < count; i++) {
             double distance = apart(a, q + i * a->n, own);
             if (distance < SAME) break;
@@ -173,7 +173,7 @@ static long long by_closed_form(const pose_solver *s, const double *T, double *q
     if (s->release) s->release(memory);
     return failed ? -1
                   : pose_settle(s->arm, T, branches, q, residual, real, real + branches, s->suspect,
-                                number, doubtful);
+                                s->nearly, number, doubtful);
 }
 
 /* The solutions of the general method, in no order. */
@@ -184,7 +184,7 @@ static long long by_elimination(const pose_solver *s, const double *T, double *q
     long long i;
     roth_solve(a, s->loop, T, &found);
     for (i = 0; i < found.count; i++) {
-        if (!is_certain(a, T, q + i * a->n, &residual[i])) *doubtful = 1;
+        if (!is_certain(a, T, q + i * a->n, s->nearly, &residual[i])) *doubtful = 1;
         if (!(residual[i] <= SOLVED * fmax(1.0, a->length))) *doubtful = 1;
         number[i] = (double)i;
     }
@@ -244,10 +244,10 @@ EXPORT void mbs_singular(const arm *a, double bound, long long count, const doub
 
 /* `pose_settle` for a closed form that was evaluated elsewhere; gives what came of the pose. */
 EXPORT int mbs_settle(const arm *a, const double *T, long long branches, double *q, double *residual,
-                      const double *real, const double *regular, double suspect, double *number,
+                      const double *real, const double *regular, double suspect, double nearly, double *number,
                       long long *count) {
     int doubtful = 0;
-    *count = pose_settle(a, T, branches, q, residual, real, regular, suspect, number,
-                         &doubtful);
+    *count = pose_settle(a, T, branches, q, residual, real, regular, suspect, nearly,
+                         number, &doubtful);
     return doubtful ? POSE_DOUBTFUL : POSE_CERTAIN;
 }

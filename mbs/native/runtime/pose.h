@@ -20,7 +20,7 @@ typedef struct {
     void (*release)(int);
     long long branches;
     long long arguments, results, integers, reals; /* that the closed form works with */
-    double suspect; /* see pose_settle */
+    double suspect, nearly; /* see pose_settle */
     long long nq;
     const long long *indices; /* (n,) of the arm's joints among the coordinates; NULL: all, in order */
     const double *others;     /* (nq,) positions of all coordinates; those of the arm do not count */
@@ -34,9 +34,10 @@ int pose_is_singular(const arm *a, const double *q, double bound);
 
 /* Keeps in q (branches, n) and in residual those branches of a closed form that are solutions, each
  * once, with their numbers; gives how many they are. *doubtful is set where others may be missing.
- * Of branches whose `real` and `regular` are at least `suspect` the Jacobian is not asked. */
+ * Below a singular value `nearly` they may; of branches whose `real` and `regular` are at least
+ * `suspect` the Jacobian is not asked. */
 long long pose_settle(const arm *a, const double *T, long long branches, double *q,
                       double *residual, const double *real, const double *regular,
-                      double suspect, double *number, int *doubtful);
+                      double suspect, double nearly, double *number, int *doubtful);
 
 #endif

@@ -124,8 +124,8 @@ class Merged:
 def merged(arm: Arm, T: Array, q: Array) -> Merged:
     """The distinct ones of several solutions for one pose, in their order.
 
-    Two are one when they are closer than 1e-6, or closer than 1e-2 with a solution half way, to
-    1e-13 or as good as they are, as between scattered copies of a multiple root. Of two that are
+    Two are one when they are closer than 1e-9, or closer than 1e-2 with a solution half way, to
+    1e-14 or as good as they are, as between scattered copies of a multiple root. Of two that are
     one the better stays. Angles that differ by whole turns are equal, slides are measured in arm
     lengths.
 

@@ -109,7 +109,7 @@ class Target:
             step = (inverse @ np.concatenate([e, further], axis=-1)[..., None])[..., 0]
             size = np.linalg.norm(step, axis=-1, keepdims=True)
             x = x - step * np.minimum(1.0, _LONGEST_STEP / np.maximum(size, NONZERO))
-            if np.max(size) < _TARGET_SETTLED:
+            if np.max(size, initial=0.0) < _TARGET_SETTLED:
                 break
         return x
 

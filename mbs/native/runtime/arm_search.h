@@ -19,8 +19,8 @@ typedef struct {
 void arm_start(const arm *a, const double *target, unsigned long long seed, long long number,
                double *q);
 
-/* Whether two solutions are one: closer than 1e-6, or closer than 1e-2 with a solution midway,
- * to 1e-13 or as good as they are, as between copies of a multiple root. Angles that differ by
+/* Whether two solutions are one: closer than 1e-9, or closer than 1e-2 with a solution midway,
+ * to 1e-14 or as good as they are, as between copies of a multiple root. Angles that differ by
  * angles modulo 2 pi are equal; lengths are measured in arm lengths. */
 int arm_same(const arm *a, const double *target, const double *q, const double *other);
 

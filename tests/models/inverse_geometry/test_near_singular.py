@@ -10,6 +10,7 @@ import pytest
 from support.arm_search import distance
 from support.near_singular import KINDS, ROBOTS, near_singular, plain, robot, told_apart
 
+import mbs.models.inverse_geometry.core as core
 from mbs.models.inverse_geometry import solve, solve_many, solver
 
 ROUNDING = 3e-14
@@ -61,6 +62,13 @@ def test_the_other_side_of_the_shoulder_is_found():
     answer = solve(robot("rx90"), T)
     assert len(answer) == 8
     assert [s.multiplicity for s in answer] == [1] * 8
+
+
+@pytest.mark.parametrize(("name", "kind", "seed"), [FEW[0], ("rx90", "shoulder", 1)])
+def test_without_a_compiler(name, kind, seed, monkeypatch):
+    monkeypatch.setattr(core, "compiler_found", lambda: False)
+    assert core.core() is None
+    check(name, kind, seed)
 
 
 def test_two_branches_of_a_closed_form_are_told_apart_from_a_ten_millionth_on():

@@ -10,7 +10,7 @@ import pytest
 from support.arm_search import distance
 from support.near_singular import KINDS, ROBOTS, near_singular, plain, robot, told_apart
 
-import mbs.models.inverse_geometry.core as core
+import mbs.closed_forms.arm_core as core
 from mbs.models.inverse_geometry import solve, solve_many, solver
 
 ROUNDING = 3e-14

@@ -57,7 +57,7 @@ class Mode:
 
 
 class ModeList(list[Mode]):
-    """ModeList, and what is known of whether they are all.
+    """Modes, and what is known of whether they are all.
 
     Attributes:
         complete: whether these are all modes that there are.
@@ -142,7 +142,7 @@ def _same(mode: Mode, other: Mode) -> bool:
     return bool(np.max(np.abs(np.subtract(mode.q, other.q)), initial=0.0) < _SAME)
 
 
-# ModeList of loops that are solved in numbers, one step after the other.
+# Modes of loops that are solved in numbers, one step after the other.
 
 
 _REFINED = 1e-4

@@ -22,7 +22,7 @@ Locked: TypeAlias = Mapping[str, Any]
 
 _TURN = 2 * math.pi
 _MOST = 10_000_000
-"""LockedSamples of one call: their configurations take some gigabytes."""
+"""Samples of one call: their configurations take some gigabytes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -29,7 +29,7 @@ def reached(x, y, z):
     return next(way.q for way in ways if way.branch == BRANCH)
 
 
-BRANCH = "shoulder left, elbow up, no flip; q8:parallel"
+BRANCH = "q1:- q2:+ q5:+; q8:parallel"  # the arm stretched forward, its elbow up
 PICK, PLACE = reached(0.9, -0.9, 0.1), reached(0.9, 0.9, 0.1)
 names = [coordinate.name for coordinate in system.coordinates]
 dae = mbs.models.dae(system, q0=dict(zip(names, PICK, strict=True)))

@@ -112,6 +112,9 @@ class _Pickler(pickle.Pickler):
     def reducer_override(self, obj: Any) -> Any:
         if isinstance(obj, (type, FunctionType)) and obj.__module__.split(".")[0] not in _KNOWN:
             self.names_alone = True
+        if isinstance(obj, Function):  # a Callback of a user is in it by its name
+            parts = (obj, *obj.find_functions())
+            self.names_alone |= any(part.class_name() == "CallbackInternal" for part in parts)
         return NotImplemented
 
 

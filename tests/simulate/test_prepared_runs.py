@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 
+import casadi
 import numpy as np
 import pytest
 
@@ -309,3 +310,33 @@ def test_motions_that_differ_in_velocities_close_the_loops_once(monkeypatch):
     assert len(closed) == 2
     for one, result in zip(reversed(starts), reversed(found), strict=True):
         assert np.array_equal(swing(other, **one).values, result.values)
+
+
+class Push(casadi.Callback):
+    """A law that no graph shows."""
+
+    def __init__(self, strength):
+        casadi.Callback.__init__(self)
+        self.strength = strength
+        self.construct("push", {"enable_fd": True})
+
+    def get_n_in(self):
+        return 3
+
+    def get_sparsity_in(self, k):
+        return casadi.Sparsity.dense(2 if k else 1, 1)
+
+    def get_sparsity_out(self, k):
+        return casadi.Sparsity.dense(2, 1)
+
+    def eval(self, arguments):
+        return [casadi.DM([self.strength, 0])]
+
+
+def test_callbacks_of_one_name_are_told_apart():
+    system = mbs.load("planar_2r").assemble()
+    laws = [Push(1.0), Push(2.0)]
+    ends = [swing(system, tau=law)["q1.q"][-1] for law in laws]
+    expected = [swing(system, tau={"q1": law.strength})["q1.q"][-1] for law in laws]
+    np.testing.assert_allclose(ends, expected, 1e-6)
+    assert abs(ends[0] - ends[1]) > 0.01

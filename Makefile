@@ -90,7 +90,7 @@ layers: $(VENV)/.dev
 	@$(RUN)/lint-imports
 
 docs: $(VENV)/.dev
-	@$(RUN)/sphinx-build -q -W --keep-going -b html -d build/doctrees docs build/docs
+	@$(RUN)/sphinx-build -q -W --keep-going -j auto -b html -d build/doctrees docs build/docs
 	@echo "Documentation in build/docs/index.html"
 
 clean:

@@ -21,6 +21,7 @@ extensions = [
     "sphinxcontrib.bibtex",
     "docstrings",
     "mathml",
+    "navigation",
     "sources",
 ]
 source_suffix = {".md": "markdown"}

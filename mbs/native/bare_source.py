@@ -25,6 +25,7 @@ from mbs.native.c_code import (
     slots,
 )
 from mbs.native.kernel import BLOCK
+from mbs.native.repeats import with_calls
 from mbs.operations.graph import Graph, Node, graph_of
 
 Real = Literal["double", "float"]
@@ -61,6 +62,10 @@ class FloatCode(BlockCode):
     zero: ClassVar[str] = "0.0f"
 
     def stored(self, number: int) -> str:
+        """See BlockCode."""
+        return _float_operand(self.graph, number)
+
+    def number(self, number: int) -> str:
         """See BlockCode."""
         return _float_operand(self.graph, number)
 
@@ -128,11 +133,12 @@ def _float_operand(graph: Graph, number: int) -> str:
 
 def _function(function: Function, real: Real) -> tuple[str, int]:
     name, graph = function.name(), graph_of(function)
-    pieces: list[list[Step]] = blocks(graph, plain_order(graph), BLOCK)
+    pieces = blocks(graph, with_calls(graph, plain_order(graph)), BLOCK)
     where = slots(graph, pieces)
     code = (BlockCode if real == "double" else FloatCode)(graph, where, "")
     text = "\n".join(
         [
+            *code.repeats(),
             *(code.block(f"{name}_part{k}", k, steps) for k, steps in enumerate(pieces)),
             f"static int {name}(const {real} **arg, {real} **res, long long *iw, {real} *w,"
             " int mem)",

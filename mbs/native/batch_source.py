@@ -11,6 +11,7 @@ from casadi import Function
 
 from mbs.native.c_code import BlockCode, LaneCode, SinCosGroup, blocks, schedule, slots
 from mbs.native.kernel import BLOCK, HEADERS
+from mbs.native.repeats import with_calls
 from mbs.operations.graph import Graph, graph_of
 
 _HEAD = """\
@@ -70,7 +71,7 @@ def batch_source(
         ModelError: it has no scalar operations, or one that C does not have.
     """
     graph = graph_of(function)
-    pieces = blocks(graph, schedule(graph), block)
+    pieces = blocks(graph, with_calls(graph, schedule(graph)), block)
     where = slots(graph, pieces)
     angles = sum(
         len(step.angles) for steps in pieces for step in steps if isinstance(step, SinCosGroup)
@@ -85,6 +86,7 @@ def batch_source(
     flags = [f"out[{shown + k}][0]" for k in range(valid)]
     lines = [
         _HEAD,
+        *code.repeats(),
         *(code.block(f"part{k}", k, steps) for k, steps in enumerate(pieces)),
         "EXPORT void mbs_batch(const mbs_port *ports, double *work, long long first,"
         " long long last)",

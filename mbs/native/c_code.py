@@ -7,16 +7,18 @@ import re
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import accumulate, groupby, pairwise
-from typing import ClassVar, TypeAlias
+from dataclasses import dataclass, field, replace
+from itertools import accumulate, chain, groupby, pairwise
+from typing import ClassVar, Self, TypeAlias
 
 import casadi
 from casadi import Function
 
 from mbs.errors import ModelError
+from mbs.native.repeats import Calls, Repeat, Table, table_of
 from mbs.operations.graph import Graph, Node
 from mbs.operations.text import CODES, NAMES
+from mbs.text import in_c_comment
 
 # One operation of a graph as a C expression, of numbers and of vectors.
 
@@ -150,9 +152,20 @@ class SinCosGroup:
     angles: tuple[int, ...]
     results: tuple[tuple[int, int], ...]
 
+    def taken(self) -> tuple[int, ...]:
+        """The nodes that must be known before."""
+        return self.angles
+
+    def given(self) -> tuple[int, ...]:
+        """The nodes that are known afterwards."""
+        return tuple(number for number, _ in self.results)
+
 
 Step: TypeAlias = int | SinCosGroup
 """A node to compute by its own operation, or a batch."""
+
+Item: TypeAlias = Step | Calls
+"""A step, or occurrences of a sequence of steps that recurs."""
 
 
 def schedule(graph: Graph, phase: Sequence[int] | None = None) -> list[Step]:
@@ -202,10 +215,10 @@ def phases(graph: Graph, late: Mapping[int, int]) -> list[int]:
     return phase
 
 
-def blocks(graph: Graph, steps: Sequence[Step], size: int) -> list[list[Step]]:
+def blocks(graph: Graph, steps: Sequence[Item], size: int) -> list[list[Item]]:
     """Steps in pieces of about `size` operations, or in one if they are few enough for that."""
     leaves = Counter(number for result in graph.results for number in result)
-    ends = list(accumulate(_weight(step) + sum(leaves[n] for n in gives(step)) for step in steps))
+    ends = list(accumulate(_weight(step, leaves) for step in steps))
     total = ends[-1] if ends else 0
     one = total <= _ONE_PIECE and leaves.total() <= size
     pieces = 1 if one else round(total / size) or 1
@@ -213,18 +226,22 @@ def blocks(graph: Graph, steps: Sequence[Step], size: int) -> list[list[Step]]:
     return [list(steps[a:b]) for a, b in pairwise([*cuts, len(steps)])]
 
 
-def _weight(step: Step) -> int:
-    return _BATCH_SIZE if isinstance(step, SinCosGroup) else 1
+def _weight(step: Item, leaves: Mapping[int, int]) -> int:
+    """Lines, or what takes a compiler as long; results of sequences leave by tables."""
+    if isinstance(step, Calls):
+        return 2
+    size = _BATCH_SIZE if isinstance(step, SinCosGroup) else 1
+    return size + sum(leaves[n] for n in gives(step))
 
 
-def needs(graph: Graph, step: Step) -> tuple[int, ...]:
+def needs(graph: Graph, step: Item) -> tuple[int, ...]:
     """The nodes that must be known before a step."""
-    return step.angles if isinstance(step, SinCosGroup) else graph.operands(step)
+    return graph.operands(step) if isinstance(step, int) else step.taken()
 
 
-def gives(step: Step) -> tuple[int, ...]:
+def gives(step: Item) -> tuple[int, ...]:
     """The nodes that are known after a step."""
-    return tuple(n for n, _ in step.results) if isinstance(step, SinCosGroup) else (step,)
+    return (step,) if isinstance(step, int) else step.given()
 
 
 def _take(numbers: Iterable[int], pending: list[bool]) -> list[int]:
@@ -286,24 +303,31 @@ class Slots:
     """Places in a work array.
 
     Attributes:
-        of: place of each node that more than one block uses.
+        of: place of each node that more than one block uses, as the C text of an index.
         outputs: for each computed node where it leaves: number of the output, of the element in
             it, and the node.
         copied: for each block the same of the inputs and constants that it copies.
         count: length of the array.
         blocks: number of blocks.
+        inputs: of inputs that recurring sequences take, where they are copied to.
+        tables: of recurring sequences, where they find what they take.
+        last: what recurring sequences computed of the outputs: number of the output, of the element
+            in it, and its place.
     """
 
-    of: Mapping[int, int]
+    of: Mapping[int, str]
     outputs: Mapping[int, Sequence[Leaving]]
     copied: Mapping[int, Sequence[Leaving]]
     count: int
     blocks: int
+    inputs: Mapping[int, int] = field(default_factory=dict)
+    tables: Mapping[Repeat, Table] = field(default_factory=dict)
+    last: Sequence[tuple[int, int, int]] = ()
 
 
 def slots(
     graph: Graph,
-    blocks: Sequence[Sequence[Step]],
+    blocks: Sequence[Sequence[Item]],
     begins: Mapping[int, int] | None = None,
     elsewhere: Container[int] = (),
 ) -> Slots:
@@ -312,43 +336,96 @@ def slots(
     Args:
         graph: what is computed.
         blocks: the steps.
-        begins: of inputs that are not known from the beginning, the first block that has them.
+        begins: of inputs that are not known from the beginning, the first block that has them;
+            recurring sequences cannot take those.
         elsewhere: inputs, as nodes, that reach their outputs without a copy.
     """
     home = {n: k for k, steps in enumerate(blocks) for step in steps for n in gives(step)}
-    of, count = _slot_numbers(graph, blocks, home)
+    calls = [step for steps in blocks for step in steps if isinstance(step, Calls)]
+    inputs, first = _input_places(graph, calls)
+    of, count = _places(graph, blocks, home, first)
     outputs: dict[int, list[Leaving]] = {}
     copied: dict[int, list[Leaving]] = {}
+    last: list[tuple[int, int, int]] = []
+    stored = {n for step in calls for n in step.given()}
     for k, nodes in enumerate(graph.results):
         for element, n in enumerate(nodes):
-            if n in home:
+            if n in stored:
+                last.append((k, element, of[n]))
+            elif n in home:
                 outputs.setdefault(n, []).append((k, element, n))
             elif n not in elsewhere:
                 copied.setdefault(_first(graph, n, begins or {}), []).append((k, element, n))
-    return Slots(of, outputs, copied, count, len(blocks))
+
+    def place(n: int) -> int:
+        port, element = graph.nodes[n].args if n not in of else (-1, 0)
+        return of[n] if port < 0 else inputs[port] + element
+
+    repeats = dict.fromkeys(step.repeat for step in calls)
+    tables = {repeat: table_of(repeat, place) for repeat in repeats}
+    texts = {n: str(k) for n, k in of.items()}
+    return Slots(texts, outputs, copied, count, len(blocks), inputs, tables, last)
 
 
-def _slot_numbers(
-    graph: Graph, blocks: Sequence[Sequence[Step]], home: Mapping[int, int]
+def _input_places(graph: Graph, calls: Sequence[Calls]) -> tuple[dict[int, int], int]:
+    """Where the inputs begin that recurring sequences take, and how long they are together."""
+    taken = {n for step in calls for column in step.repeat.taken for n in column.nodes}
+    nodes = (graph.nodes[n] for n in taken)
+    ports = sorted({node.args[0] for node in nodes if node.op == casadi.OP_INPUT})
+    ends = list(accumulate((graph.inputs[k].sparsity.nnz() for k in ports), initial=0))
+    return dict(zip(ports, ends, strict=False)), ends[-1]
+
+
+def _places(
+    graph: Graph, blocks: Sequence[Sequence[Item]], home: Mapping[int, int], count: int
 ) -> tuple[dict[int, int], int]:
-    """The place of each node that a later block than its own uses, and how many there are."""
+    """The place of each node that is not used in its own block alone, and how many there are.
+
+    What an occurrence of a recurring sequence gives stands side by side. Time goes by from block
+    to block, and at every step that is such occurrences.
+
+    Args:
+        graph: what is computed.
+        blocks: the steps.
+        home: of each node its block.
+        count: of the places that are taken already.
+    """
+    results = {n for result in graph.results for n in result}
+    together: dict[int, tuple[int, ...]] = {}  # of each node those that stand side by side
+    born: dict[int, int] = {}
     last: dict[int, int] = {}
+    time = 0
     for k, steps in enumerate(blocks):
         for step in steps:
-            last.update({n: k for n in needs(graph, step) if home.get(n, k) < k})
-    starts: list[list[int]] = [[] for _ in blocks]
-    ends: list[list[int]] = [[] for _ in blocks]
-    for n in sorted(last):
-        starts[home[n]].append(n)
-        ends[last[n]].append(n)
+            if isinstance(step, Calls):
+                time += 1
+                last.update(dict.fromkeys(step.taken(), time))
+                for occurrence in range(step.first, step.first + step.count):
+                    nodes = step.gives(occurrence)
+                    together.update(dict.fromkeys(nodes, nodes))
+                    last.update(dict.fromkeys(nodes, time))
+            else:
+                near = (n for n in needs(graph, step) if n in together or home.get(n, k) < k)
+                last.update(dict.fromkeys(near, time))
+            born.update(dict.fromkeys(gives(step), time))
+            time += isinstance(step, Calls)
+        time += 1
+    last.update((n, time) for n in together if n in results)
+    starts: list[list[tuple[int, ...]]] = [[] for _ in range(time + 1)]
+    ends: list[list[tuple[int, ...]]] = [[] for _ in range(time + 1)]
+    for nodes in dict.fromkeys(together.get(n, (n,)) for n in sorted(last) if n in home):
+        starts[born[nodes[0]]].append(nodes)
+        ends[max(last[n] for n in nodes)].append(nodes)
     of: dict[int, int] = {}
-    free: list[int] = []
-    count = 0
-    for k, entering in enumerate(starts):
-        for n in entering:
-            of[n] = free.pop() if free else count
-            count += of[n] == count
-        free += [of[n] for n in ends[k]]
+    free: dict[int, list[int]] = {}
+    for entering, leaving in zip(starts, ends, strict=True):
+        for nodes in entering:
+            same = free.get(len(nodes))
+            first = same.pop() if same else count
+            count += 0 if first < count else len(nodes)
+            of.update((n, first + k) for k, n in enumerate(nodes))
+        for nodes in leaving:
+            free.setdefault(len(nodes), []).append(of[nodes[0]])
     return of, count
 
 
@@ -361,6 +438,7 @@ def _first(graph: Graph, number: int, begins: Mapping[int, int]) -> int:
 _POINTERS = re.compile(r"\b[io]\d+\b")  # of inputs and outputs
 
 _MANY_ZEROS = 4  # in a row, from which they are stored at once
+_MANY_LEFT = 8  # elements of an output, from which a table says where they are
 
 
 @dataclass(frozen=True, slots=True)
@@ -381,7 +459,7 @@ class BlockCode:
     scalar: ClassVar[str] = "double"
     zero: ClassVar[str] = "0.0"
 
-    def block(self, name: str, number: int, steps: Sequence[Step]) -> str:
+    def block(self, name: str, number: int, steps: Sequence[Item]) -> str:
         """A C function: loads what earlier ones left, computes, stores what later ones need."""
         lines = self._body(number, steps)
         used = set(_POINTERS.findall("\n".join(lines)))
@@ -397,18 +475,104 @@ class BlockCode:
         ]
         return "\n".join([*head, *lines, "}"])
 
-    def _body(self, number: int, steps: Sequence[Step]) -> list[str]:
-        lines = self._stores(self.where.copied.get(number, ()))
+    def repeats(self) -> list[str]:
+        """The functions of the sequences that recur, and their tables."""
+        return [self._repeat(*item) for item in self.where.tables.items()]
+
+    def _repeat(self, repeat: Repeat, table: Table) -> str:
+        """The C function of a sequence, and its tables."""
+        index, name = _index(self.where.count), self._repeat_name(repeat)
+        columns = (taken.nodes for taken in repeat.constants)
+        constants = (map(self.number, row) for row in zip(*columns, strict=True))
+        places = (map(str, row) for row in table.rows)
+        count = f"{len(repeat.steps)} operations, done {repeat.count} times"
+        own = Slots(table.texts, {}, {}, self.where.count, 0)
+        return "\n".join(
+            [
+                f"/* {count}{self._ends(repeat)}. */",
+                *_table(index, f"{name}_at", places),
+                *_table(self.scalar, f"{name}_of", constants),
+                f"static NOINLINE void {name}"
+                f"(const {index} *restrict at, const {self.scalar} *restrict i0,"
+                f" {self.kind} *restrict w)",
+                "{",
+                "  (void)at, (void)i0, (void)w;",
+                *self.of(repeat.graph, own)._body(0, repeat.steps),
+                "}",
+            ]
+        )
+
+    def _repeat_name(self, repeat: Repeat) -> str:
+        return f"{self.graph.name}_repeat{list(self.where.tables).index(repeat)}"
+
+    def _ends(self, repeat: Repeat) -> str:
+        """In words, the inputs and outputs whose elements a sequence takes and gives."""
+        taken = {n for column in repeat.taken for n in column.nodes}
+        given = {n for column in repeat.given for n in column.nodes}
+        nodes = (self.graph.nodes[n] for n in taken)
+        ports = {node.args[0] for node in nodes if node.op == casadi.OP_INPUT}
+        inputs = [port.name for k, port in enumerate(self.graph.inputs) if k in ports]
+        results = zip(self.graph.outputs, self.graph.results, strict=True)
+        outputs = [port.name for port, nodes in results if not given.isdisjoint(nodes)]
+        words = {"takes": ", ".join(inputs), "gives": ", ".join(outputs)}
+        return "".join(f"; {verb} {in_c_comment(names)}" for verb, names in words.items() if names)
+
+    def _calls(self, step: Calls) -> str:
+        """Occurrences of a sequence that follow each other."""
+        name, table = self._repeat_name(step.repeat), self.where.tables[step.repeat]
+        loop = f"for (int k = {step.first}; k < {step.first + step.count}; ++k) "
+        index = "k" if step.count > 1 else str(step.first)
+        sizes = {"at": len(table.rows[0]), "of": len(step.repeat.constants)}
+        rows = [f"{name}_{end} + {size} * {index}" if size else "0" for end, size in sizes.items()]
+        return f"  {loop if step.count > 1 else ''}{name}({', '.join(rows)}, w);"
+
+    def _inputs(self) -> list[str]:
+        """Copies the inputs that sequences take to the work array."""
+        sizes = {k: self.graph.inputs[k].sparsity.nnz() for k in self.where.inputs}
+        return [
+            f"  memcpy(w + {place}, i{k}, {sizes[k]} * sizeof({self.kind}));"
+            for k, place in self.where.inputs.items()
+        ]
+
+    def _last(self) -> list[str]:
+        """Gives the elements of outputs that sequences computed."""
+        lines: list[str] = []
+        for k, leaving in groupby(self.where.last, lambda leaving: leaving[0]):
+            pairs = [row[1:] for row in leaving]
+            if len(pairs) < _MANY_LEFT:
+                lines += [f"  o{k}[{element}] = w[{place}];" for element, place in pairs]
+                continue
+            parts = (pairs[n : n + _MANY_LEFT] for n in range(0, len(pairs), _MANY_LEFT))
+            rows = (map(str, chain(*part)) for part in parts)
+            lines += _table(_index(max(map(max, pairs))), f"left{k}", rows)
+            loop = f"for (int k = 0; k < {2 * len(pairs)}; k += 2)"
+            lines.append(f"  {loop} o{k}[left{k}[k]] = w[left{k}[k + 1]];")
+        return lines
+
+    def of(self, graph: Graph, where: Slots) -> Self:
+        """The same code of another graph, without inputs of its own but constants."""
+        return replace(self, graph=graph, where=where)
+
+    def number(self, number: int) -> str:
+        """A constant as a table has it."""
+        return operand(self.graph, number)
+
+    def _body(self, number: int, steps: Sequence[Item]) -> list[str]:
+        lines = [] if number else self._inputs()
+        lines += self._stores(self.where.copied.get(number, ()))
         known: set[int] = set()
         of = self.where.of
         for step in steps:
+            if isinstance(step, Calls):
+                lines.append(self._calls(step))
+                continue
             lines += self._loads(step, known)
             lines += self.values(step)
             known.update(gives(step))
             for n in gives(step):
                 lines += [f"  w[{of[n]}] = t{n};"] if n in of else []
                 lines += self._stores(self.where.outputs.get(n, ()))
-        return lines
+        return lines + (self._last() if number == self.where.blocks - 1 else [])
 
     def _loads(self, step: Step, known: set[int]) -> list[str]:
         of = self.where.of
@@ -453,6 +617,18 @@ class BlockCode:
         return lines
 
 
+def _index(largest: int) -> str:
+    """The C type of indices; the short one halves tables."""
+    return "unsigned short" if largest < 1 << 16 else "int"
+
+
+def _table(kind: str, name: str, rows: Iterable[Iterable[str]]) -> list[str]:
+    """Lines that declare a table; none for one without values."""
+    lines = [f"  {', '.join(row)}," for row in rows]
+    declared = f"static const {kind} {name}[] = {{"
+    return [declared, *lines, "};"] if any(line.strip(" ,") for line in lines) else []
+
+
 def _runs(indices: Sequence[int]) -> list[tuple[int, int]]:
     """First and last of each run of consecutive numbers."""
     runs: list[tuple[int, int]] = []
@@ -478,6 +654,10 @@ class LaneCode(BlockCode):
     shared: Sequence[bool]
 
     kind: ClassVar[str] = "mbs_lanes"
+
+    def of(self, graph: Graph, where: Slots) -> Self:
+        """See BlockCode."""
+        return replace(self, graph=graph, where=where, shared=[True])
 
     def input(self, number: int) -> str:
         """See BlockCode."""

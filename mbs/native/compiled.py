@@ -1,5 +1,6 @@
 """A Function as machine code: equal to the interpreted one to the last bit, or faster."""
 
+import contextlib
 import ctypes
 import functools
 import hashlib
@@ -23,6 +24,8 @@ from mbs.native.derivatives_on_demand import (
 )
 from mbs.native.kernel import LoopCode, index_key, indexed_library, kernel_library
 from mbs.native.patterns import pattern_source, patterns_source
+from mbs.native.plain_source import external_source
+from mbs.native.repeats import LEAST
 from mbs.text import in_c_comment, quoted
 
 
@@ -163,10 +166,22 @@ def _compiled(
     library = kernel_library(functions, further) if fast else None
     if library is not None:
         return library
-    text = generated(functions)
+    text = _exact(functions)
     if unwritten(text):
         return None
     return cached_library({"function.c": text, **further}, flags_for(text))
+
+
+def _exact(functions: Sequence[casadi.Function]) -> str:
+    """C text that gives the bits of the interpreted Functions.
+
+    CasADi's own is one C function, for which compilers take more than proportional time.
+    """
+    scalar = all(function.is_a("SXFunction") for function in functions)
+    if scalar and any(function.n_instructions() >= LEAST for function in functions):
+        with contextlib.suppress(ModelError):
+            return external_source(functions)
+    return generated(functions)
 
 
 class MachineCode(NamedTuple):

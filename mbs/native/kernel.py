@@ -22,6 +22,7 @@ from mbs.errors import ModelError
 from mbs.native.c_code import (
     LANES,
     BlockCode,
+    Item,
     LaneCode,
     Memory,
     SinCosGroup,
@@ -40,6 +41,7 @@ from mbs.native.compiler import (
     find_compiler,
     is_whole,
 )
+from mbs.native.repeats import with_calls
 from mbs.native.staged import Mapped, Staged, staged
 from mbs.operations.graph import Graph, graph_of
 
@@ -240,18 +242,22 @@ _GCC = """\
 #pragma GCC optimize("schedule-insns", "sched-pressure")
 #endif
 """
-_HEAD = """\
-#include <math.h>
-#include <string.h>
-#include "elementary.h"
+EXPORT = """\
 #define casadi_int long long int
-#define NOINLINE __attribute__((noinline))
-#define ALIGNED __attribute__((aligned(64)))
 #ifdef _WIN32
 #define EXPORT __declspec(dllexport)
 #else
 #define EXPORT __attribute__((visibility("default")))
 #endif
+"""
+"""What stands before functions that CasADi's `external` looks for."""
+
+_HEAD = """\
+#include <math.h>
+#include <string.h>
+#include "elementary.h"
+#define NOINLINE __attribute__((noinline))
+#define ALIGNED __attribute__((aligned(64)))
 """
 
 
@@ -280,7 +286,7 @@ def _file(function: Function, block: int) -> str:
     stages = staged(function) or Staged(function, ())
     graph = graph_of(stages.scalar)
     scheduling = _GCC if len(graph.nodes) <= _SHORT else ""
-    return "\n".join([scheduling, _HEAD, _function(function, graph, stages.maps, block)])
+    return "\n".join([scheduling, _HEAD, EXPORT, _function(function, graph, stages.maps, block)])
 
 
 def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: int) -> str:
@@ -304,6 +310,7 @@ def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: i
         calls += [f"  {name}_part{j}(in, out, w);" for j in range(begins[k], begins[k + 1])]
     return "\n".join(
         [
+            *code.repeats(),
             *(code.block(f"{name}_part{k}", k, steps) for k, steps in enumerate(every)),
             *(source.text for source in sources),
             f"EXPORT int {name}(const double **arg, double **res, casadi_int *iw, double *w,"
@@ -318,14 +325,15 @@ def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: i
     )
 
 
-def _pieces(graph: Graph, late: dict[int, int], maps: int, block: int) -> list[list[list[Step]]]:
+def _pieces(graph: Graph, late: dict[int, int], maps: int, block: int) -> list[list[list[Item]]]:
     """The blocks before the first map, between it and the second one, and so on."""
     phase = phases(graph, late)
     order = schedule(graph, phase)
     every: list[list[Step]] = [[] for _ in range(maps + 1)]
     for step in order:
         every[max(phase[n] for n in gives(step))].append(step)
-    return [blocks(graph, steps, block) for steps in every]
+    # inputs that maps give are not there from the beginning, as recurring sequences need them
+    return [blocks(graph, steps if maps else with_calls(graph, steps), block) for steps in every]
 
 
 _NATIVE = "-march=native" if platform.machine().lower() in ("x86_64", "amd64") else "-mcpu=native"

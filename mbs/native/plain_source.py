@@ -6,14 +6,15 @@ that is linear in the length, at any level of optimization.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from casadi import Function
 
-from mbs.native.c_code import BlockCode, Memory, Step, blocks, plain_order, slots
+from mbs.native.c_code import BlockCode, Memory, blocks, plain_order, slots
 from mbs.native.compiler import FLAGS
-from mbs.native.kernel import BLOCK
+from mbs.native.kernel import BLOCK, EXPORT, function_table
+from mbs.native.repeats import with_calls
 from mbs.operations.graph import graph_of
 
 _HEAD = """\
@@ -68,6 +69,28 @@ def plain_source(functions: Iterable[Function], block: int = BLOCK) -> tuple[str
     return "\n".join(texts), most
 
 
+def external_source(functions: Sequence[Function]) -> str:
+    """The same text with what CasADi's `external` asks of each Function.
+
+    Args:
+        functions: with different names, made of scalar operations.
+
+    Raises:
+        ModelError: some Function has an operation that C does not have.
+    """
+    texts = [plain_source([function]) for function in functions]
+    lines = [EXPORT]
+    for function, (text, work) in zip(functions, texts, strict=True):
+        name = function.name()
+        lines += [
+            f"EXPORT int {name}"
+            "(const double **arg, double **res, casadi_int *iw, double *w, int mem);",
+            text,
+            function_table(function, work.w),
+        ]
+    return "\n".join(lines)
+
+
 def plain_flags(source: str) -> tuple[str, ...]:
     """The flags to compile such text with.
 
@@ -82,12 +105,13 @@ def plain_flags(source: str) -> tuple[str, ...]:
 
 def _function(function: Function, block: int) -> tuple[str, Work]:
     name, graph = function.name(), graph_of(function)
-    pieces: list[list[Step]] = blocks(graph, plain_order(graph), block)
+    pieces = blocks(graph, with_calls(graph, plain_order(graph)), block)
     where = slots(graph, pieces)
     code = BlockCode(graph, where, "")
     memory = Memory(function, graph, where.count)
     text = "\n".join(
         [
+            *code.repeats(),
             *(code.block(f"{name}_part{k}", k, steps) for k, steps in enumerate(pieces)),
             f"int {name}(const double **arg, double **res, long long *iw, double *w, int mem) {{",
             "  (void)iw, (void)mem;",

@@ -2,6 +2,7 @@
 
 import csv
 import importlib
+import io
 import json
 import os
 import zipfile
@@ -18,6 +19,10 @@ from mbs.files import whole_file
 from mbs.text import install_command
 
 Array = npt.NDArray[np.float64]
+
+_AT_ONCE = 1 << 26
+"""Bytes of a result from which its archive is written piece by piece: it would be in memory twice
+otherwise."""
 
 _QUANTITIES = {
     "1": "value",
@@ -170,8 +175,13 @@ class Result:
             "events": self.events,
             "stopped": self.stopped,
         }
-        with whole_file(path) as scratch, scratch.open("wb") as stream:
-            np.savez(stream, time=self.time, values=self.values, rest=json.dumps(rest))
+        with whole_file(path) as scratch:
+            # many small pieces of one archive take a disk longer than all of them at once
+            stream = io.BytesIO() if self.values.nbytes < _AT_ONCE else scratch.open("wb")
+            with stream:
+                np.savez(stream, time=self.time, values=self.values, rest=json.dumps(rest))
+                if isinstance(stream, io.BytesIO):
+                    scratch.write_bytes(stream.getbuffer())
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> "Result":

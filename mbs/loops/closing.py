@@ -16,7 +16,7 @@ from mbs.assembly.tree import norm_rows, quaternion_slices
 from mbs.errors import Unclosable
 from mbs.loops.closure import closure_rows, facing, position_rows, velocity_row_units
 from mbs.numbers import OnArrays, on_arrays
-from mbs.solvers.least_squares import MANY, Entries, gauss_newton
+from mbs.solvers.least_squares import MANY, Entries, Root, gauss_newton
 
 # What rows of a closure are measured by: lengths by the size of the mechanism, cosines as such.
 #
@@ -115,6 +115,10 @@ OPEN = 1e-6
 little."""
 
 
+_KEPT = 8
+"""Values of parameters of which sizes are kept: a line between two has as many steps."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Closed:
     """Where an attempt to close the loops ended.
@@ -170,12 +174,22 @@ class Closing:
     @property
     def size(self) -> float:
         """The size of the mechanism [m]."""
-        return float(self._functions().sizes(self.p)[0][0, 0])
+        return float(self._sizes[0][0, 0])
 
     @property
     def sizes(self) -> Vector:
         """(m,) what the rows are measured by: the size of the mechanism for lengths [m], or 1."""
-        return self._functions().sizes(self.p)[1].ravel()
+        return self._sizes[1].ravel()
+
+    @property
+    def _sizes(self) -> list[Vector]:
+        """The size of the mechanism and those of the rows; starts have the same p as a rule."""
+
+        def build() -> list[Vector]:
+            return self._functions().sizes(self.p)
+
+        found: list[Vector] = self.system.recent("closing sizes", self.p.tobytes(), build, _KEPT)
+        return found
 
     def openness(self, q: Vector) -> float:
         """The largest row at q, (nq,), in parts of the size of the mechanism."""
@@ -193,6 +207,10 @@ class Closing:
             return self._functions().values(_replace(start, free, x), self.p)[0].ravel()
 
         tolerance = TOLERANCE * self.sizes
+        compiled = self._functions().root.near(start, self.p, free, tolerance)
+        if compiled is not None:
+            found, root = compiled
+            return Closed(found, root.residual, root.converged and self.faces(found))
         root = gauss_newton(residual, start[free], tolerance=tolerance, values=values)
         found = _replace(start, free, root.x)
         return Closed(found, root.residual, root.converged and self.faces(found))
@@ -248,6 +266,7 @@ class ClosingFunctions(NamedTuple):
         values: ``(q, p) -> r`` alone.
         facing: ``(q, p)``, positive where no axis is opposed.
         sizes: ``(p)``, the size of the mechanism and what each row is measured by.
+        root: the rows, to be solved in machine code.
     """
 
     equations: OnArrays
@@ -256,6 +275,7 @@ class ClosingFunctions(NamedTuple):
     values: OnArrays
     facing: OnArrays
     sizes: OnArrays
+    root: Root
 
 
 def closure_parameters(system: System, values: Mapping[str, float] | None = None) -> Vector:
@@ -283,13 +303,16 @@ def _functions(system: System) -> ClosingFunctions:
     def arrays(name: str, inputs: list[SX], outputs: list[SX]) -> OnArrays:
         return on_arrays(Function(name, inputs, outputs))
 
+    equations = Function("equations", [q, system.p], [r, J])
+    values = Function("values", [q, system.p], [r])
     return ClosingFunctions(
-        equations=arrays("equations", [q, system.p], [r, J]),
+        equations=on_arrays(equations),
         elements=arrays("elements", [q, system.p], [r, casadi.densify(J.nz[:])]),
         places=np.array(J.sparsity().get_triplet(), dtype=np.int64).reshape(2, -1),
-        values=arrays("values", [q, system.p], [r]),
+        values=on_arrays(values),
         facing=arrays("facing", [q, system.p], [facing(system, q)]),
         sizes=arrays("sizes", [system.p], [mechanism_size(system), sizes]),
+        root=Root(equations, values),
     )
 
 

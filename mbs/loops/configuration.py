@@ -266,14 +266,19 @@ def smallest_velocity(system: System, J: Vector, v0: Values) -> tuple[Vector, st
     rows = [k for k, name in enumerate(names) if not named or name in (v0 or {})]
     v = _refine(J, rows, target[rows])
     closed = np.all(np.abs(J @ v) <= _FITS * np.linalg.norm(J, axis=1) * np.linalg.norm(v))
-    if closed and np.allclose(v[rows], target[rows], rtol=_FITS, atol=_SLOW):
+    if closed and _fit(v[rows], target[rows]):
         return v, ""
     # rows that are nearly dependent: what they leave free decides
     free = null_space(J)
     near: Vector = free @ np.linalg.lstsq(free[rows], target[rows], rcond=None)[0]
-    if np.allclose(near[rows], target[rows], rtol=_FITS, atol=_SLOW):
+    if _fit(near[rows], target[rows]):
         return v, ""
     return near, ", ".join(f"{names[k]} = {target[k]:g}" for k in rows)
+
+
+def _fit(v: Vector, target: Vector) -> bool:
+    """Whether velocities are those asked for."""
+    return bool(np.all(np.abs(v - target) <= _SLOW + _FITS * np.abs(target)))
 
 
 def _refine(J: Vector, rows: list[int], target: Vector) -> Vector:

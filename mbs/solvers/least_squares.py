@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import ctypes
+import functools
+import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib import resources
+from typing import Any
 
 import casadi
 import numpy as np
-from casadi import DM
+from casadi import DM, Function
 from numpy.typing import NDArray
 
+from mbs.errors import CompilerError
+from mbs.native import cached_library, compiler_found
 from mbs.solvers.rank import EQUAL
 
 Array = NDArray[np.float64]
@@ -36,6 +43,22 @@ def smallest_solution(A: Array, b: Array, gap: float) -> Array:
         b: (m,).
         gap: columns that the ones before leave shorter than this part of the longest count as
             dependent.
+    """
+    if (library := _library()) is not None:
+        A, b, x = np.ascontiguousarray(A), np.ascontiguousarray(b), np.empty(A.shape[1])
+        if library.mbs_smallest_solution(*A.shape, _at(A), _at(b), gap, _at(x)):
+            raise MemoryError(f"no memory is left for {A.shape} equations")
+        return x
+    return plain_solution(A, b, gap)
+
+
+def plain_solution(A: Array, b: Array, gap: float) -> Array:
+    """The same without machine code, to the bit: the twin of `native/runtime/least_squares.c`.
+
+    Args:
+        A: as of `smallest_solution`, likewise the others.
+        b: likewise.
+        gap: likewise.
     """
     n = A.shape[1]
     W = np.column_stack([A, b])[np.logical_or.reduce(A, axis=1)]
@@ -88,6 +111,59 @@ def _reflect(W: Array) -> None:
     rest = W[rows, 1:]
     W[rows, 1:] = rest + v * (_sum(v * rest, axis=0) / (first * v[0, 0]))
     W[0, 0] = first
+
+
+# The same in machine code, which is the same for all equations.
+
+
+_OFTEN = 300
+"""Solutions in this process from which machine code is worth its compiler, which takes as long as a
+thousand of them, once for all processes."""
+
+_asked = itertools.count()
+
+
+def _library() -> ctypes.CDLL | None:
+    """The machine code; None where few solutions were asked for, or there is no compiler."""
+    return _compiled() if next(_asked) >= _OFTEN else None
+
+
+@functools.cache
+def _compiled() -> ctypes.CDLL | None:
+    folder = resources.files("mbs.native") / "runtime"
+    names = ("least_squares.c", "least_squares.h")
+    try:
+        if not compiler_found():
+            return None
+        files = {name: (folder / name).read_text(encoding="utf-8") for name in names}
+        library = ctypes.CDLL(str(cached_library(files)))
+    except CompilerError:
+        return None
+    pointer, integer, real = ctypes.c_void_p, ctypes.c_int, ctypes.c_double
+    library.mbs_smallest_solution.argtypes = [integer, integer, pointer, pointer, real, pointer]
+    library.mbs_gauss_newton.argtypes = [ctypes.POINTER(_Equations), ctypes.POINTER(real)]
+    return library
+
+
+def _at(array: NDArray[Any]) -> int:
+    return array.ctypes.data
+
+
+_EVALUATE = ctypes.CFUNCTYPE(ctypes.c_int)
+
+
+class _Equations(ctypes.Structure):
+    """`least_squares` of `native/runtime/least_squares.h`."""
+
+    _fields_ = (
+        *((name, ctypes.c_int) for name in ("size", "rows", "unknowns", "elements")),
+        *((name, ctypes.c_void_p) for name in ("q", "r", "e", "free", "row", "column")),
+        ("tolerance", ctypes.c_void_p),
+        ("gap", ctypes.c_double),
+        ("iterations", ctypes.c_int),
+        ("equations", _EVALUATE),
+        ("values", _EVALUATE),
+    )
 
 
 MANY = 100
@@ -164,6 +240,9 @@ Jacobian = Vector | Entries
 Residual = Callable[[Vector], tuple[Vector, Jacobian]]
 """x -> residual (m,), Jacobian (m, n), as its elements where most of it is zero."""
 
+_RANK, _ITERATIONS = 1e-9, 100
+"""Part of the largest singular value below which others count as zero: where Newton's method is of
+use none is near to it; and the most iterations, where ten are many."""
 _STALLED = 1e-14
 """Length of a step [rad or m] that changes no digit of positions of size one that could matter."""
 
@@ -191,8 +270,8 @@ def gauss_newton(
     start: Vector,
     *,
     tolerance: float | Vector = 1e-12,
-    iterations: int = 100,
-    rank_tolerance: float = 1e-9,
+    iterations: int = _ITERATIONS,
+    rank_tolerance: float = _RANK,
     values: Callable[[Vector], Vector] | None = None,
 ) -> LeastSquaresResult:
     """Damped Gauss-Newton with the smallest step that solves the linearised equations.
@@ -239,6 +318,118 @@ def gauss_newton(
         if stalled or reached:
             break
     return LeastSquaresResult(x, norm, bool((np.abs(r) <= tolerance).all()))
+
+
+class Root:
+    """Equations r(q, p) = 0 that are solved for some of q, again and again.
+
+    What `gauss_newton` does with them is machine code, which calls their Functions by itself, for
+    fewer than `MANY` unknowns.
+    """
+
+    def __init__(self, equations: Function, values: Function) -> None:
+        """Keep the Functions.
+
+        Args:
+            equations: `equations(q, p) -> r, J`, r dense.
+            values: `values(q, p) -> r`.
+        """
+        self._functions = equations, values
+        self._rooms: list[_Room] = []  # each is for one thread at a time
+
+    def near(
+        self, q: Vector, p: Vector, free: Sequence[int], tolerance: Vector
+    ) -> tuple[Vector, LeastSquaresResult] | None:
+        """Where `gauss_newton` ends, to the bit; None where there is no machine code for it.
+
+        Args:
+            q: (nq,) first guess; what is not free stays.
+            p: (np,).
+            free: numbers of the unknowns in q.
+            tolerance: of each row.
+
+        Returns:
+            q (nq,) at the end, and what `gauss_newton` says of the unknowns.
+        """
+        library = _library() if len(free) < MANY else None
+        if library is None:
+            return None
+        try:
+            room = self._rooms.pop()
+        except IndexError:
+            room = _Room(*self._functions)
+        found = room.solved(library, q, p, free, tolerance)
+        self._rooms.append(room)
+        return found
+
+
+class _Room:
+    """Memory from which Functions read and in which they write, and what calls them there."""
+
+    def __init__(self, equations: Function, values: Function) -> None:
+        pattern = equations.sparsity_out(1)
+        self.row, columns = (np.array(x, dtype=np.intc) for x in pattern.get_triplet())
+        self.columns, self.column = columns, np.empty_like(columns)
+        self.q, self.p = (np.zeros(equations.numel_in(k)) for k in range(2))
+        self.r, self.e = np.zeros(equations.numel_out(0)), np.zeros(pattern.nnz())
+        self.error: BaseException | None = None
+        self.calls = [
+            self._call(equations, [self.r, self.e]),
+            self._call(values, [self.r]),
+        ]
+
+    def _call(self, function: Function, results: Sequence[Vector]) -> Any:
+        made: Any = function.buffer()
+        buffer, run = made
+        for k, array in enumerate((self.q, self.p)):
+            buffer.set_arg(k, array.data)
+        for k, array in enumerate(results):
+            buffer.set_res(k, array.data)
+
+        def evaluate() -> int:
+            try:
+                run()
+                return int(buffer.ret())
+            except BaseException as error:  # control-C too; it cannot pass through machine code
+                self.error = error
+                return 1
+
+        return _EVALUATE(evaluate)
+
+    def solved(
+        self,
+        library: ctypes.CDLL,
+        q: Vector,
+        p: Vector,
+        free: Sequence[int],
+        tolerance: Vector,
+    ) -> tuple[Vector, LeastSquaresResult]:
+        """What `Root.near` gives.
+
+        Args:
+            library: the machine code.
+            q: as there, likewise the others.
+            p: likewise.
+            free: likewise.
+            tolerance: likewise.
+        """
+        self.q[:], self.p[:] = q, p
+        indices, number = np.array(free, dtype=np.intc), np.full(len(q), -1, dtype=np.intc)
+        number[indices] = np.arange(len(free))
+        self.column[:] = number[self.columns]
+        limits, residual = np.ascontiguousarray(tolerance), ctypes.c_double()
+        arrays: tuple[NDArray[Any], ...] = (self.q, self.r, self.e)
+        arrays += (indices, self.row, self.column, limits)
+        sizes = (len(q), len(self.r), len(free), len(self.e))
+        given = _Equations(*sizes, *map(_at, arrays), _RANK, _ITERATIONS, *self.calls)
+        status = library.mbs_gauss_newton(ctypes.byref(given), ctypes.byref(residual))
+        if (error := self.error) is not None:
+            self.error = None
+            raise error
+        if status > 1:
+            raise RuntimeError("equations of a closure have no value there, or no memory is left")
+        found = self.q.copy()
+        return found, LeastSquaresResult(found[indices], residual.value, status == 1)
 
 
 def _step(J: Jacobian, b: Vector, rank_tolerance: float) -> Vector:

@@ -101,3 +101,24 @@ def test_a_miss_is_named_where_it_is_larger_than_rounding(monkeypatch):
     assert "come near each other" in words()
     scale(monkeypatch, "APART", 10)
     assert "is not passed" in words()
+
+
+def test_the_rows_of_many_loops_in_their_order_lead_to_the_same_motion(monkeypatch):
+    """As if few were many: without pivots, by reflections of the rows where columns are not zero."""
+
+    def motion():
+        system = mbs.robots.n_four_bar(4).assemble(active=["a0"])
+        return mbs.simulate.run(system, 3.0, v0={"a0": -4.0}, tolerance=1e-8, quiet=True)
+
+    pivots = motion()
+    scale(monkeypatch, "MANY", 0)
+    ordered = motion()
+    difference = np.abs(ordered.values - pivots.values).max(axis=0)
+    assert difference.max() > 0
+    uprights = [f"a{k}.q" for k in range(5)]
+    for name in uprights:
+        np.testing.assert_allclose(ordered[name], pivots[name], atol=1e-7)
+        np.testing.assert_allclose(ordered[name], ordered["a0.q"], atol=1e-8)
+    energy = ordered["kinetic_energy"] + ordered["potential_energy"]
+    assert np.ptp(energy) < 5e-8 * ordered["kinetic_energy"].max()
+    assert ordered["closure_residual"].max() < 1e-11

@@ -22,6 +22,10 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
  * the motion: its tangents are then 78 degrees away. */
 #define TURNED 0.2
 #define NEWTON 10       /* Newton steps onto the rows; quadratic convergence takes three or four */
+#define DEGENERATE (10 * DBL_EPSILON) /* part of the longest row below which one is rounding */
+/* Rows beyond which the fill of pivots costs more than they tell: the last pivot is nearer to the
+ * smallest singular value than the smallest of pivots in order, by a factor of two. */
+#define MANY 32
 #define LAST_MOVE 1e-9  /* after a move this small the next one is rounding */
 /* Part of the velocities, or of what they make of a step, by which a state may differ from where the
  * velocities and accelerations of the stages lead. What error control lets pass is a hundredth of it;
@@ -57,15 +61,31 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
 /* offsets in memory */
 enum { SIGMA, LARGEST, REGULARITY, RISE, SEEN, SEEN_TIME, BASED, BASE_TIME, BASE };
 
+typedef unsigned long long mask;
+#define BITS 64
+#define WORDS(n) (((n) + BITS - 1) / BITS)
+
+/* A (n, m) = Q R by reflections, each of the rows alone in which its column has elements: rows of loops
+ * touch few joints. */
+typedef struct {
+    double *A, *weight;  /* columns of R */
+    double *tails;       /* what reflection k is made of, from k n on, */
+    int *moved, *count;  /* the rows in which it is, row[k] first, from k n on; how many they are */
+    int *order;          /* column k of R stands in column order[k] of A, */
+    int *row;            /* and its row k in row[k]; the rows that no reflection has come last */
+    double *size;        /* squares of what is left of columns, in that order, */
+    mask *where;         /* and the rows in which they may have elements, WORDS(n) for each */
+} factors;
+
 /* Rows and forces at a point, and the tangents there. */
 typedef struct {
     passage_rows rows;
     double *M, *f, *rate; /* M is replaced by its Cholesky factor L */
-    double *A, *weight;   /* L^-1 J' = Q R, reflections below R */
+    int *end;             /* of the columns of L, the row behind their last element */
+    factors qr;           /* of L^-1 J' */
     double *T;            /* (nv, d) tangents, orthonormal in the metric of M */
-    int *order;           /* column k of R belongs to row order[k] */
     int rank;
-    double sigma; /* the last pivot of R: the distance from losing rank */
+    double sigma; /* the smallest pivot of R: the distance from losing rank */
     double more;  /* what is added to M as more J' J */
 } frame;
 
@@ -75,8 +95,9 @@ struct passage {
     passage_size size;
     passage_model model;
     double *memory, *block;
-    int *orders;
+    int *numbers;
     frame base, here;
+    factors other; /* of matrices that last for one solution */
     double *C;            /* (d, nq) coordinates of positions */
     const double *guide;  /* a state near the one that is looked for, or NULL; */
     double *guided, ahead; /* how fast its positions move, and for how long */
@@ -96,26 +117,27 @@ struct passage {
     int missed; /* branches that come near each other were met since the last full step */
 };
 
-/* Solve L y = b, or L' y = b, in place; L (n, n) by columns. */
-static void lower(const double *L, int n, double *b) {
+/* Solve L y = b, or L' y = b, in place; L (n, n) by columns, column k with elements before end[k]. */
+static void lower(const double *L, const int *end, int n, double *b) {
     int i, k;
     for (k = 0; k < n; k++) {
         if (b[k] == 0.0) continue; /* rows of loops touch few joints */
         b[k] /= L[k * n + k];
-        for (i = k + 1; i < n; i++) b[i] -= L[k * n + i] * b[k];
+        for (i = k + 1; i < end[k]; i++) b[i] -= L[k * n + i] * b[k];
     }
 }
 
-static void lower_transposed(const double *L, int n, double *b) {
+static void lower_transposed(const double *L, const int *end, int n, double *b) {
     int i, k;
     for (k = n - 1; k >= 0; k--) {
-        for (i = k + 1; i < n; i++) b[k] -= L[k * n + i] * b[i];
-        b[k] /= L[k * n + k];
+        double sum = b[k];
+        for (i = k + 1; i < end[k]; i++) sum -= L[k * n + i] * b[i];
+        b[k] = sum / L[k * n + k];
     }
 }
 
-/* 1 where a pivot is too small. */
-static int cholesky(double *M, int n) {
+/* M (n, n) = L L', and where its columns end; 1 where a pivot is too small. */
+static int cholesky(double *M, int *end, int n) {
     double largest = 0.0;
     int i, j, k;
     for (k = 0; k < n; k++) largest = fmax(largest, M[k * n + k]);
@@ -123,9 +145,10 @@ static int cholesky(double *M, int n) {
         double *column = M + k * n;
         if (!(column[k] > MASSLESS * largest)) return 1;
         column[k] = sqrt(column[k]);
-        for (i = k + 1; i < n; i++) column[i] /= column[k];
-        for (j = k + 1; j < n; j++)
-            for (i = j; i < n && column[j] != 0.0; i++) M[j * n + i] -= column[i] * column[j];
+        for (end[k] = n; end[k] > k + 1 && column[end[k] - 1] == 0.0; end[k]--) continue;
+        for (i = k + 1; i < end[k]; i++) column[i] /= column[k];
+        for (j = k + 1; j < end[k]; j++)
+            for (i = j; i < end[k] && column[j] != 0.0; i++) M[j * n + i] -= column[i] * column[j];
     }
     return 0;
 }
@@ -135,13 +158,10 @@ static int rows_at(passage *g, double t, const double *x, const passage_rows *ro
     int j, nv = z->nv;
     if (g->model.rows(g->s->user, t, x, rows)) return 1;
     if (z->nq > nv) return 0;
-    memset(rows->N, 0, sizeof(double) * (size_t)(nv * nv));
     memset(rows->bend, 0, sizeof(double) * (size_t)nv);
-    for (j = 0; j < nv; j++) {
-        rows->N[j * nv + j] = 1.0;
+    for (j = 0; j < nv; j++)
         memcpy(rows->J + j * z->speeds, rows->slope + j * z->positions,
                sizeof(double) * (size_t)z->speeds);
-    }
     return 0;
 }
 
@@ -160,7 +180,7 @@ static int factor_mass(passage *g, frame *p) {
     int n = g->size.nv, m = g->size.speeds, i, j, k;
     double *copy = g->G, mass = 0.0, length = 0.0;
     memcpy(copy, p->M, sizeof(double) * (size_t)(n * n));
-    if (!cholesky(p->M, n)) return 0;
+    if (!cholesky(p->M, p->end, n)) return 0;
     for (k = 0; k < n; k++) mass += copy[k * n + k];
     for (k = 0; k < n * m; k++) length += p->rows.J[k] * p->rows.J[k];
     if (!(length > 0.0) || !(mass > 0.0)) return 1;
@@ -171,80 +191,167 @@ static int factor_mass(passage *g, frame *p) {
             for (k = 0; k < m; k++) sum += p->rows.J[i * m + k] * p->rows.J[j * m + k];
             p->M[j * n + i] = copy[j * n + i] + p->more * sum;
         }
-    return cholesky(p->M, n);
+    return cholesky(p->M, p->end, n);
 }
 
-/* A (n, m) = Q R by reflections, the longest remaining column first, up to a rank, or until what
- * remains is shorter than a part of the first one; column k of R is order[k] of A. The rank. */
-static int pivoted(double *A, int n, int m, int rank, double least, int *order, double *weight) {
+/* b (n,) reflected by reflection k. */
+static void reflect(const factors *f, int n, int k, double *b) {
+    const double *tail = f->tails + k * n;
+    const int *rows = f->moved + k * n;
+    double sum = b[rows[0]];
+    int i, count = f->count[k];
+    for (i = 1; i < count; i++) sum += tail[i] * b[rows[i]];
+    sum *= f->weight[k];
+    if (sum == 0.0) return;
+    b[rows[0]] -= sum;
+    for (i = 1; i < count; i++) b[rows[i]] -= sum * tail[i];
+}
+
+/* Where the column at place k has elements, and its length. */
+static void look_at(factors *f, int n, int k) {
+    const double *column = f->A + f->order[k] * n;
+    mask *where = f->where + k * WORDS(n);
+    double size = 0.0;
+    int i;
+    memset(where, 0, sizeof(mask) * (size_t)WORDS(n));
+    for (i = 0; i < n; i++) {
+        if (column[i] == 0.0) continue;
+        where[i / BITS] |= (mask)1 << i % BITS;
+        size += column[i] * column[i];
+    }
+    f->size[k] = size;
+}
+
+/* The columns at places k and j change them. */
+static void exchange(factors *f, int n, int k, int j) {
+    int i, words = WORDS(n), column = f->order[k];
+    double kept = f->size[k];
+    f->order[k] = f->order[j], f->order[j] = column;
+    f->size[k] = f->size[j], f->size[j] = kept;
+    for (i = 0; i < words; i++) {
+        mask bits = f->where[k * words + i];
+        f->where[k * words + i] = f->where[j * words + i];
+        f->where[j * words + i] = bits;
+    }
+}
+
+/* Column k of R becomes what its reflection leaves, an element in the next row; of many columns, in the
+ * first row where it has one. */
+static void make_reflection(factors *f, int n, int k, int many) {
+    double *column = f->A + f->order[k] * n, *tail = f->tails + k * n;
+    mask *where = f->where + k * WORDS(n);
+    int *rows = f->moved + k * n, count = 0, first, i;
+    if (!many) where[f->row[k] / BITS] |= (mask)1 << f->row[k] % BITS;
+    for (i = k; i < n; i++) {
+        int row = f->row[i];
+        if (where[row / BITS] >> row % BITS & 1) rows[count++] = row;
+    }
+    if (count == 0) rows[count++] = f->row[k];
+    for (i = 0; i < count; i++) tail[i] = column[rows[i]];
+    f->weight[k] = dense_reflection(tail, count);
+    column[rows[0]] = tail[0];
+    f->count[k] = count;
+    for (first = k; f->row[first] != rows[0]; first++) continue;
+    for (; first > k; first--) f->row[first] = f->row[first - 1];
+    f->row[k] = rows[0];
+}
+
+/* The column at place j after reflection k: where they meet its rows may have elements now, but row k
+ * is done. What is left of it is summed where somebody asks for it. */
+static void reflect_column(factors *f, int n, int k, int j, int sums) {
+    int i, words = WORDS(n), done = f->row[k];
+    mask *where = f->where + j * words;
+    const mask *other = f->where + k * words;
+    double *column = f->A + f->order[j] * n;
+    for (i = 0; i < words && !(where[i] & other[i]); i++) continue;
+    if (i == words) return;
+    reflect(f, n, k, column);
+    for (i = 0; i < words; i++) where[i] |= other[i];
+    where[done / BITS] &= ~((mask)1 << done % BITS);
+    if (!sums) return;
+    for (f->size[j] = 0.0, i = k + 1; i < n; i++)
+        f->size[j] += column[f->row[i]] * column[f->row[i]];
+}
+
+/* A (n, m) = Q R up to a rank, or until what remains is shorter than a part of the first one; the rank.
+ * The longest remaining column is next. Of many that are all needed it is the first: in their order
+ * those of a chain of loops have reflections of few rows. */
+static int factorize(factors *f, int n, int m, int rank, double least) {
     double first = 0.0;
-    int i, j, k;
-    for (j = 0; j < m; j++) order[j] = j;
+    int i, j, k, in_order = m > MANY && rank == m && least == 0.0;
+    for (i = 0; i < n; i++) f->row[i] = i;
+    for (j = 0; j < m; j++) {
+        f->order[j] = j;
+        look_at(f, n, j);
+    }
     for (k = 0; k < rank; k++) {
-        double most = -1.0;
-        int longest = k, kept = order[k], end = n;
-        for (j = k; j < m; j++) {
-            double size = 0.0;
-            for (i = k; i < n; i++) size += A[j * n + i] * A[j * n + i];
-            if (size > most) most = size, longest = j;
-        }
-        if (k == 0) first = most;
-        if (most < least * least * first) return k;
-        for (i = 0; i < n && longest != k; i++) {
-            double value = A[k * n + i];
-            A[k * n + i] = A[longest * n + i];
-            A[longest * n + i] = value;
-        }
-        order[k] = order[longest];
-        order[longest] = kept;
-        weight[k] = dense_reflection(A + k * n + k, n - k);
-        while (end > k + 1 && A[k * n + end - 1] == 0.0) end--; /* what it leaves alone */
-        for (j = k + 1; j < m; j++)
-            dense_reflect(A + k * n + k, weight[k], end - k, A + j * n + k);
+        int longest = k;
+        for (j = k + 1; j < m && !in_order; j++)
+            if (f->size[j] > f->size[longest]) longest = j;
+        if (k == 0) first = f->size[longest];
+        if (f->size[longest] < least * least * first) return k;
+        if (longest != k) exchange(f, n, k, longest);
+        make_reflection(f, n, k, m > MANY);
+        for (j = k + 1; j < m; j++) reflect_column(f, n, k, j, !in_order);
     }
     return rank;
+}
+
+/* The elements y of Q' x, in the rows of the first ones, such that A' x = b there. */
+static void forward(const factors *f, int n, int rank, const double *b, double *y) {
+    int i, k;
+    for (k = 0; k < rank; k++) {
+        const double *column = f->A + f->order[k] * n;
+        double sum = b[f->order[k]];
+        for (i = 0; i < k; i++) sum -= column[f->row[i]] * y[f->row[i]];
+        y[f->row[k]] = sum / column[f->row[k]];
+    }
+}
+
+static double pivot_of(const factors *f, int n, int k) {
+    return fabs(f->A[f->order[k] * n + f->row[k]]);
+}
+
+/* Q y, in place. */
+static void reflect_back(const factors *f, int n, int rank, double *y) {
+    int k;
+    for (k = rank - 1; k >= 0; k--) reflect(f, n, k, y);
 }
 
 /* L^-1 J' = Q R, as many columns as the rank. */
 static void factor_rows(passage *g, frame *p) {
     int n = g->size.nv, m = g->size.speeds, i, j;
+    double *A = p->qr.A;
     for (j = 0; j < m; j++) {
-        for (i = 0; i < n; i++) p->A[j * n + i] = p->rows.J[i * m + j];
-        lower(p->M, n, p->A + j * n);
+        for (i = 0; i < n; i++) A[j * n + i] = p->rows.J[i * m + j];
+        lower(p->M, p->end, n, A + j * n);
     }
-    pivoted(p->A, n, m, p->rank, 0.0, p->order, p->weight);
-    p->sigma = p->rank ? fabs(p->A[(p->rank - 1) * n + p->rank - 1]) : 1.0;
+    factorize(&p->qr, n, m, p->rank, 0.0);
+    p->sigma = p->rank ? HUGE_VAL : 1.0;
+    for (j = 0; j < p->rank; j++) p->sigma = fmin(p->sigma, pivot_of(&p->qr, n, j));
 }
 
-/* The shortest y with A' y = b, A (n, m) replaced, on its rows that are not nearly dependent. */
-static void shortest(passage *g, double *A, int n, int m, const double *b, double least, double *y) {
-    int *order = g->orders + 2 * g->size.speeds, i, k;
-    int rank = pivoted(A, n, m, n < m ? n : m, least, order, g->w);
+/* The shortest y (n,) with A' y = b, A (n, m), on its rows that are not nearly dependent. */
+static void shortest(passage *g, int n, int m, const double *b, double least, double *y) {
+    factors *f = &g->other;
+    int rank = factorize(f, n, m, n < m ? n : m, least), k;
     memset(y, 0, sizeof(double) * (size_t)n);
-    for (k = 0; k < rank; k++) {
-        double sum = b[order[k]];
-        for (i = 0; i < k; i++) sum -= A[k * n + i] * y[i];
-        if (A[k * n + k] != 0.0) y[k] = sum / A[k * n + k];
-    }
-    for (k = rank - 1; k >= 0; k--) dense_reflect(A + k * n + k, g->w[k], n - k, y + k);
+    for (k = 0; k < rank; k++) /* what is empty determines nothing */
+        if (pivot_of(f, n, k) == 0.0) rank = k;
+    forward(f, n, rank, b, y);
+    reflect_back(f, n, rank, y);
 }
 
 /* v = L^-T Q y, in place. */
 static void to_velocity(const passage *g, const frame *p, double *y) {
-    int n = g->size.nv, k;
-    for (k = p->rank - 1; k >= 0; k--)
-        dense_reflect(p->A + k * n + k, p->weight[k], n - k, y + k);
-    lower_transposed(p->M, n, y);
+    int n = g->size.nv;
+    reflect_back(&p->qr, n, p->rank, y);
+    lower_transposed(p->M, p->end, n, y);
 }
 
-/* The first elements of y such that J v = c for v = L^-T Q y. */
+/* The elements of y such that J v = c for v = L^-T Q y. */
 static void along_rows(const passage *g, const frame *p, const double *c, double *y) {
-    int n = g->size.nv, i, k;
-    for (k = 0; k < p->rank; k++) {
-        double sum = c[p->order[k]];
-        for (i = 0; i < k; i++) sum -= p->A[k * n + i] * y[i];
-        y[k] = sum / p->A[k * n + k];
-    }
+    forward(&p->qr, g->size.nv, p->rank, c, y);
 }
 
 static int factor(passage *g, frame *p) {
@@ -254,7 +361,7 @@ static int factor(passage *g, frame *p) {
     for (j = 0; j < n - p->rank; j++) {
         double *T = p->T + j * n;
         memset(T, 0, sizeof(double) * (size_t)n);
-        T[p->rank + j] = 1.0;
+        T[p->qr.row[p->rank + j]] = 1.0;
         to_velocity(g, p, T);
     }
     return !isfinite(p->sigma);
@@ -267,36 +374,54 @@ static void particular(const passage *g, const frame *p, double *v) {
     to_velocity(g, p, v);
 }
 
+/* Element i of N v. */
+static double rate_of(const passage *g, const passage_rows *rows, int i, const double *v) {
+    int nq = g->size.nq, nv = g->size.nv, j;
+    double rate = 0.0;
+    if (nq == nv) return v[i];
+    for (j = 0; j < nv; j++) rate += rows->N[j * nq + i] * v[j];
+    return rate;
+}
+
 /* y = C N v */
 static void coordinates(const passage *g, const frame *p, const double *v, double *y) {
-    int nq = g->size.nq, nv = g->size.nv, i, j, k;
+    int i, k;
     for (k = 0; k < g->d; k++) y[k] = 0.0;
-    for (i = 0; i < nq; i++) {
-        double rate = 0.0;
-        for (j = 0; j < nv; j++) rate += p->rows.N[j * nq + i] * v[j];
+    for (i = 0; i < g->size.nq; i++) {
+        double rate = rate_of(g, &p->rows, i, v);
         for (k = 0; k < g->d; k++) y[k] += g->C[i * g->d + k] * rate;
     }
 }
 
-/* Gaussian elimination with row exchanges, A (n, n) and b (n, count) replaced; 1 if singular. */
-static int solve(double *A, int n, double *b, int count) {
-    int i, j, k;
+/* A (n, n) = L U with row exchanges, in place, and b (n, count) as its rows are: the sign of the
+ * determinant, 0 where A is singular. */
+static int eliminate(double *A, int n, double *b, int count) {
+    int sign = 1, i, j, k;
     for (k = 0; k < n; k++) {
+        double *column = A + k * n;
         int pivot = k;
         for (i = k + 1; i < n; i++)
-            if (fabs(A[k * n + i]) > fabs(A[k * n + pivot])) pivot = i;
-        if (!(fabs(A[k * n + pivot]) > 0.0)) return 1;
-        for (j = 0; j < n + count && pivot != k; j++) {
-            double *column = j < n ? A + j * n : b + (j - n) * n, kept = column[k];
-            column[k] = column[pivot];
-            column[pivot] = kept;
+            if (fabs(column[i]) > fabs(column[pivot])) pivot = i;
+        if (!(fabs(column[pivot]) > 0.0)) return 0;
+        for (j = k; j < n + count && pivot != k; j++) {
+            double *other = j < n ? A + j * n : b + (j - n) * n, kept = other[k];
+            other[k] = other[pivot];
+            other[pivot] = kept;
         }
-        for (i = k + 1; i < n; i++) {
-            double part = A[k * n + i] / A[k * n + k];
-            for (j = k; j < n; j++) A[j * n + i] -= part * A[j * n + k];
-            for (j = 0; j < count; j++) b[j * n + i] -= part * b[j * n + k];
+        if ((column[k] < 0.0) != (pivot != k)) sign = -sign;
+        for (i = k + 1; i < n; i++) column[i] /= column[k];
+        for (j = k + 1; j < n + count; j++) {
+            double *other = j < n ? A + j * n : b + (j - n) * n, part = other[k];
+            for (i = k + 1; i < n && part != 0.0; i++) other[i] -= column[i] * part;
         }
     }
+    return sign;
+}
+
+/* X = A^-1 b in place of b (n, count), A (n, n) replaced; 1 if singular. */
+static int solve(double *A, int n, double *b, int count) {
+    int i, j, k;
+    if (!eliminate(A, n, b, count)) return 1;
     for (j = 0; j < count; j++)
         for (k = n - 1; k >= 0; k--) {
             for (i = k + 1; i < n; i++) b[j * n + k] -= A[i * n + k] * b[j * n + i];
@@ -340,6 +465,62 @@ static int coordinates_of_base(passage *g) {
     return 0;
 }
 
+/* The Newton step r, in place of the residuals of the rows and of xi, by reflections of the slopes
+ * K (rows, nq); 1 where they are dependent. */
+static int newton_step(passage *g, int rows, double *r) {
+    double *K = g->K, least = HUGE_VAL, most = 0.0;
+    int nq = g->size.nq, i, j, k;
+    for (k = 0; k < nq; k++) {
+        double weight = dense_reflection(K + k * rows + k, rows - k);
+        for (j = k + 1; j < nq; j++)
+            dense_reflect(K + k * rows + k, weight, rows - k, K + j * rows + k);
+        dense_reflect(K + k * rows + k, weight, rows - k, r + k);
+        least = fmin(least, fabs(K[k * rows + k]));
+        most = fmax(most, fabs(K[k * rows + k]));
+    }
+    if (!(least > DEGENERATE * most)) return 1;
+    for (k = nq - 1; k >= 0; k--) {
+        for (i = k + 1; i < nq; i++) r[k] -= K[i * rows + k] * r[i];
+        r[k] /= K[k * rows + k];
+    }
+    return 0;
+}
+
+/* The same where there are as many rows as positions: on the rows of the loops, which touch few joints
+ * each, then along them by the last rows of K, those of xi, which touch all. */
+static int sparse_newton_step(passage *g, double *r) {
+    factors *f = &g->other;
+    int n = g->size.nq, d = g->d, m = n - d, i, j, k;
+    double *A = f->A, *step = g->y, *along = g->K + n * n, *S = g->G;
+    double least = HUGE_VAL, most = 0.0;
+    for (j = 0; j < m; j++)
+        for (i = 0; i < n; i++) A[j * n + i] = g->K[i * n + j];
+    factorize(f, n, m, m, 0.0);
+    for (k = 0; k < m; k++) {
+        least = fmin(least, pivot_of(f, n, k));
+        most = fmax(most, pivot_of(f, n, k));
+    }
+    if (!(least > DEGENERATE * most)) return 1;
+    memset(step, 0, sizeof(double) * (size_t)n);
+    forward(f, n, m, r, step);
+    reflect_back(f, n, m, step);
+    memset(along, 0, sizeof(double) * (size_t)(n * d));
+    for (k = 0; k < d; k++) {
+        double *Z = along + k * n;
+        Z[f->row[m + k]] = 1.0;
+        reflect_back(f, n, m, Z);
+        for (i = 0; i < n; i++) r[m + k] -= g->K[i * n + m + k] * step[i];
+        for (j = 0; j < d; j++)
+            for (S[k * d + j] = 0.0, i = 0; i < n; i++)
+                S[k * d + j] += g->K[i * n + m + j] * Z[i];
+    }
+    if (solve(S, d, r + m, 1)) return 1;
+    for (k = 0; k < d; k++)
+        for (i = 0; i < n; i++) step[i] += along[k * n + i] * r[m + k];
+    memcpy(r, step, sizeof(double) * (size_t)n);
+    return 0;
+}
+
 /* Newton steps from q in x onto all rows, xi as given; *distance: how far they went. */
 static int onto_rows(passage *g, double t, const double *xi, double *x, double *distance) {
     frame *p = &g->here;
@@ -348,7 +529,7 @@ static int onto_rows(passage *g, double t, const double *xi, double *x, double *
     int first = g->size.speeds - g->size.anchors, after = g->size.speeds;
     double *K = g->K, *r = g->r, total = 0.0;
     for (pass = 0; pass < NEWTON; pass++) {
-        double move = 0.0, least = HUGE_VAL, most = 0.0;
+        double move = 0.0;
         if (rows_at(g, t, x, &p->rows)) return 1;
         memcpy(r, p->rows.position, sizeof(double) * (size_t)m);
         for (i = first; i < after; i++) r[i] -= g->base.rows.position[i];
@@ -365,18 +546,8 @@ static int onto_rows(passage *g, double t, const double *xi, double *x, double *
             r[m + k] = off / size;
         }
         if (rows < nq || !stepper_all_finite(r, rows)) return 1;
+        if (rows == nq ? sparse_newton_step(g, r) : newton_step(g, rows, r)) return 1;
         for (k = 0; k < nq; k++) {
-            double weight = dense_reflection(K + k * rows + k, rows - k);
-            for (j = k + 1; j < nq; j++)
-                dense_reflect(K + k * rows + k, weight, rows - k, K + j * rows + k);
-            dense_reflect(K + k * rows + k, weight, rows - k, r + k);
-            least = fmin(least, fabs(K[k * rows + k]));
-            most = fmax(most, fabs(K[k * rows + k]));
-        }
-        if (!(least > 10 * DBL_EPSILON * most)) return 1;
-        for (k = nq - 1; k >= 0; k--) {
-            for (i = k + 1; i < nq; i++) r[k] -= K[i * rows + k] * r[i];
-            r[k] /= K[k * rows + k];
             x[k] -= r[k];
             move = fmax(move, fabs(r[k]));
         }
@@ -414,8 +585,7 @@ static int predict(passage *g, double t, const double *xi, double *x) {
     }
     for (j = 0; j < nv; j++) D[j] += 0.5 * bend[j] * dt * dt;
     for (i = 0; i < nq; i++) {
-        x[i] = x0[i];
-        for (j = 0; j < nv; j++) x[i] += g->base.rows.N[j * nq + i] * D[j];
+        x[i] = x0[i] + rate_of(g, &g->base.rows, i, D);
     }
     return 0;
 }
@@ -475,16 +645,11 @@ static int lift(passage *g, double t, const double *y, double *x, double *xdot, 
             sum += p->more * p->rows.J[i * g->size.speeds + j] * p->rows.c[j];
         a[i] = sum;
     }
-    lower(p->M, nv, a);
-    for (k = 0; k < p->rank; k++)
-        dense_reflect(p->A + k * nv + k, p->weight[k], nv - k, a + k);
+    lower(p->M, p->end, nv, a);
+    for (k = 0; k < p->rank; k++) reflect(&p->qr, nv, k, a);
     along_rows(g, p, p->rows.c, a);
     to_velocity(g, p, a);
-    for (i = 0; i < nq; i++) {
-        double rate = 0.0;
-        for (j = 0; j < nv; j++) rate += p->rows.N[j * nq + i] * v[j];
-        xdot[i] = rate;
-    }
+    for (i = 0; i < nq; i++) xdot[i] = rate_of(g, &p->rows, i, v);
     memcpy(xdot + nq + nv, p->rate, sizeof(double) * (size_t)nz);
     memcpy(ydot, u, sizeof(double) * (size_t)d);
     coordinates(g, p, a, ydot + d);
@@ -556,15 +721,14 @@ static double regularity_at(passage *g, double t, const double *x) {
 
 /* A regular state behind a singular one, along its velocity; 1 where no branch has this velocity. */
 static int base_behind(passage *g, double t, const double *x) {
-    int nq = g->size.nq, nv = g->size.nv, n = g->s->n, i, j, pass;
+    int nq = g->size.nq, nv = g->size.nv, n = g->s->n, i, pass;
     double *q = g->at, *v = g->w, *y = g->y, speed = 0.0, move = HUGE_VAL, behind, part;
     for (i = 0; i < nv; i++) speed = fmax(speed, fabs(x[nq + i]));
     if (!(speed > 0.0) || evaluate(g, &g->here, t, x)) return 1;
     behind = t - (g->size.moving ? BACK / speed : 0.0);
     memcpy(q, x, sizeof(double) * (size_t)n);
     for (i = 0; i < nv; i++) v[i] = -x[nq + i] * BACK / speed;
-    for (i = 0; i < nq; i++)
-        for (j = 0; j < nv; j++) q[i] += g->here.rows.N[j * nq + i] * v[j];
+    for (i = 0; i < nq; i++) q[i] += rate_of(g, &g->here.rows, i, v);
     for (pass = 0; pass < NEWTON && !(move < LAST_MOVE); pass++) {
         if (evaluate(g, &g->base, behind, q) || factor(g, &g->base)) return 1;
         memset(y, 0, sizeof(double) * (size_t)nv);
@@ -572,8 +736,7 @@ static int base_behind(passage *g, double t, const double *x) {
         to_velocity(g, &g->base, y);
         move = 0.0;
         for (i = 0; i < nv; i++) move = fmax(move, fabs(y[i]));
-        for (i = 0; i < nq; i++)
-            for (j = 0; j < nv; j++) q[i] -= g->base.rows.N[j * nq + i] * y[j];
+        for (i = 0; i < nq; i++) q[i] -= rate_of(g, &g->base.rows, i, y);
     }
     if (!(move < LAST_MOVE)) return 1;
     if (evaluate(g, &g->base, behind, q) || factor(g, &g->base)) return 1;
@@ -677,7 +840,8 @@ static void error_of(const passage *g, double h, double *error) {
             move += T[k * nv + i] * e[k];
             error[nq + i] += T[k * nv + i] * e[d + k];
         }
-        for (j = 0; j < nq; j++) error[j] += N[i * nq + j] * move;
+        for (j = 0; j < nq && nq > nv; j++) error[j] += N[i * nq + j] * move;
+        if (nq == nv) error[i] += move;
     }
     memcpy(error + nq + nv, e + 2 * d, sizeof(double) * (size_t)nz);
 }
@@ -704,36 +868,18 @@ static void square(const passage *g, const passage_rows *rows, int transposed, d
         for (k = 0; k < nv; k++) {
             double value = 0.0;
             if (k < g->base.rank)
-                value = rows->J[j * m + g->base.order[k]];
+                value = rows->J[j * m + g->base.qr.order[k]];
             else
-                for (i = 0; i < nq; i++)
-                    value += g->C[i * g->d + k - g->base.rank] * rows->N[j * nq + i];
+                for (i = nq == nv ? j : 0; i < (nq == nv ? j + 1 : nq); i++)
+                    value += g->C[i * g->d + k - g->base.rank] * (nq == nv ? 1.0 : rows->N[j * nq + i]);
             K[transposed ? k * nv + j : j * nv + k] = value;
         }
 }
 
 /* The side of the singular configuration on which a point is, by the sign of a determinant. */
 static int side_of(const passage *g, const passage_rows *rows) {
-    double *A = g->K;
-    int n = g->size.nv, sign = 1, i, j, k;
-    square(g, rows, 0, A);
-    for (k = 0; k < n; k++) {
-        int pivot = k;
-        for (i = k + 1; i < n; i++)
-            if (fabs(A[k * n + i]) > fabs(A[k * n + pivot])) pivot = i;
-        if (!(fabs(A[k * n + pivot]) > 0.0)) return 0;
-        for (j = k; j < n && pivot != k; j++) {
-            double kept = A[j * n + k];
-            A[j * n + k] = A[j * n + pivot];
-            A[j * n + pivot] = kept;
-        }
-        if ((A[k * n + k] < 0.0) != (pivot != k)) sign = -sign;
-        for (i = k + 1; i < n; i++) {
-            double part = A[k * n + i] / A[k * n + k];
-            for (j = k + 1; j < n; j++) A[j * n + i] -= part * A[j * n + k];
-        }
-    }
-    return sign;
+    square(g, rows, 0, g->K);
+    return eliminate(g->K, g->size.nv, NULL, 0);
 }
 
 /* How far the rows are from holding where they are dependent: what of them no move of the positions
@@ -749,7 +895,7 @@ static double gap_of(const passage *g, const passage_rows *rows) {
         for (i = 0; i < n; i++) y[i] /= most;
     }
     for (most = 0.0, i = 0; i < g->base.rank; i++) {
-        int row = g->base.order[i], anchored = row >= first && row < g->size.speeds;
+        int row = g->base.qr.order[i], anchored = row >= first && row < g->size.speeds;
         most = fmax(most, fabs(y[i]));
         sum += y[i] * (rows->position[row] - (anchored ? g->base.rows.position[row] : 0.0));
     }
@@ -962,12 +1108,9 @@ int passage_jumps(passage *g, double t, const double *x, const double *first, do
 int passage_state(passage *g, double t, const double *y, const double *guide, double *x,
                   double *slope_x, double *slope_y, double *alignment) {
     double largest = g->memory[SIGMA];
-    int nq = g->size.nq, nv = g->size.nv, i, j, status;
+    int nq = g->size.nq, i, status;
     if (restored(g) || rows_at(g, t, guide, &g->here.rows)) return STEPPER_SINGULAR;
-    for (i = 0; i < nq; i++) {
-        g->guided[i] = 0.0;
-        for (j = 0; j < nv; j++) g->guided[i] += g->here.rows.N[j * nq + i] * guide[nq + j];
-    }
+    for (i = 0; i < nq; i++) g->guided[i] = rate_of(g, &g->here.rows, i, guide + nq);
     g->guide = guide;
     g->sigma = HUGE_VAL;
     status = slope(g, t, y, x, slope_x, slope_y);
@@ -983,7 +1126,7 @@ int passage_singular(passage *g, double t, const double *x) {
 
 int passage_place(passage *g, double t, double *x, const int *loose, int count) {
     int m = g->size.positions, first = g->size.speeds - g->size.anchors, i, j, pass;
-    double worst = HUGE_VAL, move = HUGE_VAL, *A = g->K, *r = g->r;
+    double worst = HUGE_VAL, move = HUGE_VAL, *A = g->other.A, *r = g->r;
     for (pass = 0; pass <= PLACING; pass++) {
         if (rows_at(g, t, x, &g->here.rows)) return 1;
         for (worst = 0.0, j = 0; j < m; j++) {
@@ -995,7 +1138,7 @@ int passage_place(passage *g, double t, double *x, const int *loose, int count) 
         }
         if (!isfinite(worst) || !stepper_all_finite(A, m * count)) return 1;
         if (move < LAST_MOVE || pass == PLACING) break;
-        shortest(g, A, count, m, r, SETTLED, g->y);
+        shortest(g, count, m, r, SETTLED, g->y);
         for (move = 0.0, i = 0; i < count; i++) {
             x[loose[i]] += g->y[i];
             move = fmax(move, fabs(g->y[i]));
@@ -1006,7 +1149,7 @@ int passage_place(passage *g, double t, double *x, const int *loose, int count) 
 
 int passage_velocities(passage *g, double t, double *x, const int *kept, int count) {
     int nq = g->size.nq, nv = g->size.nv, m = g->size.speeds, i, j;
-    double *A = g->K, *r = g->r, *v = x + nq, *y = g->y, speed = 0.0, miss = 0.0;
+    double *A = g->other.A, *r = g->r, *v = x + nq, *y = g->y, speed = 0.0, miss = 0.0;
     if (rows_at(g, t, x, &g->here.rows)) return 1;
     for (j = 0; j < m + count; j++) {
         int anchored = j >= m - g->size.anchors && j < m;
@@ -1017,7 +1160,7 @@ int passage_velocities(passage *g, double t, double *x, const int *kept, int cou
         }
     }
     if (!stepper_all_finite(A, (m + count) * nv)) return 1;
-    shortest(g, A, nv, m + count, r, DEPENDENT, y);
+    shortest(g, nv, m + count, r, DEPENDENT, y);
     for (i = 0; i < nv; i++) speed = fmax(speed, fabs(y[i]));
     for (j = 0; j < m + count; j++) {
         double off = j < m ? -r[j] : y[kept[j - m]] - r[j];
@@ -1052,7 +1195,7 @@ int passage_loosest(passage *g, double t, const double *x, const double *unit) {
     for (k = first; k < nv; k++) { /* the directions that rows constrain least, orthonormal */
         double *v = B + (k - first) * nv, size = 0.0;
         memset(v, 0, sizeof(double) * (size_t)nv);
-        v[k] = 1.0;
+        v[g->here.qr.row[k]] = 1.0;
         to_velocity(g, &g->here, v);
         for (i = 0; i < nv; i++) v[i] *= unit[i];
         for (j = 0; j < k - first; j++) {
@@ -1099,6 +1242,22 @@ static double *take(double *block, size_t *used, size_t count) {
     return found;
 }
 
+static void lay_factors(factors *f, size_t n, size_t m, double *block, size_t *used) {
+    f->A = take(block, used, n * m);
+    f->weight = take(block, used, n);
+    f->tails = take(block, used, n * n);
+    f->size = take(block, used, m);
+    f->where = (mask *)take(block, used, m * WORDS(n));
+}
+
+static int *lay_numbers(factors *f, size_t n, size_t m, int *numbers) {
+    f->order = numbers;
+    f->row = f->order + m;
+    f->count = f->row + n;
+    f->moved = f->count + n;
+    return f->moved + n * n;
+}
+
 static void lay_frame(frame *p, const passage_size *z, double *block, size_t *used) {
     size_t nq = (size_t)z->nq, nv = (size_t)z->nv, m = (size_t)z->speeds, l = (size_t)z->positions;
     p->rows.position = take(block, used, l);
@@ -1110,10 +1269,10 @@ static void lay_frame(frame *p, const passage_size *z, double *block, size_t *us
     p->rows.bend = take(block, used, nq);
     p->rows.rank = take(block, used, 1);
     p->M = take(block, used, nv * nv);
+    p->end = (int *)take(block, used, nv);
     p->f = take(block, used, nv);
     p->rate = take(block, used, (size_t)z->nz);
-    p->A = take(block, used, nv * m);
-    p->weight = take(block, used, nv);
+    lay_factors(&p->qr, nv, m, block, used);
     p->T = take(block, used, nv * nv);
 }
 
@@ -1124,6 +1283,7 @@ static size_t lay(passage *g, double *block) {
     int k;
     lay_frame(&g->base, z, block, &used);
     lay_frame(&g->here, z, block, &used);
+    lay_factors(&g->other, nq, rows, block, &used);
     g->C = take(block, &used, nv * nq);
     g->guided = take(block, &used, nq);
     g->drift = take(block, &used, nv);
@@ -1137,7 +1297,7 @@ static size_t lay(passage *g, double *block) {
     g->at = take(block, &used, n);
     g->side = take(block, &used, nv);
     g->sum = take(block, &used, 2 * n + 2 * ny);
-    g->K = take(block, &used, rows * nq + nv * (nv + 1));
+    g->K = take(block, &used, rows * nq + nq * (nq + 1));
     g->r = take(block, &used, rows + nv);
     g->y = take(block, &used, ny);
     g->w = take(block, &used, ny);
@@ -1151,21 +1311,23 @@ passage *passage_new(stepper *s, const passage_size *size, const passage_model *
                      double *memory) {
     static const stepper_method hybrid = {open, attempt, keep, close, interpolate, opening};
     passage *g = calloc(1, sizeof *g);
+    size_t nq = (size_t)size->nq, nv = (size_t)size->nv, m = (size_t)size->speeds;
+    size_t rows = (size_t)size->positions + nv;
+    int *next;
     if (!g) return NULL;
     g->s = s;
     g->size = *size;
     g->model = *model;
     g->memory = memory;
     g->block = calloc(lay(g, NULL), sizeof *g->block);
-    g->orders = calloc(2 * (size_t)size->speeds + (size_t)(size->positions + size->nv) + 1,
-                       sizeof *g->orders);
-    if (!g->block || !g->orders) {
+    g->numbers = calloc(2 * (m + nv * (nv + 2)) + rows + nq * (nq + 2) + 1, sizeof *g->numbers);
+    if (!g->block || !g->numbers) {
         passage_free(g);
         return NULL;
     }
     lay(g, g->block);
-    g->base.order = g->orders;
-    g->here.order = g->orders + size->speeds;
+    next = lay_numbers(&g->here.qr, nv, m, lay_numbers(&g->base.qr, nv, m, g->numbers));
+    lay_numbers(&g->other, nq, rows, next);
     g->inner = s->method;
     s->method = &hybrid;
     s->passage = g;
@@ -1176,6 +1338,6 @@ passage *passage_new(stepper *s, const passage_size *size, const passage_model *
 void passage_free(passage *g) {
     if (!g) return;
     free(g->block);
-    free(g->orders);
+    free(g->numbers);
     free(g);
 }

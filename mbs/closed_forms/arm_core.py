@@ -4,29 +4,32 @@ from __future__ import annotations
 
 import ctypes
 import functools
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
+from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Arm, Array
 from mbs.closed_forms.raghavan_roth.numbers import Prepared
 from mbs.native import cached_library, compiler_found
+from mbs.native.handwritten import handwritten
 
 Hits: TypeAlias = NDArray[np.int64]
 
 _PAIRS = ("rigid", "arm", "arm_search", "pair", "dense", "eigenvalues", "raghavan_roth", "pose")
 _SOURCES = (
     "arm_descend.c",
-    "arm_nearest.c",
-    "arm_calls.c",
     "raghavan_roth_roots.c",
     "raghavan_roth_middle.c",
     "raghavan_roth_rest.c",
     "raghavan_roth_solve.c",
 )
+_CALLS = ("arm_nearest.h", "arm_nearest.c", "arm_calls.c")  # for callers in Python
 _FLAGS = ("-O3", "-ffp-contract=off", "-fPIC", "-shared")
 _JOINTS = 7  # for which the core has room
 
@@ -98,12 +101,16 @@ def path_of(library: ctypes.CDLL) -> Path:
     return Path(library._name)
 
 
+def _files(sources: tuple[str, ...]) -> dict[str, str]:
+    """The text of the core: the C files and headers of `_PAIRS`, and other C files."""
+    folder = resources.files("mbs.native") / "runtime"
+    names = [*(name + end for name in _PAIRS for end in (".c", ".h")), *sources]
+    return {name: (folder / name).read_text(encoding="utf-8") for name in names}
+
+
 @functools.cache
 def _load() -> ctypes.CDLL:
-    folder = resources.files("mbs.native") / "runtime"
-    names = [*_SOURCES, *(name + end for name in _PAIRS for end in (".c", ".h"))]
-    files = {name: (folder / name).read_text(encoding="utf-8") for name in names}
-    library = ctypes.CDLL(str(cached_library(files, _FLAGS)))
+    library = ctypes.CDLL(str(cached_library(_files((*_SOURCES, *_CALLS)), _FLAGS)))
     for name, (result, arguments) in _SIGNATURES.items():
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments
@@ -333,7 +340,7 @@ class _LoopStruct(ctypes.Structure):
         ("sign", _int),
         ("slides", _int * 6),
         ("offsets", _double * 6),
-        ("ways", _double * 96),
+        ("ways", _double * 16 * 6),
         ("place", _int),
         ("after", _double * 16),
         ("length", _double),
@@ -363,7 +370,7 @@ class HandedLoop:
             loop.sign,
             (_int * 6)(*map(int, loop.prismatic)),
             (_double * 6)(*loop.offsets.tolist()),
-            (_double * 96)(*loop.ways.ravel().tolist()),
+            (_double * 16 * 6)(*((_double * 16)(*way.ravel().tolist()) for way in loop.ways)),
             loop.index,
             (_double * 16)(*loop.after.ravel().tolist()),
             loop.length,
@@ -407,3 +414,116 @@ def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbe
         return found[0]
     numbers, configurations = zip(*found, strict=True)
     return np.concatenate(numbers), np.concatenate(configurations)
+
+
+# The general method of one arm as a Function of C text, its numbers written out.
+
+
+COLUMNS = 16
+"""POSE_COLUMNS: configurations that `general_function` has room for."""
+
+_TABLES = """\
+#include <math.h>
+#include <string.h>
+#include "pose.h"
+
+static const double FUNCTION_gaps[] = {gaps};
+static const unsigned char FUNCTION_prismatic[] = {slides};
+static const arm FUNCTION_arm = {arm};
+{mix}static const roth_loop FUNCTION_loop = {loop};
+static const long long FUNCTION_indices[] = {indices};
+static const double FUNCTION_others[] = {others};
+static const pose_solver FUNCTION_solver = {solver};
+
+EXPORT int FUNCTION(const double **arg, double **res, long long *iw, double *w, int mem) {{
+    (void)iw;
+    (void)mem;
+    return pose_all(&FUNCTION_solver, arg, res, w);
+}}
+
+EXPORT int jac_FUNCTION(const double **arg, double **res, long long *iw, double *w, int mem) {{
+    (void)iw;
+    (void)w;
+    (void)mem;
+    return pose_all_jacobian(&FUNCTION_solver, arg, res);
+}}
+"""
+
+
+class SolverStruct(ctypes.Structure):
+    """`pose_solver` of pose.h."""
+
+    _fields_ = (
+        *((name, ctypes.c_void_p) for name in ("robot", "loop", "evaluate", "checkout", "release")),
+        *((name, ctypes.c_longlong) for name in ("branches", "arguments", "results")),
+        *((name, ctypes.c_longlong) for name in ("integers", "reals")),
+        ("suspect", ctypes.c_double),
+        ("nearly", ctypes.c_double),
+        ("nq", ctypes.c_longlong),
+        *((name, ctypes.c_void_p) for name in ("indices", "others")),
+    )
+
+
+def general_function(
+    name: str, handed: HandedLoop, indices: Sequence[int], others: Array, nearly: float
+) -> Function:
+    """``name(T) -> q, valid, count, certain``, see `pose_all` of pose.h, of this computer's code.
+
+    Args:
+        name: what its name begins with.
+        handed: the arm, ready for the general method.
+        indices: (6,) of its joints among the coordinates.
+        others: (nq,) positions of all coordinates; those of the arm do not count [rad or m].
+        nearly: smallest singular value below which configurations may be missing.
+
+    Raises:
+        CompilerError: there is no compiler.
+    """
+    nq, arm = len(others), handed.arm
+    solver = SolverStruct(nearly=nearly, nq=nq)
+    of_arm = {"gaps": "FUNCTION_gaps", "slides": "FUNCTION_prismatic"}
+    of_loop = {"mix": "FUNCTION_mix"} if handed.loop.mix else {}
+    of_solver = {"robot": "&FUNCTION_arm", "loop": "&FUNCTION_loop"}
+    of_solver |= {"indices": "FUNCTION_indices", "others": "FUNCTION_others"}
+    mix = _initializer(handed.mix.ravel())
+    own = _TABLES.format(
+        gaps=_initializer(arm.gaps.ravel()),
+        slides=_initializer(arm.slides),
+        arm=_initializer(arm.arm, of_arm),
+        mix=f"static const double FUNCTION_mix[] = {mix};\n" if handed.loop.mix else "",
+        loop=_initializer(handed.loop, of_loop),
+        indices=_initializer(indices),
+        others=_initializer(others),
+        solver=_initializer(solver, of_solver),
+    )
+    T, outputs = SX.sym("T", 4, 4), {"q": (nq, COLUMNS), "valid": (COLUMNS, 1)}
+    outputs |= {"count": (1, 1), "certain": (1, 1)}
+    values = [SX.zeros(*shape) for shape in outputs.values()]
+    signature = Function(name, [T], values, ["T"], [*outputs])
+    given = [T, *(SX.sym(f"out_{key}", *shape) for key, shape in outputs.items())]
+    slopes = [SX.ones(COLUMNS * nq, 16), *(SX(n, 16) for n in (COLUMNS, 1, 1))]
+    jacobian = Function(
+        f"jac_{name}",
+        given,
+        slopes,
+        ["T", *(f"out_{key}" for key in outputs)],
+        [f"jac_{key}_T" for key in outputs],
+    )
+    work = _CANDIDATES * (nq + 3)
+    return handwritten(signature, jacobian, own, _files(_SOURCES), work)
+
+
+def _initializer(value: Any, owned: Mapping[str, str] = MappingProxyType({})) -> str:
+    """C text of numbers, or of a structure, whose pointers are names or null."""
+    if isinstance(value, ctypes.Structure):
+        pairs = [(field[0], field[1]) for field in value._fields_]
+        texts = (
+            owned.get(name, "0") if kind is _pointer else _initializer(getattr(value, name))
+            for name, kind in pairs
+        )
+        return f"{{{', '.join(texts)}}}"
+    if isinstance(value, (int, np.integer)):
+        return str(int(value))
+    if isinstance(value, (float, np.floating)):
+        return repr(float(value))
+    return f"{{{', '.join(_initializer(x) for x in value)}}}"

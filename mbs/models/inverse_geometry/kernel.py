@@ -161,20 +161,6 @@ def kernel_of(chain: FrameChain, p: Array, method: str = "auto") -> PoseKernel |
 # The compiled call: one builtin for all robots, which is handed what it needs to know of one.
 
 
-class _SolverStruct(ctypes.Structure):
-    """`pose_solver` of pose.h."""
-
-    _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("arm", "loop", "evaluate", "checkout", "release")),
-        *((name, ctypes.c_longlong) for name in ("branches", "arguments", "results")),
-        *((name, ctypes.c_longlong) for name in ("integers", "reals")),
-        ("suspect", ctypes.c_double),
-        ("nearly", ctypes.c_double),
-        ("nq", ctypes.c_longlong),
-        *((name, ctypes.c_void_p) for name in ("indices", "others")),
-    )
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _PoseCode:
     """The compiled call of a kernel.
@@ -203,7 +189,7 @@ def _pose_code(chain: FrameChain, p: Array, solves: StepSequence | General) -> _
     machine: MachineCode | None = None
     if isinstance(solves, General):
         handed, room, work = solves.handed.arm, _CANDIDATES, _CANDIDATES
-        own = _SolverStruct(
+        own = core.SolverStruct(
             handed.address, solves.handed.address, *[None] * 3, *[0] * 5, 0.0, NEARLY_SINGULAR, *end
         )
     else:
@@ -215,7 +201,7 @@ def _pose_code(chain: FrameChain, p: Array, solves: StepSequence | General) -> _
         work = arguments + results + integers + reals + 3 * room
         addresses = (machine.evaluate, machine.checkout, machine.release)
         sizes = (room, arguments, results, integers, reals)
-        own = _SolverStruct(handed.address, None, *addresses, *sizes, *bounds_of(solves), *end)
+        own = core.SolverStruct(handed.address, None, *addresses, *sizes, *bounds_of(solves), *end)
     solver = np.frombuffer(memoryview(own).cast("B"), dtype=np.float64)
     inputs = [SX.sym("T", 4, 4), SX.sym("solver", solver.size)]
     room = max(room, 2)  # one column alone would come as a vector

@@ -6,7 +6,7 @@
 #include "rigid.h"
 
 enum { STALLS = 3, ROWS = 7 + ARM_JOINTS };
-static const double FINE = 1e-26;   /* costs below it are those of solutions but for rounding */
+static const double SOLUTION = 1e-26;   /* costs below it are those of solutions but for rounding */
 static const double FINEST = 1e-31; /* nothing is left to gain */
 static const double WEAK = 1e-8;    /* pivots of squares below it are taken for rounding */
 static const double LEAST = 1e-31;  /* damping, so that no matrix is singular */
@@ -45,7 +45,7 @@ static int normal_step(const arm *a, const configuration *p, double shift, doubl
 }
 
 /* Reflects columns j .. n so that column j ends at its element j. */
-static void reflect(double A[ARM_JOINTS + 1][ROWS], int j, int n, int rows) {
+static void reflect_rows(double A[ARM_JOINTS + 1][ROWS], int j, int n, int rows) {
     double size = 0.0, scale;
     int i, k;
     for (i = j; i < rows; i++) size += A[j][i] * A[j][i];
@@ -70,7 +70,7 @@ static void orthogonal_step(const arm *a, const configuration *p, double shift, 
         A[j][6 + j] = sqrt(shift);
     }
     memcpy(A[n], p->gap, sizeof p->gap);
-    for (j = 0; j < n; j++) reflect(A, j, n, rows);
+    for (j = 0; j < n; j++) reflect_rows(A, j, n, rows);
     for (j = n - 1; j >= 0; j--) {
         dx[j] = A[n][j];
         for (k = j + 1; k < n; k++) dx[j] -= A[k][j] * dx[k];
@@ -90,7 +90,7 @@ static void held_step(const arm *a, const configuration *p, const double *right,
     }
     memcpy(A[n], right, 6 * sizeof(double));
     A[n][6] = value;
-    for (j = 0; j < n; j++) reflect(A, j, n, 7 + n);
+    for (j = 0; j < n; j++) reflect_rows(A, j, n, 7 + n);
     for (j = n - 1; j >= 0; j--) {
         dx[j] = A[n][j];
         for (k = j + 1; k < n; k++) dx[j] -= A[k][j] * dx[k];
@@ -287,7 +287,7 @@ void arm_descend(const arm *a, const double *target, configuration *p) {
         attempt(a, target, p, damping, &next);
         if (!(next.cost < p->cost)) {
             damping = damping < 1e-3 ? 1e-2 : 4.0 * damping;
-            stalls += p->cost < FINE || damping * p->cost > 1e12;
+            stalls += p->cost < SOLUTION || damping * p->cost > 1e12;
             continue;
         }
         gain = 1.0 - next.cost / p->cost;

@@ -63,6 +63,7 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
         ctypes.c_int,
         (_pointer, _pointer, _integer, *[_pointer] * 4, _real, _real, _pointer, _pointer),
     ),
+    "mbs_round": (ctypes.c_int, (_pointer,)),
     "mbs_nearest": (_real, (_pointer, _pointer, _integer, ctypes.c_ulonglong, _pointer)),
 }
 
@@ -256,6 +257,12 @@ def walked_by(
         ctypes.addressof(closed),
     )
     return points[:count].copy(), bool(closed.value)
+
+
+def rounded_by(library: ctypes.CDLL, T: Array) -> Array | None:
+    """The rigid transform nearest to T, (4, 4); None where it is none but for 1e-6."""
+    own = np.array(T, dtype=float, order="C")
+    return own if library.mbs_round(_at(own)) else None
 
 
 def settled_by(

@@ -135,3 +135,6 @@ EXPORT int mbs_settle(const arm *a, const double *T, long long branches, double 
                          number, &doubtful);
     return doubtful ? POSE_DOUBTFUL : POSE_CERTAIN;
 }
+
+/* `pose_round`. */
+EXPORT int mbs_round(double *T) { return pose_round(T); }

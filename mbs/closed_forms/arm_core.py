@@ -29,7 +29,10 @@ _SOURCES = (
     "raghavan_roth_rest.c",
     "raghavan_roth_solve.c",
 )
-_CALLS = ("arm_nearest.h", "arm_nearest.c", "arm_calls.c")  # for callers in Python
+_CALLS = (
+    *("arm_nearest.h", "arm_nearest.c", "arm_reduce.h", "arm_reduce.c"),
+    "arm_calls.c",
+)  # for callers in Python
 _FLAGS = ("-O3", "-ffp-contract=off", "-fPIC", "-shared")
 _JOINTS = 7  # for which the core has room
 
@@ -63,6 +66,8 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
         ctypes.c_int,
         (_pointer, _pointer, _integer, *[_pointer] * 4, _real, _real, _pointer, _pointer),
     ),
+    "mbs_reach_sphere": (None, (_pointer, _pointer, _pointer, _real, _integer, _pointer)),
+    "mbs_reduced": (ctypes.c_int, (_pointer, _pointer, _pointer, _integer, *[_pointer] * 3)),
     "mbs_round": (ctypes.c_int, (_pointer,)),
     "mbs_nearest": (_real, (_pointer, _pointer, _integer, ctypes.c_ulonglong, _pointer)),
 }
@@ -130,7 +135,7 @@ def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Arr
     own, residual, _ = _rooms(len(q), arm.size)
     own[:] = q
     target = _targets(T, len(q))
-    stride, handed = 16 if target.ndim == 3 else 0, Handed(arm)
+    stride, handed = 16 if target.ndim == 3 else 0, handed_of(arm)
     library.mbs_polish(handed.address, _at(target), stride, len(q), _at(own), _at(residual))
     return own, residual
 
@@ -141,7 +146,7 @@ def found_by(
     """Configurations (m, n) that multi-start Levenberg-Marquardt finds, and how often, (m,)."""
     target = _wanted(T, 4, 4)
     q, residual, hits = _rooms(starts, arm.size)
-    handed = Handed(arm)
+    handed = handed_of(arm)
     count = library.mbs_search(
         handed.address, _at(target), starts, seed, _at(q), _at(residual), hits.ctypes.data
     )
@@ -153,7 +158,7 @@ def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array
     target = _wanted(T, 4, 4)
     own, residual, hits = _rooms(len(q), arm.size)
     own[:] = q
-    handed = Handed(arm)
+    handed = handed_of(arm)
     count = library.mbs_merge(
         handed.address, _at(target), len(q), _at(own), _at(residual), hits.ctypes.data
     )
@@ -163,7 +168,7 @@ def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array
 def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int) -> Array:
     """The configuration, (n,), whose pose is nearest to T."""
     target, q = _wanted(T, 4, 4), np.empty(arm.size)
-    handed = Handed(arm)
+    handed = handed_of(arm)
     library.mbs_nearest(handed.address, _at(target), starts, seed, _at(q))
     return q
 
@@ -171,7 +176,7 @@ def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int)
 def singular_by(library: ctypes.CDLL, arm: Arm, q: Array, bound: float) -> NDArray[np.bool_]:
     """Which of configurations q, (m, n), have a singular value below a bound, (m,)."""
     own, singular = _wanted(q, len(q), arm.size), np.empty(len(q), dtype=bool)
-    handed = Handed(arm)
+    handed = handed_of(arm)
     library.mbs_singular(handed.address, bound, len(q), _at(own), singular.ctypes.data)
     return singular
 
@@ -193,7 +198,7 @@ def corrected_by(
     m, n = len(x), arm.size
     own = np.array(np.broadcast_to(x, (m, n)), dtype=float, order="C")
     target = _targets(T, m)
-    stride, handed = 16 if target.ndim == 3 else 0, Handed(arm)
+    stride, handed = 16 if target.ndim == 3 else 0, handed_of(arm)
     rows, right = _wanted(held, m, n), _wanted(value, m)
     library.mbs_correct(
         handed.address, _at(target), stride, m, _at(rows), _at(right), iterations, _at(own)
@@ -204,7 +209,7 @@ def corrected_by(
 def residual_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> Array:
     """(m,) largest element of pose(q) - T, T (4, 4) or (m, 4, 4), at q, (m, n)."""
     own, target, residual = _wanted(q, *q.shape), _targets(T, len(q)), np.empty(len(q))
-    handed = Handed(arm)
+    handed = handed_of(arm)
     stride = 16 if target.ndim == 3 else 0
     library.mbs_residual(handed.address, _at(target), stride, len(q), _at(own), _at(residual))
     return residual
@@ -215,10 +220,62 @@ def examined_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Arr
     m, n = q.shape
     own, target = _wanted(q, m, n), _targets(T, m)
     gap, J = np.empty((m, 6)), np.empty((m, n, 6))
-    handed = Handed(arm)
+    handed = handed_of(arm)
     stride = 16 if target.ndim == 3 else 0
     library.mbs_examine(handed.address, _at(target), stride, m, _at(own), _at(gap), _at(J))
     return gap, np.swapaxes(J, 1, 2)
+
+
+def on_sphere_by(
+    library: ctypes.CDLL, arm: Arm, T: Array, centre: Array, radius: float, x: Array
+) -> Array:
+    """Configurations (m, n) of x = q / unit, (m, n), brought to the pose and a distance.
+
+    Args:
+        library: the core.
+        arm: whose configurations.
+        T: (4, 4) the pose that is held.
+        centre: (n,) from where the distance counts.
+        radius: the distance.
+        x: (m, n) first guesses.
+    """
+    own, middle = np.array(x, dtype=float, order="C"), _wanted(centre, arm.size)
+    target, handed = _wanted(T, 4, 4), handed_of(arm)
+    library.mbs_reach_sphere(handed.address, _at(target), _at(middle), radius, len(own), _at(own))
+    return own
+
+
+class _ReductionStruct(ctypes.Structure):
+    """`arm_reduction` of arm_reduce.h."""
+
+    _fields_ = (
+        ("corank", ctypes.c_int),
+        *((name, ctypes.c_void_p) for name in ("centre", "solved", "left", "null")),
+    )
+
+
+def reduced_by(
+    library: ctypes.CDLL, arm: Arm, T: Array, parts: tuple[Array, Array, Array, Array], h: Array
+) -> tuple[Array, Array, bool]:
+    """X (m, n) and g (m, 6 - rank) for h, (m, corank), and whether all were found.
+
+    Args:
+        library: the core.
+        arm: whose configurations.
+        T: (4, 4) the pose.
+        parts: of a reduction: its centre (n,), and the directions solved (rank, 6), left
+            (6 - rank, 6) and null (corank, n).
+        h: the unknowns that remain.
+    """
+    count, corank = h.shape
+    held = [np.ascontiguousarray(part, dtype=float) for part in parts]
+    own = _ReductionStruct(corank, *map(_at, held))
+    x, g = np.empty((count, arm.size)), np.empty((count, len(held[2])))
+    target, given, handed = _wanted(T, 4, 4), _wanted(h, count, corank), handed_of(arm)
+    found = library.mbs_reduced(
+        handed.address, _at(target), ctypes.addressof(own), count, _at(given), _at(x), _at(g)
+    )
+    return x, g, bool(found)
 
 
 def walked_by(
@@ -245,7 +302,7 @@ def walked_by(
     """
     points, target = np.empty((most + 1, arm.size)), _wanted(T, 4, 4)
     points[0] = start
-    along, closed, handed = _wanted(tangent, arm.size), ctypes.c_int(0), Handed(arm)
+    along, closed, handed = _wanted(tangent, arm.size), ctypes.c_int(0), handed_of(arm)
     count = library.mbs_walk(
         handed.address,
         _at(target),
@@ -312,8 +369,16 @@ class Handed:
         self.address = ctypes.addressof(self.arm)
 
 
+@functools.lru_cache(maxsize=256)
+def handed_of(arm: Arm) -> Handed:
+    """The same, made once for an arm, which never changes."""
+    return Handed(arm)
+
+
 def _wanted(T: Array, *shape: int) -> Array:
-    """Poses as C reads them; a wrong shape is refused, for C would read beyond the array."""
+    """Numbers as C reads them; a wrong shape is refused, for C would read beyond the array."""
+    if type(T) is np.ndarray and T.shape == shape and T.dtype == np.float64:
+        return T if T.flags.c_contiguous else np.ascontiguousarray(T)
     return np.ascontiguousarray(np.broadcast_to(np.asarray(T, dtype=float), shape))
 
 
@@ -367,7 +432,7 @@ class HandedLoop:
     def __init__(self, arm: Arm, prepared: Prepared) -> None:
         loop, pencil = prepared.arrangement, prepared.pencil
         elimination = pencil.elimination
-        self.arm = Handed(arm)
+        self.arm = handed_of(arm)
         self.mix = np.ascontiguousarray(pencil.mix, dtype=float)
         square = self.mix.shape[0] == self.mix.shape[1]
         parts = ("first", "second", "third", "fourth", "fifth")

@@ -13,7 +13,15 @@ from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Array
 from mbs.closed_forms.arm_search import nearest
 from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, named, new_among, roots
+from mbs.models.inverse_geometry.answer import (
+    ChainRoot,
+    Examined,
+    Question,
+    answer,
+    named,
+    new_among,
+    roots,
+)
 from mbs.models.inverse_geometry.branches import branch_labels
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, require_method, sequence_of
@@ -298,13 +306,14 @@ def solved(
     if method not in ("auto", *CLOSED_FORMS) or not _is_doubtful(target, gathered):
         return roots(target, gathered, question.chain_indices), gathered.method
     gathered = gather_further(chain, target, gathered, p)
-    found = roots(target, gathered, question.chain_indices)
+    examined: Examined = {}
+    found = roots(target, gathered, question.chain_indices, examined)
     if gathered.method == "search":
         return found, gathered.method
     # where an arm moves, a search gives points of what is known already
     more = new_among(target, found, by_search(target))
     if len(more.q):
-        found = roots(target, joined(gathered, more), question.chain_indices)
+        found = roots(target, joined(gathered, more), question.chain_indices, examined)
     return found, gathered.method
 
 

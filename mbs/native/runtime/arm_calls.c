@@ -1,5 +1,6 @@
 /* The arm's algorithms for callers that hand over plain arrays. */
 #include "arm_nearest.h"
+#include "arm_reduce.h"
 #include "arm_search.h"
 #include "pose.h"
 
@@ -138,3 +139,20 @@ EXPORT int mbs_settle(const arm *a, const double *T, long long branches, double 
 
 /* `pose_round`. */
 EXPORT int mbs_round(double *T) { return pose_round(T); }
+
+/* Brings x (count, n) to a sphere, see arm_reach_sphere. */
+EXPORT void mbs_reach_sphere(const arm *a, const double *target, const double *centre, double radius,
+                             long long count, double *x) {
+    long long i;
+    for (i = 0; i < count; i++) arm_reach_sphere(a, target, centre, radius, x + i * a->n);
+}
+
+/* x (count, n) and g (count, 6 - n + c) for h (count, c), see arm_reduced; whether all were found. */
+EXPORT int mbs_reduced(const arm *a, const double *target, const arm_reduction *r, long long count,
+                       const double *h, double *x, double *g) {
+    long long i;
+    int c = r->corank, found = 1;
+    for (i = 0; i < count; i++)
+        found &= arm_reduced(a, target, r, h + i * c, x + i * a->n, g + i * (6 - a->n + c));
+    return found;
+}

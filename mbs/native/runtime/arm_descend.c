@@ -13,6 +13,8 @@ static const double LEAST = 1e-31;  /* damping, so that no matrix is singular */
 static const double DEPENDENT = 1e-12; /* singular values below it are rounding, and damped */
 static const double ZERO = 2e-6;       /* those of a self-motion, known to the root of 1e-12 */
 static const double LONGEST = 0.3;     /* step [rad or arm lengths] in which all is nearly linear */
+static const double DEPENDENT_THERE = 1e-10; /* likewise on a sphere, where motions meet */
+static const double FINISHED = 1e-14;  /* step that is rounding of angles of about one */
 static const double SETTLED = 1e-12;   /* step that is hardly more than rounding, likewise */
 
 /* (J' J + shift) dx = J' gap by Cholesky. 0: too close to singular. */
@@ -116,6 +118,30 @@ void arm_correct(const arm *a, const double *target, const double *held, double 
         part = size > LONGEST ? LONGEST / size : 1.0;
         for (k = 0; k < a->n; k++) x[k] += part * dx[k];
         if (!(size >= SETTLED)) return;
+    }
+}
+
+void arm_reach_sphere(const arm *a, const double *target, const double *centre, double radius,
+                      double *x) {
+    enum { STEPS = 60 };
+    configuration p;
+    double dx[ARM_JOINTS], away[ARM_JOINTS];
+    int k, step;
+    for (step = 0; step < STEPS; step++) {
+        double rest = 0.5 * radius, size = 0.0, part;
+        for (k = 0; k < a->n; k++) {
+            away[k] = (x[k] - centre[k]) / radius;
+            rest -= 0.5 * radius * away[k] * away[k];
+            p.q[k] = arm_unit(a, k) * x[k];
+        }
+        arm_examine(a, target, &p);
+        held_step(a, &p, p.gap, away, rest, DEPENDENT_THERE, dx);
+        for (k = 0; k < a->n; k++) size += dx[k] * dx[k];
+        size = sqrt(size);
+        /* short beside the sphere, so that it is not left for another solution */
+        part = size > 0.3 * radius ? 0.3 * radius / size : 1.0;
+        for (k = 0; k < a->n; k++) x[k] += part * dx[k];
+        if (!(size >= FINISHED)) return;
     }
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -119,8 +120,13 @@ class ModelFunction(Function):
     It is called like any Function. The last input p may be left out: its defaults are taken
     (CasADi's own `default_in` holds one number per input, so it cannot keep them). A call with a
     wrong number of values says so by the names of the coordinates, and numbers in never give a
-    NaN out.
+    NaN out, but in `may_be_nan`.
+
+    Attributes:
+        may_be_nan: outputs of which some elements are NaN where there is nothing to say.
     """
+
+    may_be_nan: tuple[str, ...] = ()
 
     def __init__(
         self,
@@ -192,7 +198,9 @@ class ModelFunction(Function):
 
     def like(self, function: Function) -> ModelFunction:
         """Another Function with the inputs of this one, checked and completed in the same way."""
-        return ModelFunction(function, self._system, check=self._check_configuration)
+        made = ModelFunction(function, self._system, check=self._check_configuration)
+        made.may_be_nan = self.may_be_nan
+        return made
 
     def asked(self) -> tuple[str, ...]:
         """The inputs of which more than finite numbers is asked: positions q, parameters p."""
@@ -277,6 +285,10 @@ class ModelFunction(Function):
     def __str__(self) -> str:
         """The table of `describe`; `repr` is the one line of CasADi."""
         return self.describe()
+
+    def example(self, name: str) -> NDArray[np.float64] | None:
+        """Numbers that an input takes, where not all would do; None where any will do."""
+        return self.default_of_p() if name == "p" else None
 
     @property
     def _title(self) -> str:
@@ -390,7 +402,11 @@ class ModelFunction(Function):
 
     def _require_numbers(self, outputs: Any) -> None:
         every = outputs if isinstance(outputs, tuple) else (outputs,)
-        if all(isinstance(o, (SX, MX)) or o.is_regular() for o in every):
+        names = self.name_out() if self.may_be_nan else itertools.repeat("")
+        if all(
+            isinstance(o, (SX, MX)) or o.is_regular() or name in self.may_be_nan
+            for o, name in zip(every, names, strict=False)
+        ):
             return
         loops = ", no configuration closes the loops there" if self._system.is_closed else ""
         raise ModelError(

@@ -4,29 +4,35 @@ from __future__ import annotations
 
 import ctypes
 import functools
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
+from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Arm, Array
 from mbs.closed_forms.raghavan_roth.numbers import Prepared
 from mbs.native import cached_library, compiler_found
+from mbs.native.handwritten import handwritten
 
 Hits: TypeAlias = NDArray[np.int64]
 
 _PAIRS = ("rigid", "arm", "arm_search", "pair", "dense", "eigenvalues", "raghavan_roth", "pose")
 _SOURCES = (
     "arm_descend.c",
-    "arm_nearest.c",
-    "arm_calls.c",
     "raghavan_roth_roots.c",
     "raghavan_roth_middle.c",
     "raghavan_roth_rest.c",
     "raghavan_roth_solve.c",
 )
+_CALLS = (
+    *("arm_nearest.h", "arm_nearest.c", "arm_reduce.h", "arm_reduce.c"),
+    "arm_calls.c",
+)  # for callers in Python
 _FLAGS = ("-O3", "-ffp-contract=off", "-fPIC", "-shared")
 _JOINTS = 7  # for which the core has room
 
@@ -60,6 +66,9 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
         ctypes.c_int,
         (_pointer, _pointer, _integer, *[_pointer] * 4, _real, _real, _pointer, _pointer),
     ),
+    "mbs_reach_sphere": (None, (_pointer, _pointer, _pointer, _real, _integer, _pointer)),
+    "mbs_reduced": (ctypes.c_int, (_pointer, _pointer, _pointer, _integer, *[_pointer] * 3)),
+    "mbs_round": (ctypes.c_int, (_pointer,)),
     "mbs_nearest": (_real, (_pointer, _pointer, _integer, ctypes.c_ulonglong, _pointer)),
 }
 
@@ -98,12 +107,16 @@ def path_of(library: ctypes.CDLL) -> Path:
     return Path(library._name)
 
 
+def _files(sources: tuple[str, ...]) -> dict[str, str]:
+    """The text of the core: the C files and headers of `_PAIRS`, and other C files."""
+    folder = resources.files("mbs.native") / "runtime"
+    names = [*(name + end for name in _PAIRS for end in (".c", ".h")), *sources]
+    return {name: (folder / name).read_text(encoding="utf-8") for name in names}
+
+
 @functools.cache
 def _load() -> ctypes.CDLL:
-    folder = resources.files("mbs.native") / "runtime"
-    names = [*_SOURCES, *(name + end for name in _PAIRS for end in (".c", ".h"))]
-    files = {name: (folder / name).read_text(encoding="utf-8") for name in names}
-    library = ctypes.CDLL(str(cached_library(files, _FLAGS)))
+    library = ctypes.CDLL(str(cached_library(_files((*_SOURCES, *_CALLS)), _FLAGS)))
     for name, (result, arguments) in _SIGNATURES.items():
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments
@@ -122,7 +135,7 @@ def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Arr
     own, residual, _ = _rooms(len(q), arm.size)
     own[:] = q
     target = _targets(T, len(q))
-    stride, handed = 16 if target.ndim == 3 else 0, Handed(arm)
+    stride, handed = 16 if target.ndim == 3 else 0, handed_of(arm)
     library.mbs_polish(handed.address, _at(target), stride, len(q), _at(own), _at(residual))
     return own, residual
 
@@ -133,7 +146,7 @@ def found_by(
     """Configurations (m, n) that multi-start Levenberg-Marquardt finds, and how often, (m,)."""
     target = _wanted(T, 4, 4)
     q, residual, hits = _rooms(starts, arm.size)
-    handed = Handed(arm)
+    handed = handed_of(arm)
     count = library.mbs_search(
         handed.address, _at(target), starts, seed, _at(q), _at(residual), hits.ctypes.data
     )
@@ -145,7 +158,7 @@ def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array
     target = _wanted(T, 4, 4)
     own, residual, hits = _rooms(len(q), arm.size)
     own[:] = q
-    handed = Handed(arm)
+    handed = handed_of(arm)
     count = library.mbs_merge(
         handed.address, _at(target), len(q), _at(own), _at(residual), hits.ctypes.data
     )
@@ -155,7 +168,7 @@ def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array
 def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int) -> Array:
     """The configuration, (n,), whose pose is nearest to T."""
     target, q = _wanted(T, 4, 4), np.empty(arm.size)
-    handed = Handed(arm)
+    handed = handed_of(arm)
     library.mbs_nearest(handed.address, _at(target), starts, seed, _at(q))
     return q
 
@@ -163,7 +176,7 @@ def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int)
 def singular_by(library: ctypes.CDLL, arm: Arm, q: Array, bound: float) -> NDArray[np.bool_]:
     """Which of configurations q, (m, n), have a singular value below a bound, (m,)."""
     own, singular = _wanted(q, len(q), arm.size), np.empty(len(q), dtype=bool)
-    handed = Handed(arm)
+    handed = handed_of(arm)
     library.mbs_singular(handed.address, bound, len(q), _at(own), singular.ctypes.data)
     return singular
 
@@ -185,7 +198,7 @@ def corrected_by(
     m, n = len(x), arm.size
     own = np.array(np.broadcast_to(x, (m, n)), dtype=float, order="C")
     target = _targets(T, m)
-    stride, handed = 16 if target.ndim == 3 else 0, Handed(arm)
+    stride, handed = 16 if target.ndim == 3 else 0, handed_of(arm)
     rows, right = _wanted(held, m, n), _wanted(value, m)
     library.mbs_correct(
         handed.address, _at(target), stride, m, _at(rows), _at(right), iterations, _at(own)
@@ -196,7 +209,7 @@ def corrected_by(
 def residual_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> Array:
     """(m,) largest element of pose(q) - T, T (4, 4) or (m, 4, 4), at q, (m, n)."""
     own, target, residual = _wanted(q, *q.shape), _targets(T, len(q)), np.empty(len(q))
-    handed = Handed(arm)
+    handed = handed_of(arm)
     stride = 16 if target.ndim == 3 else 0
     library.mbs_residual(handed.address, _at(target), stride, len(q), _at(own), _at(residual))
     return residual
@@ -207,10 +220,62 @@ def examined_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Arr
     m, n = q.shape
     own, target = _wanted(q, m, n), _targets(T, m)
     gap, J = np.empty((m, 6)), np.empty((m, n, 6))
-    handed = Handed(arm)
+    handed = handed_of(arm)
     stride = 16 if target.ndim == 3 else 0
     library.mbs_examine(handed.address, _at(target), stride, m, _at(own), _at(gap), _at(J))
     return gap, np.swapaxes(J, 1, 2)
+
+
+def on_sphere_by(
+    library: ctypes.CDLL, arm: Arm, T: Array, centre: Array, radius: float, x: Array
+) -> Array:
+    """Configurations (m, n) of x = q / unit, (m, n), brought to the pose and a distance.
+
+    Args:
+        library: the core.
+        arm: whose configurations.
+        T: (4, 4) the pose that is held.
+        centre: (n,) from where the distance counts.
+        radius: the distance.
+        x: (m, n) first guesses.
+    """
+    own, middle = np.array(x, dtype=float, order="C"), _wanted(centre, arm.size)
+    target, handed = _wanted(T, 4, 4), handed_of(arm)
+    library.mbs_reach_sphere(handed.address, _at(target), _at(middle), radius, len(own), _at(own))
+    return own
+
+
+class _ReductionStruct(ctypes.Structure):
+    """`arm_reduction` of arm_reduce.h."""
+
+    _fields_ = (
+        ("corank", ctypes.c_int),
+        *((name, ctypes.c_void_p) for name in ("centre", "solved", "left", "null")),
+    )
+
+
+def reduced_by(
+    library: ctypes.CDLL, arm: Arm, T: Array, parts: tuple[Array, Array, Array, Array], h: Array
+) -> tuple[Array, Array, bool]:
+    """X (m, n) and g (m, 6 - rank) for h, (m, corank), and whether all were found.
+
+    Args:
+        library: the core.
+        arm: whose configurations.
+        T: (4, 4) the pose.
+        parts: of a reduction: its centre (n,), and the directions solved (rank, 6), left
+            (6 - rank, 6) and null (corank, n).
+        h: the unknowns that remain.
+    """
+    count, corank = h.shape
+    held = [np.ascontiguousarray(part, dtype=float) for part in parts]
+    own = _ReductionStruct(corank, *map(_at, held))
+    x, g = np.empty((count, arm.size)), np.empty((count, len(held[2])))
+    target, given, handed = _wanted(T, 4, 4), _wanted(h, count, corank), handed_of(arm)
+    found = library.mbs_reduced(
+        handed.address, _at(target), ctypes.addressof(own), count, _at(given), _at(x), _at(g)
+    )
+    return x, g, bool(found)
 
 
 def walked_by(
@@ -237,7 +302,7 @@ def walked_by(
     """
     points, target = np.empty((most + 1, arm.size)), _wanted(T, 4, 4)
     points[0] = start
-    along, closed, handed = _wanted(tangent, arm.size), ctypes.c_int(0), Handed(arm)
+    along, closed, handed = _wanted(tangent, arm.size), ctypes.c_int(0), handed_of(arm)
     count = library.mbs_walk(
         handed.address,
         _at(target),
@@ -249,6 +314,12 @@ def walked_by(
         ctypes.addressof(closed),
     )
     return points[:count].copy(), bool(closed.value)
+
+
+def rounded_by(library: ctypes.CDLL, T: Array) -> Array | None:
+    """The rigid transform nearest to T, (4, 4); None where it is none but for 1e-6."""
+    own = np.array(T, dtype=float, order="C")
+    return own if library.mbs_round(_at(own)) else None
 
 
 def settled_by(
@@ -298,8 +369,16 @@ class Handed:
         self.address = ctypes.addressof(self.arm)
 
 
+@functools.lru_cache(maxsize=256)
+def handed_of(arm: Arm) -> Handed:
+    """The same, made once for an arm, which never changes."""
+    return Handed(arm)
+
+
 def _wanted(T: Array, *shape: int) -> Array:
-    """Poses as C reads them; a wrong shape is refused, for C would read beyond the array."""
+    """Numbers as C reads them; a wrong shape is refused, for C would read beyond the array."""
+    if type(T) is np.ndarray and T.shape == shape and T.dtype == np.float64:
+        return T if T.flags.c_contiguous else np.ascontiguousarray(T)
     return np.ascontiguousarray(np.broadcast_to(np.asarray(T, dtype=float), shape))
 
 
@@ -333,7 +412,7 @@ class _LoopStruct(ctypes.Structure):
         ("sign", _int),
         ("slides", _int * 6),
         ("offsets", _double * 6),
-        ("ways", _double * 96),
+        ("ways", _double * 16 * 6),
         ("place", _int),
         ("after", _double * 16),
         ("length", _double),
@@ -353,7 +432,7 @@ class HandedLoop:
     def __init__(self, arm: Arm, prepared: Prepared) -> None:
         loop, pencil = prepared.arrangement, prepared.pencil
         elimination = pencil.elimination
-        self.arm = Handed(arm)
+        self.arm = handed_of(arm)
         self.mix = np.ascontiguousarray(pencil.mix, dtype=float)
         square = self.mix.shape[0] == self.mix.shape[1]
         parts = ("first", "second", "third", "fourth", "fifth")
@@ -363,7 +442,7 @@ class HandedLoop:
             loop.sign,
             (_int * 6)(*map(int, loop.prismatic)),
             (_double * 6)(*loop.offsets.tolist()),
-            (_double * 96)(*loop.ways.ravel().tolist()),
+            (_double * 16 * 6)(*((_double * 16)(*way.ravel().tolist()) for way in loop.ways)),
             loop.index,
             (_double * 16)(*loop.after.ravel().tolist()),
             loop.length,
@@ -407,3 +486,116 @@ def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbe
         return found[0]
     numbers, configurations = zip(*found, strict=True)
     return np.concatenate(numbers), np.concatenate(configurations)
+
+
+# The general method of one arm as a Function of C text, its numbers written out.
+
+
+COLUMNS = 16
+"""POSE_COLUMNS: configurations that `general_function` has room for."""
+
+_TABLES = """\
+#include <math.h>
+#include <string.h>
+#include "pose.h"
+
+static const double FUNCTION_gaps[] = {gaps};
+static const unsigned char FUNCTION_prismatic[] = {slides};
+static const arm FUNCTION_arm = {arm};
+{mix}static const roth_loop FUNCTION_loop = {loop};
+static const long long FUNCTION_indices[] = {indices};
+static const double FUNCTION_others[] = {others};
+static const pose_solver FUNCTION_solver = {solver};
+
+EXPORT int FUNCTION(const double **arg, double **res, long long *iw, double *w, int mem) {{
+    (void)iw;
+    (void)mem;
+    return pose_all(&FUNCTION_solver, arg, res, w);
+}}
+
+EXPORT int jac_FUNCTION(const double **arg, double **res, long long *iw, double *w, int mem) {{
+    (void)iw;
+    (void)w;
+    (void)mem;
+    return pose_all_jacobian(&FUNCTION_solver, arg, res);
+}}
+"""
+
+
+class SolverStruct(ctypes.Structure):
+    """`pose_solver` of pose.h."""
+
+    _fields_ = (
+        *((name, ctypes.c_void_p) for name in ("robot", "loop", "evaluate", "checkout", "release")),
+        *((name, ctypes.c_longlong) for name in ("branches", "arguments", "results")),
+        *((name, ctypes.c_longlong) for name in ("integers", "reals")),
+        ("suspect", ctypes.c_double),
+        ("nearly", ctypes.c_double),
+        ("nq", ctypes.c_longlong),
+        *((name, ctypes.c_void_p) for name in ("indices", "others")),
+    )
+
+
+def general_function(
+    name: str, handed: HandedLoop, indices: Sequence[int], others: Array, nearly: float
+) -> Function:
+    """``name(T) -> q, valid, count, certain``, see `pose_all` of pose.h, of this computer's code.
+
+    Args:
+        name: what its name begins with.
+        handed: the arm, ready for the general method.
+        indices: (6,) of its joints among the coordinates.
+        others: (nq,) positions of all coordinates; those of the arm do not count [rad or m].
+        nearly: smallest singular value below which configurations may be missing.
+
+    Raises:
+        CompilerError: there is no compiler.
+    """
+    nq, arm = len(others), handed.arm
+    solver = SolverStruct(nearly=nearly, nq=nq)
+    of_arm = {"gaps": "FUNCTION_gaps", "slides": "FUNCTION_prismatic"}
+    of_loop = {"mix": "FUNCTION_mix"} if handed.loop.mix else {}
+    of_solver = {"robot": "&FUNCTION_arm", "loop": "&FUNCTION_loop"}
+    of_solver |= {"indices": "FUNCTION_indices", "others": "FUNCTION_others"}
+    mix = _initializer(handed.mix.ravel())
+    own = _TABLES.format(
+        gaps=_initializer(arm.gaps.ravel()),
+        slides=_initializer(arm.slides),
+        arm=_initializer(arm.arm, of_arm),
+        mix=f"static const double FUNCTION_mix[] = {mix};\n" if handed.loop.mix else "",
+        loop=_initializer(handed.loop, of_loop),
+        indices=_initializer(indices),
+        others=_initializer(others),
+        solver=_initializer(solver, of_solver),
+    )
+    T, outputs = SX.sym("T", 4, 4), {"q": (nq, COLUMNS), "valid": (COLUMNS, 1)}
+    outputs |= {"count": (1, 1), "certain": (1, 1)}
+    values = [SX.zeros(*shape) for shape in outputs.values()]
+    signature = Function(name, [T], values, ["T"], [*outputs])
+    given = [T, *(SX.sym(f"out_{key}", *shape) for key, shape in outputs.items())]
+    slopes = [SX.ones(COLUMNS * nq, 16), *(SX(n, 16) for n in (COLUMNS, 1, 1))]
+    jacobian = Function(
+        f"jac_{name}",
+        given,
+        slopes,
+        ["T", *(f"out_{key}" for key in outputs)],
+        [f"jac_{key}_T" for key in outputs],
+    )
+    work = _CANDIDATES * (nq + 3)
+    return handwritten(signature, jacobian, own, _files(_SOURCES), work)
+
+
+def _initializer(value: Any, owned: Mapping[str, str] = MappingProxyType({})) -> str:
+    """C text of numbers, or of a structure, whose pointers are names or null."""
+    if isinstance(value, ctypes.Structure):
+        pairs = [(field[0], field[1]) for field in value._fields_]
+        texts = (
+            owned.get(name, "0") if kind is _pointer else _initializer(getattr(value, name))
+            for name, kind in pairs
+        )
+        return f"{{{', '.join(texts)}}}"
+    if isinstance(value, (int, np.integer)):
+        return str(int(value))
+    if isinstance(value, (float, np.floating)):
+        return repr(float(value))
+    return f"{{{', '.join(_initializer(x) for x in value)}}}"

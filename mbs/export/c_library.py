@@ -21,6 +21,7 @@ from mbs.export.c_step import StepTexts, step_texts
 from mbs.files import path_of, write_texts
 from mbs.native.bare_source import NOINLINE, Real, Target, bare_source, literal
 from mbs.native.compiled import generated, require_function, require_names, unwritten
+from mbs.native.handwritten import handwritten_text, names_declared
 from mbs.text import in_c_comment, quoted
 
 # Names that C, C++ and CMake leave free.
@@ -241,7 +242,8 @@ def c_library(
     are not finite, quaternions that are not of unit length, parameters out of their bounds, loops
     that are open by more than the same part of the size of the mechanism, independent joints that
     do not determine the others, and results that are not finite. A casadi.Function that is no model
-    is asked for finite inputs and outputs alone.
+    is asked for finite inputs and outputs alone. Columns that all configurations of the general
+    inverse geometric model leave empty are NaN, and no fault.
 
     With target="bare" the code is for microcontrollers: C99 in scalar operations, without heap,
     files and variables that change outside of functions; it needs math.h, memset and memcpy. A
@@ -368,6 +370,7 @@ def _entries(
                 f" {{'{name}_left': left, '{name}_right': right}}"
             )
     check_function_names(names, where)
+    _check_handwritten([(n, m) for n, m in pairs if isinstance(m, Function)], where, library)
     if library.bare and library.type in names:
         raise ModelError(
             f"{where}: {library.type} is the type of numbers; give the function another name, as in"
@@ -383,6 +386,25 @@ def _entries(
         _entry(name, model, library) for name, model in pairs if not isinstance(model, System)
     ]
     return entries, systems
+
+
+def _check_handwritten(
+    functions: Sequence[tuple[str, Function]], where: str, library: _Library
+) -> None:
+    """Refuse what does not go with C that is written by hand."""
+    text = handwritten_text([function for _, function in functions])
+    if text and library.real == "float":
+        raise ModelError(
+            f"{where}: the general inverse geometric model refines its configurations to 1e-12,"
+            " which single precision does not have; leave real='float' out"
+        )
+    taken = names_declared(text)
+    for name, _ in functions:
+        if name in taken:
+            raise ModelError(
+                f"{where}: {name!r} is a name of C beside the general inverse geometric model; give"
+                f" another one, as in {{'my_{name}': function}}"
+            )
 
 
 def _pairs(functions: Any) -> list[tuple[str, Model]]:
@@ -476,7 +498,7 @@ def _source(entries: Sequence[_Entry], library: _Library, where: str) -> str:
 
 def _is_scalar(entry: _Entry, library: _Library) -> bool:
     """Whether its code is written without CasADi, which is left to calls and maps."""
-    return library.bare or entry.code.is_a("SXFunction")
+    return entry.code.is_a("SXFunction") or (library.bare and not handwritten_text([entry.code]))
 
 
 def _parameters(entry: _Entry, real: str) -> str:
@@ -510,12 +532,14 @@ def _checking_body(entry: _Entry, library: _Library, call: str) -> str:
     model = entry.model
     inputs = [(name, model.numel_in(k)) for k, name in enumerate(entry.inputs)]
     outputs = [(name, model.numel_out(k)) for k, name in enumerate(entry.outputs)]
+    empty: tuple[str, ...] = getattr(model, "may_be_nan", ())
+    full = [pair for k, pair in enumerate(outputs) if model.name_out(k) not in empty]
     count, half = len(entry.statuses), literal(0.5, library.real)
     return _CHECKED.format(
         finite=_all_finite(inputs, library.real),
         call=call,
         rows=_ROWS.format(count=count, zero=half) if count else "",
-        numbers=_all_finite(outputs, library.real),
+        numbers=_all_finite(full, library.real),
         erase="".join(f"    mbs__erase({name}, {n});\n" for name, n in outputs if n),
     )
 
@@ -640,10 +664,10 @@ def example_input(model: Function, k: int) -> np.ndarray[tuple[int, ...], np.dty
     if not isinstance(model, ModelFunction):
         return values
     system, name = model.system, model.name_in(k)
-    own: Any = None
-    if name == "p":
-        own = model.default_of_p()
-    elif system.is_closed or system.parameters or system.nq != system.nv:
+    own: Any = model.example(name)
+    if np.ndim(own) == 2:
+        return np.array(own, dtype=float)
+    if name != "p" and (system.is_closed or system.parameters or system.nq != system.nv):
         named = {c.name: x for c, x in zip(system.coordinates, system.configuration, strict=True)}
         if name in ("q", "q_a"):
             own = [named.get(element) for element, _ in model.elements(name)]

@@ -201,7 +201,8 @@ def with_array_calls(
     if library is not None:
         valid = None if like is None else result.valid()
         if valid is None:
-            result._arrays = array_builtin(function, library, like is not None) or _decline
+            finite = like is not None and not result.may_be_nan
+            result._arrays = array_builtin(function, library, finite) or _decline
         elif code_of is not None:  # without it calls go the model's way, which asks them
             result._arrays = _guarded(result, function, library, valid, code_of)
     result._last = None if like is None else default_of_last(function, like.__self__)

@@ -24,6 +24,7 @@ from mbs.native.derivatives_on_demand import (
     source,
     write_record,
 )
+from mbs.native.handwritten import handwritten_text, is_handwritten
 from mbs.native.kernel import LoopCode, index_key, indexed_library, kernel_library
 from mbs.native.patterns import pattern_source, patterns_source
 from mbs.native.plain_source import external_source
@@ -311,7 +312,7 @@ def c_source(function: casadi.Function, *, derivatives: int = 0) -> str:
 
 
 def generated(functions: Iterable[casadi.Function], **options: Any) -> str:
-    """C text of Functions with different names; see `unwritten`.
+    """C text of Functions with different names, and of all that they call; see `unwritten`.
 
     Args:
         functions: what to write.
@@ -320,11 +321,11 @@ def generated(functions: Iterable[casadi.Function], **options: Any) -> str:
     Raises:
         ModelError: an input or output is called by what would end a comment or a string of C.
     """
-    generator = casadi.CodeGenerator("generated", options)
-    for function in functions:
+    generator, every = casadi.CodeGenerator("generated", options), list(functions)
+    for function in every:
         require_names(function)
         generator.add(function)
-    return str(generator.dump())
+    return handwritten_text(every) + str(generator.dump())
 
 
 def require_names(function: casadi.Function) -> None:
@@ -343,12 +344,16 @@ def require_names(function: casadi.Function) -> None:
 
 
 def calls_machine_code(functions: Iterable[casadi.Function]) -> bool:
-    """Whether one of these calls an external function, which C text of it would not contain.
+    """Whether one of these calls an external function, which C text of it does not contain.
 
     Args:
         functions: any Functions.
     """
-    return any(part.is_a("External") for f in functions for part in f.find_functions())
+    return any(
+        part.is_a("External") and not is_handwritten(part)
+        for function in functions
+        for part in function.find_functions()
+    )
 
 
 def unwritten(source: str) -> str:

@@ -1,10 +1,9 @@
 import numpy as np
 import pytest
-from support.plain_arms import apart, manseur_doty, puma, random_arm
+from support.plain_arms import apart, manseur_doty, needs_compiler, puma, random_arm
 
 import mbs.closed_forms.arm_core as core
 from mbs.closed_forms.arm_search import general, general_of, merged, nearest, polish, search
-from mbs.native import compiler_found
 
 
 @pytest.fixture
@@ -13,7 +12,7 @@ def no_compiler(monkeypatch):
     assert core.core() is None
 
 
-@pytest.mark.skipif(not compiler_found(), reason="no C compiler")
+@needs_compiler
 def test_the_core_is_loaded_once():
     assert core.core() is core.core() is not None
 
@@ -28,7 +27,7 @@ def test_arms_of_more_joints_than_the_core_has_room_for_are_solved_too():
     assert nearest(arm, T).distance < 1e-12
 
 
-@pytest.mark.skipif(not compiler_found(), reason="no C compiler")
+@needs_compiler
 def test_poses_and_configurations_of_wrong_shapes_are_refused():
     arm, T = manseur_doty()
     for poses, configurations in (

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from support.plain_arms import apart, manseur_doty, puma, random_arm
+from support.plain_arms import apart, manseur_doty, needs_compiler, puma, random_arm
 
 from mbs.closed_forms.arm_search import (
     SEED,
@@ -9,7 +9,6 @@ from mbs.closed_forms.arm_search import (
     search,
     searched_with_numpy,
 )
-from mbs.native import compiler_found
 
 
 def test_all_configurations_of_an_arm_with_a_wrist():
@@ -75,7 +74,7 @@ def test_random_configurations_fill_the_range():
         assert np.all(np.abs(counts - 400) < 5 * np.sqrt(400))
 
 
-@pytest.mark.skipif(not compiler_found(), reason="no C compiler")
+@needs_compiler
 def test_numpy_finds_what_the_compiled_core_finds():
     rng = np.random.default_rng(9)
     slides = random_arm(rng, 6, [False, True, False, False, True, False])

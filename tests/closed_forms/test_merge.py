@@ -1,18 +1,10 @@
 import numpy as np
 import pytest
-from support.plain_arms import khalil, puma
+from support.plain_arms import both_ways, khalil, puma
 
 from mbs.closed_forms.arm_search import merged, merged_with_numpy, wrapped
-from mbs.native import compiler_found
 
-WAYS = [
-    pytest.param(
-        merged,
-        id="compiled",
-        marks=pytest.mark.skipif(not compiler_found(), reason="no C compiler"),
-    ),
-    pytest.param(merged_with_numpy, id="numpy"),
-]
+WAYS = both_ways(merged, merged_with_numpy)
 PLANAR = khalil([(0, 0, 0, 0), (0, 1.0, 0, 0), (0, 0.7, 0, 0)])
 
 

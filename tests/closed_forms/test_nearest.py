@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
-from support.plain_arms import khalil, puma, random_arm
+from support.plain_arms import khalil, needs_compiler, puma, random_arm
 
 from mbs.closed_forms.arm_search import nearest, nearest_with_numpy
-from mbs.native import compiler_found
 
 PLANAR = khalil([(0, 0, 0, 0), (0, 1.0, 0, 0), (0, 0.5, 0, 0)])
 
@@ -50,7 +49,7 @@ def test_no_small_move_comes_nearer():
         assert all(_cost(arm, T, q) > least for q in far)
 
 
-@pytest.mark.skipif(not compiler_found(), reason="no C compiler")
+@needs_compiler
 def test_numpy_comes_as_near_as_the_compiled_core():
     rng = np.random.default_rng(8)
     for size in (4, 6):

@@ -1,18 +1,18 @@
 import numpy as np
 import pytest
-from support.plain_arms import apart, khalil, manseur_doty, puma, random_arm
+from support.plain_arms import (
+    apart,
+    both_ways,
+    khalil,
+    manseur_doty,
+    needs_compiler,
+    puma,
+    random_arm,
+)
 
 from mbs.closed_forms.arm_search import polish, polished_with_numpy
-from mbs.native import compiler_found
 
-WAYS = [
-    pytest.param(
-        polish,
-        id="compiled",
-        marks=pytest.mark.skipif(not compiler_found(), reason="no C compiler"),
-    ),
-    pytest.param(polished_with_numpy, id="numpy"),
-]
+WAYS = both_ways(polish, polished_with_numpy)
 RNG_SEED = 20260401
 
 
@@ -90,7 +90,7 @@ def test_a_wrist_that_is_nearly_or_quite_straight(way, bend):
     assert np.max(polished.residual) < 1e-13
 
 
-@pytest.mark.skipif(not compiler_found(), reason="no C compiler")
+@needs_compiler
 def test_numpy_takes_the_steps_of_the_compiled_core():
     rng = np.random.default_rng(4)
     for arm in arms():

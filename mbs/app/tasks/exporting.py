@@ -104,7 +104,8 @@ def c_functions(
         chosen = entry(key)
         if reason := chosen.refusal(system):
             raise ModelError(f"{key}: {reason}; leave it out of the C library")
-        functions[key.replace("-", "_")] = chosen.build(system, **(options or {}).get(key, {}))
+        given = (options or {}).get(key, {})
+        functions[key.replace("-", "_")] = chosen.build_numeric(system, **given)
     return functions
 
 

@@ -6,13 +6,15 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import casadi
 import numpy as np
-from casadi import SX, Function
+from casadi import DM, MX, SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
+from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import ExportError
 from mbs.export.fmu.description import FmuModel, FmuVariable, State
 from mbs.export.fmu.documentation import about
@@ -21,7 +23,11 @@ from mbs.export.fmu.variables import parameters
 from mbs.files import path_of
 from mbs.models.geometry import terminal_frame, transform
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain
-from mbs.models.inverse_geometry.closed_form import all_branches, sequence_of, size
+from mbs.models.inverse_geometry.closed_form import (
+    all_branches,
+    size,
+    steps_or_all,
+)
 
 _MEMORY = 0.01
 """Time constant [s] with which the joints that choose the branch follow the solution: some times
@@ -44,19 +50,21 @@ def inverse_geometry_fmu(
     fmi: str = "2.0",
     platforms: Sequence[str] | None = None,
 ) -> Path:
-    """Write the closed form of an arm's inverse geometric model as an FMU.
+    """Write an arm's inverse geometric model as an FMU: its closed form, else the general method.
 
     Inputs are the pose of the frame in the base, `tool.x`, `tool.y`, `tool.z` and the rotation
     matrix `tool.R11` .. `tool.R33`, whose columns are made orthonormal. Outputs are the positions
     `name.q` of the joints on the branch that is nearest to where the joints were, without leaps by
     whole turns, and `valid`, which is 0 where no branch takes the pose; the joints then stay.
     States `name.last` follow the outputs with the time constant `memory`; their start values choose
-    the first branch. Symbols of the system are parameters.
+    the first branch. Symbols of the system are parameters. By the general method there is one more
+    output, `certain`, which is 0 where a configuration may be missing, next to a singular one.
 
     Args:
-        system: an open chain that has a closed form.
+        system: an open chain that has a closed form, or six joints without symbols.
         path: of the file to write.
-        method: "pieper", "paul", or "auto" for the cheaper of them.
+        method: "pieper", "paul", "general", or "auto" for the cheaper of the first two, else the
+            third.
         frame: a body, a named frame, the number of a link, or None for the terminal frame.
         locked: positions of joints that stay where they are, by name [rad or m].
         start: configuration at the start, (nq,) or by name; the assembled one when left out.
@@ -67,7 +75,7 @@ def inverse_geometry_fmu(
         The path written.
 
     Raises:
-        NoClosedForm: no closed form is known.
+        NoClosedForm: no closed form is known, and the general method does not hold.
         ExportError: the system is closed, the file cannot be written, or another FMI version was
             asked for.
         ModelError: a name is unknown, a parameter has no value, or more than six joints are free.
@@ -78,16 +86,17 @@ def inverse_geometry_fmu(
     require_writable(path_of(path))
     if system.is_closed:
         raise ExportError(
-            f"{system.name}: its loops must be closed too, and no closed form does both; export an"
+            f"{system.name}: its loops must be closed too, and no method does both; export an"
             " open chain"
         )
     name = terminal_frame(system) if frame is None else frame
     chain = frame_chain(system, name, locked)
     first = np.array(system.position(start))
-    return write_fmu(_model(chain, method, first), path, fmi=fmi, platforms=platforms)
+    every = steps_or_all(chain, method)
+    return write_fmu(_model(chain, every, first), path, fmi=fmi, platforms=platforms)
 
 
-def _model(chain: FrameChain, method: str, start: np.ndarray) -> FmuModel:
+def _model(chain: FrameChain, every: StepSequence | Function, start: np.ndarray) -> FmuModel:
     system = chain.system
     coordinates = [system.coordinates[k] for k in chain.indices]
     own = tuple(parameters(system))
@@ -114,6 +123,10 @@ def _model(chain: FrameChain, method: str, start: np.ndarray) -> FmuModel:
         for c in coordinates
     ]
     valid = FmuVariable(name="valid", description="1 where a branch takes the pose, else 0")
+    certain = FmuVariable(
+        name="certain",
+        description="0 where a configuration may be missing: next to a singular one, or no pose",
+    )
     memory = FmuVariable(
         name="memory",
         unit="s",
@@ -130,45 +143,68 @@ def _model(chain: FrameChain, method: str, start: np.ndarray) -> FmuModel:
             FmuVariable(name=f"tool.{name}", unit=unit, start=float(value))
             for name, value, unit in entries
         ),
-        outputs=(*shown, valid),
+        outputs=(*shown, valid, *([certain] if isinstance(every, Function) else [])),
         parameters=(*own, memory),
-        rhs=_rhs(chain, method),
+        rhs=_rhs(chain, every),
         documentation=system.source,
         about=about(system),
     )
 
 
-def _rhs(chain: FrameChain, method: str) -> Function:
-    """``rhs(t, x, z, u, p) -> xdot, y`` of the branch nearest to x."""
+def _rhs(chain: FrameChain, every: StepSequence | Function) -> Function:
+    """``rhs(t, x, z, u, p) -> xdot, y`` of the configuration nearest to x."""
     n, system = len(chain.names), chain.system
-    t, z, x = SX.sym("t"), SX.sym("z", 0), SX.sym("x", n)
-    u, p, memory = SX.sym("u", 12), SX.sym("p", system.p.numel()), SX.sym("memory")
-    T = casadi.vertcat(casadi.horzcat(_rotation(u[3:]), u[:3]), SX([[0, 0, 0, 1]]))
-    every = all_branches(chain, sequence_of(chain, method))
-    given = [T, p] if system.parameters else [T]
-    q, residual, real, _, _ = every.call(given)
-    nearest, least = x, SX(_HOPELESS)
-    scale = casadi.fmax(1.0, casadi.substitute(size(chain), system.p, p))
-    for b in range(q.size2()):
-        apart = q[:, b] - x
-        for k in range(n):
-            if not chain.prismatic[k]:
-                apart[k] -= 2 * math.pi * casadi.floor(apart[k] / (2 * math.pi) + 0.5)
-        holds = casadi.logic_and(residual[b] <= _MISSED * scale, real[b] >= -_MISSED)
+    kind: Any = MX if isinstance(every, Function) else SX
+    t, z, x = kind.sym("t"), kind.sym("z", 0), kind.sym("x", n)
+    u, p, memory = kind.sym("u", 12), kind.sym("p", system.p.numel()), kind.sym("memory")
+    T = casadi.vertcat(casadi.horzcat(_rotation(u[3:]), u[:3]), kind(DM([[0, 0, 0, 1]])))
+    columns: list[tuple[Any, Any]]
+    seen: list[MX] = []
+    if isinstance(every, Function):
+        columns, seen = _of_general(chain, every, T, x)
+    else:
+        columns = _of_closed_form(chain, every, T, p)
+    turning = 2 * math.pi * DM([not prismatic for prismatic in chain.prismatic])
+    nearest, least = x, kind(_HOPELESS)
+    for q, holds in columns:
+        apart = q - x
+        apart = apart - turning * casadi.floor(apart / (2 * math.pi) + 0.5)
         away = casadi.sumsqr(apart) + casadi.if_else(holds, 0, _HOPELESS)
         closer = away < least
         nearest = casadi.if_else(closer, x + apart, nearest)
         least = casadi.if_else(closer, away, least)
-    valid = least < _HOPELESS
-    y = casadi.vertcat(nearest, valid)
+    y = casadi.vertcat(nearest, least < _HOPELESS, *seen)
     every_p = casadi.vertcat(p, memory)
     return Function("rhs", [t, x, z, u, every_p], [(nearest - x) / memory, y])
 
 
-def _rotation(rows: SX) -> SX:
+def _of_closed_form(chain: FrameChain, sequence: StepSequence, T: SX, p: SX) -> list[tuple[SX, SX]]:
+    """The joints of every branch, and whether it holds."""
+    system = chain.system
+    given = [T, p] if system.parameters else [T]
+    q, residual, real, _, _ = all_branches(chain, sequence).call(given)
+    scale = casadi.fmax(1.0, casadi.substitute(size(chain), system.p, p))
+    holds = casadi.logic_and(residual <= _MISSED * scale, real >= -_MISSED)
+    return [(q[:, b], holds[b]) for b in range(q.size2())]
+
+
+def _of_general(
+    chain: FrameChain, every: Function, T: MX, x: MX
+) -> tuple[list[tuple[MX, MX]], list[MX]]:
+    """Likewise of the general method, and whether none may be missing."""
+    q, valid, _, certain = every.call([T])
+    columns = [
+        # NaN must not come near sums, whose derivatives it would spoil
+        (casadi.if_else(valid[b], q[list(chain.indices), b], x), valid[b])
+        for b in range(q.size2())
+    ]
+    return columns, [certain]
+
+
+def _rotation(rows: Any) -> Any:
     """(3, 3) the rotation beside nine elements, row by row: interpolated inputs are none."""
     R = casadi.reshape(rows, 3, 3).T
     first = R[:, 0] / casadi.norm_2(R[:, 0])
     second = R[:, 1] - first * casadi.dot(first, R[:, 1])
     second = second / casadi.norm_2(second)
-    return SX(casadi.horzcat(first, second, casadi.cross(first, second)))
+    return casadi.horzcat(first, second, casadi.cross(first, second))

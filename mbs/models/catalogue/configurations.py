@@ -66,9 +66,10 @@ def held_at(
     return {c.name: float(x) for c, x in places if c.name in names}
 
 
-def _function(method: str) -> Callable[..., Function]:
+def _function(method: str, branches: str = "one") -> Callable[..., Function]:
     def function(system: System, frame: Frame, locked: Sequence[str]) -> Function:
-        return inverse_geometry.function(system, method, frame, held_at(system, locked))
+        held = held_at(system, locked)
+        return inverse_geometry.function(system, method, frame, held, branches=branches)
 
     return function
 
@@ -171,5 +172,6 @@ INVERSE_GEOMETRY: tuple[Entry, ...] = (
         _general,
         "general",
         writes=_has_six,
+        numeric=_function("general", "all"),
     ),
 )

@@ -78,6 +78,8 @@ class Entry:
         structures: the mechanisms that have it: all, those without loops, or those with loops.
         writes: whether it has a Function of a mechanism, where `function` is given.
         obstacle: says why a mechanism of the right structure does not have it, "" where it does.
+        numeric: builds the casadi.Function of a C library where `function` is a step of it; None
+            where that one serves there too.
     """
 
     key: str
@@ -91,6 +93,7 @@ class Entry:
     structures: Structures = "all"
     writes: Callable[[System], bool] = lambda _: True
     obstacle: Callable[[System], str] = lambda _: ""
+    numeric: Callable[..., Function] | None = None
 
     def applies(self, system: System) -> bool:
         """Whether the mechanism has the model."""
@@ -145,6 +148,12 @@ class Entry:
                 " configurations"
             )
         return self.function(system, **self.choices(system, **given))
+
+    def build_numeric(self, system: System, **given: Any) -> Function:
+        """`build` for a C library: of an algorithm the whole of it."""
+        if self.numeric is None:
+            return self.build(system, **given)
+        return self.numeric(system, **self.choices(system, **given))
 
 
 def _has(structures: Structures, system: System) -> bool:

@@ -66,14 +66,22 @@ class ChainIndices:
     whole: Callable[[Array], Array]
 
 
-def roots(target: Target, gathered: Gathered, chain: ChainIndices) -> list[ChainRoot]:
+Examined = dict[bytes, tuple[ChainRoot, bool]]
+"""What was found of singular solutions, by their configurations."""
+
+
+def roots(
+    target: Target, gathered: Gathered, chain: ChainIndices, examined: Examined | None = None
+) -> list[ChainRoot]:
     """The distinct solutions, in the order in which they were gathered.
 
     Args:
         target: the target pose.
         gathered: solutions, some of them more than once.
         chain: its joints in the system.
+        examined: what is known of them, and what becomes known.
     """
+    known = {} if examined is None else examined
     found = _merge(target, gathered)
     singular = [int(k) for k in np.flatnonzero(_singular(target, found))]
     unsettled = list[int]()
@@ -81,7 +89,11 @@ def roots(target: Target, gathered: Gathered, chain: ChainIndices) -> list[Chain
     for k in singular:
         if k in dropped:
             continue
-        found[k], settled = _examine(target, found[k], chain)
+        key = found[k].q.tobytes()
+        if key not in known:
+            known[key] = _examine(target, found[k], chain)
+        root, settled = known[key]
+        found[k] = replace(root, label=found[k].label)
         if not settled:
             unsettled.append(k)
         dropped |= _on(target, found, k, [m for m in singular if m > k])

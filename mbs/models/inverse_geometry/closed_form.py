@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction, Named, model_function, require_system
+from mbs.closed_forms.arm_core import general_function
 from mbs.closed_forms.sequence import Leaf, Problem, SequenceStep, StepSequence
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
@@ -278,9 +279,7 @@ class InverseGeometry(ModelFunction):
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Evaluate it as any model; a branch and a pose given in numbers must be such."""
-        T = kwargs.get("T", args[0] if args else None)
-        if isinstance(T, (DM, np.ndarray, list, tuple)) and np.shape(np.array(T)) == (4, 4):
-            target_pose(self.system, T)
+        _require_pose(self.system, args, kwargs)
         branch = kwargs.get("branch", args[1] if len(args) > 1 else None)
         if isinstance(branch, (int, float, np.ndarray, np.generic)):
             self._require_branch(np.asarray(branch))
@@ -300,10 +299,46 @@ class AllBranches(InverseGeometry):
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Evaluate it as any model; a pose given in numbers must be one."""
-        T = kwargs.get("T", args[0] if args else None)
-        if isinstance(T, (DM, np.ndarray, list, tuple)) and np.shape(np.array(T)) == (4, 4):
-            target_pose(self.system, T)
+        _require_pose(self.system, args, kwargs)
         return ModelFunction.__call__(self, *args, **kwargs)
+
+
+class AllConfigurations(ModelFunction):
+    """The general method ``igm_all(T) -> q, valid, count, certain``, a column a configuration.
+
+    Columns that no configuration fills are NaN, `valid` 0; they come last.
+    """
+
+    may_be_nan = ("q",)
+
+    def __init__(self, function: Function, chain: FrameChain) -> None:
+        super().__init__(function, chain.system)
+        self._chain = chain
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Evaluate it as any model; a pose given in numbers must be one."""
+        _require_pose(self.system, args, kwargs)
+        return super().__call__(*args, **kwargs)
+
+    def example(self, name: str) -> NDArray[np.float64] | None:
+        """A pose that the arm has."""
+        q = 0.3 + 0.2 * np.sin(np.arange(len(self._chain.names)))  # where no joint is special
+        return np.array(self._chain.arm(np.zeros(0)).pose(q)) if name == "T" else None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A pickle holds what it was made of, and is compiled where it is read."""
+        chain = self._chain
+        return _all_again, (chain.system, chain.frame, dict(chain.locked))
+
+
+def _all_again(system: System, frame: str | int, locked: dict[str, float]) -> Function:
+    return function(system, "general", frame, locked, branches="all")
+
+
+def _require_pose(system: System, args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
+    T = kwargs.get("T", args[0] if args else None)
+    if isinstance(T, (DM, np.ndarray, list, tuple)) and np.shape(np.array(T)) == (4, 4):
+        target_pose(system, T)
 
 
 def function(
@@ -320,12 +355,17 @@ def function(
     column for each, which share their common steps. It can be differentiated with respect to T and
     to the parameters wherever the configuration is not singular.
 
-    Source: Pieper 1968; Paul 1981; Khalil & Creusot 1997, section 3.3.
+    Where an arm of six joints has no closed form, and with method="general", ``branches="all"``
+    gives ``igm_all(T) -> q, valid, count, certain`` of C code: all configurations, up to 16, by the
+    general method. It can be differentiated once, with respect to T.
+
+    Source: Pieper 1968; Paul 1981; Khalil & Creusot 1997, section 3.3; Raghavan & Roth 1993.
 
     Args:
         system: open; a closed one is solved by `mbs.models.inverse_geometry.solve`.
         method: "pieper", "paul", "auto" for the cheaper of them, or "general" for the matrices
-            ``igm_characteristic(T) -> M0, M1, M2`` of the method of Raghavan and Roth.
+            ``igm_characteristic(T) -> M0, M1, M2`` of the method of Raghavan and Roth, and with
+            branches="all" for its configurations.
         frame: a body, a named frame, the number of a link, or None for the terminal frame.
         locked: positions of joints that stay where they are, by name [rad or m].
         branches: "one", whose number is an input, or "all" in one call.
@@ -335,20 +375,29 @@ def function(
         of the number of the branch; q (nq, 1) [rad or m], finite for every T, joints outside the
         chain as in the assembled configuration; valid, 1 where q gives T back within 1e-9 of the
         size of the robot, else 0. AllBranches has no number; q (nq, branches), valid (branches, 1).
+        AllConfigurations: q (nq, 16), each residual at most 1e-12 of max(1 m, the length), columns
+        from `count` on NaN; valid (16, 1), 1 for the columns before; certain, 0 where a
+        configuration may be missing, next to a singular one, or T is no rigid transform.
 
     Raises:
         NoClosedForm: no closed form is known; the message says what stood in the way.
         ModelError: there is no such method, frame or joint, more than six joints are free, or
-            the system is closed; or all branches of the general method are asked for.
+            the system is closed; or the general method holds for its numbers alone, and some are
+            symbols.
+        CompilerError: all configurations of the general method are asked for, and there is no C
+            compiler.
     """
     require_system(system)
     require_method(system, method, METHODS)
     _require_branches(system, method, branches)
     chain = frame_chain(system, frame, locked)
-    if method == "general":
+    if method == "general" and branches == "one":
         return characteristic_function(chain)
     _require_open(system)
-    sequence = sequence_of(chain, method)
+    solves = sequence_of(chain, method) if branches == "one" else steps_or_all(chain, method)
+    if isinstance(solves, Function):
+        return solves
+    sequence = solves
 
     def make() -> Function:
         if branches == "all":
@@ -366,11 +415,6 @@ def function(
 def _require_branches(system: System, method: str, branches: object) -> None:
     if branches not in ("one", "all"):
         raise ModelError(f"{system.name}: branches is {quoted(branches)}; use 'one' or 'all'")
-    if branches == "all" and method == "general":
-        raise ModelError(
-            f"{system.name}: the configurations of the general method are eigenvalues and no"
-            " branches of a Function; use mbs.models.inverse_geometry.solver"
-        )
 
 
 def _require_open(system: System) -> None:
@@ -397,6 +441,65 @@ def _all_built(chain: FrameChain, sequence: StepSequence) -> tuple[Named, Named]
     reached = casadi.logic_and(real >= -_ROUNDING, residual <= _ROUNDING * size(chain))
     outputs: Named = [("q", casadi.horzcat(*columns)), ("valid", SX(reached))]
     return [("T", T)], outputs
+
+
+_SIX = 6  # joints that the general method is for
+
+
+def steps_or_all(chain: FrameChain, method: str) -> StepSequence | AllConfigurations:
+    """The steps of a closed form; where there is none, all configurations by the general method.
+
+    Args:
+        chain: what is solved for.
+        method: as of `sequence_of`, or "general".
+
+    Raises:
+        NoClosedForm, ModelError, CompilerError: as of `sequence_of` and `all_configurations`.
+    """
+    if method == "general":
+        return all_configurations(chain)
+    try:
+        return sequence_of(chain, method)
+    except NoClosedForm:
+        if method != "auto" or len(chain.names) != _SIX:
+            raise
+        return all_configurations(chain)
+
+
+def all_configurations(chain: FrameChain) -> AllConfigurations:
+    """``igm_all(T) -> q, valid, count, certain`` of a chain of six joints; kept on the system.
+
+    Raises:
+        NoClosedForm: the general method does not hold for the arm.
+        ModelError: it has not six joints, or some length is a symbol.
+        CompilerError: there is no C compiler.
+    """
+    from mbs.models.inverse_geometry.gathering import ILL_CONDITIONED, general_ready
+    from mbs.models.inverse_geometry.target import NEARLY_SINGULAR
+
+    system = chain.system
+    if symbols := [parameter.name for parameter in system.parameters]:
+        raise ModelError(
+            f"{system.name}: {', '.join(symbols)} are symbols, and the general method is made for"
+            " an arm in numbers; give them as numbers, or use mbs.models.inverse_geometry.solver"
+        )
+
+    def make() -> AllConfigurations:
+        ready = general_ready(chain, np.zeros(0))
+        if ready is None or ready.prepared.regularity < ILL_CONDITIONED:
+            raise NoClosedForm(
+                f"{system.name}: the general method does not hold for {', '.join(chain.names)}, it"
+                " is for six joints of which one turns, in a regular arrangement; use"
+                " mbs.models.inverse_geometry.solve"
+            )
+        others = np.array(system.position(chain.locked))
+        code = general_function("mbs_igm_all", ready.handed, chain.indices, others, NEARLY_SINGULAR)
+        T = casadi.MX.sym("T", 4, 4)
+        names = [code.name_out(k) for k in range(code.n_out())]
+        return AllConfigurations(Function("igm_all", [T], code.call([T]), ["T"], names), chain)
+
+    made: AllConfigurations = system.cached(("all configurations", *chain.key), make)
+    return made
 
 
 def signs_of(sequence: StepSequence, branch: SX) -> SX:

@@ -263,7 +263,7 @@ class FreeOrientation:
             self._singular_value(x, still),
             count,
             solution.within_limits,
-            self._whole(windings[order], near),
+            self._whole(windings[order], near).copy,
         )
 
     def _missed(self, x: Array, target: Array) -> float:

@@ -131,6 +131,7 @@ nearly moves there: next to a fold, where two solutions meet, it is some 1e-3.""
 _ALONG = 0.2
 """Length of a step along a valley [rad or arm lengths], from which four Newton steps lead back; a
 solution draws what is nearer than a quarter turn."""
+_SETTLED = 1e-8  # a Newton step [rad or arm lengths] that leaves but rounding, its square
 _STEPS_ALONG = 32  # a whole turn
 _CROSSINGS = 8  # of false position: along a sine the digits double with each
 
@@ -202,13 +203,15 @@ class _Valley(NamedTuple):
 
 def _valley_at(target: Target, x: Array) -> _Valley:
     """The valleys beside x, (m, 6)."""
+    step = np.ones_like(x)
     for last in (False, False, False, False, True):
         e, J = target.excess(x)
         U, s, Vt = np.linalg.svd(J)
-        if last:
+        if last or np.max(np.abs(step)) < _SETTLED:
             break
         amounts = np.einsum("mik,mi->mk", U[:, :, :5], e) / np.maximum(s[:, :5], NONZERO)
-        x = x - np.clip(np.einsum("mki,mk->mi", Vt[:, :5], amounts), -_ALONG, _ALONG)
+        step = np.clip(np.einsum("mki,mk->mi", Vt[:, :5], amounts), -_ALONG, _ALONG)
+        x = x - step
     across = U[:, :, 5]
     height = np.sum(across * e, axis=1)
     return _Valley(Vt[:, 5], across, height, x, target.residual(x * target.unit))

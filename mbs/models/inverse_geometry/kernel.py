@@ -17,11 +17,12 @@ from mbs.closed_forms.arm import Array
 from mbs.closed_forms.arm_search import General
 from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import NoClosedForm
+from mbs.loops.pose import pose_numbers, rounded
 from mbs.models.inverse_geometry.branches import branch_labels
 from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, plain_branches, sequence_of
 from mbs.models.inverse_geometry.gathering import ILL_CONDITIONED, closed_form_name, general_ready
-from mbs.models.inverse_geometry.many import bounds_of, draft_solutions, general_draft
+from mbs.models.inverse_geometry.many import MANY, bounds_of, draft_solutions, general_draft
 from mbs.models.inverse_geometry.target import NEARLY_SINGULAR
 from mbs.native.array_calls import array_builtin
 from mbs.native.compiled import MachineCode, machine_code
@@ -56,6 +57,7 @@ class PoseKernel:
     Attributes:
         chain: what is solved for.
         p: (np,) the parameters.
+        arm: the chain in numbers.
         method: "pieper", "paul" or "general".
         labels: of the branches; of the general method numbers.
     """
@@ -65,14 +67,17 @@ class PoseKernel:
     ) -> None:
         """Use `kernel_of`, which chooses how the chain is solved."""
         self.chain, self.p, self.method = chain, p, method
-        self._solves, self._arm = solves, chain.arm(p)
+        self._solves, self.arm = solves, chain.arm(p)
         if isinstance(solves, General):
             self.labels = tuple(str(k + 1) for k in range(_CANDIDATES))
         else:
             self.labels = branch_labels(chain, solves, p)
-        self._handed = core.Handed(self._arm)
+        self._handed = core.handed_of(self.arm)
         self._lock = threading.Lock()
         self._code: _PoseCode | None = None
+        self._buffers: _Buffers | None = None
+        self._indices, self._asked = list(chain.indices), 0
+        self._plain = self._indices == list(range(chain.system.nq))
 
     def code(self) -> _PoseCode | None:
         """The compiled call; None where there is no C compiler, or it cannot be compiled."""
@@ -81,49 +86,78 @@ class PoseKernel:
                 self._code = _pose_code(self.chain, self.p, self._solves)
             return self._code
 
-    def draft(self, T: Array) -> PoseDraft:
-        """The solutions for a rigid transform T, (4, 4)."""
-        if isinstance(self._solves, General):
-            return self._by_arrays(T) if core.core_of(self._arm) is None else self._by_code(T)
-        if self._code is not None:
-            return self._by_code(T)
-        return self._by_arrays(T)
+    def draft(self, T: Any) -> PoseDraft | None:
+        """The solutions for a pose (4, 4) of any type; None where it is no rigid transform."""
+        self._asked += 1
+        code = self._code
+        if code is None and (isinstance(self._solves, General) or self._asked > MANY):
+            code = self.code()  # of the general method nothing is compiled but the core
+        draft = None if code is None else self._read(code.call(T, code.solver))
+        return draft or self._by_arrays(T)
 
-    def _by_code(self, T: Array) -> PoseDraft:
-        code = self.code()
-        found = None if code is None else code.call(T, code.solver)
+    def _read(self, found: Any) -> PoseDraft | None:
+        """What the compiled call gave; None where it does not take the pose."""
         if found is None:
-            return self._by_arrays(T)
+            return None
         q, residual, branch, told = found
-        count, state = (int(x) for x in told)
-        if state == FAILED:
-            return self._by_arrays(T)
-        own = q.T[:count, list(self.chain.indices)]
-        return PoseDraft(own, residual[:count], branch[:count].astype(int), state == CERTAIN)
+        count, state = told.tolist()
+        if state in (FAILED, NOT_RIGID):
+            return None
+        m = int(count)
+        own = q.T[:m] if self._plain else q.T[:m, self._indices]
+        return PoseDraft(own, residual[:m], branch[:m].astype(int), state == CERTAIN)
 
-    def _by_arrays(self, T: Array) -> PoseDraft:
-        """In numpy."""
-        library = core.core_of(self._arm)
+    def _by_arrays(self, T: Any) -> PoseDraft | None:
+        """Without machine code of the closed form."""
+        library, numbers = core.core_of(self.arm), pose_numbers(T)
+        if numbers is None or numbers.shape != (4, 4):
+            return None
+        if library is not None and isinstance(self._solves, StepSequence):
+            own = core.rounded_by(library, numbers)
+            return None if own is None else self._settled(library, own, self._solves)
+        pose, good = rounded(numbers)
+        if not good:
+            return None
         if isinstance(self._solves, General):
-            draft = general_draft(self._solves, T[None])
-        elif library is not None:
-            return self._settled(library, T, self._solves)
+            draft = general_draft(self._solves, pose[None])
         else:
-            draft = draft_solutions(self.chain, self._solves, self.p, T[None], np.zeros((1, 0)))
+            draft = draft_solutions(self.chain, self._solves, self.p, pose[None], np.zeros((1, 0)))
         valid = np.flatnonzero(draft.valid[0])
         q = draft.q[0, valid]
-        turned = np.where(self._arm.prismatic | (np.abs(q) <= np.pi), q, self._arm.wrapped(q))
+        turned = np.where(self.arm.prismatic | (np.abs(q) <= np.pi), q, self.arm.wrapped(q))
         return PoseDraft(turned, draft.residual[0, valid], valid, not draft.searched[0])
 
     def _settled(self, library: ctypes.CDLL, T: Array, sequence: StepSequence) -> PoseDraft:
         """By the interpreter and the compiled core."""
-        plain = plain_branches(self.chain, sequence, self.p)
-        q, *rows = (part.full() for part in plain.call([T])[:4])
-        every = (np.ascontiguousarray(q.T), *(row.ravel() for row in rows))
+        with self._lock:
+            if self._buffers is None:
+                self._buffers = _Buffers(plain_branches(self.chain, sequence, self.p))
+            every = self._buffers.values(T)
         handed = self._handed
         found = core.settled_by(library, handed, T, every, bounds_of(sequence))
         own, residual, branch, certain = found
         return PoseDraft(own, residual, branch.astype(int), certain)
+
+
+class _Buffers:
+    """A closed form of `all_branches`, evaluated by the interpreter into arrays."""
+
+    def __init__(self, plain: Function) -> None:
+        buffer: Any
+        buffer, self._evaluate = plain.buffer()
+        self._buffer = buffer  # which must live as long as it is evaluated
+        n, branches = plain.size_out(0)
+        self._T = np.empty((4, 4))  # row by row of the transpose: column by column
+        self._values = (np.empty((branches, n)), *(np.empty(branches) for _ in range(4)))
+        buffer.set_arg(0, self._T.data)
+        for k, value in enumerate(self._values):
+            buffer.set_res(k, value.data)
+
+    def values(self, T: Array) -> tuple[Array, ...]:
+        """What `settled_by` takes for a pose T, (4, 4)."""
+        self._T[:] = T.T
+        self._evaluate()
+        return tuple(value.copy() for value in self._values[:4])
 
 
 def kernel_of(chain: FrameChain, p: Array, method: str = "auto") -> PoseKernel | None:
@@ -161,20 +195,6 @@ def kernel_of(chain: FrameChain, p: Array, method: str = "auto") -> PoseKernel |
 # The compiled call: one builtin for all robots, which is handed what it needs to know of one.
 
 
-class _SolverStruct(ctypes.Structure):
-    """`pose_solver` of pose.h."""
-
-    _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("arm", "loop", "evaluate", "checkout", "release")),
-        *((name, ctypes.c_longlong) for name in ("branches", "arguments", "results")),
-        *((name, ctypes.c_longlong) for name in ("integers", "reals")),
-        ("suspect", ctypes.c_double),
-        ("nearly", ctypes.c_double),
-        ("nq", ctypes.c_longlong),
-        *((name, ctypes.c_void_p) for name in ("indices", "others")),
-    )
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _PoseCode:
     """The compiled call of a kernel.
@@ -203,11 +223,11 @@ def _pose_code(chain: FrameChain, p: Array, solves: StepSequence | General) -> _
     machine: MachineCode | None = None
     if isinstance(solves, General):
         handed, room, work = solves.handed.arm, _CANDIDATES, _CANDIDATES
-        own = _SolverStruct(
+        own = core.SolverStruct(
             handed.address, solves.handed.address, *[None] * 3, *[0] * 5, 0.0, NEARLY_SINGULAR, *end
         )
     else:
-        machine, handed = machine_code(plain_branches(chain, solves, p)), core.Handed(arm)
+        machine, handed = machine_code(plain_branches(chain, solves, p)), core.handed_of(arm)
         if machine is None:
             return None
         arguments, results, integers, reals = machine.work
@@ -215,7 +235,7 @@ def _pose_code(chain: FrameChain, p: Array, solves: StepSequence | General) -> _
         work = arguments + results + integers + reals + 3 * room
         addresses = (machine.evaluate, machine.checkout, machine.release)
         sizes = (room, arguments, results, integers, reals)
-        own = _SolverStruct(handed.address, None, *addresses, *sizes, *bounds_of(solves), *end)
+        own = core.SolverStruct(handed.address, None, *addresses, *sizes, *bounds_of(solves), *end)
     solver = np.frombuffer(memoryview(own).cast("B"), dtype=np.float64)
     inputs = [SX.sym("T", 4, 4), SX.sym("solver", solver.size)]
     room = max(room, 2)  # one column alone would come as a vector

@@ -50,7 +50,7 @@ from mbs.native import compiled
 
 _COLUMNS = 32
 """Poses in one call: more make the code longer, fewer the calls felt."""
-_MANY = 1000
+MANY = 1000
 """Poses from which machine code is worth the second that a compiler takes; those of earlier calls
 count."""
 
@@ -71,7 +71,7 @@ def batch(
     key = ("machine code of igm_all", sequence, *chain.key, p.tobytes())
     asked: list[int] = chain.system.cached(("poses", *key), lambda: [0])
     asked[0] += len(T)
-    if asked[0] < _MANY:
+    if asked[0] < MANY:
         return at_poses(plain, T, r)
     return _by_machine(chain.system.cached(key, lambda: _machine_code(plain)), plain, T, r)
 

@@ -69,10 +69,11 @@ def freedoms(reduced: TargetReduction) -> tuple[int, Array]:
     probes = [_probe(reduced, d) for d in directions[:2]]
     if c and all(_solves(target, x) for x in probes):
         return c, (probes[0] - reduced.x) / np.linalg.norm(probes[0] - reduced.x)
-    for direction in directions if c > 1 else ():
-        x = _nearest_on_sphere(reduced, direction)
+    if c > 1:
+        around = _nearest_on_sphere(reduced, np.array(directions))
+        on = np.abs(np.linalg.norm(around - reduced.x, axis=1) / _AWAY - 1) < 1e-3
         # on the sphere, not fallen back to its centre
-        if _solves(target, x) and abs(np.linalg.norm(x - reduced.x) / _AWAY - 1) < 1e-3:
+        for x in around[on & (target.residual(around * target.unit) < target.tolerance)]:
             return 1, (x - reduced.x) / np.linalg.norm(x - reduced.x)
     return 0, np.zeros(reduced.x.size)
 
@@ -88,20 +89,25 @@ def _probe(reduced: TargetReduction, direction: Array) -> Array:
     return reduced.target.corrected(start, reduced.null.T, h + reduced.null.T @ reduced.x)
 
 
-def _nearest_on_sphere(reduced: TargetReduction, direction: Array) -> Array:
-    """A solution at a distance from the centre in any direction of the null space."""
-    x = reduced.x + _AWAY * (reduced.null @ direction)
+def _nearest_on_sphere(reduced: TargetReduction, directions: Array) -> Array:
+    """Solutions (m, n) at a distance from the centre, from directions (m, corank) on."""
+    target = reduced.target
+    x = reduced.x + _AWAY * (directions @ reduced.null.T)
+    library = core.core_of(target.arm)
+    if library is not None:
+        return core.on_sphere_by(library, target.arm, target.T, reduced.x, _AWAY, x)
     for _ in range(60):
-        e, J = reduced.target.excess(x)
-        away = x - reduced.x
-        rows = np.vstack([J, away / _AWAY])
-        right = np.append(e, 0.5 * (away @ away / _AWAY - _AWAY))
+        e, J = target.excess(x)
+        away = (x - reduced.x) / _AWAY
+        rows = np.concatenate([J, away[:, None]], axis=1)
+        rest = 0.5 * _AWAY * (np.sum(away * away, axis=1) - 1.0)
+        right = np.concatenate([e, rest[:, None]], axis=1)
         # rows that a self-motion leaves dependent are so but for rounding, no others are so near
-        step = np.linalg.lstsq(rows, -right, rcond=1e-10)[0]
-        size = float(np.linalg.norm(step))
+        step = -(np.linalg.pinv(rows, rcond=1e-10) @ right[..., None])[..., 0]
+        size = np.linalg.norm(step, axis=1, keepdims=True)
         # short beside the sphere, so that it is not left for another solution
-        x = x + step * min(1.0, 0.3 * _AWAY / max(size, NONZERO))
-        if size < 1e-14:  # rounding of positions of about one [rad or arm lengths]
+        x = x + step * np.minimum(1.0, 0.3 * _AWAY / np.maximum(size, NONZERO))
+        if np.max(size) < 1e-14:  # rounding of positions of about one [rad or arm lengths]
             break
     return x
 

@@ -5,15 +5,16 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.closed_forms.arm import Array
+from mbs.closed_forms.arm import Arm, Array
 from mbs.closed_forms.arm_search import Nearest
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry.self_motions import Family
@@ -53,15 +54,17 @@ class CoordinateLimits:
         """The names of the coordinates that no whole number of turns brings within limits."""
         return [self.names[k] for k in range(q.size) if not self._options(k, q[k], 0.0)]
 
-    def wound(self, q: Array, near: Array) -> tuple[Array, Array]:
-        """`wrap_to_limits`, and the `windings` of what it gives."""
-        options = [self._options(k, q[k], near[k]) for k in range(q.size)]
-        first = self._first(options, q, near)
-        if all(len(option) == 1 for option in options):
-            return first, first[None].copy()
-        if not all(options):
-            return first, np.empty((0, q.size))
-        return first, self.windings(first, near)
+    def wound(self, q: Array, near: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """`wrap_to_limits` of configurations (m, nq), and (m,) which of them are within limits."""
+        low, high = self.low - WITHIN, self.high + WITHIN
+        away = (near - q) / _TURN
+        # of two that are as near, the lower one as in `_options`
+        free = np.isinf(low) & np.isinf(high)
+        turns = np.where(free, np.rint(away), np.ceil(away - 0.5))
+        first, last = np.ceil((low - q) / _TURN), np.floor((high - q) / _TURN)
+        within = np.where(self.turns, first <= last, (low <= q) & (q <= high))
+        turns = np.where(within, np.minimum(np.maximum(turns, first), last), np.rint(away))
+        return np.where(self.turns, q + _TURN * turns, q), np.all(within, axis=1, keepdims=False)
 
     def windings(self, q: Array, near: Array) -> Array:
         """Configurations that differ from q by whole turns and are within the limits.
@@ -84,15 +87,8 @@ class CoordinateLimits:
 
     def wrap_to_limits(self, q: Array, near: Array) -> Array:
         """(nq,) q changed by whole turns: each coordinate within limits if it can, near `near`."""
-        options = [self._options(k, q[k], near[k]) for k in range(q.size)]
-        return self._first(options, q, near)
-
-    def _first(self, options: list[list[float]], q: Array, near: Array) -> Array:
-        """The first option of each coordinate, near `near` where there is none."""
-        if all(options):
-            return np.array([option[0] for option in options])
-        plain = np.where(self.turns, near + _remainder(q - near), q)
-        return np.array([o[0] if o else x for o, x in zip(options, plain, strict=True)])
+        wrapped: Array = self.wound(q[None], near)[0][0]
+        return wrapped
 
     def _options(self, k: int, value: float, near: float) -> list[float]:
         """Positions of one coordinate within its limits, the nearest first."""
@@ -193,8 +189,6 @@ class Solution:
         multiplicity: how many roots meet in it; 1 but at a singular configuration, 0 where it is
             one of a self-motion.
         within_limits: whether every joint is within its limits.
-        windings: (w, nq) configurations within the limits that differ from it by whole turns, q
-            itself the first; none where a joint is outside.
         family: the self-motion that it stands for, or None.
     """
 
@@ -204,8 +198,90 @@ class Solution:
     sigma_min: float
     multiplicity: int
     within_limits: bool
-    windings: Array
+    _windings: Callable[[], Array] = field(repr=False)
     family: Family | None = None
+
+    @property
+    def windings(self) -> Array:
+        """(w, nq) what is within limits and differs from q by whole turns, q itself the first.
+
+        None where a joint is outside.
+        """
+        return self._windings()
+
+
+class RegularSolutions(Sequence[Solution]):
+    """The solutions of a regular pose as arrays; each is a `Solution` when it is asked for."""
+
+    __slots__ = (
+        "_arm",
+        "_bounds",
+        "_branches",
+        "_made",
+        "_near",
+        "_own",
+        "_residual",
+        "_sigma",
+        "_within",
+        "q",
+    )
+
+    def __init__(
+        self,
+        q: Array,
+        branches: Sequence[str],
+        residual: Array,
+        arm: Arm,
+        own: Array,
+        bounds: CoordinateLimits,
+        near: Array,
+        within: NDArray[np.bool_],
+    ) -> None:
+        """Take them.
+
+        Args:
+            q: (m, nq) configurations, wound towards `near` within limits [rad or m].
+            branches: (m,) their names.
+            residual: (m,) largest element of pose(q) - T [m or 1].
+            arm: the chain in numbers.
+            own: (m, n) configurations of the chain [rad or m].
+            bounds: limits of the coordinates.
+            near: (nq,) configuration that others are wound towards.
+            within: (m,) whether each is within limits.
+        """
+        self.q, self._branches, self._residual = q, branches, residual
+        self._arm, self._own, self._bounds, self._near = arm, own, bounds, near
+        self._within = within
+        self._sigma: Array | None = None
+        self._made: dict[int, Solution] = {}
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    @overload
+    def __getitem__(self, k: int) -> Solution: ...
+    @overload
+    def __getitem__(self, k: slice) -> Sequence[Solution]: ...
+    def __getitem__(self, k: int | slice) -> Solution | Sequence[Solution]:
+        if isinstance(k, slice):
+            return tuple(self[m] for m in range(len(self))[k])
+        number = range(len(self))[k]
+        if number not in self._made:
+            self._made[number] = self._solution(number)
+        return self._made[number]
+
+    def _solution(self, k: int) -> Solution:
+        if self._sigma is None:  # which does not depend on the pose
+            self._sigma = Target(self._arm, np.eye(4)).singular_values(self._own)[:, -1]
+        return Solution(
+            self.q[k],
+            self._branches[k],
+            float(self._residual[k]),
+            float(self._sigma[k]),
+            1,
+            bool(self._within[k]),
+            partial(self._bounds.windings, self.q[k], self._near),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -225,7 +301,7 @@ class Solutions(Sequence[Solution]):
 
     system: str
     names: tuple[str, ...]
-    solutions: tuple[Solution, ...]
+    solutions: Sequence[Solution]
     method: str
     reason: str
     nearest: Nearest | None
@@ -244,6 +320,8 @@ class Solutions(Sequence[Solution]):
     @property
     def q(self) -> Array:
         """(m, nq) the configurations [rad or m]."""
+        if isinstance(self.solutions, RegularSolutions):
+            return self.solutions.q.copy()
         return np.array([s.q for s in self.solutions]).reshape(len(self), len(self.names))
 
     def closest(self, q: Sequence[float] | Array) -> Solution:
@@ -262,7 +340,7 @@ class Solutions(Sequence[Solution]):
             )
         wound = [replace(s, q=self._bounds.wrap_to_limits(s.q, near)) for s in self.solutions]
         best = min(wound, key=lambda s: float(np.linalg.norm(s.q - near)))
-        return replace(best, windings=self._bounds.windings(best.q, near))
+        return replace(best, _windings=partial(self._bounds.windings, best.q, near))
 
     def __str__(self) -> str:
         if not self.solutions:
@@ -454,14 +532,15 @@ class Wishes:
         return Solutions(self.system.name, names, tuple(kept), method, reason, nearest, self.bounds)
 
     def _solution(self, draft: RobotSolution) -> Solution:
-        q, windings = self.bounds.wound(draft.q, self.near)
+        wound, within = self.bounds.wound(draft.q[None], self.near)
+        q = wound[0]
         return Solution(
             q,
             draft.branch,
             draft.residual,
             draft.sigma_min,
             draft.multiplicity,
-            len(windings) > 0,
-            windings,
+            bool(within[0]),
+            partial(self.bounds.windings, q, self.near),
             draft.family,
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,15 @@ from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Array
 from mbs.closed_forms.arm_search import nearest
 from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, named, new_among, roots
+from mbs.models.inverse_geometry.answer import (
+    ChainRoot,
+    Examined,
+    Question,
+    answer,
+    named,
+    new_among,
+    roots,
+)
 from mbs.models.inverse_geometry.branches import branch_labels
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, require_method, sequence_of
@@ -25,9 +33,16 @@ from mbs.models.inverse_geometry.gathering import (
     gather_further,
     joined,
 )
-from mbs.models.inverse_geometry.kernel import kernel_of
+from mbs.models.inverse_geometry.kernel import PoseKernel, kernel_of
 from mbs.models.inverse_geometry.redundancy import LockedSamples, Redundant, samples_of
-from mbs.models.inverse_geometry.solutions import Given, Solutions, Wishes, bounds, leaves_out
+from mbs.models.inverse_geometry.solutions import (
+    Given,
+    RegularSolutions,
+    Solutions,
+    Wishes,
+    bounds,
+    leaves_out,
+)
 from mbs.models.inverse_geometry.target import Target, nearly_singular
 from mbs.models.inverse_geometry.whole_robot import parallel
 
@@ -76,6 +91,11 @@ def solve(
         NoClosedForm: "pieper" or "paul" was asked for and does not fit.
     """
     require_system(system)
+    if redundant is None:
+        shell = _shell_of(system, frame, method, limits, locked, parameters)
+        found = None if shell is None else shell.solutions(T, seed)
+        if found is not None:
+            return found
     target = target_pose(system, T)
     return solve_rigid(
         system,
@@ -88,6 +108,87 @@ def solve(
         redundant=redundant,
         parameters=parameters,
     )
+
+
+_KEPT = 256  # shells, one for every position of locked joints and value of parameters
+Seed = Mapping[str, float] | Sequence[float] | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shell:
+    """What `solve` knows of a frame before it is told a pose.
+
+    Attributes:
+        kernel: that solves for poses.
+        names: of the coordinates.
+        plain: what is asked for where no seed is given.
+    """
+
+    kernel: PoseKernel
+    names: tuple[str, ...]
+    plain: Wishes
+
+    def solutions(self, T: Any, seed: Seed) -> Solutions | None:
+        """The solutions of a regular pose; None where they are found, or not found, otherwise."""
+        kernel, wishes = self.kernel, self.plain
+        draft = kernel.draft(T)
+        if draft is None or not draft.certain or not len(draft.q):
+            return None
+        if seed is not None:
+            wishes = replace(wishes, near=_near(wishes.system, kernel.chain, seed), seeded=True)
+        q = np.empty((len(draft.q), len(self.names)))
+        q[:] = wishes.near
+        q[:, kernel.chain.indices] = draft.q
+        q, within = wishes.bounds.wound(q, wishes.near)
+        order = np.flatnonzero(within) if wishes.strict else np.arange(len(q))
+        if not len(order):
+            return None
+        if wishes.seeded:
+            order = order[np.argsort(np.linalg.norm(q[order] - wishes.near, axis=1), kind="stable")]
+        names = [kernel.labels[b] for b in draft.branch[order].tolist()]
+        rows = RegularSolutions(
+            q[order],
+            names,
+            draft.residual[order],
+            kernel.arm,
+            draft.q[order],
+            wishes.bounds,
+            wishes.near,
+            within[order],
+        )
+        system = wishes.system
+        return Solutions(system.name, self.names, rows, kernel.method, "", None, wishes.bounds)
+
+
+def _shell_of(
+    system: System,
+    frame: str | int | None,
+    method: str,
+    limits: bool | Given | None,
+    locked: Mapping[str, float] | None,
+    parameters: Mapping[str, float] | None,
+) -> _Shell | None:
+    """What is kept for poses of a frame; None where only the slow methods hold."""
+    own = tuple(limits.items()) if isinstance(limits, Mapping) else limits
+    given = (tuple(x.items()) if x else None for x in (locked, parameters))
+    key = (frame, method, type(limits), own, *given)
+    try:
+        hash(key)
+    except TypeError:
+        return None
+
+    def made() -> _Shell | None:
+        require_method(system, method, METHODS)
+        p = np.array(system.parameter_values(parameters))
+        chain = chain_or_none(system, frame, locked)
+        kernel = None if chain is None or system.is_closed else kernel_of(chain, p, method)
+        if chain is None or kernel is None:
+            return None
+        names = tuple(coordinate.name for coordinate in system.coordinates)
+        return _Shell(kernel, names, _wishes(system, chain, limits, None))
+
+    shell: _Shell | None = system.recent("poses of a frame", key, made, _KEPT)
+    return shell
 
 
 def solve_rigid(
@@ -205,13 +306,14 @@ def solved(
     if method not in ("auto", *CLOSED_FORMS) or not _is_doubtful(target, gathered):
         return roots(target, gathered, question.chain_indices), gathered.method
     gathered = gather_further(chain, target, gathered, p)
-    found = roots(target, gathered, question.chain_indices)
+    examined: Examined = {}
+    found = roots(target, gathered, question.chain_indices, examined)
     if gathered.method == "search":
         return found, gathered.method
     # where an arm moves, a search gives points of what is known already
     more = new_among(target, found, by_search(target))
     if len(more.q):
-        found = roots(target, joined(gathered, more), question.chain_indices)
+        found = roots(target, joined(gathered, more), question.chain_indices, examined)
     return found, gathered.method
 
 
@@ -269,14 +371,22 @@ def _wishes(
     limits: bool | Given | None,
     seed: Mapping[str, float] | Sequence[float] | None,
 ) -> Wishes:
-    near = np.array(system.position(seed))
     names = [coordinate.name for coordinate in system.coordinates]
     locked_indices = [] if chain is None else [names.index(name) for name in chain.locked]
-    if chain is not None:
-        if seed is None:
-            near[list(chain.indices)] = 0.0
-        near[locked_indices] = list(chain.locked.values())
     turning = None if chain is None or system.is_closed else chain.indices
     coupled = [k for c in system.couplings for k in c.coordinates]
     limited = bounds(system, limits, set(turning or range(system.nq)) - {*locked_indices, *coupled})
+    near = _near(system, chain, seed)
     return Wishes(system, near, limited, leaves_out(limits), seed is not None)
+
+
+def _near(system: System, chain: FrameChain | None, seed: Seed) -> Array:
+    """(nq,) the configuration that solutions are wound towards."""
+    near = np.array(system.position(seed))
+    if chain is None:
+        return near
+    if seed is None:
+        near[list(chain.indices)] = 0.0
+    names = [coordinate.name for coordinate in system.coordinates]
+    near[[names.index(name) for name in chain.locked]] = list(chain.locked.values())
+    return near

@@ -6,10 +6,13 @@ for turns, so that a number in x or in the equations means the same for every jo
 
 from __future__ import annotations
 
+import ctypes
+import functools
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +45,14 @@ class Target:
 
     arm: Arm
     T: Array
+    _library: ctypes.CDLL | None = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_library", core.core_of(self.arm))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A library is found again where it is read."""
+        return type(self), (self.arm, self.T)
 
     @property
     def unit(self) -> Array:
@@ -55,7 +66,7 @@ class Target:
 
     def residual(self, q: Array) -> Array:
         """(...) largest element of pose(q) - T at configurations q, (..., n)."""
-        library = core.core_of(self.arm)
+        library = self._library
         if library is None or (self.T.ndim > 2 and q.ndim != 2):
             return self.arm.residual(q, self.T)
         flat = np.asarray(q, dtype=float).reshape(-1, self.arm.size)
@@ -63,7 +74,7 @@ class Target:
 
     def excess(self, x: Array) -> tuple[Array, Array]:
         """The equations e(x) = 0, (..., 6), and their derivative to first order, (..., 6, n)."""
-        library = core.core_of(self.arm)
+        library = self._library
         if library is not None and (self.T.ndim == 2 or x.ndim == 2):
             q = (x * self.unit).reshape(-1, self.arm.size)
             gap, slope = core.examined_by(library, self.arm, self.T, q)
@@ -93,7 +104,7 @@ class Target:
         Returns:
             (..., n) the last iterates; whether they solve the equations is left to the residual.
         """
-        library = core.core_of(self.arm)
+        library = self._library
         if library is not None and held.shape[-2] == 1 and type(self) is Target:
             every = np.broadcast_to(x, np.broadcast_shapes(x.shape, held.shape[:-2] + x.shape[-1:]))
             flat = every.reshape(-1, x.shape[-1])
@@ -244,6 +255,10 @@ class TargetReduction:
 
     def at(self, h: Array) -> tuple[Array, Array, bool]:
         """X (k, n) and g (k, 6 - rank) for h, (k, corank), and whether all were found."""
+        target, library = self.target, self.target._library
+        if library is not None and type(target) is Target:
+            parts = self.x, self.solved.T, self.left.T, self.null.T
+            return core.reduced_by(library, target.arm, target.T, parts, h)
         x = self.x + h @ self.null.T
         for _ in range(12):
             e, J = self.target.excess(x)
@@ -351,15 +366,23 @@ def _shift(g: Array, by: float) -> Array:
 
 def _coefficients(reduced: TargetReduction) -> Array:
     """(degree + 1, 6 - rank) Taylor coefficients of g in one unknown."""
-    nodes = np.cos(np.pi * (np.arange(2 * _DEGREE + 1) + 0.5) / (2 * _DEGREE + 1))
+    nodes, powers, inverse = _fitting()
     for radius in _RADII:
         _, g, found = reduced.at(radius * nodes[:, None])
-        fit = np.polynomial.polynomial.polyfit(nodes, g, _DEGREE)
-        rest = np.polynomial.polynomial.polyval(nodes, fit).T - g
+        fit = inverse @ g
+        rest = powers @ fit - g
         if found and np.max(np.abs(rest)) < _ROUNDING:
             break
     coefficients: Array = fit / radius ** np.arange(_DEGREE + 1)[:, None]
     return coefficients
+
+
+@functools.cache
+def _fitting() -> tuple[Array, Array, Array]:
+    """Nodes in [-1, 1], their powers, and what makes coefficients of values at them."""
+    nodes = np.cos(np.pi * (np.arange(2 * _DEGREE + 1) + 0.5) / (2 * _DEGREE + 1))
+    powers = np.vander(nodes, _DEGREE + 1, increasing=True)
+    return nodes, powers, np.linalg.pinv(powers)
 
 
 def _dual_dimension(reduced: TargetReduction) -> int:

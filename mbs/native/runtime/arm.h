@@ -53,6 +53,11 @@ void arm_descend(const arm *a, const double *target, configuration *p);
 void arm_correct(const arm *a, const double *target, const double *held, double value,
                  int iterations, double *x);
 
+/* Gauss-Newton steps from x = q / unit towards the target pose and a distance from a centre, to a
+ * solution on the sphere where there is one. */
+void arm_reach_sphere(const arm *a, const double *target, const double *centre, double radius,
+                      double *x);
+
 /* What of a direction the pose does not feel at x = q / unit, divided by the square of its part. */
 void arm_tangent(const arm *a, const double *x, const double *before, double *tangent);
 

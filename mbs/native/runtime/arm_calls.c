@@ -1,6 +1,8 @@
 /* The arm's algorithms for callers that hand over plain arrays. */
+#include "arm_nearest.h"
+#include "arm_reduce.h"
 #include "arm_search.h"
-#include "raghavan_roth.h"
+#include "pose.h"
 
 #ifdef _WIN32
 #define EXPORT __declspec(dllexport)
@@ -98,4 +100,59 @@ EXPORT long long mbs_general(const arm *a, const roth_loop *r, const double *tar
         count += found.count;
     }
     return count;
+}
+
+/* `pose_solve` in CasADi's convention: T and a pose_solver -> q, residual, number, (count, state). */
+EXPORT int mbs_pose(const double **arg, double **res, long long *iw, double *w, int mem) {
+    long long count;
+    (void)iw;
+    (void)mem;
+    res[3][1] = pose_solve((const pose_solver *)arg[1], arg[0], res[0], res[1], res[2], w, &count);
+    res[3][0] = (double)count;
+    return 0;
+}
+
+EXPORT int mbs_pose_work(long long *arguments, long long *results, long long *integers,
+                         long long *reals) {
+    *arguments = 2;
+    *results = 4;
+    *integers = *reals = 0;
+    return 0;
+}
+
+/* Which of q (count, n) have a singular value below the bound. */
+EXPORT void mbs_singular(const arm *a, double bound, long long count, const double *q,
+                         unsigned char *singular) {
+    long long i;
+    for (i = 0; i < count; i++) singular[i] = (unsigned char)pose_is_singular(a, q + i * a->n, bound);
+}
+
+/* `pose_settle` for a closed form that was evaluated elsewhere; gives what came of the pose. */
+EXPORT int mbs_settle(const arm *a, const double *T, long long branches, double *q, double *residual,
+                      const double *real, const double *regular, double suspect, double nearly, double *number,
+                      long long *count) {
+    int doubtful = 0;
+    *count = pose_settle(a, T, branches, q, residual, real, regular, suspect, nearly,
+                         number, &doubtful);
+    return doubtful ? POSE_DOUBTFUL : POSE_CERTAIN;
+}
+
+/* `pose_round`. */
+EXPORT int mbs_round(double *T) { return pose_round(T); }
+
+/* Brings x (count, n) to a sphere, see arm_reach_sphere. */
+EXPORT void mbs_reach_sphere(const arm *a, const double *target, const double *centre, double radius,
+                             long long count, double *x) {
+    long long i;
+    for (i = 0; i < count; i++) arm_reach_sphere(a, target, centre, radius, x + i * a->n);
+}
+
+/* x (count, n) and g (count, 6 - n + c) for h (count, c), see arm_reduced; whether all were found. */
+EXPORT int mbs_reduced(const arm *a, const double *target, const arm_reduction *r, long long count,
+                       const double *h, double *x, double *g) {
+    long long i;
+    int c = r->corank, found = 1;
+    for (i = 0; i < count; i++)
+        found &= arm_reduced(a, target, r, h + i * c, x + i * a->n, g + i * (6 - a->n + c));
+    return found;
 }

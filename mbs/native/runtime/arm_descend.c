@@ -6,13 +6,15 @@
 #include "rigid.h"
 
 enum { STALLS = 3, ROWS = 7 + ARM_JOINTS };
-static const double FINE = 1e-26;   /* costs below it are those of solutions but for rounding */
+static const double SOLUTION = 1e-26;   /* costs below it are those of solutions but for rounding */
 static const double FINEST = 1e-31; /* nothing is left to gain */
 static const double WEAK = 1e-8;    /* pivots of squares below it are taken for rounding */
 static const double LEAST = 1e-31;  /* damping, so that no matrix is singular */
 static const double DEPENDENT = 1e-12; /* singular values below it are rounding, and damped */
 static const double ZERO = 2e-6;       /* those of a self-motion, known to the root of 1e-12 */
 static const double LONGEST = 0.3;     /* step [rad or arm lengths] in which all is nearly linear */
+static const double DEPENDENT_THERE = 1e-10; /* likewise on a sphere, where motions meet */
+static const double FINISHED = 1e-14;  /* step that is rounding of angles of about one */
 static const double SETTLED = 1e-12;   /* step that is hardly more than rounding, likewise */
 
 /* (J' J + shift) dx = J' gap by Cholesky. 0: too close to singular. */
@@ -45,7 +47,7 @@ static int normal_step(const arm *a, const configuration *p, double shift, doubl
 }
 
 /* Reflects columns j .. n so that column j ends at its element j. */
-static void reflect(double A[ARM_JOINTS + 1][ROWS], int j, int n, int rows) {
+static void reflect_rows(double A[ARM_JOINTS + 1][ROWS], int j, int n, int rows) {
     double size = 0.0, scale;
     int i, k;
     for (i = j; i < rows; i++) size += A[j][i] * A[j][i];
@@ -70,7 +72,7 @@ static void orthogonal_step(const arm *a, const configuration *p, double shift, 
         A[j][6 + j] = sqrt(shift);
     }
     memcpy(A[n], p->gap, sizeof p->gap);
-    for (j = 0; j < n; j++) reflect(A, j, n, rows);
+    for (j = 0; j < n; j++) reflect_rows(A, j, n, rows);
     for (j = n - 1; j >= 0; j--) {
         dx[j] = A[n][j];
         for (k = j + 1; k < n; k++) dx[j] -= A[k][j] * dx[k];
@@ -90,7 +92,7 @@ static void held_step(const arm *a, const configuration *p, const double *right,
     }
     memcpy(A[n], right, 6 * sizeof(double));
     A[n][6] = value;
-    for (j = 0; j < n; j++) reflect(A, j, n, 7 + n);
+    for (j = 0; j < n; j++) reflect_rows(A, j, n, 7 + n);
     for (j = n - 1; j >= 0; j--) {
         dx[j] = A[n][j];
         for (k = j + 1; k < n; k++) dx[j] -= A[k][j] * dx[k];
@@ -116,6 +118,30 @@ void arm_correct(const arm *a, const double *target, const double *held, double 
         part = size > LONGEST ? LONGEST / size : 1.0;
         for (k = 0; k < a->n; k++) x[k] += part * dx[k];
         if (!(size >= SETTLED)) return;
+    }
+}
+
+void arm_reach_sphere(const arm *a, const double *target, const double *centre, double radius,
+                      double *x) {
+    enum { STEPS = 60 };
+    configuration p;
+    double dx[ARM_JOINTS], away[ARM_JOINTS];
+    int k, step;
+    for (step = 0; step < STEPS; step++) {
+        double rest = 0.5 * radius, size = 0.0, part;
+        for (k = 0; k < a->n; k++) {
+            away[k] = (x[k] - centre[k]) / radius;
+            rest -= 0.5 * radius * away[k] * away[k];
+            p.q[k] = arm_unit(a, k) * x[k];
+        }
+        arm_examine(a, target, &p);
+        held_step(a, &p, p.gap, away, rest, DEPENDENT_THERE, dx);
+        for (k = 0; k < a->n; k++) size += dx[k] * dx[k];
+        size = sqrt(size);
+        /* short beside the sphere, so that it is not left for another solution */
+        part = size > 0.3 * radius ? 0.3 * radius / size : 1.0;
+        for (k = 0; k < a->n; k++) x[k] += part * dx[k];
+        if (!(size >= FINISHED)) return;
     }
 }
 
@@ -287,7 +313,7 @@ void arm_descend(const arm *a, const double *target, configuration *p) {
         attempt(a, target, p, damping, &next);
         if (!(next.cost < p->cost)) {
             damping = damping < 1e-3 ? 1e-2 : 4.0 * damping;
-            stalls += p->cost < FINE || damping * p->cost > 1e12;
+            stalls += p->cost < SOLUTION || damping * p->cost > 1e12;
             continue;
         }
         gain = 1.0 - next.cost / p->cost;

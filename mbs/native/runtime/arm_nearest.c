@@ -1,7 +1,9 @@
-#include "arm_search.h"
+#include "arm_nearest.h"
 
 #include <math.h>
 #include <string.h>
+
+#include "arm_search.h"
 
 enum { KEPT = 8, REFINEMENTS = 60 };
 static const double NUDGE = 1e-5;   /* of joints, for differences of the slope */

@@ -1,4 +1,4 @@
-/* All configurations that reach a pose, and those that come nearest to one, from random starts.
+/* All configurations that reach a pose, from random starts.
  *
  * Re-entrant: no globals and no allocation. The starts depend on the seed alone.
  */
@@ -30,10 +30,5 @@ void arm_add(const arm *a, const double *target, const double *q, arm_configurat
 /* Solutions found from `starts` starts; there must be room for as many. */
 void arm_search(const arm *a, const double *target, long long starts, unsigned long long seed,
                 arm_configurations *found);
-
-/* The configuration whose pose is nearest, the gap's cost being the square of the distance; gives that
- * cost. At least one start. */
-double arm_nearest(const arm *a, const double *target, long long starts, unsigned long long seed,
-                   double *q);
 
 #endif

@@ -34,7 +34,7 @@ static int all_finite(int n, const double *A) {
 }
 
 /* Elements of about 1 or less, by a power of two; gives its exponent. */
-static int scale(int n, double *A) {
+static int scale_rows(int n, double *A) {
     double most = 0.0;
     int i, exponent = 0;
     for (i = 0; i < n * n; i++) most = fmax(most, fabs(A[i]));
@@ -195,7 +195,7 @@ static void francis_step(int n, double *H, int first, int last, const shifts *s)
     }
 }
 
-static void pair_of(const double *row, const double *next, double *real, double *imaginary) {
+static void pair_at(const double *row, const double *next, double *real, double *imaginary) {
     double half = 0.5 * (row[0] - next[1]), product = row[1] * next[0];
     double root = half * half + product, size = sqrt(fabs(root));
     if (root < 0.0) {
@@ -228,7 +228,7 @@ int eigenvalues(int n, double *A, double *real, double *imaginary) {
     int k, exponent, last = n - 1, sweeps = 0;
     double size;
     if (!all_finite(n, A)) return 1;
-    exponent = scale(n, A);
+    exponent = scale_rows(n, A);
     balance(n, A);
     reduce_to_hessenberg(n, A);
     size = norm(n, A);
@@ -245,7 +245,7 @@ int eigenvalues(int n, double *A, double *real, double *imaginary) {
         real[last] = row[last];
         imaginary[last] = 0.0;
         if (first < last)
-            pair_of(row - n + last - 1, row + last - 1, real + last - 1, imaginary + last - 1);
+            pair_at(row - n + last - 1, row + last - 1, real + last - 1, imaginary + last - 1);
         last = first - 1;
         sweeps = 0;
     }

@@ -3,13 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "dense.h"
 #include "rigid.h"
-
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
 
 static const double SKEWED = 1e-6;     /* by how much an element may miss a rigid transform */
 static const double SOLVED = 1e-12;    /* residual of a solution, of max(1 m, the length) */
@@ -17,8 +12,9 @@ static const double EXACT = 1e-14;     /* one that polishing hardly betters, lik
 static const double DOUBTFUL = 1e-6;   /* one beside which a solution may stand, likewise */
 static const double FOLD = 1e-9;       /* radicand below zero of a root real but for rounding */
 static const double DEGENERATE = 1e-12; /* squared, of a step that leaves a joint undetermined */
-static const double SAME = 1e-9;       /* between configurations that are one [rad or lengths] */
+static const double EQUAL = 1e-9;      /* between configurations that are one [rad or lengths] */
 static const double MEETING = 1e-5;    /* between those near a double root, likewise */
+static const double FLAT_PIVOT = 1e-15; /* pivots of a Jacobian that are but rounding */
 
 /* Source: Higham 2008, chapter 8, the Newton-Schulz iteration for the polar factor. */
 int pose_round(double *T) {
@@ -138,7 +134,7 @@ long long pose_settle(const arm *a, const double *T, long long branches, double 
         if (near && !is_certain(a, T, own, nearly, &residual[b])) *doubtful = 1;
         for (i = 0; i < count; i++) {
             double distance = apart(a, q + i * a->n, own);
-            if (distance < SAME) break;
+            if (distance < EQUAL) break;
             if (distance < MEETING) *doubtful = 1;
         }
         if (i < count) continue;
@@ -172,14 +168,14 @@ static long long by_closed_form(const pose_solver *s, const double *T, double *q
     failed = s->evaluate(in, out, integers, reals, memory);
     if (s->release) s->release(memory);
     return failed ? -1
-                  : pose_settle(s->arm, T, branches, q, residual, real, real + branches, s->suspect,
+                  : pose_settle(s->robot, T, branches, q, residual, real, real + branches, s->suspect,
                                 s->nearly, number, doubtful);
 }
 
 /* The solutions of the general method, in no order. */
 static long long by_elimination(const pose_solver *s, const double *T, double *q, double *residual,
                                 double *number, double *w, int *doubtful) {
-    const arm *a = s->arm;
+    const arm *a = s->robot;
     arm_configurations found = {q, residual, (long long *)w, 0};
     long long i;
     roth_solve(a, s->loop, T, &found);
@@ -192,8 +188,8 @@ static long long by_elimination(const pose_solver *s, const double *T, double *q
 }
 
 /* From (count, n) joints of the arm to (count, nq) coordinates, in place. */
-static void spread(const pose_solver *s, long long count, double *q) {
-    const long long n = s->arm->n, nq = s->nq;
+static void fill_coordinates(const pose_solver *s, long long count, double *q) {
+    const long long n = s->robot->n, nq = s->nq;
     double own[ARM_JOINTS];
     long long i, k;
     for (i = count - 1; i >= 0; i--) {
@@ -203,51 +199,91 @@ static void spread(const pose_solver *s, long long count, double *q) {
     }
 }
 
-/* T (4, 4) and a pose_solver; gives q (nq, room), residual (room,), number (room,) of the branches,
- * how many they are and what came of the pose. There must be room for all branches, or for
- * ROTH_CONFIGURATIONS. */
-EXPORT int mbs_pose(const double **arg, double **res, long long *iw, double *w, int mem) {
-    const pose_solver *s = (const pose_solver *)arg[1];
-    double T[16];
-    long long count;
-    int i, j, doubtful = 0;
-    (void)iw;
-    (void)mem;
+/* T (4, 4) of CasADi, column by column, row by row; 0 where it is no rigid transform. */
+static int read_pose(const double *columns, double *T) {
+    int i, j;
     for (i = 0; i < 4; i++)
-        for (j = 0; j < 4; j++) T[4 * i + j] = arg[0][4 * j + i];
-    res[3][0] = 0.0;
-    res[3][1] = POSE_NOT_RIGID;
-    if (!pose_round(T)) return 0;
-    count = s->loop ? by_elimination(s, T, res[0], res[1], res[2], w, &doubtful)
-                    : by_closed_form(s, T, res[0], res[1], res[2], w, &doubtful);
-    res[3][1] = count < 0 ? POSE_FAILED : doubtful ? POSE_DOUBTFUL : POSE_CERTAIN;
-    if (count < 0) return 0;
-    if (s->indices) spread(s, count, res[0]);
-    res[3][0] = (double)count;
-    return 0;
+        for (j = 0; j < 4; j++) T[4 * i + j] = columns ? columns[4 * j + i] : 0.0;
+    return pose_round(T);
 }
 
-EXPORT int mbs_pose_work(long long *arguments, long long *results, long long *integers,
-                         long long *reals) {
-    *arguments = 2;
-    *results = 4;
-    *integers = *reals = 0;
-    return 0;
-}
-
-/* Which of q (count, n) have a singular value below the bound. */
-EXPORT void mbs_singular(const arm *a, double bound, long long count, const double *q,
-                         unsigned char *singular) {
-    long long i;
-    for (i = 0; i < count; i++) singular[i] = (unsigned char)pose_is_singular(a, q + i * a->n, bound);
-}
-
-/* `pose_settle` for a closed form that was evaluated elsewhere; gives what came of the pose. */
-EXPORT int mbs_settle(const arm *a, const double *T, long long branches, double *q, double *residual,
-                      const double *real, const double *regular, double suspect, double nearly, double *number,
-                      long long *count) {
+int pose_solve(const pose_solver *s, const double *columns, double *q, double *residual,
+               double *number, double *w, long long *count) {
+    double T[16];
+    long long found;
     int doubtful = 0;
-    *count = pose_settle(a, T, branches, q, residual, real, regular, suspect, nearly,
-                         number, &doubtful);
+    *count = 0;
+    if (!read_pose(columns, T)) return POSE_NOT_RIGID;
+    found = s->loop ? by_elimination(s, T, q, residual, number, w, &doubtful)
+                    : by_closed_form(s, T, q, residual, number, w, &doubtful);
+    if (found < 0) return POSE_FAILED;
+    if (s->indices) fill_coordinates(s, found, q);
+    *count = found;
     return doubtful ? POSE_DOUBTFUL : POSE_CERTAIN;
+}
+
+int pose_all(const pose_solver *s, const double **arg, double **res, double *w) {
+    const double bound = SOLVED * fmax(1.0, s->robot->length);
+    const size_t nq = (size_t)s->nq;
+    double *q = w, *residual = q + ROTH_CONFIGURATIONS * nq;
+    double *number = residual + ROTH_CONFIGURATIONS, *work = number + ROTH_CONFIGURATIONS;
+    long long found, i, count = 0;
+    size_t k;
+    int certain = pose_solve(s, arg[0], q, residual, number, work, &found) == POSE_CERTAIN;
+    for (i = 0; i < found; i++) {
+        if (!(residual[i] <= bound)) continue;
+        if (count == POSE_COLUMNS) { /* samples of a motion with the pose held */
+            certain = 0;
+            break;
+        }
+        if (i > count) memmove(q + (size_t)count * nq, q + (size_t)i * nq, nq * sizeof(double));
+        count++;
+    }
+    for (k = (size_t)count * nq; k < POSE_COLUMNS * nq; k++) q[k] = NAN;
+    if (res[0]) memcpy(res[0], q, POSE_COLUMNS * nq * sizeof(double));
+    for (i = 0; res[1] && i < POSE_COLUMNS; i++) res[1][i] = i < count;
+    if (res[2]) res[2][0] = (double)count;
+    if (res[3]) res[3][0] = certain;
+    return 0;
+}
+
+/* What six elements of a gap, in arm lengths and rad, are for a change of T in row r and column c: of
+ * R the part that is no rotation is lost, see pose_round. */
+static void gap_of_element(const arm *a, const double *T, int r, int c, double *gap) {
+    int x = (r + 1) % 3, y = (r + 2) % 3;
+    memset(gap, 0, 6 * sizeof(double));
+    if (c == 3) {
+        gap[r] = 1.0 / a->length;
+        return;
+    }
+    gap[3 + x] = 0.5 * T[4 * y + c]; /* half of column c times axis r */
+    gap[3 + y] = -0.5 * T[4 * x + c];
+}
+
+int pose_all_jacobian(const pose_solver *s, const double **arg, double **res) {
+    const arm *a = s->robot;
+    const long long nq = s->nq, rows = POSE_COLUMNS * nq;
+    double T[16], moves[12 * 6];
+    long long b;
+    int k, e;
+    if (!res[0]) return 0;
+    for (b = 0; b < rows * 16; b++) res[0][b] = 0.0;
+    if (!arg[1] || !arg[2] || !read_pose(arg[0], T)) return 0;
+    for (b = 0; b < POSE_COLUMNS; b++) {
+        configuration p;
+        dense_qr f;
+        if (!(arg[2][b] > 0.0)) continue;
+        for (k = 0; k < a->n; k++) p.q[k] = arg[1][b * nq + s->indices[k]];
+        arm_examine(a, T, &p);
+        for (e = 0; e < 12; e++) gap_of_element(a, T, e / 4, e % 4, moves + 6 * e);
+        f.rows = f.columns = f.steps = 6;
+        f.A = &p.J[0][0];
+        dense_factorize(&f);
+        dense_solve(&f, moves, 12, FLAT_PIVOT);
+        for (e = 0; e < 12; e++)
+            for (k = 0; k < a->n; k++)
+                res[0][(4 * (e % 4) + e / 4) * rows + b * nq + s->indices[k]] =
+                    arm_unit(a, k) * moves[6 * e + k];
+    }
+    return 0;
 }

@@ -11,8 +11,10 @@
 /* What came of a pose. */
 enum { POSE_CERTAIN, POSE_DOUBTFUL, POSE_NOT_RIGID, POSE_FAILED };
 
+enum { POSE_COLUMNS = 16 }; /* isolated configurations of six joints that reach a pose, at most */
+
 typedef struct {
-    const arm *arm;
+    const arm *robot;
     const roth_loop *loop; /* of the general method; NULL: the closed form solves */
     /* T -> q (n, branches), residual, real, regular, mark (branches,), in CasADi's convention */
     int (*evaluate)(const double **, double **, long long *, double *, int);
@@ -39,5 +41,20 @@ int pose_is_singular(const arm *a, const double *q, double bound);
 long long pose_settle(const arm *a, const double *T, long long branches, double *q,
                       double *residual, const double *real, const double *regular,
                       double suspect, double nearly, double *number, int *doubtful);
+
+/* What came of a pose (4, 4), column by column: q (room, nq), residual (room,), number (room,) of the
+ * branches, and how many they are. There must be room for all branches, or for
+ * ROTH_CONFIGURATIONS; w has as many doubles, or what the closed form works with and three a branch. */
+int pose_solve(const pose_solver *s, const double *columns, double *q, double *residual,
+               double *number, double *w, long long *count);
+
+/* The general method as a Function of CasADi: T (4, 4) -> q (nq, POSE_COLUMNS), valid
+ * (POSE_COLUMNS,), count, certain. Residuals are below 1e-12 of max(1 m, the length); columns from
+ * the count on are NaN; certain is 0 where a configuration may be missing or T is no pose. w has
+ * ROTH_CONFIGURATIONS (nq + 3) doubles. */
+int pose_all(const pose_solver *s, const double **arg, double **res, double *w);
+
+/* Its Jacobian: T and the outputs -> d q / d T (POSE_COLUMNS nq, 16), zero for columns without one. */
+int pose_all_jacobian(const pose_solver *s, const double **arg, double **res);
 
 #endif

@@ -143,7 +143,7 @@ static void mix_rows(const roth_loop *r, const double *rows, double *M) {
         }
 }
 
-static void scale(roth_matrix *m) {
+static void scale_parts(roth_matrix *m) {
     double most = 0.0;
     int i, k, count = m->size * m->size;
     for (k = 0; k < m->parts; k++)
@@ -171,5 +171,5 @@ void roth_eliminate(const roth_loop *r, const double transforms[6][16], roth_mat
         spread(r, k, left, right, rows);
         mix_rows(r, rows, m->M[k]);
     }
-    scale(m);
+    scale_parts(m);
 }

@@ -9,7 +9,7 @@
 enum { OFFSETS = 8 };
 static const double FIRST_OFFSET = 0.2731; /* [rad], an angle that no design prefers */
 static const double WELL = 1e-3;           /* a regularity with which no other offset is tried */
-static const double ROUNDING = 1e-15;      /* of pivots */
+static const double FAR_ROUNDING = 1e-15;      /* of pivots */
 static const double OFF_CIRCLE = 0.5;      /* |log| of the size of e^(iu) of roots that are kept */
 
 /* The matrix where x = tan((u - offset) / 2) is infinite. */
@@ -71,7 +71,7 @@ static int companion(const roth_matrix *m, double *offset, double *A) {
     f.A = far;
     *offset = well_placed(m, &f);
     lower_factors(m, *offset, lower);
-    dense_solve(&f, lower, all, ROUNDING);
+    dense_solve(&f, lower, all, FAR_ROUNDING);
     memset(A, 0, (size_t)(all * all) * sizeof(double));
     for (i = 0; i < all - n; i++) A[i * all + n + i] = 1.0;
     for (i = 0; i < n; i++)

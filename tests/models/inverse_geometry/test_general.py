@@ -1,6 +1,14 @@
 import numpy as np
 import pytest
-from support.plain_arms import apart, khalil, manseur_doty, puma, random_arm
+from support.plain_arms import (
+    apart,
+    both_ways,
+    khalil,
+    manseur_doty,
+    needs_compiler,
+    puma,
+    random_arm,
+)
 
 from mbs.closed_forms.arm_search import (
     general,
@@ -10,16 +18,8 @@ from mbs.closed_forms.arm_search import (
     search,
 )
 from mbs.errors import ModelError, NoClosedForm
-from mbs.native import compiler_found
 
-WAYS = [
-    pytest.param(
-        general_many,
-        id="compiled",
-        marks=pytest.mark.skipif(not compiler_found(), reason="no C compiler"),
-    ),
-    pytest.param(general_with_numpy, id="numpy"),
-]
+WAYS = both_ways(general_many, general_with_numpy)
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -98,7 +98,7 @@ def test_one_pose_and_many():
     assert general_many(prepared, np.zeros((0, 4, 4)))[1].shape == (0, 6)
 
 
-@pytest.mark.skipif(not compiler_found(), reason="no C compiler")
+@needs_compiler
 def test_numpy_finds_what_the_compiled_core_finds():
     rng = np.random.default_rng(4)
     for _ in range(5):

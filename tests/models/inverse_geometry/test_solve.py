@@ -1,5 +1,6 @@
 """The one entry: every configuration of a pose, on robots whose answer is known beforehand."""
 
+import pickle
 from functools import cache
 
 import numpy as np
@@ -12,6 +13,8 @@ from support.catalogue_systems import catalogue_system
 import mbs
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry import solve
+from mbs.models.inverse_geometry.chain import frame_chain, target_pose
+from mbs.models.inverse_geometry.solve import solve_rigid
 
 ANGLES = st.floats(-3.1, 3.1)
 ROBOTS = {
@@ -262,3 +265,38 @@ def test_a_locked_joint_keeps_its_value_whatever_the_seed():
     assert len(answer) >= 1
     assert np.all(answer.q[:, 5] == 0.2)
     assert nearest_of(system, answer, q) < 1e-9
+
+
+@pytest.mark.parametrize("name", ["puma560", "ur5", "crx10"])
+@pytest.mark.parametrize("asked", [{}, {"limits": True}, {"seed": [0.3, 2.0, -5.0, 9.0, 0.1, 1.0]}])
+def test_a_regular_pose_takes_a_short_way_to_the_same(name, asked):
+    system = catalogue_system(name)
+    arm = frame_chain(system).arm(np.zeros(0))
+    for q in np.random.default_rng(7).uniform(-2, 2, (8, 6)):
+        T = target_pose(system, arm.pose(q))
+        short = solve(system, T, **asked)
+        long = solve_rigid(system, T, None, "auto", **asked, locked=None, parameters=None)
+        assert len(short) == len(long)
+        assert short.method == long.method
+        np.testing.assert_allclose(short.q, long.q, rtol=0, atol=1e-12)
+        for one, other in zip(short, long, strict=True):
+            assert (one.branch, one.multiplicity) == (other.branch, other.multiplicity)
+            assert one.within_limits == other.within_limits == (len(one.windings) > 0)
+            np.testing.assert_allclose(one.windings, other.windings, rtol=0, atol=1e-12)
+            assert one.sigma_min == pytest.approx(other.sigma_min, rel=1e-9)
+            assert max(one.residual, other.residual) < 1e-12
+
+
+def test_solutions_are_a_sequence_that_is_pickled():
+    system = catalogue_system("puma560")
+    T = frame_chain(system).arm(np.zeros(0)).pose(np.array([0.3, -0.5, 0.7, 0.4, 0.9, 0.2]))
+    found = solve(system, T)
+    assert found[-1] is found[7]
+    assert [s.branch for s in found[2:5]] == [found[k].branch for k in (2, 3, 4)]
+    with pytest.raises(IndexError):
+        found[8]
+    again = pickle.loads(pickle.dumps(found))
+    assert np.array_equal(again.q, found.q)
+    assert np.array_equal(again[1].windings, found[1].windings)
+    found.q[:] = 0.0  # a copy
+    assert np.array_equal(again.q, found.q)

@@ -273,8 +273,8 @@ _FIRST, _EASED, _STIFFENED, _STIFFEST = 1e-3, 3.0, 4.0, 1e12
 it after a step that led down and multiplies it after another, unlike so that no cycle arises; and
 the largest, where steps are too short to change the digits of r' r."""
 _LEAST = 1e-15
-"""The smallest damping: J' J has rounding errors of 1e-16, which may leave it without an inverse where
-there are more unknowns than equations."""
+"""The smallest damping: J' J has rounding errors of 1e-16, which may leave it without an inverse
+where there are more unknowns than equations."""
 _SETTLED = 1e-16
 """Part of r' r below which a gain is the rounding of it."""
 

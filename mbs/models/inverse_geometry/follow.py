@@ -11,14 +11,15 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+import mbs.closed_forms.arm_core as core
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, gap_to
-from mbs.closed_forms.arm_search import polish
+from mbs.closed_forms.arm_search import examine_arm
 from mbs.closed_forms.ring import spin_indices
 from mbs.errors import ModelError, NoClosedForm
 from mbs.loops.plan import regular_configuration, undetermined_beside
-from mbs.loops.pose import Goal, goal
+from mbs.loops.pose import Goal, goal, pose_numbers
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose, target_poses
 from mbs.models.inverse_geometry.closed_form import sequence_of
@@ -381,7 +382,7 @@ def follower(
         found = frame_chain(system, frame, locked, most=len(path))
         arm = found.arm(target.closing.p)
         more, exact = max(0, arm.size - _WHOLE), arm.size >= _WHOLE
-        rows = _arm_rows(arm, arm.units)
+        rows = _arm_rows(arm)
         led = Follower(target, found.indices, arm.units, rows, more, exact, ends, found, more)
     else:
         led = _closed_follower(target, start, list(locked or {}), ends)
@@ -420,12 +421,15 @@ def _closed_follower(
     return Follower(target, moving, scale, rows, slack + more, exact, ends, None, more)
 
 
-def _arm_rows(arm: Arm, scale: Array) -> Rows:
-    lengths = np.array([arm.length] * 3 + [1.0] * 3)
+def _arm_rows(arm: Arm) -> Rows:
+    library = core.core_of(arm)
 
     def rows(x: Array, T: Array) -> tuple[Array, Array]:
-        pose, J = arm.pose_and_jacobian(x * scale)
-        return gap_to(T, pose) / lengths, J * scale / lengths[:, None]
+        q = (x * arm.units)[None]
+        gap, J = (
+            examine_arm(arm, T, q)[1:] if library is None else core.examined_by(library, arm, T, q)
+        )
+        return gap[0], J[0]
 
     return rows
 
@@ -575,8 +579,20 @@ def path_of(system: System, path: Any, samples: int) -> Path:
     def function(s: float) -> Array:
         return target_pose(system, path(s))
 
-    numbers = np.linspace(0.0, 1.0, samples)
-    return Path(np.array([function(float(s)) for s in numbers]), function)
+    numbers = np.linspace(0.0, 1.0, samples).tolist()
+    return Path(_sampled(system, path, numbers), function)
+
+
+def _sampled(system: System, path: Callable[[float], Any], numbers: list[float]) -> Array:
+    """(N, 4, 4) poses that a function gives."""
+    poses = np.empty((len(numbers), 4, 4))
+    for k, s in enumerate(numbers):
+        given = path(s)
+        T = given if isinstance(given, np.ndarray) else pose_numbers(given)
+        if T is None or T.shape != (4, 4) or T.dtype != poses.dtype:
+            T = target_pose(system, given)
+        poses[k] = T  # a copy: the function may write the next pose over it
+    return target_poses(system, poses)
 
 
 def straight(before: Array, after: Array) -> Callable[[float], Array]:
@@ -709,7 +725,7 @@ def _runs(led: Follower, poses: Path, number: int, known: Runs | None) -> Runs |
     if known is not None and known.first <= number < known.first + len(known.q) - 1:
         return known
     last = number == poses.count - 1
-    if led.chain is None or led.redundant or last or poses.function is not None:
+    if led.chain is None or led.redundant or last:
         return None
     if poses.count < _SHORT and known is None:
         return None
@@ -764,8 +780,8 @@ _WATCHED = 1e-4
 """Smallest singular value above which no way ends at a singular configuration: it ends at a limit
 or out of reach."""
 _ALIKE = 0.9
-"""Cosine of the angle, 26 degrees, by which the motion that a frame does not see may turn in a leap:
-little where the joints go on, by a right angle where they turn aside."""
+"""Cosine of the angle, 26 degrees, by which the motion that a frame does not see may turn in a
+leap: little where the joints go on, by a right angle where they turn aside."""
 _UNCERTAIN = 0.25
 """Of the distance between the straight line and a smooth curve through the poses, by which joints
 may leave the curve: they are as smooth as the poses."""
@@ -961,17 +977,16 @@ def _settled(led: Follower, x: Array, T: Array) -> Array | None:
         r, J = led.rows(z, T)
         return -r, J
 
-    good = False
-    if led.chain is not None:
-        arm = led.chain.arm(led.target.closing.p)
-        better = polish(arm, T, (x * led.scale)[None])
-        good = float(better.residual[0]) <= SOLVED * max(1.0, arm.length)
-        y = x + arm.wrapped(better.q[0] / led.scale - x)
-    if not good:
+    def missing(z: Array) -> float:
+        return float(np.max(np.abs(led.rows(z, T)[0])))
+
+    # what a singular configuration leaves free stays: to move it changes rounding alone
+    y = gauss_newton(residual, x, rank_tolerance=SINGULAR).x
+    most = _OFF if led.chain is None else SOLVED
+    if missing(y) > most:
         y = levenberg_marquardt(residual, x).x
-        most = _OFF if led.chain is None else SOLVED
-        good = float(np.max(np.abs(led.rows(y, T)[0]))) <= most
-    return y if good and float(np.max(np.abs(y - x))) < _BESIDE else None
+    near = float(np.max(np.abs(y - x))) < _BESIDE
+    return y if near and missing(y) <= most else None
 
 
 def _leap_between(
@@ -1254,7 +1269,8 @@ class Conditioning:
         """(k,) the values."""
         if self.arm is None:
             return self.values
-        J = _arm_rows(self.arm, self.arm.units)(self.values, np.eye(4))[1]
+        q = self.values * self.arm.units
+        J = examine_arm(self.arm, np.eye(4), q)[2]  # which does not depend on the target
         return np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1], dtype=float)
 
 
@@ -1353,7 +1369,9 @@ def _follow(led: Follower, poses: Path, q: Array) -> Followed:
                 point = trail[-1][1]
                 continue
             # next to a singular configuration pose by pose, as smoothly as before
-            smooth = None if runs is None else _smooth_step(led, poses, curve, runs, found, number)
+            smooth = None
+            if runs is not None and poses.function is None:
+                smooth = _smooth_step(led, poses, curve, runs, found, number)
             if smooth is not None:
                 found[number], residual[number] = smooth
                 number += 1

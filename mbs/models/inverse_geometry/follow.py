@@ -15,7 +15,7 @@ import mbs.closed_forms.arm_core as core
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, gap_to
-from mbs.closed_forms.arm_search import examine_arm
+from mbs.closed_forms.arm_search import examine_arm, polish
 from mbs.closed_forms.ring import spin_indices
 from mbs.errors import ModelError, NoClosedForm
 from mbs.loops.plan import regular_configuration, undetermined_beside
@@ -984,9 +984,23 @@ def _settled(led: Follower, x: Array, T: Array) -> Array | None:
     y = gauss_newton(residual, x, rank_tolerance=SINGULAR).x
     most = _OFF if led.chain is None else SOLVED
     if missing(y) > most:
-        y = levenberg_marquardt(residual, x).x
+        y = _descended(led, x, T)
     near = float(np.max(np.abs(y - x))) < _BESIDE
     return y if near and missing(y) <= most else None
+
+
+def _descended(led: Follower, x: Array, T: Array) -> Array:
+    """(n,) the configuration nearest to a pose beside x, also where the Jacobian loses rank."""
+    if led.chain is not None:
+        arm = led.chain.arm(led.target.closing.p)
+        better = polish(arm, T, (x * led.scale)[None]).q[0]
+        return x + arm.wrapped(better - x * led.scale) / led.scale
+
+    def residual(z: Array) -> tuple[Array, Array]:
+        r, J = led.rows(z, T)
+        return -r, J
+
+    return levenberg_marquardt(residual, x).x
 
 
 def _leap_between(

@@ -463,6 +463,9 @@ _FIRST, _EASED, _STIFFENED, _STIFFEST = 1e-3, 3.0, 4.0, 1e12
 """The damping mu at the start, nearly a Gauss-Newton step for Jacobians of size one; what divides
 it after a step that led down and multiplies it after another, unlike so that no cycle arises; and
 the largest, where steps are too short to change the digits of r' r."""
+_LEAST = 1e-15
+"""The smallest damping: J' J has rounding errors of 1e-16, which may leave it without an inverse
+where there are more unknowns than equations."""
 _SETTLED = 1e-16
 """Part of r' r below which a gain is the rounding of it."""
 
@@ -492,7 +495,7 @@ def levenberg_marquardt(
         gain = float(r @ r - r_trial @ r_trial)
         if gain > 0:
             settled = gain <= _SETTLED * float(r @ r)
-            x, r, J, damping = x + step, r_trial, J_trial, damping / _EASED
+            x, r, J, damping = x + step, r_trial, J_trial, max(damping / _EASED, _LEAST)
         else:
             settled, damping = damping > _STIFFEST, damping * _STIFFENED
         if settled:

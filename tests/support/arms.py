@@ -22,6 +22,15 @@ def general_7r(seed):
     return _assembled("general_7r", _rows(_rng(9, seed), "RRRRRRR"))
 
 
+def human_like_arm():
+    """Seven revolute joints: a spherical shoulder, an elbow, a spherical wrist."""
+    quarter = np.pi / 2
+    twists = [0.0, -quarter, quarter, quarter, -quarter, -quarter, quarter]
+    along = [0.34, 0.0, 0.4, 0.0, 0.4, 0.0, 0.0]
+    rows = [frame(k, "revolute", alpha=twists[k], d=0.0, theta=0.0, r=along[k]) for k in range(7)]
+    return _assembled("human_like_arm", [*rows, {"r": 0.126}])
+
+
 def spherical(first, seed):
     """Six revolute joints, of which the axes of joints first, first + 1, first + 2 meet."""
     rows = _rows(_rng(3, 10 * seed + first), "RRRRRR")

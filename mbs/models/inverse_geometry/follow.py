@@ -11,14 +11,15 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+import mbs.closed_forms.arm_core as core
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, gap_to
-from mbs.closed_forms.arm_search import polish
+from mbs.closed_forms.arm_search import examine_arm, polish
 from mbs.closed_forms.ring import spin_indices
 from mbs.errors import ModelError, NoClosedForm
 from mbs.loops.plan import regular_configuration, undetermined_beside
-from mbs.loops.pose import Goal, goal
+from mbs.loops.pose import Goal, goal, pose_numbers
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose, target_poses
 from mbs.models.inverse_geometry.closed_form import sequence_of
@@ -61,6 +62,8 @@ _SMALL = 1e-9
 solution, as towards a singular configuration rounding is magnified."""
 _SMALLEST_STEP = 1e-12
 """Part of the way between two poses that is not halved any more: next to one, 1e-16 is rounding."""
+_TANGENT = 1e-3
+"""Of a step, along which the tangent of a curve of poses is measured."""
 _MOST_STEPS = 200
 """Between two poses; a joint that turns all the way round takes some tens."""
 _GAIN = 10.0
@@ -124,6 +127,7 @@ def carried(
     pose: Callable[[float], Array],
     step: float,
     trail: list[tuple[float, PathPoint]] | None = None,
+    curved: bool = False,
 ) -> tuple[PathPoint, float, float]:
     """The configuration carried on from the pose at 0 towards the pose at 1.
 
@@ -133,6 +137,7 @@ def carried(
         pose: the path of the pose, of a number between 0 and 1.
         step: first one to try.
         trail: where the configurations on the way are left, each with its number.
+        curved: whether the path of the pose is another one than a straight line.
 
     Returns:
         Where it ended, at which number, and the last step tried; the number is 1 unless it stopped
@@ -143,7 +148,12 @@ def carried(
         if at == 1.0 or step <= _SMALLEST_STEP or smallest(tracker, point.J) <= SINGULAR:
             break
         to = min(1.0, at + step)
-        found = _step(tracker, point, pose(to))
+        T = pose(to)
+        found = _step(tracker, point, T, tracker.rows(point.x, T)[0])
+        if found is None and curved:
+            # what the curve bends is magnified next to a singular configuration
+            part = _TANGENT * (to - at)
+            found = _step(tracker, point, T, tracker.rows(point.x, pose(at + part))[0] / _TANGENT)
         if found is None:
             step = (to - at) / 2
         else:
@@ -165,12 +175,17 @@ def smallest(tracker: Tracker, J: Array) -> float:
     return float(values[J.shape[1] - 1 - tracker.slack])
 
 
-def _step(tracker: Tracker, point: PathPoint, T: Array) -> PathPoint | None:
+def _step(tracker: Tracker, point: PathPoint, T: Array, r: Array) -> PathPoint | None:
     """The configuration at the next pose; None where the step is too long.
 
     Of redundant joints those that would pass a limit stop there, and the others move instead.
+
+    Args:
+        tracker: what follows.
+        point: the configuration before.
+        T: the next pose.
+        r: what leads to it from the one before.
     """
-    r, _ = tracker.rows(point.x, T)
     free = np.ones(point.x.size, dtype=bool)
     aim = point.x.copy()
     for _ in range(tracker.redundant + 1):
@@ -199,7 +214,7 @@ def _predicted(
     Args:
         tracker: what follows.
         point: the configuration before.
-        r: what is missing from it to the next pose.
+        r: what leads from it to the next pose.
         free: (n,) joints that are not stopped at a limit.
         aim: (n,) positions of those that are.
     """
@@ -367,7 +382,7 @@ def follower(
         found = frame_chain(system, frame, locked, most=len(path))
         arm = found.arm(target.closing.p)
         more, exact = max(0, arm.size - _WHOLE), arm.size >= _WHOLE
-        rows = _arm_rows(arm, arm.units)
+        rows = _arm_rows(arm)
         led = Follower(target, found.indices, arm.units, rows, more, exact, ends, found, more)
     else:
         led = _closed_follower(target, start, list(locked or {}), ends)
@@ -406,12 +421,15 @@ def _closed_follower(
     return Follower(target, moving, scale, rows, slack + more, exact, ends, None, more)
 
 
-def _arm_rows(arm: Arm, scale: Array) -> Rows:
-    lengths = np.array([arm.length] * 3 + [1.0] * 3)
+def _arm_rows(arm: Arm) -> Rows:
+    library = core.core_of(arm)
 
     def rows(x: Array, T: Array) -> tuple[Array, Array]:
-        pose, J = arm.pose_and_jacobian(x * scale)
-        return gap_to(T, pose) / lengths, J * scale / lengths[:, None]
+        q = (x * arm.units)[None]
+        gap, J = (
+            examine_arm(arm, T, q)[1:] if library is None else core.examined_by(library, arm, T, q)
+        )
+        return gap[0], J[0]
 
     return rows
 
@@ -561,8 +579,20 @@ def path_of(system: System, path: Any, samples: int) -> Path:
     def function(s: float) -> Array:
         return target_pose(system, path(s))
 
-    numbers = np.linspace(0.0, 1.0, samples)
-    return Path(np.array([function(float(s)) for s in numbers]), function)
+    numbers = np.linspace(0.0, 1.0, samples).tolist()
+    return Path(_sampled(system, path, numbers), function)
+
+
+def _sampled(system: System, path: Callable[[float], Any], numbers: list[float]) -> Array:
+    """(N, 4, 4) poses that a function gives."""
+    poses = np.empty((len(numbers), 4, 4))
+    for k, s in enumerate(numbers):
+        given = path(s)
+        T = given if isinstance(given, np.ndarray) else pose_numbers(given)
+        if T is None or T.shape != (4, 4) or T.dtype != poses.dtype:
+            T = target_pose(system, given)
+        poses[k] = T  # a copy: the function may write the next pose over it
+    return target_poses(system, poses)
 
 
 def straight(before: Array, after: Array) -> Callable[[float], Array]:
@@ -695,7 +725,7 @@ def _runs(led: Follower, poses: Path, number: int, known: Runs | None) -> Runs |
     if known is not None and known.first <= number < known.first + len(known.q) - 1:
         return known
     last = number == poses.count - 1
-    if led.chain is None or led.redundant or last or poses.function is not None:
+    if led.chain is None or led.redundant or last:
         return None
     if poses.count < _SHORT and known is None:
         return None
@@ -739,6 +769,9 @@ _FAIR, _HALF = 0.1, 0.5
 """Of the way, added to the prediction, at most: along the curve itself, and from pose to pose."""
 _LONGEST_LEAP = 0.5
 """Way to either side of a singular configuration, in those between two poses, tried first."""
+_LEAST_LEAP = 0.03
+"""The least way tried where redundant joints pass by a singular configuration: they do not meet it
+but for rounding and the length of steps, so that close to it they turn aside."""
 _BESIDE = 0.1
 """Move [rad or arm lengths] of a configuration between two sides of a leap to one that solves."""
 _AT_POSE = 1e-3
@@ -746,6 +779,9 @@ _AT_POSE = 1e-3
 _WATCHED = 1e-4
 """Smallest singular value above which no way ends at a singular configuration: it ends at a limit
 or out of reach."""
+_ALIKE = 0.9
+"""Cosine of the angle, 26 degrees, by which the motion that a frame does not see may turn in a
+leap: little where the joints go on, by a right angle where they turn aside."""
 _UNCERTAIN = 0.25
 """Of the distance between the straight line and a smooth curve through the poses, by which joints
 may leave the curve: they are as smooth as the poses."""
@@ -842,8 +878,6 @@ def _leap(
         number: of the next pose.
         stopped: whether the way ends before it.
     """
-    if led.redundant:
-        return None
     near = trail[-1][1]
     if stopped and smallest(led.tracker, near.J) > _WATCHED:
         return None
@@ -851,7 +885,13 @@ def _leap(
         between = _leap_between(led, poses, curve, trail, found, number, stopped)
         if between is not None:
             return between
-    return _leap_along(led, poses, curve, trail, number) if stopped else None
+    if stopped:
+        return _leap_along(led, poses, curve, trail, number, _NEAREST)
+    if led.redundant and poses.function is not None:
+        singular = [smallest(led.tracker, point.J) for _, point in trail]
+        before = trail[: int(np.argmin(singular)) + 1]
+        return _leap_along(led, poses, curve, before, number, _LEAST_LEAP)
+    return None
 
 
 def _leap_along(
@@ -860,13 +900,14 @@ def _leap_along(
     curve: Callable[[float], Array],
     trail: list[tuple[float, PathPoint]],
     number: int,
+    least: float,
 ) -> Leap | None:
     """Along the curve itself, from one side of the singular configuration to the other."""
     tracker, at, end = led.tracker, trail[-1][0], float(poses.count - 1)
     # lines between given poses have corners there
     start = max(trail[0][0], number - 1.0 if poses.function is None else min(0.0, at - 1.0))
     way, before = min((at - start) / 3, _LONGEST_LEAP), np.inf
-    while way > _NEAREST:
+    while way > least:
         nodes = [at - 3 * way, at - 2 * way, at - way]
         x = [_configuration_at(tracker, curve, trail, u) for u in nodes]
         if any(one is None for one in x):
@@ -881,7 +922,8 @@ def _leap_along(
         ratio = np.inf
         if behind is not None and tracker.may(behind):
             ratio = _added(predicted, behind, np.asarray(x[-1]))
-        if behind is not None and ratio < _FAIR and ratio < max(_LITTLE, _SMOOTH * before):
+        smooth = ratio < _FAIR and ratio < max(_LITTLE, _SMOOTH * before)
+        if behind is not None and smooth and _goes_across(led, np.asarray(x[-1]), behind):
             every = np.array([*x, behind])
             numbers = range(number, math.floor(to) + 1)
             passed = _passed(led, poses, [*nodes, to], every, numbers)
@@ -909,7 +951,8 @@ def _configuration_at(
     at, point = known[-1]
     if at == u:
         return point.x
-    last, reached, _ = carried(tracker, point, lambda s: curve(at + s * (u - at)), 1.0)
+    segment = _segment(curve, at, u)
+    last, reached, _ = carried(tracker, point, segment, 1.0, curved=True)
     return last.x if reached == 1.0 else None
 
 
@@ -929,20 +972,35 @@ def _passed(
 
 def _settled(led: Follower, x: Array, T: Array) -> Array | None:
     """(n,) the configuration beside x that takes a pose, also a singular one; None if it is not."""
+
+    def residual(z: Array) -> tuple[Array, Array]:
+        r, J = led.rows(z, T)
+        return -r, J
+
+    def missing(z: Array) -> float:
+        return float(np.max(np.abs(led.rows(z, T)[0])))
+
+    # what a singular configuration leaves free stays: to move it changes rounding alone
+    y = gauss_newton(residual, x, rank_tolerance=SINGULAR).x
+    most = _OFF if led.chain is None else SOLVED
+    if missing(y) > most:
+        y = _descended(led, x, T)
+    near = float(np.max(np.abs(y - x))) < _BESIDE
+    return y if near and missing(y) <= most else None
+
+
+def _descended(led: Follower, x: Array, T: Array) -> Array:
+    """(n,) the configuration nearest to a pose beside x, also where the Jacobian loses rank."""
     if led.chain is not None:
         arm = led.chain.arm(led.target.closing.p)
-        better = polish(arm, T, (x * led.scale)[None])
-        good = float(better.residual[0]) <= SOLVED * max(1.0, arm.length)
-        y = x + arm.wrapped(better.q[0] / led.scale - x)
-    else:
+        better = polish(arm, T, (x * led.scale)[None]).q[0]
+        return x + arm.wrapped(better - x * led.scale) / led.scale
 
-        def residual(z: Array) -> tuple[Array, Array]:
-            r, J = led.rows(z, T)
-            return -r, J
+    def residual(z: Array) -> tuple[Array, Array]:
+        r, J = led.rows(z, T)
+        return -r, J
 
-        y = levenberg_marquardt(residual, x).x
-        good = float(np.max(np.abs(led.rows(y, T)[0]))) <= _OFF
-    return y if good and float(np.max(np.abs(y - x))) < _BESIDE else None
+    return levenberg_marquardt(residual, x).x
 
 
 def _leap_between(
@@ -955,13 +1013,29 @@ def _leap_between(
     stopped: bool,
 ) -> Leap | None:
     """From the poses before a singular configuration to those behind it."""
-    tracker, at = led.tracker, trail[-1][0]
     before = _before(trail, found, number)
     if before is None:
         return None
-    nodes, x = before
     # the next pose may be the singular one itself
-    to = number + 1 if stopped and number - at < _AT_POSE else number
+    beyond = number + 1
+    ends = [beyond if stopped and number - trail[-1][0] < _AT_POSE else number]
+    if led.redundant and ends[0] < beyond < poses.count:
+        ends.append(beyond)
+    leaps = (_leap_to(led, poses, curve, *before, number, to) for to in ends)
+    return next((leap for leap in leaps if leap is not None), None)
+
+
+def _leap_to(
+    led: Follower,
+    poses: Path,
+    curve: Callable[[float], Array],
+    nodes: list[float],
+    x: Array,
+    number: int,
+    to: int,
+) -> Leap | None:
+    """From configurations (k, n) at nodes to the pose of a number."""
+    tracker = led.tracker
     predicted = _lagrange(nodes, x, float(min(to, poses.count - 1)))
     if to >= poses.count:  # the path ends at the singular configuration
         last = _settled(led, predicted, poses.poses[-1])
@@ -970,6 +1044,8 @@ def _leap_between(
         return Leap(last[None], number, last)
     behind = _smooth_solution(led, poses, predicted, to, x[-1])
     if behind is None or not tracker.may(behind):
+        return None
+    if not _goes_across(led, x[-1], behind):
         return None
     nodes, x = [*nodes[-2:], float(to)], np.vstack([x[-2:], behind])
     beyond = None
@@ -1003,13 +1079,35 @@ def _smooth_solution(
 ) -> Array | None:
     """(n,) the configuration at a pose that is near the prediction, measured by the way to it."""
     found = _nearest_solution(led, predicted, poses.poses[number])
-    return None if found is None or _added(predicted, found, last) > _HALF else found
+    most = _FAIR if led.redundant else _HALF
+    return None if found is None or _added(predicted, found, last) > most else found
+
+
+def _goes_across(led: Follower, before: Array, behind: Array) -> bool:
+    """Whether joints that are redundant come out on the other side of a singular configuration.
+
+    There the determinant of the Jacobian and of the motion that the frame does not see has the
+    other sign, and this motion is nearly the same. Beside a configuration that they only come near
+    to they turn aside instead, on the same side.
+    """
+    if not led.redundant:
+        return True
+    T = np.eye(4)  # the Jacobian does not depend on the target
+    (_, J), (_, K), kept = led.rows(before, T), led.rows(behind, T), before.size - led.slack
+    still = np.linalg.svd(J)[2][kept:]
+    alike = np.linalg.svd(still @ np.linalg.svd(K)[2][kept:].T)[1][led.redundant - 1] > _ALIKE
+    if len(J) != kept:  # rows of loops depend on each other
+        return bool(alike)
+    signs = [np.linalg.slogdet(np.vstack([rows, still]))[0] for rows in (J, K)]
+    return bool(alike) and signs[0] != signs[1]
 
 
 def _nearest_solution(led: Follower, x: Array, T: Array) -> Array | None:
     """(n,) the configuration nearest to x of all that take a pose."""
     if led.chain is None:
         return None
+    if led.redundant:  # of infinitely many the one beside it
+        return _settled(led, x, T)
     p = led.target.closing.p
     q = solve_at(led.chain, NOT_VARIED, T, "auto", p).q[:, list(led.indices)]
     if not len(q):
@@ -1099,9 +1197,17 @@ def stop_reason(led: Follower, poses: Path, number: int, q: Array, at: float) ->
 
 
 def _jump(led: Follower, x: Array, T: Array) -> str:
-    """The joint that is farthest from where it would have to be behind a singular configuration."""
-    behind = None if led.redundant else _nearest_solution(led, x, T)
-    if behind is None:
+    """The joint that is farthest from where it would have to be behind a singular configuration.
+
+    Of redundant joints whether there is a configuration behind it that is near.
+    """
+    behind = _nearest_solution(led, x, T)
+    if led.redundant and behind is None and led.chain is not None:
+        return (
+            "; no configuration beside it takes the pose behind, as what is redundant has no room"
+            " left; another redundancy or another start may lead past"
+        )
+    if led.redundant or behind is None:
         return ""
     farthest = int(np.argmax(np.abs(behind - x)))
     coordinate = led.system.coordinates[led.indices[farthest]]
@@ -1177,7 +1283,8 @@ class Conditioning:
         """(k,) the values."""
         if self.arm is None:
             return self.values
-        J = _arm_rows(self.arm, self.arm.units)(self.values, np.eye(4))[1]
+        q = self.values * self.arm.units
+        J = examine_arm(self.arm, np.eye(4), q)[2]  # which does not depend on the target
         return np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1], dtype=float)
 
 
@@ -1276,7 +1383,9 @@ def _follow(led: Follower, poses: Path, q: Array) -> Followed:
                 point = trail[-1][1]
                 continue
             # next to a singular configuration pose by pose, as smoothly as before
-            smooth = None if runs is None else _smooth_step(led, poses, curve, runs, found, number)
+            smooth = None
+            if runs is not None and poses.function is None:
+                smooth = _smooth_step(led, poses, curve, runs, found, number)
             if smooth is not None:
                 found[number], residual[number] = smooth
                 number += 1
@@ -1289,7 +1398,8 @@ def _follow(led: Follower, poses: Path, q: Array) -> Followed:
         segment = _segment(curve, u, number)
         last, at = point, 0.0
         if allowed:
-            last, at, step = carried(tracker, point, segment, min(1.0, step), way)
+            curved = poses.function is not None
+            last, at, step = carried(tracker, point, segment, min(1.0, step), way, curved)
         trail = trail[-_TRAIL:] + [(u + s * (number - u), passed) for s, passed in way]
         u = float(number) if at == 1.0 else u + at * (number - u)
         # a part of the next segment: after a narrow passage ten doublings lead back to all of it
@@ -1333,9 +1443,9 @@ def _conditioning(led: Follower, poses: Path, x: Array) -> Conditioning:
     return Conditioning(None, np.array([smallest(led.tracker, one) for one in J]))
 
 
-def _segment(curve: Callable[[float], Array], u: float, number: int) -> Callable[[float], Array]:
-    """The poses from u to that of a number, of a number between 0 and 1."""
-    return lambda s: curve(float(number) if s == 1.0 else u + s * (number - u))
+def _segment(curve: Callable[[float], Array], u: float, to: float) -> Callable[[float], Array]:
+    """The poses from one number to another, of a number between 0 and 1."""
+    return lambda s: curve(to if s == 1.0 else u + s * (to - u))
 
 
 def _start(system: System, start: Any, locked: Mapping[str, float] | None) -> Array:

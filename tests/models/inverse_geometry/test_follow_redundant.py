@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.arms import human_like_arm
 from support.catalogue_systems import catalogue_system
 
 import mbs
@@ -137,6 +138,48 @@ def test_joints_that_are_locked_leave_none_redundant(panda, arm):
     path = np.linspace(START, end, 20)
     found = follow(panda, arm.pose(path), START, locked={"q3": START[2]}, redundancy="limits")
     np.testing.assert_allclose(found.q, path, atol=1e-11)
+
+
+@pytest.mark.parametrize("criterion", [None, "limits", "manipulability"])
+@pytest.mark.parametrize(("count", "function"), [(30, False), (31, False), (30, True)])
+def test_a_stretched_elbow_bends_to_the_other_side(criterion, count, function):
+    """The arm is as long as it can be half way, at a pose or between two of them."""
+    system = human_like_arm()
+    own = frame_chain(system, most=7).arm(np.zeros(0))
+    start, end = (
+        np.array([0.2, 0.7, 0.1, 0.5, -0.3, 0.9, 0.2]),
+        START + np.array([0, 1, 0, 0, 0, 0, 0]),
+    )
+    end[3] = -0.5
+    s = np.linspace(0, 1, count)
+    joints = start + s[:, None] * (end - start)
+    path = (lambda s: own.pose(start + s * (end - start))) if function else own.pose(joints)
+    found = follow(system, path, start, samples=count, redundancy=criterion, limits={"q1": (-2, 2)})
+    assert found.reason == ""
+    assert own.residual(found.q, own.pose(joints)).max() < 1e-12
+    np.testing.assert_allclose(found.q[:, 3], joints[:, 3], atol=1e-6)
+    speed = np.linalg.norm(np.diff(found.q, axis=0), axis=1)
+    assert speed.max() < 1.5 * np.linalg.norm(joints[1] - joints[0])
+    assert np.max(np.abs(np.diff(found.q, 2, axis=0))) < 0.01
+
+
+def test_where_redundant_joints_have_no_room_left_is_told(panda, arm):
+    """The joints that made the path went otherwise; away from singular configurations these do."""
+    start = np.array([0.4, -0.3, 0.4, -0.6, 0.4, 2.1, 0.4])
+    way = np.array([-0.9, 0.6, 0.1, 0.3, 0.2, 0.3, -0.4])
+
+    def path(s):
+        return arm.pose(start + s * way)
+
+    found = follow(panda, path, start, samples=21, limits=False)
+    assert found.reached == 10
+    where = "stopped between poses 10 and 11 of 21, at 0.501"
+    assert found.reason.startswith(where)
+    assert "no configuration beside it takes the pose behind" in found.reason
+    assert "another redundancy or another start may lead past" in found.reason
+    able = follow(panda, path, start, samples=21, limits=False, redundancy="manipulability")
+    assert able.reason == ""
+    assert able.residual.max() < 1e-12
 
 
 @pytest.mark.parametrize(

@@ -99,28 +99,38 @@ _MOST_STEPS = 4000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Homotopy:
-    """Q(t) = Q0 + t Q1 + t^2 Q2, from one platform to another.
+    """Q(t) = Q0 + t Q1 + t^2 Q2, from one platform to another, and t times the change of c.
 
     Attributes:
-        Q: (3, 7, 8, 8).
+        Q: (3, 7, 8, 8), or (1, 7, 8, 8) where the ends of the legs stay.
+        c: (7,) by how much the constants of the rows change.
     """
 
     Q: Complex
+    c: Complex
 
     @staticmethod
     def between(start: Legs, end: Legs) -> Homotopy:
         """Along a straight line of a, b and c."""
-        middle = Legs((start.a + end.a) / 2, (start.b + end.b) / 2, (start.c + end.c) / 2)
-        first, half, last = start.forms(), middle.forms(), end.forms()
+        c = np.append(end.c - start.c, 0)
+        first = start.forms()
+        if np.array_equal(start.a, end.a) and np.array_equal(start.b, end.b):
+            return Homotopy(first[None], c)
+        middle = Legs((start.a + end.a) / 2, (start.b + end.b) / 2, start.c)
+        half, last = middle.forms(), Legs(end.a, end.b, start.c).forms()
         bend = 2 * (first + last) - 4 * half
-        return Homotopy(np.array([first, last - first - bend, bend]))
+        return Homotopy(np.array([first, last - first - bend, bend]), c)
 
     def slopes(self, x: Complex, t: Real) -> tuple[Complex, Complex]:
         """Derivatives by x, (r, 7, 8), and by t, (r, 7), of the rows at x (r, 8) and t (r,)."""
-        Y = (x @ self.Q.reshape(-1, _SIZE).T).reshape(len(x), 3, _ROWS, _SIZE)
-        s = t[:, None, None]
-        J = 2 * (Y[:, 0] + s * (Y[:, 1] + s * Y[:, 2]))
-        return J, np.einsum("rij,rj->ri", Y[:, 1] + 2 * s * Y[:, 2], x)
+        Y = (x @ self.Q.reshape(-1, _SIZE).T).reshape(len(x), len(self.Q), _ROWS, _SIZE)
+        s, e = t[:, None, None], x[:, :4]
+        J, rate = Y[:, 0], np.einsum("k,ri,ri->rk", self.c, e, e)
+        if len(self.Q) > 1:
+            rate += np.einsum("rij,rj->ri", Y[:, 1] + 2 * s * Y[:, 2], x)
+            J = J + s * (Y[:, 1] + s * Y[:, 2])
+        J[:, :, :4] += np.einsum("r,k,ri->rki", t, self.c, e)
+        return 2 * J, rate
 
 
 def _square(J: Complex, patch: Complex) -> Complex:
@@ -128,23 +138,19 @@ def _square(J: Complex, patch: Complex) -> Complex:
     return np.concatenate([J, patch.conj()[:, None, :]], axis=1)
 
 
-def _velocity(path: Homotopy, x: Complex, t: Real, patch: Complex) -> Complex:
+def _correction(path: Homotopy, x: Complex, t: Real, patch: Complex) -> tuple[Complex, Complex]:
+    """Newton's step, and how x goes on with t, both (r, 8)."""
     J, rate = path.slopes(x, t)
-    side = np.concatenate([rate, np.zeros((len(x), 1))], axis=1)
-    return -_solved(_square(J, patch), side)
-
-
-def _correction(path: Homotopy, x: Complex, t: Real, patch: Complex) -> Complex:
-    J, _ = path.slopes(x, t)
-    rows = np.einsum("rij,rj->ri", J, x) / 2
-    side = np.concatenate([rows, np.zeros((len(x), 1))], axis=1)
-    return -_solved(_square(J, patch), side)
+    sides = np.zeros((len(x), _SIZE, 2), dtype=np.complex128)
+    sides[:, :_ROWS, 0], sides[:, :_ROWS, 1] = np.einsum("rij,rj->ri", J, x) / 2, rate
+    solved = -_solved(_square(J, patch), sides)
+    return solved[..., 0], solved[..., 1]
 
 
 def _solved(A: Complex, b: Complex) -> Complex:
-    """(r, 8) solutions of A x = b, NaN where A is singular to the last bit."""
+    """(r, 8, k) solutions of A x = b, NaN where A is singular to the last bit."""
     try:
-        return np.asarray(np.linalg.solve(A, b[..., None])[..., 0], np.complex128)
+        return np.asarray(np.linalg.solve(A, b), np.complex128)
     except np.linalg.LinAlgError:
         x = np.full(b.shape, np.nan, dtype=np.complex128)
         for k in range(len(b)):
@@ -161,6 +167,7 @@ def follow(path: Homotopy, x: Complex, tolerance: float = _TOLERANCE) -> tuple[C
     """
     x = x / np.linalg.norm(x, axis=1, keepdims=True)
     t, h = np.zeros(len(x)), np.full(len(x), _FIRST_STEP)
+    slope = _correction(path, x, t, x)[1]
     for _ in range(_MOST_STEPS):
         going = np.flatnonzero((t < 1) & (h > _LEAST_STEP))
         if not len(going):
@@ -168,30 +175,32 @@ def follow(path: Homotopy, x: Complex, tolerance: float = _TOLERANCE) -> tuple[C
         x0, t0 = x[going], t[going]
         step = np.minimum(h[going], 1 - t0)
         with np.errstate(all="ignore"):  # near singular matrices steps have no bounds
-            tried, first, second = _step(path, x0, t0, step)
+            y = _predicted(path, x0, slope[going], t0, step)
+            first, _ = _correction(path, y, t0 + step, x0)
+            second, along = _correction(path, y + first, t0 + step, x0)
+            error, rest = np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
         # the second correction is about the square of the first where the root is regular
-        good = (first < 2 * tolerance) & (second < tolerance**1.5)
-        factor = _SAFETY * (tolerance / np.maximum(first, NONZERO)) ** (1 / 5)
+        good = (error < 2 * tolerance) & (rest < tolerance**1.5)
+        factor = _SAFETY * (tolerance / np.maximum(error, NONZERO)) ** (1 / 5)
         factor = np.where(np.isfinite(factor), factor, _SHRINK)
         h[going] = step * np.clip(factor, _SHRINK, np.where(good, _GROW, 0.5))
         won = going[good]
-        x[won] = tried[good] / np.linalg.norm(tried[good], axis=1, keepdims=True)
-        t[won] = np.where(step[good] >= 1 - t0[good], 1.0, t0[good] + step[good])
+        y = (y + first + second)[good]
+        size = np.linalg.norm(y, axis=1, keepdims=True)
+        x[won], v = y / size, along[good] / size
+        # in the patch of the new root its length does not change
+        slope[won] = v - np.sum(x[won].conj() * v, axis=1, keepdims=True) * x[won]
+        t[won] = np.where(step[good] >= 1 - t0[good], 1.0, (t0 + step)[good])
     return x, t
 
 
-def _step(path: Homotopy, x: Complex, t: Real, h: Real) -> tuple[Complex, Real, Real]:
-    """The corrected prediction and the lengths of both corrections."""
+def _predicted(path: Homotopy, x: Complex, k1: Complex, t: Real, h: Real) -> Complex:
+    """(r, 8) the roots at t + h, from x with slopes k1."""
     s = h[:, None]
-    k1 = _velocity(path, x, t, x)
-    k2 = _velocity(path, x + s / 2 * k1, t + h / 2, x)
-    k3 = _velocity(path, x + s / 2 * k2, t + h / 2, x)
-    k4 = _velocity(path, x + s * k3, t + h, x)
-    y = x + s / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    first = _correction(path, y, t + h, x)
-    y = y + first
-    second = _correction(path, y, t + h, x)
-    return y + second, np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
+    _, k2 = _correction(path, x + s / 2 * k1, t + h / 2, x)
+    _, k3 = _correction(path, x + s / 2 * k2, t + h / 2, x)
+    _, k4 = _correction(path, x + s * k3, t + h, x)
+    return x + s / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
 
 
 # Which ends are regular roots, each its own: a certificate.
@@ -225,27 +234,28 @@ def certify(legs: Legs, x: Complex, t: Real) -> Ends:
 
     Source: Blum, Cucker, Shub & Smale 1998, chapter 8; in floating point, with room for rounding.
     """
-    path = Homotopy(np.array([legs.forms(), np.zeros((_ROWS, _SIZE, _SIZE))])[[0, 1, 1]])
+    path = Homotopy.between(legs, legs)
     regular = t >= 1
     for _ in range(3):
         now = np.flatnonzero(regular)
         if len(now):
-            y = x[now] + _correction(path, x[now], t[now], x[now])
+            y = x[now] + _correction(path, x[now], t[now], x[now])[0]
             regular[now] = np.all(np.isfinite(y), axis=1)
             with np.errstate(invalid="ignore"):
                 y /= np.linalg.norm(y, axis=1, keepdims=True)
             x[now] = np.where(regular[now, None], y, x[now])
-    for k in np.flatnonzero(regular):
-        J, _ = path.slopes(x[k : k + 1], np.zeros(1))
-        unit = np.eye(_SIZE, dtype=np.complex128)
-        W = _solved(np.repeat(_square(J, x[k : k + 1]), _SIZE, axis=0), unit).T
-        rows = np.append(J[0] @ x[k] / 2, 0.0)
-        bend = np.linalg.norm(np.tensordot(W[:, :_ROWS], path.Q[0], axes=1))
-        along = x @ x[k].conj()
-        same = np.linalg.norm(x - along[:, None] * x[k], axis=1) < _APART
-        alone = not np.any(same & regular & (np.arange(len(x)) < k))
-        certain = float(np.linalg.norm(W @ rows)) * bend < _CERTAIN
-        regular[k] = certain and alone and float(np.linalg.norm(x[k, :4])) > _FLAT
+    number = np.flatnonzero(regular)
+    y, zero = x[number], np.zeros(len(number))
+    J, _ = path.slopes(y, zero)
+    unit = np.broadcast_to(np.eye(_SIZE, dtype=np.complex128), (len(y), _SIZE, _SIZE))
+    W = _solved(_square(J, y), unit)[..., :_ROWS]
+    newton = np.einsum("rij,rj->ri", W, np.einsum("rij,rj->ri", J, y) / 2)
+    bend = np.linalg.norm(W @ path.Q[0].reshape(_ROWS, _SIZE * _SIZE), axis=(1, 2))
+    certain = np.linalg.norm(newton, axis=1) * bend < _CERTAIN
+    along = y @ y.conj().T
+    same = np.linalg.norm(y[:, None] - along[..., None] * y, axis=2) < _APART
+    alone = ~np.any(np.tril(same & certain, -1), axis=1)
+    regular[number] = certain & alone & (np.linalg.norm(y[:, :4], axis=1) > _FLAT)
     return Ends(x, regular)
 
 

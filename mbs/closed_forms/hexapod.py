@@ -99,11 +99,11 @@ _MOST_STEPS = 4000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Homotopy:
-    """Q(t) = Q0 + t Q1 + t^2 Q2, from one platform to another, and t times the change of c.
+    """From one platform to another: Q(t) = Q0 + t Q1 + t^2 Q2, or Q0 and t times constants.
 
     Attributes:
         Q: (3, 7, 8, 8), or (1, 7, 8, 8) where the ends of the legs stay.
-        c: (7,) by how much the constants of the rows change.
+        c: (7,) by how much the constants of the rows change where the ends stay.
     """
 
     Q: Complex
@@ -113,24 +113,23 @@ class Homotopy:
     def between(start: Legs, end: Legs) -> Homotopy:
         """Along a straight line of a, b and c."""
         c = np.append(end.c - start.c, 0)
-        first = start.forms()
+        first, last = start.forms(), end.forms()
         if np.array_equal(start.a, end.a) and np.array_equal(start.b, end.b):
             return Homotopy(first[None], c)
-        middle = Legs((start.a + end.a) / 2, (start.b + end.b) / 2, start.c)
-        half, last = middle.forms(), Legs(end.a, end.b, start.c).forms()
-        bend = 2 * (first + last) - 4 * half
+        middle = Legs((start.a + end.a) / 2, (start.b + end.b) / 2, (start.c + end.c) / 2)
+        bend = 2 * (first + last) - 4 * middle.forms()
         return Homotopy(np.array([first, last - first - bend, bend]), c)
 
     def slopes(self, x: Complex, t: Real) -> tuple[Complex, Complex]:
         """Derivatives by x, (r, 7, 8), and by t, (r, 7), of the rows at x (r, 8) and t (r,)."""
         Y = (x @ self.Q.reshape(-1, _SIZE).T).reshape(len(x), len(self.Q), _ROWS, _SIZE)
-        s, e = t[:, None, None], x[:, :4]
-        J, rate = Y[:, 0], np.einsum("k,ri,ri->rk", self.c, e, e)
-        if len(self.Q) > 1:
-            rate += np.einsum("rij,rj->ri", Y[:, 1] + 2 * s * Y[:, 2], x)
-            J = J + s * (Y[:, 1] + s * Y[:, 2])
-        J[:, :, :4] += np.einsum("r,k,ri->rki", t, self.c, e)
-        return 2 * J, rate
+        J, e = Y[:, 0], x[:, :4]
+        if len(self.Q) == 1:
+            J[:, :, :4] += np.einsum("r,k,ri->rki", t, self.c, e)
+            return 2 * J, np.einsum("k,ri,ri->rk", self.c, e, e)
+        s = t[:, None, None]
+        rate = np.einsum("rij,rj->ri", Y[:, 1] + 2 * s * Y[:, 2], x)
+        return 2 * (J + s * (Y[:, 1] + s * Y[:, 2])), rate
 
 
 def _square(J: Complex, patch: Complex) -> Complex:

@@ -107,7 +107,7 @@ def arm_of(chain: Chain, symbols: SX, p: Array) -> Arm:
 
 def motion(q: Array, prismatic: bool) -> Array:
     """(..., 4, 4) translation along z by q [m], or rotation about z by q [rad]."""
-    T = np.empty((*np.shape(q), 4, 4))
+    T = np.empty((*np.shape(q), 4, 4), np.result_type(q, float))
     T[...] = np.eye(4)
     if prismatic:
         T[..., 2, 3] = q

@@ -20,7 +20,12 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
 from mbs.closed_forms.arm import Arm, inverse
-from mbs.closed_forms.arm_search import General, general, general_of
+from mbs.closed_forms.arm_certificate import (
+    CertifiedArm,
+    certified_arm,
+    certified_configurations,
+)
+from mbs.closed_forms.arm_search import general_of
 from mbs.closed_forms.hexapod import LEGS, poses
 from mbs.closed_forms.planar_loops import KNOWN, PlanarLoops, planar_roots
 from mbs.closed_forms.ring import PARAMETERS, extent, independent_indices, loop_links
@@ -550,7 +555,7 @@ class _SingleLoop:
     system: System
     joints: tuple[ChainJoint, ...]
     gaps: Function
-    arm: tuple[bytes, General] | None = None
+    arm: tuple[bytes, CertifiedArm] | None = None
 
     @staticmethod
     def of(work: PlanWork, ring: Ring) -> _SingleLoop:
@@ -565,16 +570,16 @@ class _SingleLoop:
         """Every way to close the loop."""
         gaps = _side_by_side(self.gaps, q, p)
         signs = np.array([joint.sign for joint in self.joints])
-        found = general(self._general(gaps), inverse(gaps[0]))
-        return Roots(found * signs, "the general inverse geometric model, of degree 16")
+        found = certified_configurations(self._arm(gaps), inverse(gaps[0]))
+        return Roots(found.q * signs, found.proof, found.complete)
 
-    def _general(self, gaps: Matrix) -> General:
+    def _arm(self, gaps: Matrix) -> CertifiedArm:
         between = np.concatenate([np.eye(4)[None], gaps[1:], np.eye(4)[None]])
         key = between.tobytes()
         if self.arm is None or self.arm[0] != key:
             prismatic = np.array([not joint.is_rotational for joint in self.joints])
             names = tuple(joint.name for joint in self.joints)
-            self.arm = (key, general_of(Arm(names, prismatic, between)))
+            self.arm = (key, certified_arm(general_of(Arm(names, prismatic, between))))
         return self.arm[1]
 
 

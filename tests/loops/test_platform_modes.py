@@ -90,7 +90,8 @@ def test_a_loop_behind_a_platform_follows():
 def test_one_loop_of_six_unknown_joints(kinds, seed):
     system = ring_loop(seed, kinds).assemble()
     found = check(system, starts=100)
-    assert found.proof == "the general inverse geometric model, of degree 16"
+    count = 16 if kinds == "RRRRRRR" else 8
+    assert found.proof.endswith(f"certified: {count} of {count} roots")
     assert len(found) in range(1, 17)
     # elsewhere the arm is the same one and its target another
     q_a = np.array(found[0].q)[list(system.free)] + 0.05

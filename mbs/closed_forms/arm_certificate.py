@@ -108,10 +108,10 @@ def _first(prismatic: bool, near: Complex, goal: Array) -> Complex:
         slide: Complex = goal[2, 3] - near[:, 2, 3]
         return slide
     x, y = near[:, 0, 2:], near[:, 1, 2:]
+    X, Y = goal[0, 2:], goal[1, 2:]
     # X = c x - s y and Y = s x + c y, of a point and of a direction
-    A = np.concatenate([np.stack([x, -y], axis=2), np.stack([y, x], axis=2)], axis=1)
-    c, s = (np.linalg.pinv(A) @ np.concatenate([goal[0, 2:], goal[1, 2:]])).T
-    return _angle(c, s)
+    square = np.sum(x * x + y * y, axis=1)
+    return _angle(np.sum(x * X + y * Y, axis=1) / square, np.sum(x * Y - y * X, axis=1) / square)
 
 
 def _second(way: Array, prismatic: NDArray[np.bool_], beyond: Complex, goal: Array) -> Complex:
@@ -119,6 +119,7 @@ def _second(way: Array, prismatic: NDArray[np.bool_], beyond: Complex, goal: Arr
     kept = KEPT_BY_SLIDE if prismatic[0] else KEPT_BY_TURN
     moved = np.einsum("iab,nb->nai", motion_parts(bool(prismatic[1])), pair(beyond))
     A = (rho(way) @ moved)[:, kept]
+    A = np.where(np.all(np.isfinite(A), axis=(1, 2), keepdims=True), A, 0.0)
     U, s, Vh = np.linalg.svd(A[:, :, 1:], full_matrices=False)
     g = np.einsum("nai,na->ni", U.conj(), pair(goal)[kept] - A[:, :, 0])
     used = s > _FLAT * s[:, :1]

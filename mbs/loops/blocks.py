@@ -47,6 +47,7 @@ from mbs.loops.plan import (
 )
 from mbs.numbers import NONZERO
 from mbs.recursions.chain import ChainJoint, Ring
+from mbs.solvers.rank import rank
 from mbs.spatial import Pose, vector
 
 Step = Stage | LoopBlock
@@ -89,13 +90,18 @@ def _block(work: PlanWork, waiting: Sequence[int]) -> LoopBlock | None:
     return None
 
 
+def _assembled(system: System) -> tuple[Vector, Vector]:
+    """All positions and p where a system was assembled."""
+    q = np.array(system.configuration)
+    return started_at(system, q, range(system.nq)), closure_parameters(system)
+
+
 def _gives_assembled(work: PlanWork, block: LoopBlock) -> bool:
     """Whether the assembled configuration is among the roots of a block."""
     system = work.system
     q = np.array(system.configuration)
-    start = started_at(system, q, range(system.nq))
     try:
-        roots = block.solve(start, closure_parameters(system))
+        roots = block.solve(*_assembled(system))
     except NoClosedForm:
         return False
     except LoopError:  # it moves by itself there, which is told where its roots are asked for
@@ -516,10 +522,18 @@ class _Draughtsman:
         return _Drawing(loops, size, told)
 
 
-# One loop of six unknown revolute and prismatic joints: an arm that reaches a known pose.
+# One loop of six unknown revolute and prismatic joints: an arm that reaches a known pose. One of
+# fewer joints, such as Bricard's, gets revolute joints that must be at zero.
 
 
 _JOINTS = 6
+_LEAST_JOINTS = 3
+_AT_ZERO = 1e-6
+"""Angle [rad] below which an added joint is at zero: at a fold a root is known to 1e-7, and joints
+added at random are elsewhere by more."""
+_LOCKED = 1e-6
+"""Relative singular value below which a loop of fewer joints moves by itself: its roots are exact to
+1e-12, whose root that is."""
 
 
 def single_loops(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
@@ -529,9 +543,11 @@ def single_loops(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
             continue
         ring = work.ring(number)
         plain = all(joint.motion in (Motion.REVOLUTE, Motion.PRISMATIC) for joint in ring.joints)
-        if plain and len(ring.joints) == _JOINTS:
+        if plain and _LEAST_JOINTS <= len(ring.joints) <= _JOINTS:
             loop = _SingleLoop.of(work, ring)
             indices = tuple(_index(joint) for joint in loop.joints)
+            if len(indices) < _JOINTS and loop.moves(*_assembled(work.system)):
+                continue
             yield LoopBlock(work.system.cuts[number].edge.joint.name, indices, loop.roots)
 
 
@@ -570,17 +586,47 @@ class _SingleLoop:
         """Every way to close the loop."""
         gaps = _side_by_side(self.gaps, q, p)
         signs = np.array([joint.sign for joint in self.joints])
+        n = len(self.joints)
         found = certified_configurations(self._arm(gaps), inverse(gaps[0]))
-        return Roots(found.q * signs, found.proof, found.complete)
+        q = found.q[np.all(np.abs(found.q[:, n:]) < _AT_ZERO, axis=1), :n]
+        return Roots(q * signs, found.proof, found.complete)
+
+    def moves(self, q: Vector, p: Vector) -> bool:
+        """Whether joints can move while all that is known stays."""
+        gaps, n = _side_by_side(self.gaps, q, p), len(self.joints)
+        arm = self._arm(gaps).general.arm
+        x = np.zeros((1, _JOINTS))
+        for own in self.roots(q, p).values:
+            x[0, :n] = own * [joint.sign for joint in self.joints]
+            if rank(arm.pose_and_jacobian(x)[1][0, :, :n], _LOCKED) < n:
+                return True
+        return False
 
     def _arm(self, gaps: Matrix) -> CertifiedArm:
-        between = np.concatenate([np.eye(4)[None], gaps[1:], np.eye(4)[None]])
-        key = between.tobytes()
+        key = gaps[1:].tobytes()
         if self.arm is None or self.arm[0] != key:
-            prismatic = np.array([not joint.is_rotational for joint in self.joints])
-            names = tuple(joint.name for joint in self.joints)
-            self.arm = (key, certified_arm(general_of(Arm(names, prismatic, between))))
+            added = _JOINTS - len(self.joints)
+            turns = [not joint.is_rotational for joint in self.joints] + [False] * added
+            names = [joint.name for joint in self.joints] + ["added"] * added
+            more = _added_gaps(added, float(np.sum(np.linalg.norm(gaps[:, :3, 3], axis=1))))
+            between = np.concatenate([np.eye(4)[None], gaps[1:], more])
+            arm = Arm(tuple(names), np.array(turns), between)
+            self.arm = (key, certified_arm(general_of(arm)))
         return self.arm[1]
+
+
+def _added_gaps(count: int, size: float) -> Matrix:
+    """(count + 1, 4, 4) random gaps before added joints, and the one that leads back."""
+    rng = np.random.default_rng(_SEED)
+    gaps, back = list[Matrix](), np.eye(4)
+    for _ in range(count):
+        gap = np.eye(4)
+        gap[:3, :3] = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        gap[:3, :3] *= np.linalg.det(gap[:3, :3])
+        gap[:3, 3] = rng.uniform(-1, 1, 3) * (size or 1.0) / _JOINTS
+        gaps.append(gap)
+        back = inverse(gap) @ back
+    return np.array([*gaps, back])
 
 
 # A platform on six legs: between two points, one on the ground and one on the platform, each keeps

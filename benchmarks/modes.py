@@ -1,6 +1,7 @@
 """Every mode of loops that are solved together: what a search finds and `modes` does not.
 
-Random mechanisms of each class, closed somewhere. Where the roots are certified and as many as there
+Random mechanisms of each class, closed somewhere; of loops and of platforms on six legs ten poses
+of each geometry. Where the roots are certified and as many as there
 can be, that is the proof, and a search is asked only of some; elsewhere Levenberg and Marquardt's
 steps, or Gauss-Newton's, from many random starts are held against what was found. Prints a row for
 each class: how many mechanisms, of how many all roots are certified, how many were searched, how
@@ -12,6 +13,7 @@ of the last three kinds.
 """
 
 import argparse
+import functools
 import time
 from itertools import combinations_with_replacement
 from typing import NamedTuple
@@ -20,8 +22,12 @@ import numpy as np
 from support import leg_platforms, plane_equations
 from support.configurations import active, same, searched
 from support.platforms import planar_platform
-from support.ring_loops import ring_loop
+from support.random_trees import random_rotation
 
+from mbs.closed_forms import arm_search
+from mbs.closed_forms.arm import Arm
+from mbs.closed_forms.arm_certificate import certified_arm, certified_configurations
+from mbs.closed_forms.arm_search import general_of
 from mbs.closed_forms.hexapod import poses
 from mbs.closed_forms.planar_loops import planar_roots
 from mbs.loops import modes
@@ -74,16 +80,50 @@ def system_modes(build, starts):
     return run
 
 
-def legs(kind, starts):
-    """Six legs in numbers; every fifth one twice, for the time of the second call."""
+POSES = 10
+"""Of each geometry of a loop or of a platform, for seeds that follow each other."""
+
+
+def loop(kinds, starts):
+    """A loop of a motor and six joints in numbers: an arm that reaches a pose."""
+
+    @functools.lru_cache(maxsize=1)
+    def made(seed):
+        rng = np.random.default_rng(seed)
+        gaps = np.tile(np.eye(4), (7, 1, 1))
+        for gap in gaps:
+            gap[:3, :3], gap[:3, 3] = random_rotation(rng), rng.uniform(-1, 1, 3)
+        arm = Arm(tuple("abcdef"), np.array([kind == "P" for kind in kinds]), gaps)
+        return certified_arm(general_of(arm))
 
     def run(seed, search):
-        rng = np.random.default_rng(seed)
-        a, b = leg_platforms.ends(kind, rng)
-        e, p = leg_platforms.random_pose(rng)
+        known = made(seed // POSES)
+        arm = known.general.arm
+        q = np.random.default_rng(seed).uniform(-3, 3, 6)
+        T = arm.pose(q)
+        found, spent = timed(certified_configurations, known, T)
+        others = arm_search.search(arm, T, starts, seed) if search else []
+        missed = sum(not reached(arm, found.q, other) for other in others)
+        lost = not reached(arm, found.q, q)
+        complete = found.complete
+        return Row(complete, complete, lost, search, len(others), missed, spent)
+
+    return run
+
+
+def reached(arm, found, q):
+    """Whether a configuration is among those found."""
+    return any(np.max(np.abs(arm.wrapped(q - own))) < 1e-4 for own in found)
+
+
+def legs(kind, starts):
+    """Six legs in numbers."""
+
+    def run(seed, search):
+        a, b = leg_platforms.ends(kind, np.random.default_rng(seed // POSES))
+        e, p = leg_platforms.random_pose(np.random.default_rng(seed))
         length = leg_platforms.lengths_at(a, b, e, p)
         found, spent = timed(poses, a, b, length)
-        spent = timed(poses, a, b, length)[1] if seed % 5 == 0 else np.nan
         others = leg_platforms.searched(a, b, length, starts, seed) if search else []
         own = zip(found.e, found.p, strict=True)
         lost = all(leg_platforms.distance(e, p, *pose) > 1e-4 for pose in own)
@@ -117,10 +157,7 @@ CASES = {
         for name, how in PLATFORMS.items()
     },
     "three plane loops": plane(3, 1000),
-    **{
-        f"loop {kinds}": system_modes(lambda seed, kinds=kinds: ring_loop(seed, kinds), 100)
-        for kinds in ("RRRRRRR", "RRPRRPR")
-    },
+    **{f"loop R{kinds}": loop(kinds, 500) for kinds in ("RRRRRR", "RPRRPR", "RRPRRR", "PRRRRP")},
     **{f"six legs {kind}": legs(kind, 60) for kind in leg_platforms.DEGREES},
 }
 
@@ -154,7 +191,7 @@ def told(rows):
         sum(row.lost for row in rows),
         sum(not row.complete for row in rows),
     ]
-    return len(rows), *sums, f"{1e3 * np.nanmedian([row.spent for row in rows]):.1f}"
+    return len(rows), *sums, f"{1e3 * np.median([row.spent for row in rows]):.1f}"
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import functools
 import json
-from contextlib import suppress
 from dataclasses import dataclass
 from importlib import resources
 from itertools import pairwise
@@ -22,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.errors import LoopError
-from mbs.numbers import NONZERO
+from mbs.solvers import homotopy
+from mbs.solvers.homotopy import TOLERANCE, solved
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -85,18 +85,6 @@ _SEED = 20260302
 # Following the roots while the legs become others, all roots at once.
 
 
-_TOLERANCE = 1e-4
-"""First correction of Newton's method after a step, as a part of |x| = 1: at 1e-2 a tenth of the
-platforms lost a path to another one."""
-_FIRST_STEP, _LEAST_STEP = 0.01, 1e-9
-"""Of t, from 0 to 1: the first is shorter than most that follow; one below the other stands before
-a singular root, to which the steps of a regular path do not come near."""
-_SHRINK, _GROW, _SAFETY = 0.2, 3.0, 0.9
-"""Of steps, as in solvers of differential equations: at most by these, and a little less than what
-the fifth power of the step says."""
-_MOST_STEPS = 4000
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Homotopy:
     """From one platform to another: Q(t) = Q0 + t Q1 + t^2 Q2, or Q0 and t times constants.
@@ -142,64 +130,20 @@ def _correction(path: Homotopy, x: Complex, t: Real, patch: Complex) -> tuple[Co
     J, rate = path.slopes(x, t)
     sides = np.zeros((len(x), _SIZE, 2), dtype=np.complex128)
     sides[:, :_ROWS, 0], sides[:, :_ROWS, 1] = np.einsum("rij,rj->ri", J, x) / 2, rate
-    solved = -_solved(_square(J, patch), sides)
-    return solved[..., 0], solved[..., 1]
+    step = -solved(_square(J, patch), sides)
+    return step[..., 0], step[..., 1]
 
 
-def _solved(A: Complex, b: Complex) -> Complex:
-    """(r, 8, k) solutions of A x = b, NaN where A is singular to the last bit."""
-    try:
-        return np.asarray(np.linalg.solve(A, b), np.complex128)
-    except np.linalg.LinAlgError:
-        x = np.full(b.shape, np.nan, dtype=np.complex128)
-        for k in range(len(b)):
-            with suppress(np.linalg.LinAlgError):
-                x[k] = np.linalg.solve(A[k], b[k])
-        return x
+def follow(path: Homotopy, x: Complex, tolerance: float = TOLERANCE) -> tuple[Complex, Real]:
+    """The roots (r, 8) at the end of a path, of length one, and how far each came: see homotopy."""
+    return homotopy.follow(functools.partial(_correction, path), x, _in_patch, tolerance)
 
 
-def follow(path: Homotopy, x: Complex, tolerance: float = _TOLERANCE) -> tuple[Complex, Real]:
-    """The roots (r, 8) at the end, of length one, and how far each came.
-
-    That is 1, or less at a singular root, which is approached in ever smaller steps. Runge and
-    Kutta's fourth order predicts, two steps of Newton's method correct.
-    """
-    x = x / np.linalg.norm(x, axis=1, keepdims=True)
-    t, h = np.zeros(len(x)), np.full(len(x), _FIRST_STEP)
-    slope = _correction(path, x, t, x)[1]
-    for _ in range(_MOST_STEPS):
-        going = np.flatnonzero((t < 1) & (h > _LEAST_STEP))
-        if not len(going):
-            break
-        x0, t0 = x[going], t[going]
-        step = np.minimum(h[going], 1 - t0)
-        with np.errstate(all="ignore"):  # near singular matrices steps have no bounds
-            y = _predicted(path, x0, slope[going], t0, step)
-            first, _ = _correction(path, y, t0 + step, x0)
-            second, along = _correction(path, y + first, t0 + step, x0)
-            error, rest = np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
-        # the second correction is about the square of the first where the root is regular
-        good = (error < 2 * tolerance) & (rest < tolerance**1.5)
-        factor = _SAFETY * (tolerance / np.maximum(error, NONZERO)) ** (1 / 5)
-        factor = np.where(np.isfinite(factor), factor, _SHRINK)
-        h[going] = step * np.clip(factor, _SHRINK, np.where(good, _GROW, 0.5))
-        won = going[good]
-        y = (y + first + second)[good]
-        size = np.linalg.norm(y, axis=1, keepdims=True)
-        x[won], v = y / size, along[good] / size
-        # in the patch of the new root its length does not change
-        slope[won] = v - np.sum(x[won].conj() * v, axis=1, keepdims=True) * x[won]
-        t[won] = np.where(step[good] >= 1 - t0[good], 1.0, (t0 + step)[good])
-    return x, t
-
-
-def _predicted(path: Homotopy, x: Complex, k1: Complex, t: Real, h: Real) -> Complex:
-    """(r, 8) the roots at t + h, from x with slopes k1."""
-    s = h[:, None]
-    _, k2 = _correction(path, x + s / 2 * k1, t + h / 2, x)
-    _, k3 = _correction(path, x + s / 2 * k2, t + h / 2, x)
-    _, k4 = _correction(path, x + s * k3, t + h, x)
-    return x + s / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+def _in_patch(x: Complex, slope: Complex) -> tuple[Complex, Complex]:
+    """Roots of length one, and slopes that do not change these lengths to first order."""
+    size = np.linalg.norm(x, axis=1, keepdims=True)
+    x, slope = x / size, slope / size
+    return x, slope - np.sum(x.conj() * slope, axis=1, keepdims=True) * x
 
 
 # Which ends are regular roots, each its own: a certificate.
@@ -247,7 +191,7 @@ def certify(legs: Legs, x: Complex, t: Real) -> Ends:
     y, zero = x[number], np.zeros(len(number))
     J, _ = path.slopes(y, zero)
     unit = np.broadcast_to(np.eye(_SIZE, dtype=np.complex128), (len(y), _SIZE, _SIZE))
-    W = _solved(_square(J, y), unit)[..., :_ROWS]
+    W = solved(_square(J, y), unit)[..., :_ROWS]
     newton = np.einsum("rij,rj->ri", W, np.einsum("rij,rj->ri", J, y) / 2)
     bend = np.linalg.norm(W @ path.Q[0].reshape(_ROWS, _SIZE * _SIZE), axis=(1, 2))
     certain = np.linalg.norm(newton, axis=1) * bend < _CERTAIN
@@ -459,7 +403,7 @@ def poses(a: Real, b: Real, length: Real) -> Poses:
     legs = Legs(a0.astype(complex), b0.astype(complex), c.astype(complex))
     start = own_start(a0.tobytes(), b0.tobytes())
     path, expected = Homotopy.between(start.legs, legs), len(start.x)
-    for tolerance in (_TOLERANCE, _TOLERANCE / 10, _TOLERANCE / 100):
+    for tolerance in (TOLERANCE, TOLERANCE / 10, TOLERANCE / 100):
         x, t = follow(path, start.x, tolerance)
         ends = certify(legs, x, t)
         found = _real(a0, b0, square, ends, t)

@@ -58,7 +58,7 @@ def plane(kinds, starts):
         found = plane_equations.searched(loops, starts if search else 0, seed)
         missed = plane_equations.missed(loops, roots, found)
         lost = len(roots.theta) == 0
-        return Row(False, not roots.singular, lost, search, len(found), missed, spent)
+        return Row(False, roots.complete, lost, search, len(found), missed, spent)
 
     return run
 

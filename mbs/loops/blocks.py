@@ -285,7 +285,7 @@ class _Plane:
         found = planar_roots(drawing.loops)
         values = drawing.positions(found.theta, found.s)
         proof = " and ".join(found.methods)
-        return Roots(values, proof, not found.singular)
+        return Roots(values, proof, found.complete)
 
 
 @dataclass(slots=True)

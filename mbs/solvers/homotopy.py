@@ -46,7 +46,7 @@ def follow(
         tolerance: first correction of Newton's method after a step.
     """
     t, h = np.zeros(len(x)), np.full(len(x), _FIRST_STEP)
-    x, slope = settle(x, newton(x, t, x)[1])
+    x, slope = settle(x.copy(), newton(x, t, x)[1])
     for _ in range(_MOST_STEPS):
         going = np.flatnonzero((t < 1) & (h > _LEAST_STEP))
         if not len(going):

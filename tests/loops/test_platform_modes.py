@@ -72,6 +72,13 @@ def test_plane_linkages(kind, seed):
     assert len(found) in range(1, 2 * degree + 1)  # the four-bar has two modes
 
 
+@pytest.mark.parametrize(("sliding", "degree"), [(("OA", "QD"), 18), (("OA", "OD", "PQ"), 14)])
+def test_three_plane_loops_with_slides(sliding, degree):
+    joints, _, _ = LINKAGES["two four-bars with a common coupler point"]
+    found = check(planar_linkage(1, joints, sliding=sliding).assemble(), starts=60)
+    assert found.proof == f"homotopy, certified: {degree} of {degree} paths"
+
+
 def test_a_loop_behind_a_platform_follows():
     """A rocker that a rod ties to the platform: two positions of it for each of the platform."""
     m = planar_platform(1, ("RRR",) * 3, (0, 0, 0))

@@ -11,7 +11,6 @@ the theorem of Newton and Kantorovich; Sommese & Wampler 2005, chapter 7, for th
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +31,7 @@ from mbs.closed_forms.raghavan_roth.numbers import (
     pair,
     rho,
 )
-from mbs.numbers import NONZERO
+from mbs.solvers.homotopy import solved
 
 Complex = NDArray[np.complex128]
 
@@ -70,9 +69,7 @@ def complex_candidates(prepared: Prepared, T: Array) -> Complex:
             middle = np.where(loop.prismatic[2:5], x, 2 * np.arctan(x.astype(complex)))
             every.append(_completed(ways[0], loop, middle[np.all(np.isfinite(middle), axis=1)]))
     whole = np.concatenate(every)
-    whole = whole[np.all(np.isfinite(whole), axis=1)]
-    # of two that are conjugate rounding may have spoilt one
-    return np.concatenate([whole, whole.conj()])
+    return whole[np.all(np.isfinite(whole), axis=1)]
 
 
 def _completed(ways: Array, loop: Arrangement, middle: Complex) -> Complex:
@@ -80,15 +77,13 @@ def _completed(ways: Array, loop: Arrangement, middle: Complex) -> Complex:
     beyond, goal = np.broadcast_to(ways[1], (len(middle), 4, 4)), inverse(ways[5])
     for k in (2, 3, 4):
         beyond = beyond @ motion(middle[:, k - 2], bool(loop.prismatic[k])) @ ways[k]
-    both = _second(ways[0], loop.prismatic, beyond, goal)
-    u = list[Complex]()
-    for second in both.T:
-        near = ways[0] @ motion(second, bool(loop.prismatic[1])) @ beyond
-        first = _first(bool(loop.prismatic[0]), near, goal)
-        left = inverse(motion(first, bool(loop.prismatic[0])) @ near) @ goal
-        sixth = _angle(left[:, 0, 0] + left[:, 1, 1], left[:, 1, 0] - left[:, 0, 1])
-        u.append(np.column_stack([first, second, middle, sixth]))
-    whole = loop.sign * (np.concatenate(u) + loop.offsets)
+    number, second = _second(ways[0], loop.prismatic, beyond, goal)
+    near = ways[0] @ motion(second, bool(loop.prismatic[1])) @ beyond[number]
+    first = _first(bool(loop.prismatic[0]), near, goal)
+    left = inverse(motion(first, bool(loop.prismatic[0])) @ near) @ goal
+    sixth = _angle(left[:, 0, 0] + left[:, 1, 1], left[:, 1, 0] - left[:, 0, 1])
+    whole = np.column_stack([first, second, middle[number], sixth])
+    whole = loop.sign * (whole + loop.offsets)
     q = np.empty_like(whole)
     q[:, loop.order] = np.where(loop.prismatic, whole * loop.length, whole)
     return q
@@ -114,8 +109,10 @@ def _first(prismatic: bool, near: Complex, goal: Array) -> Complex:
     return _angle(np.sum(x * X + y * Y, axis=1) / square, np.sum(x * Y - y * X, axis=1) / square)
 
 
-def _second(way: Array, prismatic: NDArray[np.bool_], beyond: Complex, goal: Array) -> Complex:
-    """(n, 2) positions of joint 2, twice the same where there is one."""
+def _second(
+    way: Array, prismatic: NDArray[np.bool_], beyond: Complex, goal: Array
+) -> tuple[NDArray[np.int64], Complex]:
+    """Numbers of the rows, and positions of joint 2: two where there is but one equation."""
     kept = KEPT_BY_SLIDE if prismatic[0] else KEPT_BY_TURN
     moved = np.einsum("iab,nb->nai", motion_parts(bool(prismatic[1])), pair(beyond))
     A = (rho(way) @ moved)[:, kept]
@@ -123,11 +120,12 @@ def _second(way: Array, prismatic: NDArray[np.bool_], beyond: Complex, goal: Arr
     U, s, Vh = np.linalg.svd(A[:, :, 1:], full_matrices=False)
     g = np.einsum("nai,na->ni", U.conj(), pair(goal)[kept] - A[:, :, 0])
     used = s > _FLAT * s[:, :1]
+    flat = np.flatnonzero(~used[:, 1])
     g = np.where(used, g / np.where(used, s, 1.0), 0.0)
     f = np.einsum("nij,ni->nj", Vh.conj(), g)
     single = f[:, 0] if prismatic[1] else _angle(f[:, 0], f[:, 1])
-    crossings = _crossings(bool(prismatic[1]), Vh[:, 0], g[:, 0])
-    return np.stack([np.where(used[:, 1], single, crossing) for crossing in crossings], axis=1)
+    single[flat], other = _crossings(bool(prismatic[1]), Vh[flat, 0], g[flat, 0])
+    return np.concatenate([np.arange(len(single)), flat]), np.concatenate([single, other])
 
 
 def _crossings(prismatic: bool, n: Complex, g: Complex) -> tuple[Complex, Complex]:
@@ -147,12 +145,15 @@ def _crossings(prismatic: bool, n: Complex, g: Complex) -> tuple[Complex, Comple
 # Which of them are configurations, each its own: a certificate.
 
 
-_NEWTON = 12
+_NEWTON = 4
 """Steps: candidates are known to 1e-6 at least, from where two or three are enough, or they are
 none."""
 _CERTAIN = 0.03
 """Of the product of Newton's step, the norm of the inverse and the bend: below one half there is one
 root near; room for rounding."""
+_NEAR = 0.1
+"""Of |X - 1| and of what a change moves it: the bound of the second derivative is below two then,
+and a rotation whose skew part vanishes is the identity."""
 _ROUNDING = 1e-14
 """Of a pose, in lengths of the loop: what Newton's step cannot fall below."""
 
@@ -193,18 +194,20 @@ def certified_roots(arm: Arm, T: Array, candidates: Complex) -> CertifiedRoots:
     q = np.where(arm.prismatic, candidates / length, candidates)
     with np.errstate(all="ignore"):
         for _ in range(_NEWTON):
-            rows, J, _ = _rows(inner, target, q)
+            rows, J, *_ = _rows(inner, target, q)
             finite = np.all(np.isfinite(J), axis=(1, 2)) & np.all(np.isfinite(rows), axis=1)
             q, rows, J = q[finite], rows[finite], J[finite]
-            q = q - (_inverse(J) @ rows[..., None])[..., 0]
-        rows, J, norms = _rows(inner, target, q)
-        W = _inverse(J)
-        step = np.linalg.norm(rows, axis=1) + _ROUNDING * np.max(norms, axis=1, initial=0.0)
+            q = q - solved(J, rows[..., None])[..., 0]
+        # of two that are conjugate rounding may have spoilt one
+        q = np.concatenate([q, q.conj()])
+        rows, J, norms, gap = _rows(inner, target, q)
+        W = solved(J, np.broadcast_to(np.eye(6, dtype=np.complex128), J.shape))
         gain = np.sum(norms * np.linalg.norm(W, axis=2), axis=1)
-        # e^(sum |S d|) |X0| is below two where the step is as short as is asked
-        radius = gain * step
-        certain = 2 * gain * radius < _CERTAIN
-    q, radius = q[certain], 2 * radius[certain]
+        step = np.sum(norms * np.abs(np.einsum("mij,mj->mi", W, rows)), axis=1)
+        # Newton's step, in the norm in which the second derivative is below e^(sum |S d|) |X0|
+        radius = 2 * (step + gain * _ROUNDING * np.max(norms, axis=1, initial=0.0))
+        certain = (gain * radius < _CERTAIN) & (radius < _NEAR) & (gap < _NEAR)
+    q, radius = q[certain], radius[certain]
     kept = list[int]()
     for k in np.argsort(radius, kind="stable"):
         gap = q[k] - q[kept]
@@ -224,8 +227,8 @@ def _inner(arm: Arm, T: Array, length: float) -> tuple[Arm, Array]:
     return Arm(arm.names, arm.prismatic, gaps), target
 
 
-def _rows(arm: Arm, target: Array, q: Complex) -> tuple[Complex, Complex, Array]:
-    """The rows (m, 6), their derivatives (m, 6, 6), and the norms of the twists (m, 6).
+def _rows(arm: Arm, target: Array, q: Complex) -> tuple[Complex, Complex, Array, Array]:
+    """The rows (m, 6), derivatives (m, 6, 6), norms of the twists (m, 6) and |X - 1| (m,).
 
     All are seen from the middle of the arm, where complex angles lengthen the twists least.
     """
@@ -247,7 +250,9 @@ def _rows(arm: Arm, target: Array, q: Complex) -> tuple[Complex, Complex, Array]
             twists[k, :, :3, :3] = _skew(axis)
             twists[k, :, :3, 3] = np.cross(origin, axis)
     slopes = np.concatenate([X @ twists[:3], twists[3:] @ X])
-    return _six(X), np.moveaxis(_six(slopes), 0, -1), np.linalg.norm(twists, axis=(2, 3)).T
+    norms = np.linalg.norm(twists, axis=(2, 3)).T
+    gap = np.linalg.norm(X - np.eye(4), axis=(1, 2))
+    return _six(X), np.moveaxis(_six(slopes), 0, -1), norms, gap
 
 
 def _skew(axis: Complex) -> Complex:
@@ -261,18 +266,6 @@ def _six(X: Complex) -> Complex:
     R = X[..., :3, :3]
     turned = [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]]
     return np.concatenate([X[..., :3, 3], 0.5 * np.stack(turned, axis=-1)], axis=-1)
-
-
-def _inverse(J: Complex) -> Complex:
-    """(m, 6, 6) inverses, infinite where a matrix is singular to the last bit."""
-    try:
-        return np.asarray(np.linalg.inv(J), np.complex128)
-    except np.linalg.LinAlgError:
-        W = np.full_like(J, np.inf)
-        for k in range(len(J)):
-            with suppress(np.linalg.LinAlgError):
-                W[k] = np.linalg.inv(J[k])
-        return W
 
 
 # All real configurations, and whether that is proved.
@@ -297,11 +290,13 @@ class CertifiedArm:
 def certified_arm(arm: General) -> CertifiedArm:
     """The configurations of some random poses, counted."""
     q = random_configurations(arm.arm, np.eye(4), _POSES, _SEED)
-    return CertifiedArm(arm, max(len(_roots(arm, T).q) for T in arm.arm.pose(q)))
-
-
-def _roots(arm: General, T: Array) -> CertifiedRoots:
-    return certified_roots(arm.arm, T, complex_candidates(arm.prepared, T))
+    return CertifiedArm(
+        arm,
+        max(
+            len(certified_roots(arm.arm, T, complex_candidates(arm.prepared, T)).q)
+            for T in arm.arm.pose(q)
+        ),
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -321,8 +316,9 @@ class Configurations:
 
 def certified_configurations(arm: CertifiedArm, T: Array) -> Configurations:
     """The real configurations of a pose, T (4, 4) [m], with what proves them."""
-    found, roots = general(arm.general, T), _roots(arm.general, T)
-    own = arm.general.arm
+    own, found = arm.general.arm, general(arm.general, T)
+    candidates = np.concatenate([complex_candidates(arm.general.prepared, T), found])
+    roots = certified_roots(own, T, candidates)
     real = np.where(own.prismatic, roots.q.real * loop_length(own), roots.q.real)[roots.real]
     q, alone = list(found), len(found)
     for root in real:
@@ -333,9 +329,10 @@ def certified_configurations(arm: CertifiedArm, T: Array) -> Configurations:
             q.append(own.wrapped(root))
     # configurations that are no roots of their own: two roots meet in each
     certain = len(roots.q)
-    meet = f", and {2 * alone} where configurations meet" if alone else ""
+    complete = certain + 2 * alone == arm.count
+    meet = f", and {2 * alone} where configurations meet" if alone and complete else ""
     proof = f"the general inverse geometric model, certified: {certain} of {arm.count} roots{meet}"
-    return Configurations(np.array(q).reshape(-1, 6), proof, certain + 2 * alone == arm.count)
+    return Configurations(np.array(q).reshape(-1, 6), proof, complete)
 
 
 _SAME = 1e-6

@@ -734,6 +734,9 @@ _IDLE, _MOST_WAYS = 4, 60
 """Ways around other loops without new roots after which all are taken to be known; and at most."""
 _CERTAIN = 0.03
 """Of Newton's step times the bend of the rows: below one half one root is near; room for rounding."""
+_NEAR = 0.1
+"""Distance of a root [rad, or parts of the size] within which the bend is what it is in the middle,
+but for a tenth."""
 _ROUNDING = 1e-14
 """Of the rows, lengths in parts of the size: what Newton's step cannot fall below."""
 _NEARLY_REAL = 0.1
@@ -827,9 +830,9 @@ class _Rows:
             w[:, :, n:-1] *= 1 + 2 / np.maximum(np.abs(x[:, None, n:]), NONZERO)
             bend = np.einsum("klc,rkc->rkl", np.abs(self.P[:, :, :-1]), w[:, :, :-1])
             gain = np.max(np.einsum("rij,rj->ri", W, bend.reshape(rows.shape)), axis=1)
-            step = np.max(np.einsum("rij,rj->ri", W, np.abs(rows) + _ROUNDING), axis=1)
-            certain = 2 * gain * step < _CERTAIN
-        x, radius = x[certain], 2 * step[certain]
+            radius = 2 * np.max(np.einsum("rij,rj->ri", W, np.abs(rows) + _ROUNDING), axis=1)
+            certain = (gain * radius < _CERTAIN) & (radius < _NEAR)
+        x, radius = x[certain], radius[certain]
         kept = list[int]()
         for k in np.argsort(radius, kind="stable"):
             gap = x[k] - x[kept]

@@ -9,7 +9,7 @@ many roots the search found, how many of these were missed, how many mechanisms 
 configuration that they were made from, how many are not complete, the median time; and the seeds
 of the last three kinds.
 
-    PYTHONPATH=tests:. python benchmarks/modes.py [--number 100] [--first 0] [--every 1] [classes ..]
+    PYTHONPATH=tests:. python benchmarks/modes.py [--number N] [--first SEED] [--every N] [words ..]
 """
 
 import argparse

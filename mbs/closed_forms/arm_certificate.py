@@ -39,11 +39,11 @@ Complex = NDArray[np.complex128]
 
 
 _FAR_ANGLE = 12.0
-"""Imaginary part [rad] beyond which an angle is taken for infinite: those of random loops stay below
-8, and the fourfold eigenvalues at infinity come back as 10 or more."""
+"""Imaginary part [rad] beyond which an angle is taken for infinite: those of random loops stay
+below 11, and the fourfold eigenvalues at infinity come back as 28 or more."""
 _SHARED = 1e-7
-"""Singular values, as parts of the largest, that count as zero at an eigenvalue: a simple one leaves
-1e-12, one of a fold the root of 1e-15."""
+"""Singular values, as parts of the largest, that count as zero at an eigenvalue: a simple one
+leaves 1e-12, one of a fold the root of 1e-15."""
 _FLAT = 1e-6
 """Ratio of singular values below which joint 2 has two angles: its axis and that of joint 1 meet or
 are parallel, which holds by structure and leaves 1e-14."""
@@ -74,7 +74,7 @@ def complex_candidates(prepared: Prepared, T: Array) -> Complex:
 
 def _completed(ways: Array, loop: Arrangement, middle: Complex) -> Complex:
     """(m, 6) configurations of the arm with joints 3, 4 and 5 of its loop at (n, 3) positions."""
-    beyond, goal = np.broadcast_to(ways[1], (len(middle), 4, 4)), inverse(ways[5])
+    beyond, goal = np.tile(ways[1].astype(np.complex128), (len(middle), 1, 1)), inverse(ways[5])
     for k in (2, 3, 4):
         beyond = beyond @ motion(middle[:, k - 2], bool(loop.prismatic[k])) @ ways[k]
     number, second = _second(ways[0], loop.prismatic, beyond, goal)
@@ -84,7 +84,7 @@ def _completed(ways: Array, loop: Arrangement, middle: Complex) -> Complex:
     sixth = _angle(left[:, 0, 0] + left[:, 1, 1], left[:, 1, 0] - left[:, 0, 1])
     whole = np.column_stack([first, second, middle[number], sixth])
     whole = loop.sign * (whole + loop.offsets)
-    q = np.empty_like(whole)
+    q = np.empty(whole.shape, dtype=np.complex128)
     q[:, loop.order] = np.where(loop.prismatic, whole * loop.length, whole)
     return q
 
@@ -149,8 +149,8 @@ _NEWTON = 4
 """Steps: candidates are known to 1e-6 at least, from where two or three are enough, or they are
 none."""
 _CERTAIN = 0.03
-"""Of the product of Newton's step, the norm of the inverse and the bend: below one half there is one
-root near; room for rounding."""
+"""Of the product of Newton's step, the norm of the inverse and the bend: below one half there is
+one root near; room for rounding."""
 _NEAR = 0.1
 """Of |X - 1| and of what a change moves it: the bound of the second derivative is below two then,
 and a rotation whose skew part vanishes is the identity."""
@@ -173,7 +173,8 @@ class CertifiedRoots:
     @property
     def real(self) -> NDArray[np.bool_]:
         """(r,) whether a root is real: the conjugate of one that is not would be near too."""
-        return np.max(np.abs(self.q.imag), axis=1, initial=0.0) <= self.radius
+        real: NDArray[np.bool_] = np.max(np.abs(self.q.imag), axis=1, initial=0.0) <= self.radius
+        return real
 
 
 def certified_roots(arm: Arm, T: Array, candidates: Complex) -> CertifiedRoots:
@@ -232,7 +233,7 @@ def _rows(arm: Arm, target: Array, q: Complex) -> tuple[Complex, Complex, Array,
 
     All are seen from the middle of the arm, where complex angles lengthen the twists least.
     """
-    moved = arm.displacements(q)
+    moved = [motion(q[:, k], bool(prismatic)) for k, prismatic in enumerate(arm.prismatic)]
     half = moved[0] @ arm.gaps[1] @ moved[1] @ arm.gaps[2] @ moved[2] @ arm.gaps[3]
     before = inverse(half)
     frames = [before, before @ moved[0] @ arm.gaps[1]]
@@ -336,5 +337,5 @@ def certified_configurations(arm: CertifiedArm, T: Array) -> Configurations:
 
 
 _SAME = 1e-6
-"""Difference [rad or m] between a certified root and the configuration that it is: both are exact to
-1e-9 unless roots all but meet."""
+"""Difference [rad or m] between a certified root and the configuration that it is: both are exact
+to 1e-9 unless roots all but meet."""

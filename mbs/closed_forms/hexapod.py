@@ -390,10 +390,9 @@ def poses(a: Real, b: Real, length: Real) -> Poses:
     Raises:
         LoopError: the legs hold the platform at no pose.
     """
-    middle, own = a.mean(axis=0), b.mean(axis=0)
-    size = float(np.sqrt(np.mean((a - middle) ** 2) + np.mean((b - own) ** 2))) or 1.0
+    middle, own, size = a.mean(axis=0), b.mean(axis=0), _size(a, b)
     a0, b0 = (a - middle) / size, (b - own) / size
-    if not _holds(a0, b0):
+    if not holds(a, b):
         raise LoopError(
             "the ends of its six legs lie so that they hold the platform at no pose, as on similar"
             " hexagons"
@@ -434,7 +433,18 @@ def _slopes(a: Real, b: Real, e: Real, p: Real) -> tuple[Real, Real]:
     return np.sum(way**2, axis=2), np.concatenate([way, np.cross(arm, way)], axis=2)
 
 
-def _holds(a: Real, b: Real) -> bool:
+def _size(a: Real, b: Real) -> float:
+    return float(np.sqrt(np.mean(np.var(a, axis=0)) + np.mean(np.var(b, axis=0)))) or 1.0
+
+
+def holds(a: Real, b: Real) -> bool:
+    """Whether six legs hold a platform at some pose.
+
+    Args:
+        a: (6, 3) their ends on the ground [m].
+        b: (6, 3) those on the platform, in its frame [m].
+    """
+    a, b = (a - a.mean(axis=0)) / _size(a, b), (b - b.mean(axis=0)) / _size(a, b)
     rng = np.random.default_rng(_SEED)
     e = rng.normal(size=(_POSES, 4))
     e /= np.linalg.norm(e, axis=1, keepdims=True)

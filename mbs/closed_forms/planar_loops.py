@@ -726,14 +726,15 @@ class _Triad:
 # in the same places are found once, by monodromy, and followed to those that are asked for.
 #
 # The conjugate of a row is a row of its own, P+ w+ = 0 and P- w- = 0, with w+ = (e^(i theta),
-# s e^(i theta_c), 1) and w- = (e^(-i theta), s e^(-i theta_c), 1), so that the unknowns are complex.
+# s e^(i theta_c), 1) and w- = (e^(-i theta), s e^(-i theta_c), 1): the unknowns may be complex.
 
 
 _MONODROMY_SEED = 20260415
 _IDLE, _MOST_WAYS = 4, 60
 """Ways around other loops without new roots after which all are taken to be known; and at most."""
 _CERTAIN = 0.03
-"""Of Newton's step times the bend of the rows: below one half one root is near; room for rounding."""
+"""Of Newton's step times the bend of the rows: below one half one root is near; room for
+rounding."""
 _NEAR = 0.1
 """Distance of a root [rad, or parts of the size] within which the bend is what it is in the middle,
 but for a tenth."""
@@ -910,4 +911,4 @@ def path_roots(loops: PlanarLoops) -> _Found:
 def _is_near(x: Real, roots: Real, n: int) -> bool:
     gap = roots - x
     gap[:, :n] = pi - np.mod(pi - gap[:, :n], 2 * pi)
-    return bool(np.any(np.max(np.abs(gap), axis=1, initial=0.0) < _SAME_ROOT)) if len(roots) else False
+    return bool(np.any(np.max(np.abs(gap), axis=1) < _SAME_ROOT))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 from typing import NamedTuple
 
 import casadi
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
+from mbs.assembly.tables import CoordinateCoupling
 from mbs.closed_forms.arm import Arm, inverse
 from mbs.closed_forms.arm_certificate import (
     CertifiedArm,
@@ -26,9 +27,15 @@ from mbs.closed_forms.arm_certificate import (
     certified_configurations,
 )
 from mbs.closed_forms.arm_search import general_of
-from mbs.closed_forms.hexapod import LEGS, poses
+from mbs.closed_forms.hexapod import LEGS, holds, poses
 from mbs.closed_forms.planar_loops import KNOWN, PlanarLoops, planar_roots
-from mbs.closed_forms.ring import PARAMETERS, extent, independent_indices, loop_links
+from mbs.closed_forms.ring import (
+    PARAMETERS,
+    always_zero,
+    extent,
+    independent_indices,
+    loop_links,
+)
 from mbs.components import Fixed, PointOnLine, Rod, Spherical
 from mbs.components.joints import Freedom, Motion
 from mbs.errors import LoopError, NoClosedForm
@@ -83,10 +90,11 @@ def steps_of(system: System) -> tuple[Step, ...]:
 
 def _block(work: PlanWork, waiting: Sequence[int]) -> LoopBlock | None:
     """The first block that gives the assembled configuration back."""
-    for find in (planar_blocks, single_loops, platforms):
+    for find in (gear_trains, planar_blocks, single_loops, platforms):
         for block in find(work, waiting):
             if _gives_assembled(work, block):
                 return block
+    _require_held(work, waiting)
     return None
 
 
@@ -177,6 +185,132 @@ def _connected(links: dict[int, set[int]]) -> list[list[int]]:
                 shared |= links[number]
         found.append(sorted(own))
     return found
+
+
+# Loops of revolute joints about one line, with gears between them: linear equations in angles.
+
+
+_MOST_TURNS = 4
+"""Loops of a gear train: of each whole turns are tried, five or more numbers of them."""
+_SAME_ANGLE = 1e-9
+"""Angles [rad] that are equal: sums of a few leave 1e-15."""
+
+
+def gear_trains(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
+    """Blocks of coaxial loops and couplings that share unknown joints, such as a differential."""
+    system, first = work.system, len(work.system.cuts)
+    rings = {
+        number: work.ring(number)
+        for number in waiting
+        if number < first and not is_bound(system, number)
+    }
+    unknown = {
+        number: {_index(joint) for joint in ring.joints}
+        for number, ring in rings.items()
+        if _is_coaxial(work, ring)
+    }
+    couplings = dict(enumerate(system.couplings, first))
+    for number in waiting:
+        if number in couplings and _is_linear(work, couplings[number]):
+            unknown[number] = set(couplings[number].coordinates) - work.known
+    for numbers in _connected(unknown):
+        train = _GearTrain.of(
+            work,
+            [rings[number] for number in numbers if number < first],
+            [couplings[number] for number in numbers if number >= first],
+        )
+        if train is not None:
+            names = [system.cuts[number].edge.joint.name for number in numbers if number < first]
+            names += [couplings[number].name for number in numbers if number >= first]
+            yield LoopBlock(", ".join(names), train.indices, train.roots)
+
+
+def _is_coaxial(work: PlanWork, ring: Ring) -> bool:
+    """Whether all unknown joints rotate about one line."""
+    if any(joint.motion is not Motion.REVOLUTE for joint in ring.joints):
+        return False
+    across = [casadi.vertcat(gap.pose.R[0:2, 2], gap.pose.p[0:2]) for gap in ring.gaps]
+    return always_zero(casadi.vertcat(*across), work.q, work.system.p)
+
+
+def _is_linear(work: PlanWork, coupling: CoordinateCoupling) -> bool:
+    return coupling.driver in work.known or len(coupling.coefficients) <= _LINEAR
+
+
+_LINEAR = 2
+"""Coefficients of a polynomial of degree one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _GearTrain:
+    """Equations A x = b of angles, those of loops up to whole turns.
+
+    Attributes:
+        indices: of the unknown positions x.
+        looped: which of them are of joints in loops.
+        count: of the loops, whose equations come first.
+        equations: Function of all positions and p: [A, b].
+    """
+
+    indices: tuple[int, ...]
+    looped: list[int]
+    count: int
+    equations: Function
+
+    @staticmethod
+    def of(
+        work: PlanWork, rings: list[Ring], couplings: list[CoordinateCoupling]
+    ) -> _GearTrain | None:
+        """None where there are not as many equations as unknown positions, or too many loops."""
+        looped = {_index(joint) for ring in rings for joint in ring.joints}
+        coupled = {number for coupling in couplings for number in coupling.coordinates}
+        indices = tuple(sorted(looped | (coupled - work.known)))
+        if not rings or len(rings) > _MOST_TURNS or len(rings) + len(couplings) < len(indices):
+            return None
+        rows = [_coaxial_row(ring, work.q) for ring in rings]
+        rows += [coupling.value(work.q) - work.q[coupling.driven] for coupling in couplings]
+        value = casadi.vertcat(*rows)
+        x = casadi.vertcat(*(work.q[index] for index in indices))
+        rest = -casadi.substitute(value, x, SX.zeros(len(indices)))
+        system = work.system
+        outputs = [casadi.densify(casadi.jacobian(value, x)), casadi.densify(rest)]
+        equations = Function("gears", [work.q, system.p], outputs)
+        places = [k for k, index in enumerate(indices) if index in looped]
+        return _GearTrain(indices, places, len(rings), equations)
+
+    def roots(self, q: Vector, p: Vector) -> Roots:
+        """All angles with those of joints in loops within half a turn."""
+        A, b = (np.array(value) for value in self.equations(q, p))
+        if rank(A, _LOCKED) < len(self.indices):
+            raise NoClosedForm("gears leave joints a motion while all that is known stays")
+        b[: self.count] = np.remainder(b[: self.count] + np.pi, 2 * np.pi) - np.pi
+        reach = np.sum(np.abs(A[: self.count]), axis=1) * np.pi + np.abs(b[: self.count, 0])
+        most = [int(np.ceil(x / (2 * np.pi))) for x in reach]
+        found = list[Vector]()
+        for turns in product(*(range(-k, k + 1) for k in most)):
+            right = b[:, 0] + 2 * np.pi * np.array([*turns, *[0] * (len(b) - self.count)])
+            x: Vector = np.asarray(np.linalg.lstsq(A, right, rcond=None)[0], float)
+            within = np.max(np.abs(x[self.looped])) < np.pi + _SAME_ANGLE
+            # half a turn forth and back is one
+            new = all(np.max(np.abs(np.exp(1j * x) - np.exp(1j * y))) > _SAME_ANGLE for y in found)
+            if within and new and np.max(np.abs(A @ x - right)) < _SAME_ANGLE:
+                found.append(x)
+        # after a whole turn of a joint in a loop a gear stands elsewhere unless its ratio is whole
+        ratios = A[self.count :]
+        whole = bool(np.all(np.abs(ratios - np.round(ratios)) < _SAME_ANGLE))
+        proof = "linear equations of angles"
+        if not whole:
+            proof += ", those of loops within half a turn"
+        return Roots(np.array(found).reshape(-1, len(self.indices)), proof, whole)
+
+
+def _coaxial_row(ring: Ring, q: SX) -> SX:
+    """The angle by which the joints of a loop about one line miss its closure."""
+    angle, turned, sense = SX(0), SX.eye(3), SX(1)
+    for joint, gap in zip(ring.joints, [*ring.gaps[1:], ring.gaps[0]], strict=True):
+        angle += sense * joint.sign * q[_index(joint)]
+        turned, sense = turned @ gap.pose.R, sense * gap.pose.R[2, 2]
+    return SX(angle + casadi.atan2(turned[1, 0], turned[0, 0]))
 
 
 # Plane loops that share unknown joints.
@@ -532,8 +666,8 @@ _AT_ZERO = 1e-6
 """Angle [rad] below which an added joint is at zero: at a fold a root is known to 1e-7, and joints
 added at random are elsewhere by more."""
 _LOCKED = 1e-6
-"""Relative singular value below which a loop of fewer joints moves by itself: its roots are exact to
-1e-12, whose root that is."""
+"""Relative singular value below which a loop of fewer joints moves by itself: its roots are exact
+to 1e-12, whose root that is."""
 
 
 def single_loops(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
@@ -760,8 +894,41 @@ class _Distance(NamedTuple):
     length: float
 
 
-def _distance(leg: _Leg, frames: Matrix) -> _Distance | None:
-    """The two centres of a leg; None where it is no such leg."""
+def _require_held(work: PlanWork, waiting: Sequence[int]) -> None:
+    """Refuse a platform that no lengths of its legs hold.
+
+    Raises:
+        NoClosedForm: says so.
+    """
+    system = work.system
+    links = {
+        number: _unknown_links(work, number)
+        for number in waiting
+        if number < len(system.cuts) and not is_bound(system, number)
+    }
+    for numbers in _connected(links):
+        edges, frames = _edges(work, numbers, sorted(set().union(*(links[n] for n in numbers))))
+        found = _legs(edges)
+        if found is None:
+            continue
+        at = _side_by_side(frames, *_assembled(system))
+        legs = [leg for leg in (_distance(leg, at, slides=True) for leg in found[1]) if leg]
+        if len(legs) == LEGS and not holds(*(np.array([leg[k] for leg in legs]) for k in (0, 1))):
+            raise NoClosedForm(
+                f"{system.name}: the ends of its six legs lie so that they hold the platform at no"
+                " pose, as on similar hexagons, and the length of one leg follows from the others;"
+                " move an end, or use mbs.loops.solve without branch"
+            )
+
+
+def _distance(leg: _Leg, frames: Matrix, *, slides: bool = False) -> _Distance | None:
+    """The two centres of a leg; None where it is no such leg.
+
+    Args:
+        leg: with its passive joints.
+        frames: that it runs over.
+        slides: whether it may have prismatic joints, at zero here.
+    """
     here, axes = np.eye(4), list[_Axis]()
     for edge, forwards in leg.edges:
         near, far = (frames[k] for k in (edge.frames if forwards else edge.frames[::-1]))
@@ -772,6 +939,8 @@ def _distance(leg: _Leg, frames: Matrix) -> _Distance | None:
             for f in edge.freedoms
         ]
         here = at @ inverse(far)
+    if slides:
+        axes = [axis for axis in axes if axis.motion is not Motion.PRISMATIC]
     if any(axis.motion not in _FREEDOMS for axis in axes):
         return None
     if sum(_FREEDOMS[axis.motion] for axis in axes) < _LEAST:

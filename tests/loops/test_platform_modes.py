@@ -119,6 +119,27 @@ def test_bricards_loop(moved):
         assert any(same(system, q, mode.q) for mode in found)
 
 
+@pytest.mark.parametrize("q_a", [(0.0, 0.0), (0.3, -0.8), (300.0, 1.0)])
+def test_a_differential(q_a):
+    """roll = mesh1 = -mesh2, pitch + mesh1 = q1 and pitch + mesh2 = q2 up to whole turns."""
+    system = mbs.robots.differential_wrist().assemble()
+    found = modes(system, q_a)
+    assert (found.complete, found.proof) == (True, "linear equations of angles")
+    names = [c.name for c in system.coordinates]
+    pitch, roll = (np.array([mode.q[names.index(name)] for mode in found]) for name in names[:2])
+    first = (q_a[0] + q_a[1]) / 2
+    expected = np.exp(1j * np.array([first, first + np.pi]))
+    np.testing.assert_allclose(np.sort_complex(np.exp(1j * pitch)), np.sort_complex(expected))
+    np.testing.assert_allclose(np.exp(1j * (pitch + roll)), np.exp(1j * q_a[0]), atol=1e-12)
+    assert max(mode.residual for mode in found) < 1e-12
+
+
+def test_a_gear_of_no_whole_ratio_may_stand_elsewhere_after_a_turn():
+    found = modes(mbs.robots.differential_wrist(0.5).assemble(), (0.3, -0.8))
+    assert not found.complete
+    assert "those of loops within half a turn; a search from random starts" in found.proof
+
+
 def test_a_mode_is_followed_by_a_guess():
     system = planar_platform(2, ("RPR",) * 3, (1, 1, 1)).assemble()
     names = [c.name for c in system.coordinates]
@@ -256,8 +277,12 @@ def test_a_platform_on_similar_hexagons_has_other_independent_joints():
     # five legs are independent, so that a joint of the sixth one stands for its motor
     system = hexapod(1, "UPS", (a, 0.5 * a)).assemble()
     assert len([k for k in system.active if system.speeds[k].name.startswith("leg")]) == 5
-    with pytest.raises(NoClosedForm):
-        modes(system)
+    refused(
+        NoClosedForm,
+        "hexapod1: the ends of its six legs lie so that they hold the platform at no pose, as on"
+        " similar hexagons, and the length of one leg follows from the others",
+        by=lambda: modes(system),
+    )
 
 
 @pytest.mark.parametrize("moved", [0.0, 0.06])

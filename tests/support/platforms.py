@@ -58,9 +58,7 @@ def planar_linkage(seed, joints, driven=(), sliding=()):
         kind, axis = (Prismatic, "x") if a + b in sliding else (Revolute, "z")
         turn = turn_about_z(rng.uniform(-3, 3)) if a + b in sliding else None
         joint = kind(f"{a}{b}", axis=axis, actuated=motor)
-        m.connect(
-            frames[a].at(*point, rotation=turn), joint, frames[b].at(*point, rotation=turn)
-        )
+        m.connect(frames[a].at(*point, rotation=turn), joint, frames[b].at(*point, rotation=turn))
     return m
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mbs.closed_forms.arm import Arm, inverse, motion
+from mbs.closed_forms.arm import Arm, Field, inverse, motion
 from mbs.errors import ModelError, NoClosedForm
 from mbs.numbers import NONZERO
 
@@ -68,7 +68,7 @@ KEPT_BY_TURN = np.array([1, 2, 5, 8, 11, 14])
 KEPT_BY_SLIDE = np.array([3, 4, 6, 7, 8, 11])
 
 
-def pair(T: Array) -> Array:
+def pair(T: Field) -> Field:
     """(..., 15) w of the origin and the z axis of the frames T, (..., 4, 4)."""
     p, z = T[..., :3, 3], T[..., :3, 2]
     pp, pz = np.sum(p * p, axis=-1)[..., None], np.sum(p * z, axis=-1)[..., None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import casadi
 import numpy as np
@@ -13,6 +14,8 @@ from mbs.numbers import NONZERO
 from mbs.recursions.chain import Chain, transforms
 
 Array = NDArray[np.float64]
+Field = TypeVar("Field", NDArray[np.float64], NDArray[np.complex128])
+"""Real numbers, or complex ones."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,9 +108,9 @@ def arm_of(chain: Chain, symbols: SX, p: Array) -> Arm:
     return Arm(tuple(joint.name for joint in chain.joints), prismatic, gaps)
 
 
-def motion(q: Array, prismatic: bool) -> Array:
+def motion(q: Field, prismatic: bool) -> Field:
     """(..., 4, 4) translation along z by q [m], or rotation about z by q [rad]."""
-    T = np.empty((*np.shape(q), 4, 4))
+    T = np.empty((*np.shape(q), 4, 4), np.result_type(q, float))
     T[...] = np.eye(4)
     if prismatic:
         T[..., 2, 3] = q
@@ -117,7 +120,7 @@ def motion(q: Array, prismatic: bool) -> Array:
     return T
 
 
-def inverse(T: Array) -> Array:
+def inverse(T: Field) -> Field:
     """(..., 4, 4) inverse of rigid transforms."""
     back = np.zeros_like(T)
     R = np.swapaxes(T[..., :3, :3], -1, -2)

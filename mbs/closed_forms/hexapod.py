@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import functools
 import json
-from contextlib import suppress
 from dataclasses import dataclass
 from importlib import resources
 from itertools import pairwise
@@ -22,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.errors import LoopError
-from mbs.numbers import NONZERO
+from mbs.solvers import homotopy
+from mbs.solvers.homotopy import TOLERANCE, solved
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -85,42 +85,39 @@ _SEED = 20260302
 # Following the roots while the legs become others, all roots at once.
 
 
-_TOLERANCE = 1e-4
-"""First correction of Newton's method after a step, as a part of |x| = 1: at 1e-2 a tenth of the
-platforms lost a path to another one."""
-_FIRST_STEP, _LEAST_STEP = 0.01, 1e-9
-"""Of t, from 0 to 1: the first is shorter than most that follow; one below the other stands before
-a singular root, to which the steps of a regular path do not come near."""
-_SHRINK, _GROW, _SAFETY = 0.2, 3.0, 0.9
-"""Of steps, as in solvers of differential equations: at most by these, and a little less than what
-the fifth power of the step says."""
-_MOST_STEPS = 4000
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Homotopy:
-    """Q(t) = Q0 + t Q1 + t^2 Q2, from one platform to another.
+    """From one platform to another: Q(t) = Q0 + t Q1 + t^2 Q2, or Q0 and t times constants.
 
     Attributes:
-        Q: (3, 7, 8, 8).
+        Q: (3, 7, 8, 8), or (1, 7, 8, 8) where the ends of the legs stay.
+        c: (7,) by how much the constants of the rows change where the ends stay.
     """
 
     Q: Complex
+    c: Complex
 
     @staticmethod
     def between(start: Legs, end: Legs) -> Homotopy:
         """Along a straight line of a, b and c."""
+        c = np.append(end.c - start.c, 0)
+        first, last = start.forms(), end.forms()
+        if np.array_equal(start.a, end.a) and np.array_equal(start.b, end.b):
+            return Homotopy(first[None], c)
         middle = Legs((start.a + end.a) / 2, (start.b + end.b) / 2, (start.c + end.c) / 2)
-        first, half, last = start.forms(), middle.forms(), end.forms()
-        bend = 2 * (first + last) - 4 * half
-        return Homotopy(np.array([first, last - first - bend, bend]))
+        bend = 2 * (first + last) - 4 * middle.forms()
+        return Homotopy(np.array([first, last - first - bend, bend]), c)
 
     def slopes(self, x: Complex, t: Real) -> tuple[Complex, Complex]:
         """Derivatives by x, (r, 7, 8), and by t, (r, 7), of the rows at x (r, 8) and t (r,)."""
-        Y = (x @ self.Q.reshape(-1, _SIZE).T).reshape(len(x), 3, _ROWS, _SIZE)
+        Y = (x @ self.Q.reshape(-1, _SIZE).T).reshape(len(x), len(self.Q), _ROWS, _SIZE)
+        J, e = Y[:, 0], x[:, :4]
+        if len(self.Q) == 1:
+            J[:, :, :4] += np.einsum("r,k,ri->rki", t, self.c, e)
+            return 2 * J, np.einsum("k,ri,ri->rk", self.c, e, e)
         s = t[:, None, None]
-        J = 2 * (Y[:, 0] + s * (Y[:, 1] + s * Y[:, 2]))
-        return J, np.einsum("rij,rj->ri", Y[:, 1] + 2 * s * Y[:, 2], x)
+        rate = np.einsum("rij,rj->ri", Y[:, 1] + 2 * s * Y[:, 2], x)
+        return 2 * (J + s * (Y[:, 1] + s * Y[:, 2])), rate
 
 
 def _square(J: Complex, patch: Complex) -> Complex:
@@ -128,70 +125,25 @@ def _square(J: Complex, patch: Complex) -> Complex:
     return np.concatenate([J, patch.conj()[:, None, :]], axis=1)
 
 
-def _velocity(path: Homotopy, x: Complex, t: Real, patch: Complex) -> Complex:
+def _correction(path: Homotopy, x: Complex, t: Real, patch: Complex) -> tuple[Complex, Complex]:
+    """Newton's step, and how x goes on with t, both (r, 8)."""
     J, rate = path.slopes(x, t)
-    side = np.concatenate([rate, np.zeros((len(x), 1))], axis=1)
-    return -_solved(_square(J, patch), side)
+    sides = np.zeros((len(x), _SIZE, 2), dtype=np.complex128)
+    sides[:, :_ROWS, 0], sides[:, :_ROWS, 1] = np.einsum("rij,rj->ri", J, x) / 2, rate
+    step = -solved(_square(J, patch), sides)
+    return step[..., 0], step[..., 1]
 
 
-def _correction(path: Homotopy, x: Complex, t: Real, patch: Complex) -> Complex:
-    J, _ = path.slopes(x, t)
-    rows = np.einsum("rij,rj->ri", J, x) / 2
-    side = np.concatenate([rows, np.zeros((len(x), 1))], axis=1)
-    return -_solved(_square(J, patch), side)
+def follow(path: Homotopy, x: Complex, tolerance: float = TOLERANCE) -> tuple[Complex, Real]:
+    """The roots (r, 8) at the end of a path, of length one, and how far each came: see homotopy."""
+    return homotopy.follow(functools.partial(_correction, path), x, _in_patch, tolerance)
 
 
-def _solved(A: Complex, b: Complex) -> Complex:
-    """(r, 8) solutions of A x = b, NaN where A is singular to the last bit."""
-    try:
-        return np.asarray(np.linalg.solve(A, b[..., None])[..., 0], np.complex128)
-    except np.linalg.LinAlgError:
-        x = np.full(b.shape, np.nan, dtype=np.complex128)
-        for k in range(len(b)):
-            with suppress(np.linalg.LinAlgError):
-                x[k] = np.linalg.solve(A[k], b[k])
-        return x
-
-
-def follow(path: Homotopy, x: Complex, tolerance: float = _TOLERANCE) -> tuple[Complex, Real]:
-    """The roots (r, 8) at the end, of length one, and how far each came.
-
-    That is 1, or less at a singular root, which is approached in ever smaller steps. Runge and
-    Kutta's fourth order predicts, two steps of Newton's method correct.
-    """
-    x = x / np.linalg.norm(x, axis=1, keepdims=True)
-    t, h = np.zeros(len(x)), np.full(len(x), _FIRST_STEP)
-    for _ in range(_MOST_STEPS):
-        going = np.flatnonzero((t < 1) & (h > _LEAST_STEP))
-        if not len(going):
-            break
-        x0, t0 = x[going], t[going]
-        step = np.minimum(h[going], 1 - t0)
-        with np.errstate(all="ignore"):  # near singular matrices steps have no bounds
-            tried, first, second = _step(path, x0, t0, step)
-        # the second correction is about the square of the first where the root is regular
-        good = (first < 2 * tolerance) & (second < tolerance**1.5)
-        factor = _SAFETY * (tolerance / np.maximum(first, NONZERO)) ** (1 / 5)
-        factor = np.where(np.isfinite(factor), factor, _SHRINK)
-        h[going] = step * np.clip(factor, _SHRINK, np.where(good, _GROW, 0.5))
-        won = going[good]
-        x[won] = tried[good] / np.linalg.norm(tried[good], axis=1, keepdims=True)
-        t[won] = np.where(step[good] >= 1 - t0[good], 1.0, t0[good] + step[good])
-    return x, t
-
-
-def _step(path: Homotopy, x: Complex, t: Real, h: Real) -> tuple[Complex, Real, Real]:
-    """The corrected prediction and the lengths of both corrections."""
-    s = h[:, None]
-    k1 = _velocity(path, x, t, x)
-    k2 = _velocity(path, x + s / 2 * k1, t + h / 2, x)
-    k3 = _velocity(path, x + s / 2 * k2, t + h / 2, x)
-    k4 = _velocity(path, x + s * k3, t + h, x)
-    y = x + s / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    first = _correction(path, y, t + h, x)
-    y = y + first
-    second = _correction(path, y, t + h, x)
-    return y + second, np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
+def _in_patch(x: Complex, slope: Complex) -> tuple[Complex, Complex]:
+    """Roots of length one, and slopes that do not change these lengths to first order."""
+    size = np.linalg.norm(x, axis=1, keepdims=True)
+    x, slope = x / size, slope / size
+    return x, slope - np.sum(x.conj() * slope, axis=1, keepdims=True) * x
 
 
 # Which ends are regular roots, each its own: a certificate.
@@ -225,27 +177,28 @@ def certify(legs: Legs, x: Complex, t: Real) -> Ends:
 
     Source: Blum, Cucker, Shub & Smale 1998, chapter 8; in floating point, with room for rounding.
     """
-    path = Homotopy(np.array([legs.forms(), np.zeros((_ROWS, _SIZE, _SIZE))])[[0, 1, 1]])
+    path = Homotopy.between(legs, legs)
     regular = t >= 1
     for _ in range(3):
         now = np.flatnonzero(regular)
         if len(now):
-            y = x[now] + _correction(path, x[now], t[now], x[now])
+            y = x[now] + _correction(path, x[now], t[now], x[now])[0]
             regular[now] = np.all(np.isfinite(y), axis=1)
             with np.errstate(invalid="ignore"):
                 y /= np.linalg.norm(y, axis=1, keepdims=True)
             x[now] = np.where(regular[now, None], y, x[now])
-    for k in np.flatnonzero(regular):
-        J, _ = path.slopes(x[k : k + 1], np.zeros(1))
-        unit = np.eye(_SIZE, dtype=np.complex128)
-        W = _solved(np.repeat(_square(J, x[k : k + 1]), _SIZE, axis=0), unit).T
-        rows = np.append(J[0] @ x[k] / 2, 0.0)
-        bend = np.linalg.norm(np.tensordot(W[:, :_ROWS], path.Q[0], axes=1))
-        along = x @ x[k].conj()
-        same = np.linalg.norm(x - along[:, None] * x[k], axis=1) < _APART
-        alone = not np.any(same & regular & (np.arange(len(x)) < k))
-        certain = float(np.linalg.norm(W @ rows)) * bend < _CERTAIN
-        regular[k] = certain and alone and float(np.linalg.norm(x[k, :4])) > _FLAT
+    number = np.flatnonzero(regular)
+    y, zero = x[number], np.zeros(len(number))
+    J, _ = path.slopes(y, zero)
+    unit = np.broadcast_to(np.eye(_SIZE, dtype=np.complex128), (len(y), _SIZE, _SIZE))
+    W = solved(_square(J, y), unit)[..., :_ROWS]
+    newton = np.einsum("rij,rj->ri", W, np.einsum("rij,rj->ri", J, y) / 2)
+    bend = np.linalg.norm(W @ path.Q[0].reshape(_ROWS, _SIZE * _SIZE), axis=(1, 2))
+    certain = np.linalg.norm(newton, axis=1) * bend < _CERTAIN
+    along = y @ y.conj().T
+    same = np.linalg.norm(y[:, None] - along[..., None] * y, axis=2) < _APART
+    alone = ~np.any(np.tril(same & certain, -1), axis=1)
+    regular[number] = certain & alone & (np.linalg.norm(y[:, :4], axis=1) > _FLAT)
     return Ends(x, regular)
 
 
@@ -437,10 +390,9 @@ def poses(a: Real, b: Real, length: Real) -> Poses:
     Raises:
         LoopError: the legs hold the platform at no pose.
     """
-    middle, own = a.mean(axis=0), b.mean(axis=0)
-    size = float(np.sqrt(np.mean((a - middle) ** 2) + np.mean((b - own) ** 2))) or 1.0
+    middle, own, size = a.mean(axis=0), b.mean(axis=0), _size(a, b)
     a0, b0 = (a - middle) / size, (b - own) / size
-    if not _holds(a0, b0):
+    if not holds(a, b):
         raise LoopError(
             "the ends of its six legs lie so that they hold the platform at no pose, as on similar"
             " hexagons"
@@ -450,7 +402,7 @@ def poses(a: Real, b: Real, length: Real) -> Poses:
     legs = Legs(a0.astype(complex), b0.astype(complex), c.astype(complex))
     start = own_start(a0.tobytes(), b0.tobytes())
     path, expected = Homotopy.between(start.legs, legs), len(start.x)
-    for tolerance in (_TOLERANCE, _TOLERANCE / 10, _TOLERANCE / 100):
+    for tolerance in (TOLERANCE, TOLERANCE / 10, TOLERANCE / 100):
         x, t = follow(path, start.x, tolerance)
         ends = certify(legs, x, t)
         found = _real(a0, b0, square, ends, t)
@@ -481,7 +433,18 @@ def _slopes(a: Real, b: Real, e: Real, p: Real) -> tuple[Real, Real]:
     return np.sum(way**2, axis=2), np.concatenate([way, np.cross(arm, way)], axis=2)
 
 
-def _holds(a: Real, b: Real) -> bool:
+def _size(a: Real, b: Real) -> float:
+    return float(np.sqrt(np.mean(np.var(a, axis=0)) + np.mean(np.var(b, axis=0)))) or 1.0
+
+
+def holds(a: Real, b: Real) -> bool:
+    """Whether six legs hold a platform at some pose.
+
+    Args:
+        a: (6, 3) their ends on the ground [m].
+        b: (6, 3) those on the platform, in its frame [m].
+    """
+    a, b = (a - a.mean(axis=0)) / _size(a, b), (b - b.mean(axis=0)) / _size(a, b)
     rng = np.random.default_rng(_SEED)
     e = rng.normal(size=(_POSES, 4))
     e /= np.linalg.norm(e, axis=1, keepdims=True)

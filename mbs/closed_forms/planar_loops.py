@@ -10,9 +10,10 @@ Source: Wampler 2001.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 from math import pi
 
 import numpy as np
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from mbs.errors import LoopError, NoClosedForm
 from mbs.numbers import NONZERO
+from mbs.solvers.homotopy import follow, solved
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -105,14 +107,14 @@ class PlanarRoots:
         theta: (r, n) directions of the links [rad].
         s: (r, m) displacements.
         methods: what was solved, such as "Dixon's determinant of degree 6".
-        singular: whether some equation vanishes for every direction: some links may move while all
-            that is known stays.
+        complete: whether these are all: not where some equation vanishes for every direction, so
+            that some links may move while all that is known stays, or where a path is lost.
     """
 
     theta: Real
     s: Real
     methods: tuple[str, ...]
-    singular: bool
+    complete: bool
 
 
 # Parts that can be solved by themselves: as many rows in which nothing else is left as they need.
@@ -158,7 +160,7 @@ class _Found:
     theta: Real
     s: Real
     method: str
-    singular: bool = False
+    complete: bool = True
 
 
 def planar_roots(loops: PlanarLoops) -> PlanarRoots:
@@ -168,13 +170,13 @@ def planar_roots(loops: PlanarLoops) -> PlanarRoots:
         loops: as many independent rows as make half of the unknowns, dependent rows beside them.
 
     Raises:
-        NoClosedForm: a part has more prismatic joints than are known here.
+        NoClosedForm: more than eight unknowns do not follow from fewer.
         LoopError: a part can move by itself.
     """
     theta, s, parts = _solve(loops)
     theta, s, _ = refine(loops, theta, s)
     methods = tuple(dict.fromkeys(part.method for part in parts))
-    return PlanarRoots(theta, s, methods, any(part.singular for part in parts))
+    return PlanarRoots(theta, s, methods, all(part.complete for part in parts))
 
 
 def _solve(loops: PlanarLoops) -> tuple[Real, Real, list[_Found]]:
@@ -261,21 +263,20 @@ def _irreducible(loops: PlanarLoops) -> _Found:
     n, m = loops.counts
     if n + m == 1:
         found = _one_unknown(loops)
+    elif n + m < 2 * len(loops.constant):
+        found = _one_row_more(loops)
     elif n + m == 2:
         found = _dyad(loops)
     elif m == 0:
         found = dixon_roots(loops.angles, loops.constant)
-    elif n + m == 4:
+    elif n + m == 4 and _hidden(loops) is not None:
         found = triad_roots(loops)
     else:
-        raise NoClosedForm(
-            f"{len(loops.constant)} plane loops that must be solved together hold {m} unknown"
-            " prismatic joints, which is known for two loops alone"
-        )
+        found = path_roots(loops)
     theta, s, residual = refine(loops, found.theta, found.s)
     kept = residual < _OPEN
     theta, s = _distinct(loops, theta[kept], s[kept], residual[kept])
-    return _Found(theta, s, found.method, found.singular)
+    return _Found(theta, s, found.method, found.complete)
 
 
 def _one_unknown(loops: PlanarLoops) -> _Found:
@@ -286,6 +287,24 @@ def _one_unknown(loops: PlanarLoops) -> _Found:
     if n:
         return _Found(np.full((1, 1), np.angle(value)), np.zeros((1, 0)), "linear equations")
     return _Found(np.zeros((1, 0)), np.full((1, 1), value.real), "linear equations")
+
+
+_AT_ZERO = 1e-6
+"""Angle [rad] below which the added direction is at zero: at a fold it is known to 1e-7."""
+
+
+def _one_row_more(loops: PlanarLoops) -> _Found:
+    """The roots of loops that bind one unknown too often, as equal parallel cranks do.
+
+    A direction with random factors is added, at zero of which the loops are what they were.
+    """
+    n, _ = loops.counts
+    added = _random(np.random.default_rng(_MONODROMY_SEED), len(loops.constant), 1)
+    angles = np.concatenate([loops.angles, added], axis=1)
+    constant = loops.constant - added[:, 0]
+    found = _irreducible(PlanarLoops(angles, loops.slides, loops.carriers, constant))
+    kept = np.abs(found.theta[:, n]) < _AT_ZERO
+    return _Found(found.theta[kept, :n], found.s[kept], found.method, found.complete)
 
 
 # A dyad: one loop of two unknowns, by the law of cosines and its kin.
@@ -462,7 +481,7 @@ def dixon_roots(angles: Complex, constant: Complex) -> _Found:
         np.array(theta).reshape(-1, n),
         np.zeros((len(theta), 0)),
         f"Dixon's determinant of degree {max(degrees)}",
-        len(solved) < len(pencils),
+        len(solved) == len(pencils),
     )
 
 
@@ -594,21 +613,23 @@ def triad_roots(loops: PlanarLoops) -> _Found:
     """Candidates for the unknowns of two loops with prismatic joints.
 
     Raises:
-        NoClosedForm: no direction leaves three circles and lines.
         LoopError: the polynomial vanishes everywhere.
     """
-    n, m = loops.counts
-    for hidden in range(n):
+    triad = _hidden(loops)
+    assert triad is not None  # asked before
+    angle, degree = triad.angles()
+    theta, s = triad.unknowns(angle)
+    return _Found(theta, s, f"the polynomial of a triad, of degree {degree}")
+
+
+def _hidden(loops: PlanarLoops) -> _Triad | None:
+    """The triad with a direction hidden that leaves three circles and lines; None without one."""
+    for hidden in range(loops.counts[0]):
         if all(k in (KNOWN, hidden) for k in loops.carriers):
             triad = _Triad.of(loops, hidden)
             if triad is not None:
-                angle, degree = triad.angles()
-                theta, s = triad.unknowns(angle)
-                return _Found(theta, s, f"the polynomial of a triad, of degree {degree}")
-    raise NoClosedForm(
-        f"two plane loops that must be solved together hold {n} directions and {m} prismatic"
-        " joints in an order for which no closed form is known"
-    )
+                return triad
+    return None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -699,3 +720,195 @@ class _Triad:
         theta[:, [k for k in range(n) if k != self.hidden]] = np.angle(y[:, : n - 1])
         back = np.where(self.loops.carriers == KNOWN, 1.0, np.conj(x)[:, None])
         return theta, np.real(y[:, n - 1 :] * back)
+
+
+# Any other loops, such as three with prismatic joints: all complex roots of random loops with links
+# in the same places are found once, by monodromy, and followed to those that are asked for.
+#
+# The conjugate of a row is a row of its own, P+ w+ = 0 and P- w- = 0, with w+ = (e^(i theta),
+# s e^(i theta_c), 1) and w- = (e^(-i theta), s e^(-i theta_c), 1): the unknowns may be complex.
+
+
+_MONODROMY_SEED = 20260415
+_IDLE, _MOST_WAYS = 4, 60
+"""Ways around other loops without new roots after which all are taken to be known; and at most."""
+_CERTAIN = 0.03
+"""Of Newton's step times the bend of the rows: below one half one root is near; room for
+rounding."""
+_NEAR = 0.1
+"""Distance of a root [rad, or parts of the size] within which the bend is what it is in the middle,
+but for a tenth."""
+_ROUNDING = 1e-14
+"""Of the rows, lengths in parts of the size: what Newton's step cannot fall below."""
+_NEARLY_REAL = 0.1
+"""Imaginary part of the end of a path before t = 1, at a root where two meet, which may be real: t
+misses 1 by some hundredths at most there, and the root by as much as the root of that."""
+_END = 1e-2
+"""By how much t may miss 1 there."""
+_SAME_ROOT = 1e-6
+"""Distance between a certified root and the real one that it is."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rows:
+    """Rows and their conjugates, in numbers of which nothing need be conjugate.
+
+    Attributes:
+        P: (2, L, n + m + 1) of both kinds.
+        carriers: (m,) as of the loops.
+    """
+
+    P: Complex
+    carriers: Numbers
+
+    @staticmethod
+    def of(loops: PlanarLoops) -> _Rows:
+        P = np.concatenate([loops.angles, loops.slides, loops.constant[:, None]], axis=1)
+        return _Rows(np.array([P, P.conj()]), loops.carriers)
+
+    def with_constants(self, rng: np.random.Generator) -> _Rows:
+        """With random ones."""
+        P = self.P.copy()
+        P[:, :, -1] = _random(rng, *P.shape[:2])
+        return _Rows(P, self.carriers)
+
+    def terms(self, x: Complex) -> tuple[Complex, Complex]:
+        """(r, 2, n + m + 1) what P multiplies, and its derivatives by x (r, n + m)."""
+        m = len(self.carriers)
+        n, r = x.shape[1] - m, len(x)
+        w = np.ones((r, 2, n + m + 1), dtype=np.complex128)
+        dw = np.zeros((r, 2, n + m + 1, n + m), dtype=np.complex128)
+        for kind, sign in enumerate((1j, -1j)):
+            unit = np.concatenate([np.exp(sign * x[:, :n]), np.ones((r, 1))], axis=1)
+            w[:, kind, :n] = unit[:, :n]
+            dw[:, kind, range(n), range(n)] = sign * unit[:, :n]
+            for j, k in enumerate(self.carriers):
+                w[:, kind, n + j] = x[:, n + j] * unit[:, k]
+                dw[:, kind, n + j, n + j] = unit[:, k]
+                if k != KNOWN:
+                    dw[:, kind, n + j, k] = sign * x[:, n + j] * unit[:, k]
+        return w, dw
+
+    def values(self, x: Complex) -> tuple[Complex, Complex]:
+        """The rows (r, 2 L) and their derivatives (r, 2 L, n + m)."""
+        w, dw = self.terms(x)
+        size = self.P.shape[0] * self.P.shape[1]
+        rows = np.einsum("klc,rkc->rkl", self.P, w).reshape(len(x), size)
+        return rows, np.einsum("klc,rkcj->rklj", self.P, dw).reshape(len(x), size, x.shape[1])
+
+    def followed(self, other: _Rows, x: Complex) -> tuple[Complex, Real]:
+        """Its roots x while it becomes other rows, and how far each came."""
+        change = other.P - self.P
+
+        def newton(x: Complex, t: Real, _: Complex) -> tuple[Complex, Complex]:
+            w, dw = self.terms(x)
+            P = self.P + t[:, None, None, None] * change
+            rows = np.einsum("rklc,rkc->rkl", P, w)
+            J = np.einsum("rklc,rkcj->rklj", P, dw)
+            rate = np.einsum("klc,rkc->rkl", change, w)
+            size = rows.shape[1] * rows.shape[2]
+            sides = np.stack([rows, rate], axis=-1).reshape(len(x), size, 2)
+            step = -solved(J.reshape(len(x), size, x.shape[1]), sides)
+            return step[..., 0], step[..., 1]
+
+        return follow(newton, x, lambda x, slope: (x, slope))
+
+    def certified(self, x: Complex) -> tuple[Complex, Real]:
+        """The roots near x, each once, and distances beyond which they are not.
+
+        Source: Ortega & Rheinboldt 1970, section 12.6; in floating point, with room for rounding.
+        """
+        n = x.shape[1] - len(self.carriers)
+        with np.errstate(all="ignore"):
+            for _ in range(3):
+                rows, J = self.values(x)
+                x = x - solved(J, rows[..., None])[..., 0]
+                x = x[np.all(np.isfinite(x), axis=1)]
+            rows, J = self.values(x)
+            W = np.abs(solved(J, np.broadcast_to(np.eye(x.shape[1], dtype=complex), J.shape)))
+            w = np.abs(self.terms(x)[0])
+            # second derivatives of s e^(i theta) by both, beside those by theta alone
+            w[:, :, n:-1] *= 1 + 2 / np.maximum(np.abs(x[:, None, n:]), NONZERO)
+            bend = np.einsum("klc,rkc->rkl", np.abs(self.P[:, :, :-1]), w[:, :, :-1])
+            gain = np.max(np.einsum("rij,rj->ri", W, bend.reshape(rows.shape)), axis=1)
+            radius = 2 * np.max(np.einsum("rij,rj->ri", W, np.abs(rows) + _ROUNDING), axis=1)
+            certain = (gain * radius < _CERTAIN) & (radius < _NEAR)
+        x, radius = x[certain], radius[certain]
+        kept = list[int]()
+        for k in np.argsort(radius, kind="stable"):
+            gap = x[k] - x[kept]
+            gap[:, :n] -= 2 * pi * np.round(gap[:, :n].real / (2 * pi))
+            if np.all(np.max(np.abs(gap), axis=1) > radius[k] + radius[kept]):
+                kept.append(int(k))
+        return x[kept], radius[kept]
+
+
+def _random(rng: np.random.Generator, *shape: int) -> Complex:
+    return np.asarray(rng.normal(size=shape) + 1j * rng.normal(size=shape), np.complex128)
+
+
+@functools.lru_cache(maxsize=16)
+def _start(links: bytes, count: int, carriers: tuple[int, ...]) -> tuple[_Rows, Complex]:
+    """Random rows and all their roots.
+
+    Args:
+        links: (L, n + m) bytes, one where a number is not zero.
+        count: L.
+        carriers: as of the loops.
+    """
+    rng = np.random.default_rng(_MONODROMY_SEED)
+    there = np.frombuffer(links, dtype=bool).reshape(count, -1)
+
+    def drawn() -> _Rows:
+        P = np.concatenate([_random(rng, 2, *there.shape) * there, _random(rng, 2, count, 1)], 2)
+        return _Rows(P, np.array(carriers, dtype=int))
+
+    rows, x = drawn(), 0.5 * _random(rng, 1, there.shape[1])
+    # the constants that make this a root
+    rows.P[:, :, -1] -= rows.values(x)[0].reshape(2, count)
+    idle = 0
+    for _ in range(_MOST_WAYS):
+        if idle == _IDLE:
+            break
+        y, ways = x, [rows, drawn(), drawn(), rows]
+        for begin, end in pairwise(ways):
+            y, t = begin.followed(end, y)
+            y = y[t >= 1]
+        known = len(x)
+        x, _ = rows.certified(np.concatenate([x, y]))
+        idle = idle + 1 if len(x) == known else 0
+    return rows, x
+
+
+def path_roots(loops: PlanarLoops) -> _Found:
+    """The unknowns of any loops, by paths from random ones.
+
+    They are followed to random constants first: what arrives regular is as many roots as these
+    links have at almost every place, and nowhere are there more.
+    """
+    n, _ = loops.counts
+    links = np.abs(np.concatenate([loops.angles, loops.slides], axis=1)) > _SMALL
+    start, x = _start(links.tobytes(), len(links), tuple(int(k) for k in loops.carriers))
+    rows = _Rows.of(loops)
+    general = rows.with_constants(np.random.default_rng(_MONODROMY_SEED))
+    y, t = start.followed(general, x)
+    own, _ = general.certified(y[t >= 1])
+    y, t = general.followed(rows, own)
+    certain, radius = rows.certified(y[t >= 1])
+    near = y[(t > 1 - _END) & (np.max(np.abs(y.imag), axis=1) < _NEARLY_REAL)].real
+    real = certain[np.max(np.abs(certain.imag), axis=1) <= radius].real
+    every = np.concatenate([real, near])
+    theta, s, residual = refine(loops, every[:, :n], every[:, n:])
+    kept = residual < _OPEN
+    theta, s = _distinct(loops, theta[kept], s[kept], residual[kept])
+    found = np.concatenate([theta, s], axis=1)
+    folds = sum(not _is_near(x, real, n) for x in found)
+    meet = f", and {2 * folds} where roots meet" if folds else ""
+    method = f"homotopy, certified: {len(certain)} of {len(own)} paths{meet}"
+    return _Found(theta, s, method, len(certain) + 2 * folds == len(own))
+
+
+def _is_near(x: Real, roots: Real, n: int) -> bool:
+    gap = roots - x
+    gap[:, :n] = pi - np.mod(pi - gap[:, :n], 2 * pi)
+    return bool(np.any(np.max(np.abs(gap), axis=1) < _SAME_ROOT))

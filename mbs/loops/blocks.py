@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 from typing import NamedTuple
 
 import casadi
@@ -19,11 +19,23 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
+from mbs.assembly.tables import CoordinateCoupling
 from mbs.closed_forms.arm import Arm, inverse
-from mbs.closed_forms.arm_search import General, general, general_of
-from mbs.closed_forms.hexapod import LEGS, poses
+from mbs.closed_forms.arm_certificate import (
+    CertifiedArm,
+    certified_arm,
+    certified_configurations,
+)
+from mbs.closed_forms.arm_search import general_of
+from mbs.closed_forms.hexapod import LEGS, holds, poses
 from mbs.closed_forms.planar_loops import KNOWN, PlanarLoops, planar_roots
-from mbs.closed_forms.ring import PARAMETERS, extent, independent_indices, loop_links
+from mbs.closed_forms.ring import (
+    PARAMETERS,
+    always_zero,
+    extent,
+    independent_indices,
+    loop_links,
+)
 from mbs.components import Fixed, PointOnLine, Rod, Spherical
 from mbs.components.joints import Freedom, Motion
 from mbs.errors import LoopError, NoClosedForm
@@ -42,6 +54,7 @@ from mbs.loops.plan import (
 )
 from mbs.numbers import NONZERO
 from mbs.recursions.chain import ChainJoint, Ring
+from mbs.solvers.rank import rank
 from mbs.spatial import Pose, vector
 
 Step = Stage | LoopBlock
@@ -77,20 +90,26 @@ def steps_of(system: System) -> tuple[Step, ...]:
 
 def _block(work: PlanWork, waiting: Sequence[int]) -> LoopBlock | None:
     """The first block that gives the assembled configuration back."""
-    for find in (planar_blocks, single_loops, platforms):
+    for find in (gear_trains, planar_blocks, single_loops, platforms):
         for block in find(work, waiting):
             if _gives_assembled(work, block):
                 return block
+    _require_held(work, waiting)
     return None
+
+
+def _assembled(system: System) -> tuple[Vector, Vector]:
+    """All positions and p where a system was assembled."""
+    q = np.array(system.configuration)
+    return started_at(system, q, range(system.nq)), closure_parameters(system)
 
 
 def _gives_assembled(work: PlanWork, block: LoopBlock) -> bool:
     """Whether the assembled configuration is among the roots of a block."""
     system = work.system
     q = np.array(system.configuration)
-    start = started_at(system, q, range(system.nq))
     try:
-        roots = block.solve(start, closure_parameters(system))
+        roots = block.solve(*_assembled(system))
     except NoClosedForm:
         return False
     except LoopError:  # it moves by itself there, which is told where its roots are asked for
@@ -166,6 +185,132 @@ def _connected(links: dict[int, set[int]]) -> list[list[int]]:
                 shared |= links[number]
         found.append(sorted(own))
     return found
+
+
+# Loops of revolute joints about one line, with gears between them: linear equations in angles.
+
+
+_MOST_TURNS = 4
+"""Loops of a gear train: of each whole turns are tried, five or more numbers of them."""
+_SAME_ANGLE = 1e-9
+"""Angles [rad] that are equal: sums of a few leave 1e-15."""
+
+
+def gear_trains(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
+    """Blocks of coaxial loops and couplings that share unknown joints, such as a differential."""
+    system, first = work.system, len(work.system.cuts)
+    rings = {
+        number: work.ring(number)
+        for number in waiting
+        if number < first and not is_bound(system, number)
+    }
+    unknown = {
+        number: {_index(joint) for joint in ring.joints}
+        for number, ring in rings.items()
+        if _is_coaxial(work, ring)
+    }
+    couplings = dict(enumerate(system.couplings, first))
+    for number in waiting:
+        if number in couplings and _is_linear(work, couplings[number]):
+            unknown[number] = set(couplings[number].coordinates) - work.known
+    for numbers in _connected(unknown):
+        train = _GearTrain.of(
+            work,
+            [rings[number] for number in numbers if number < first],
+            [couplings[number] for number in numbers if number >= first],
+        )
+        if train is not None:
+            names = [system.cuts[number].edge.joint.name for number in numbers if number < first]
+            names += [couplings[number].name for number in numbers if number >= first]
+            yield LoopBlock(", ".join(names), train.indices, train.roots)
+
+
+def _is_coaxial(work: PlanWork, ring: Ring) -> bool:
+    """Whether all unknown joints rotate about one line."""
+    if any(joint.motion is not Motion.REVOLUTE for joint in ring.joints):
+        return False
+    across = [casadi.vertcat(gap.pose.R[0:2, 2], gap.pose.p[0:2]) for gap in ring.gaps]
+    return always_zero(casadi.vertcat(*across), work.q, work.system.p)
+
+
+def _is_linear(work: PlanWork, coupling: CoordinateCoupling) -> bool:
+    return coupling.driver in work.known or len(coupling.coefficients) <= _LINEAR
+
+
+_LINEAR = 2
+"""Coefficients of a polynomial of degree one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _GearTrain:
+    """Equations A x = b of angles, those of loops up to whole turns.
+
+    Attributes:
+        indices: of the unknown positions x.
+        looped: which of them are of joints in loops.
+        count: of the loops, whose equations come first.
+        equations: Function of all positions and p: [A, b].
+    """
+
+    indices: tuple[int, ...]
+    looped: list[int]
+    count: int
+    equations: Function
+
+    @staticmethod
+    def of(
+        work: PlanWork, rings: list[Ring], couplings: list[CoordinateCoupling]
+    ) -> _GearTrain | None:
+        """None where there are not as many equations as unknown positions, or too many loops."""
+        looped = {_index(joint) for ring in rings for joint in ring.joints}
+        coupled = {number for coupling in couplings for number in coupling.coordinates}
+        indices = tuple(sorted(looped | (coupled - work.known)))
+        if not rings or len(rings) > _MOST_TURNS or len(rings) + len(couplings) < len(indices):
+            return None
+        rows = [_coaxial_row(ring, work.q) for ring in rings]
+        rows += [coupling.value(work.q) - work.q[coupling.driven] for coupling in couplings]
+        value = casadi.vertcat(*rows)
+        x = casadi.vertcat(*(work.q[index] for index in indices))
+        rest = -casadi.substitute(value, x, SX.zeros(len(indices)))
+        system = work.system
+        outputs = [casadi.densify(casadi.jacobian(value, x)), casadi.densify(rest)]
+        equations = Function("gears", [work.q, system.p], outputs)
+        places = [k for k, index in enumerate(indices) if index in looped]
+        return _GearTrain(indices, places, len(rings), equations)
+
+    def roots(self, q: Vector, p: Vector) -> Roots:
+        """All angles with those of joints in loops within half a turn."""
+        A, b = (np.array(value) for value in self.equations(q, p))
+        if rank(A, _LOCKED) < len(self.indices):
+            raise NoClosedForm("gears leave joints a motion while all that is known stays")
+        b[: self.count] = np.remainder(b[: self.count] + np.pi, 2 * np.pi) - np.pi
+        reach = np.sum(np.abs(A[: self.count]), axis=1) * np.pi + np.abs(b[: self.count, 0])
+        most = [int(np.ceil(x / (2 * np.pi))) for x in reach]
+        found = list[Vector]()
+        for turns in product(*(range(-k, k + 1) for k in most)):
+            right = b[:, 0] + 2 * np.pi * np.array([*turns, *[0] * (len(b) - self.count)])
+            x: Vector = np.asarray(np.linalg.lstsq(A, right, rcond=None)[0], float)
+            within = np.max(np.abs(x[self.looped])) < np.pi + _SAME_ANGLE
+            # half a turn forth and back is one
+            new = all(np.max(np.abs(np.exp(1j * x) - np.exp(1j * y))) > _SAME_ANGLE for y in found)
+            if within and new and np.max(np.abs(A @ x - right)) < _SAME_ANGLE:
+                found.append(x)
+        # after a whole turn of a joint in a loop a gear stands elsewhere unless its ratio is whole
+        ratios = A[self.count :]
+        whole = bool(np.all(np.abs(ratios - np.round(ratios)) < _SAME_ANGLE))
+        proof = "linear equations of angles"
+        if not whole:
+            proof += ", those of loops within half a turn"
+        return Roots(np.array(found).reshape(-1, len(self.indices)), proof, whole)
+
+
+def _coaxial_row(ring: Ring, q: SX) -> SX:
+    """The angle by which the joints of a loop about one line miss its closure."""
+    angle, turned, sense = SX(0), SX.eye(3), SX(1)
+    for joint, gap in zip(ring.joints, [*ring.gaps[1:], ring.gaps[0]], strict=True):
+        angle += sense * joint.sign * q[_index(joint)]
+        turned, sense = turned @ gap.pose.R, sense * gap.pose.R[2, 2]
+    return SX(angle + casadi.atan2(turned[1, 0], turned[0, 0]))
 
 
 # Plane loops that share unknown joints.
@@ -274,7 +419,7 @@ class _Plane:
         found = planar_roots(drawing.loops)
         values = drawing.positions(found.theta, found.s)
         proof = " and ".join(found.methods)
-        return Roots(values, proof, not found.singular)
+        return Roots(values, proof, found.complete)
 
 
 @dataclass(slots=True)
@@ -511,10 +656,18 @@ class _Draughtsman:
         return _Drawing(loops, size, told)
 
 
-# One loop of six unknown revolute and prismatic joints: an arm that reaches a known pose.
+# One loop of six unknown revolute and prismatic joints: an arm that reaches a known pose. One of
+# fewer joints, such as Bricard's, gets revolute joints that must be at zero.
 
 
 _JOINTS = 6
+_LEAST_JOINTS = 3
+_AT_ZERO = 1e-6
+"""Angle [rad] below which an added joint is at zero: at a fold a root is known to 1e-7, and joints
+added at random are elsewhere by more."""
+_LOCKED = 1e-6
+"""Relative singular value below which a loop of fewer joints moves by itself: its roots are exact
+to 1e-12, whose root that is."""
 
 
 def single_loops(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
@@ -524,9 +677,11 @@ def single_loops(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
             continue
         ring = work.ring(number)
         plain = all(joint.motion in (Motion.REVOLUTE, Motion.PRISMATIC) for joint in ring.joints)
-        if plain and len(ring.joints) == _JOINTS:
+        if plain and _LEAST_JOINTS <= len(ring.joints) <= _JOINTS:
             loop = _SingleLoop.of(work, ring)
             indices = tuple(_index(joint) for joint in loop.joints)
+            if len(indices) < _JOINTS and loop.moves(*_assembled(work.system)):
+                continue
             yield LoopBlock(work.system.cuts[number].edge.joint.name, indices, loop.roots)
 
 
@@ -550,7 +705,7 @@ class _SingleLoop:
     system: System
     joints: tuple[ChainJoint, ...]
     gaps: Function
-    arm: tuple[bytes, General] | None = None
+    arm: tuple[bytes, CertifiedArm] | None = None
 
     @staticmethod
     def of(work: PlanWork, ring: Ring) -> _SingleLoop:
@@ -565,17 +720,47 @@ class _SingleLoop:
         """Every way to close the loop."""
         gaps = _side_by_side(self.gaps, q, p)
         signs = np.array([joint.sign for joint in self.joints])
-        found = general(self._general(gaps), inverse(gaps[0]))
-        return Roots(found * signs, "the general inverse geometric model, of degree 16")
+        n = len(self.joints)
+        found = certified_configurations(self._arm(gaps), inverse(gaps[0]))
+        q = found.q[np.all(np.abs(found.q[:, n:]) < _AT_ZERO, axis=1), :n]
+        return Roots(q * signs, found.proof, found.complete)
 
-    def _general(self, gaps: Matrix) -> General:
-        between = np.concatenate([np.eye(4)[None], gaps[1:], np.eye(4)[None]])
-        key = between.tobytes()
+    def moves(self, q: Vector, p: Vector) -> bool:
+        """Whether joints can move while all that is known stays."""
+        gaps, n = _side_by_side(self.gaps, q, p), len(self.joints)
+        arm = self._arm(gaps).general.arm
+        x = np.zeros((1, _JOINTS))
+        for own in self.roots(q, p).values:
+            x[0, :n] = own * [joint.sign for joint in self.joints]
+            if rank(arm.pose_and_jacobian(x)[1][0, :, :n], _LOCKED) < n:
+                return True
+        return False
+
+    def _arm(self, gaps: Matrix) -> CertifiedArm:
+        key = gaps[1:].tobytes()
         if self.arm is None or self.arm[0] != key:
-            prismatic = np.array([not joint.is_rotational for joint in self.joints])
-            names = tuple(joint.name for joint in self.joints)
-            self.arm = (key, general_of(Arm(names, prismatic, between)))
+            added = _JOINTS - len(self.joints)
+            turns = [not joint.is_rotational for joint in self.joints] + [False] * added
+            names = [joint.name for joint in self.joints] + ["added"] * added
+            more = _added_gaps(added, float(np.sum(np.linalg.norm(gaps[:, :3, 3], axis=1))))
+            between = np.concatenate([np.eye(4)[None], gaps[1:], more])
+            arm = Arm(tuple(names), np.array(turns), between)
+            self.arm = (key, certified_arm(general_of(arm)))
         return self.arm[1]
+
+
+def _added_gaps(count: int, size: float) -> Matrix:
+    """(count + 1, 4, 4) random gaps before added joints, and the one that leads back."""
+    rng = np.random.default_rng(_SEED)
+    gaps, back = list[Matrix](), np.eye(4)
+    for _ in range(count):
+        gap = np.eye(4)
+        gap[:3, :3] = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        gap[:3, :3] *= np.linalg.det(gap[:3, :3])
+        gap[:3, 3] = rng.uniform(-1, 1, 3) * (size or 1.0) / _JOINTS
+        gaps.append(gap)
+        back = inverse(gap) @ back
+    return np.array([*gaps, back])
 
 
 # A platform on six legs: between two points, one on the ground and one on the platform, each keeps
@@ -709,8 +894,41 @@ class _Distance(NamedTuple):
     length: float
 
 
-def _distance(leg: _Leg, frames: Matrix) -> _Distance | None:
-    """The two centres of a leg; None where it is no such leg."""
+def _require_held(work: PlanWork, waiting: Sequence[int]) -> None:
+    """Refuse a platform that no lengths of its legs hold.
+
+    Raises:
+        NoClosedForm: says so.
+    """
+    system = work.system
+    links = {
+        number: _unknown_links(work, number)
+        for number in waiting
+        if number < len(system.cuts) and not is_bound(system, number)
+    }
+    for numbers in _connected(links):
+        edges, frames = _edges(work, numbers, sorted(set().union(*(links[n] for n in numbers))))
+        found = _legs(edges)
+        if found is None:
+            continue
+        at = _side_by_side(frames, *_assembled(system))
+        legs = [leg for leg in (_distance(leg, at, slides=True) for leg in found[1]) if leg]
+        if len(legs) == LEGS and not holds(*(np.array([leg[k] for leg in legs]) for k in (0, 1))):
+            raise NoClosedForm(
+                f"{system.name}: the ends of its six legs lie so that they hold the platform at no"
+                " pose, as on similar hexagons, and the length of one leg follows from the others;"
+                " move an end, or use mbs.loops.solve without branch"
+            )
+
+
+def _distance(leg: _Leg, frames: Matrix, *, slides: bool = False) -> _Distance | None:
+    """The two centres of a leg; None where it is no such leg.
+
+    Args:
+        leg: with its passive joints.
+        frames: that it runs over.
+        slides: whether it may have prismatic joints, at zero here.
+    """
     here, axes = np.eye(4), list[_Axis]()
     for edge, forwards in leg.edges:
         near, far = (frames[k] for k in (edge.frames if forwards else edge.frames[::-1]))
@@ -721,6 +939,8 @@ def _distance(leg: _Leg, frames: Matrix) -> _Distance | None:
             for f in edge.freedoms
         ]
         here = at @ inverse(far)
+    if slides:
+        axes = [axis for axis in axes if axis.motion is not Motion.PRISMATIC]
     if any(axis.motion not in _FREEDOMS for axis in axes):
         return None
     if sum(_FREEDOMS[axis.motion] for axis in axes) < _LEAST:

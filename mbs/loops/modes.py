@@ -167,15 +167,19 @@ def _of_blocks(system: System, steps: Sequence[Step], start: Vector, p: Vector) 
     locked = tuple(k for k in independent_indices(system) if k < system.nq)
     closing = Closing(system, p, locked)
     found = _distinct(_checked(system, _refined(closing, q[: system.nq]), (), p) for q in every)
+    for mode in found:
+        _require_locked(closing, np.array(mode.q))
     complete = all(roots.complete for roots in told)
     proofs = list(dict.fromkeys(roots.proof for roots in told))
     if not complete:
-        searched = closed_configurations(closing, start[: system.nq])
-        more = [q for q in searched if not any(_near(system, q, mode) for mode in found)]
-        found += _distinct(_checked(system, q, (), p) for q in more)
+        more = list[Mode | None]()
+        # one that can move ends the search, which would find ever others
+        for q in _closed_configurations(closing, start[: system.nq]):
+            if not any(_near(system, q, mode) for mode in found):
+                _require_locked(closing, q)
+                more.append(_checked(system, q, (), p))
         proofs.append(f"a search from random starts found {len(more)} more")
-    for mode in found:
-        _require_locked(closing, np.array(mode.q))
+        found += _distinct(more)
     return ModeList(found, complete=complete, proof="; ".join(proofs))
 
 
@@ -412,6 +416,11 @@ def closed_configurations(closing: Closing, start: Vector) -> list[Vector]:
         Configurations (nq,) with angles within half a turn of zero; nothing proves that these are
         all.
     """
+    return list(_closed_configurations(closing, start))
+
+
+def _closed_configurations(closing: Closing, start: Vector) -> Iterator[Vector]:
+    """Each as soon as it is found."""
     rng = np.random.default_rng(_START_SEED)
     found, hits, newest = list[Vector](), list[int](), 0
     for number in range(1, _START_TRIES + 1):
@@ -427,9 +436,9 @@ def closed_configurations(closing: Closing, start: Vector) -> list[Vector]:
                 hits[k] += 1
             if not met:
                 found, hits, newest = [*found, q], [*hits, 1], number
+                yield q
         if number >= max(_LEAST_STARTS, 4 * newest) and all(count > 1 for count in hits):
             break
-    return found
 
 
 def _moved(closing: Closing, start: Vector, rng: np.random.Generator) -> Vector:

@@ -4,10 +4,23 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 import pytest
-from support.plane_equations import closed_loops, missed, searched, triad
+from support.plane_equations import (
+    closed,
+    closed_loops,
+    complex_numbers,
+    missed,
+    searched,
+    triad,
+)
 from support.sweeps import EVERY_CASE
 
-from mbs.closed_forms.planar_loops import PlanarLoops, dixon_roots, planar_roots
+from mbs.closed_forms.planar_loops import (
+    KNOWN,
+    PlanarLoops,
+    dixon_roots,
+    path_roots,
+    planar_roots,
+)
 from mbs.errors import LoopError, NoClosedForm
 
 SEEDS = range(100) if EVERY_CASE else range(3)
@@ -19,7 +32,7 @@ LEGS = list(combinations_with_replacement(["RR", "PR", "RP"], 3))
 def test_triads(kinds, seed):
     loops = triad(np.random.default_rng(seed), kinds)
     roots = planar_roots(loops)
-    assert not roots.singular
+    assert roots.complete
     assert missed(loops, roots, searched(loops, 200, seed)) == 0
 
 
@@ -76,7 +89,14 @@ def test_rows_that_contradict_each_other_have_no_roots():
 @pytest.mark.parametrize("seed", range(200 if EVERY_CASE else 20))
 def test_a_fold_is_kept(seed):
     """Legs in line with the normals of the curve of the platform: two roots meet."""
-    rng = np.random.default_rng(seed)
+    folded, theta = folded_triad(np.random.default_rng(seed))
+    roots = planar_roots(folded)
+    gap = np.abs(np.exp(1j * roots.theta) - np.exp(1j * theta)).max(axis=1)
+    assert gap.min() < 1e-5
+
+
+def folded_triad(rng):
+    """A platform on three legs, and its angles, (1, 4), at which two roots meet."""
     loops = triad(rng, ("RR", "RR", "RR"))
     theta = np.array(rng.uniform(-3, 3, (1, 4)))
     # the three forces along the legs meet in one point: the platform may turn about it
@@ -88,10 +108,7 @@ def test_a_fold_is_kept(seed):
     theta[0, 1:] = np.angle(along)
     angles = np.column_stack([E @ ends, -E * rng.uniform(0.3, 1.5, 3)])
     constant = -(angles @ np.exp(1j * theta[0]))
-    folded = PlanarLoops(angles, loops.slides, loops.carriers, constant)
-    roots = planar_roots(folded)
-    gap = np.abs(np.exp(1j * roots.theta) - np.exp(1j * theta)).max(axis=1)
-    assert gap.min() < 1e-5
+    return PlanarLoops(angles, loops.slides, loops.carriers, constant), theta
 
 
 def test_equal_legs_of_a_congruent_platform_move():
@@ -101,13 +118,62 @@ def test_equal_legs_of_a_congruent_platform_move():
     E = np.array([[1, -1, 0], [1, 0, -1]])
     angles = np.column_stack([E @ ends, -0.7 * E])
     loops = PlanarLoops(angles, np.zeros((2, 0)), np.zeros(0, int), -(E @ ends).astype(complex))
-    assert dixon_roots(loops.angles, loops.constant).singular
+    assert not dixon_roots(loops.angles, loops.constant).complete
+
+
+SLIDES = {
+    "carried by two links": (2, [0, 1], 6),
+    "on the ground": (3, [KNOWN] * 3, 8),
+    "on the ground and on links": (3, [KNOWN, 0, 1], 20),
+}
+"""How many loops, what carries the prismatic joints, and how many complex roots there are."""
+
+
+@pytest.mark.parametrize("kind", SLIDES)
+def test_loops_with_slides(kind):
+    count, carriers, degree = SLIDES[kind]
+    rng = np.random.default_rng(1)
+    for _ in range(len(SEEDS)):
+        angles = complex_numbers(rng, count, 2 * count - len(carriers))
+        loops = closed(rng, angles, complex_numbers(rng, count, len(carriers)), carriers)
+        roots = planar_roots(loops)
+        assert roots.complete
+        assert roots.methods == (f"homotopy, certified: {degree} of {degree} paths",)
+        assert missed(loops, roots, searched(loops, 300, 1)) == 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_paths_and_the_determinant_agree(seed):
+    loops = closed_loops(np.random.default_rng(seed), 2)
+    found, paths = planar_roots(loops), path_roots(loops)
+    assert (len(paths.theta), paths.complete) == (len(found.theta), True)
+    assert missed(loops, paths, np.concatenate([found.theta, found.s], axis=1)) == 0
+
+
+def test_paths_that_meet_count_twice():
+    """A platform on three legs in line with forces that meet in one point."""
+    loops, theta = folded_triad(np.random.default_rng(4))
+    found = path_roots(loops)
+    assert found.complete
+    assert found.method.endswith(" 4 of 6 paths, and 2 where roots meet")
+    gap = np.abs(np.exp(1j * found.theta) - np.exp(1j * theta)).max(axis=1)
+    assert gap.min() < 1e-5
+
+
+@pytest.mark.parametrize(("count", "slides"), [(2, 0), (2, 1), (3, 0)])
+def test_a_row_too_many(count, slides):
+    """Loops that close only because their lengths fit, as those of equal parallel cranks."""
+    rng = np.random.default_rng(1)
+    angles = complex_numbers(rng, count, 2 * count - 1 - slides)
+    loops = closed(rng, angles, complex_numbers(rng, count, slides), [KNOWN] * slides)
+    roots = planar_roots(loops)
+    assert (len(roots.theta), roots.complete) == (1, True)
+    assert np.abs(loops.rows(roots.theta, roots.s)[0]).max() < 1e-14
+    other = PlanarLoops(loops.angles, loops.slides, loops.carriers, loops.constant + 1e-3)
+    assert len(planar_roots(other).theta) == 0
 
 
 def test_what_is_not_known_is_said():
-    rng = np.random.default_rng(1)
-    with pytest.raises(NoClosedForm, match="hold 1 unknown prismatic joints"):
-        planar_roots(closed_loops(rng, 3, slides=1))
     with pytest.raises(NoClosedForm, match="no 8 or fewer of the 3 unknowns"):
         planar_roots(PlanarLoops(np.ones((1, 3)), np.zeros((1, 0)), np.zeros(0, int), np.ones(1)))
     with pytest.raises(LoopError, match="a dyad of equal links"):

@@ -38,13 +38,14 @@ def planar_platform(seed, legs, driven=()):
     return m
 
 
-def planar_linkage(seed, joints, driven=()):
-    """Links of a plane that revolute joints connect at random points, the plane oblique.
+def planar_linkage(seed, joints, driven=(), sliding=()):
+    """Links of a plane that joints connect at random points, the plane oblique.
 
     Args:
         seed: of the points and of the plane.
         joints: for each the letters of the links that it connects; "O" is the ground.
         driven: those of them that have motors.
+        sliding: those that are prismatic, in random directions; the others are revolute.
     """
     rng = np.random.default_rng(seed)
     m = Mechanism(f"linkage{seed}")
@@ -54,8 +55,10 @@ def planar_linkage(seed, joints, driven=()):
     for a, b in joints:
         point = (*rng.uniform(-1, 1, 2), 0.0)
         motor = True if a + b in driven else None
-        joint = Revolute(f"{a}{b}", axis="z", actuated=motor)
-        m.connect(frames[a].at(*point), joint, frames[b].at(*point))
+        kind, axis = (Prismatic, "x") if a + b in sliding else (Revolute, "z")
+        turn = turn_about_z(rng.uniform(-3, 3)) if a + b in sliding else None
+        joint = kind(f"{a}{b}", axis=axis, actuated=motor)
+        m.connect(frames[a].at(*point, rotation=turn), joint, frames[b].at(*point, rotation=turn))
     return m
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mbs.closed_forms.arm import Arm, inverse, motion
+from mbs.closed_forms.arm import Arm, Field, inverse, motion
 from mbs.errors import ModelError, NoClosedForm
 from mbs.numbers import NONZERO
 
@@ -68,7 +68,7 @@ KEPT_BY_TURN = np.array([1, 2, 5, 8, 11, 14])
 KEPT_BY_SLIDE = np.array([3, 4, 6, 7, 8, 11])
 
 
-def pair(T: Array) -> Array:
+def pair(T: Field) -> Field:
     """(..., 15) w of the origin and the z axis of the frames T, (..., 4, 4)."""
     p, z = T[..., :3, 3], T[..., :3, 2]
     pp, pz = np.sum(p * p, axis=-1)[..., None], np.sum(p * z, axis=-1)[..., None]
@@ -79,7 +79,7 @@ def pair(T: Array) -> Array:
 def rho(T: Array) -> Array:
     """(..., 15, 15) the linear map of w for displacements T, (..., 4, 4)."""
     X = np.tensordot(T[..., :3, 3], SLOPES, axes=1)
-    turned = np.zeros((*T.shape[:-2], SIZE, SIZE))
+    turned = np.zeros((*T.shape[:-2], SIZE, SIZE), T.dtype)
     turned[..., range(3), range(3)] = 1.0
     for k in (3, 6, 9, 12):
         turned[..., k : k + 3, k : k + 3] = T[..., :3, :3]
@@ -279,11 +279,11 @@ def middle_joints(M: Array, grid: tuple[int, int], count: int) -> tuple[Array, A
     """The half angles x4 and x5, (N, count) each, of as many solutions as share the angle.
 
     Args:
-        M: (N, n, n) matrices at the angles of joint 3.
+        M: (N, n, n) matrices at the angles of joint 3, real or complex.
         grid: numbers of powers of x4 and of x5, of which the n monomials are the products.
         count: of solutions, the dimension of the null space.
     """
-    V = np.linalg.svd(M)[2][:, M.shape[-1] - count :, :]
+    V = np.linalg.svd(M)[2][:, M.shape[-1] - count :, :].conj()
     basis = np.swapaxes(V, -1, -2).reshape(len(M), *grid, count)
     X4 = _shift(basis[:, :-1], basis[:, 1:])
     X5 = _shift(basis[:, :, :-1], basis[:, :, 1:])
@@ -302,11 +302,10 @@ def _shift(low: Array, high: Array) -> Array:
 
 
 def _rayleigh(vectors: Array, X: Array) -> Array:
-    """(n, m) eigenvalues of X of the vectors in the columns; of complex ones the real part."""
-    values = np.sum(np.conj(vectors) * (X @ vectors), axis=1)
+    """(n, m) eigenvalues of X of the vectors in the columns; the real part where X is real."""
     size = np.sum(np.abs(vectors) ** 2, axis=1)
-    real: Array = np.real(values) / size
-    return real
+    values: Array = np.sum(np.conj(vectors) * (X @ vectors), axis=1) / size
+    return np.real(values) if np.isrealobj(X) else values
 
 
 # A loop of six joints, begun at any of them and walked either way.
@@ -663,13 +662,23 @@ def roots(M: Array) -> tuple[NDArray[np.int64], Array]:
         (m,) numbers of the matrix, ascending, and (m,) angles in [-pi, pi), of roots e^(i u) near
         the unit circle; a double root is there twice.
     """
+    u = complex_roots(M)
+    number, column = np.nonzero(np.abs(u.imag) < _OFF_CIRCLE)
+    return number, (u.real[number, column] + np.pi) % (2 * np.pi) - np.pi
+
+
+def complex_roots(M: Array) -> NDArray[np.complex128]:
+    """(N, r) complex angles u where the matrices (N, n3, n, n) are singular.
+
+    Among them are some of large imaginary part, which belong to no configuration.
+    """
     offset, coefficients = _rotate(M / np.max(np.abs(M), axis=(1, 2, 3), keepdims=True))
     x = np.linalg.eigvals(_companion(coefficients)).astype(complex)
     top, bottom = 1 + 1j * x, 1 - 1j * x
     size = np.log(np.abs(top) + NONZERO) - np.log(np.abs(bottom) + NONZERO)
-    number, column = np.nonzero(np.abs(size) < _OFF_CIRCLE)
-    u = (offset[:, None] + np.angle(top * np.conj(bottom)))[number, column]
-    return number, (u + np.pi) % (2 * np.pi) - np.pi
+    # e^(i u) = e^(i offset) (1 + i x) / (1 - i x)
+    u: NDArray[np.complex128] = offset[:, None] + np.angle(top * np.conj(bottom)) - 1j * size
+    return u
 
 
 def _companion(coefficients: Array) -> Array:

@@ -1,0 +1,341 @@
+"""All complex configurations of an arm of six joints at a pose, each certified: a proof of a list.
+
+The elimination of `raghavan_roth` gives the complex angles of one joint as eigenvalues; the others
+follow from null vectors, and Newton's method makes them exact. At almost every pose an arm has as
+many configurations, sixteen at most, and nowhere more that are isolated: where that many are
+certified, none is missing.
+
+Source: Raghavan & Roth 1993; Primrose 1986 for sixteen; Ortega & Rheinboldt 1970, section 12.6, for
+the theorem of Newton and Kantorovich; Sommese & Wampler 2005, chapter 7, for the count.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbs.closed_forms.arm import Arm, Array, inverse, motion
+from mbs.closed_forms.arm_search import General, general, random_configurations
+from mbs.closed_forms.raghavan_roth.numbers import (
+    KEPT_BY_SLIDE,
+    KEPT_BY_TURN,
+    Arrangement,
+    Prepared,
+    at,
+    complex_roots,
+    loop_length,
+    middle_joints,
+    motion_parts,
+    pair,
+    rho,
+)
+from mbs.solvers.homotopy import solved
+
+Complex = NDArray[np.complex128]
+
+# Where configurations may be: from eigenvalues, with complex cosines and sines.
+
+
+_FAR_ANGLE = 12.0
+"""Imaginary part [rad] beyond which an angle is taken for infinite: those of random loops stay
+below 11, and the fourfold eigenvalues at infinity come back as 28 or more."""
+_SHARED = 1e-7
+"""Singular values, as parts of the largest, that count as zero at an eigenvalue: a simple one
+leaves 1e-12, one of a fold the root of 1e-15."""
+_FLAT = 1e-6
+"""Ratio of singular values below which joint 2 has two angles: its axis and that of joint 1 meet or
+are parallel, which holds by structure and leaves 1e-14."""
+
+
+def complex_candidates(prepared: Prepared, T: Array) -> Complex:
+    """(m, 6) complex configurations [rad or m] near which an arm may reach a pose T (4, 4) [m]."""
+    loop = prepared.arrangement
+    ways = loop.all_ways(T[None])
+    M = prepared.pencil.matrices(ways)
+    u = complex_roots(M)[0]
+    u = u[np.abs(u.imag) < _FAR_ANGLE]
+    matrices = at(np.repeat(M, len(u), axis=0), u)
+    values = np.linalg.svd(matrices, compute_uv=False)
+    shared = np.maximum(np.sum(values < _SHARED * values[:, :1], axis=1), 1)
+    every = [np.zeros((0, 6), dtype=np.complex128)]
+    with np.errstate(all="ignore"):  # of what is no configuration angles may be infinite
+        for count in np.unique(shared):
+            own = shared == count
+            x4, x5 = middle_joints(matrices[own], prepared.pencil.elimination.grid, int(count))
+            x3 = np.repeat(np.tan(u[own] / 2), count)
+            x = np.column_stack([x3, x4.ravel(), x5.ravel()])
+            middle = np.where(loop.prismatic[2:5], x, 2 * np.arctan(x.astype(complex)))
+            every.append(_completed(ways[0], loop, middle[np.all(np.isfinite(middle), axis=1)]))
+    whole = np.concatenate(every)
+    return whole[np.all(np.isfinite(whole), axis=1)]
+
+
+def _completed(ways: Array, loop: Arrangement, middle: Complex) -> Complex:
+    """(m, 6) configurations of the arm with joints 3, 4 and 5 of its loop at (n, 3) positions."""
+    beyond, goal = np.tile(ways[1].astype(np.complex128), (len(middle), 1, 1)), inverse(ways[5])
+    for k in (2, 3, 4):
+        beyond = beyond @ motion(middle[:, k - 2], bool(loop.prismatic[k])) @ ways[k]
+    number, second = _second(ways[0], loop.prismatic, beyond, goal)
+    near = ways[0] @ motion(second, bool(loop.prismatic[1])) @ beyond[number]
+    first = _first(bool(loop.prismatic[0]), near, goal)
+    left = inverse(motion(first, bool(loop.prismatic[0])) @ near) @ goal
+    sixth = _angle(left[:, 0, 0] + left[:, 1, 1], left[:, 1, 0] - left[:, 0, 1])
+    whole = np.column_stack([first, second, middle[number], sixth])
+    whole = loop.sign * (whole + loop.offsets)
+    q = np.empty(whole.shape, dtype=np.complex128)
+    q[:, loop.order] = np.where(loop.prismatic, whole * loop.length, whole)
+    return q
+
+
+def _angle(c: Complex, s: Complex) -> Complex:
+    """The complex angle of which these are multiples of the cosine and the sine."""
+    q: Complex = -0.5j * np.log((c + 1j * s) / (c - 1j * s))
+    # the logarithm of a square: the other half where the cosine has the other sign
+    size = np.where(np.abs(np.cos(q)) > np.abs(np.sin(q)), c / np.cos(q), s / np.sin(q))
+    return np.where(np.real(size) < 0, q + np.pi, q)
+
+
+def _first(prismatic: bool, near: Complex, goal: Array) -> Complex:
+    """(n,) the position of joint 1 that takes the origin and z axis of frames near to the goal."""
+    if prismatic:
+        slide: Complex = goal[2, 3] - near[:, 2, 3]
+        return slide
+    x, y = near[:, 0, 2:], near[:, 1, 2:]
+    X, Y = goal[0, 2:], goal[1, 2:]
+    # X = c x - s y and Y = s x + c y, of a point and of a direction
+    square = np.sum(x * x + y * y, axis=1)
+    return _angle(np.sum(x * X + y * Y, axis=1) / square, np.sum(x * Y - y * X, axis=1) / square)
+
+
+def _second(
+    way: Array, prismatic: NDArray[np.bool_], beyond: Complex, goal: Array
+) -> tuple[NDArray[np.int64], Complex]:
+    """Numbers of the rows, and positions of joint 2: two where there is but one equation."""
+    kept = KEPT_BY_SLIDE if prismatic[0] else KEPT_BY_TURN
+    moved = np.einsum("iab,nb->nai", motion_parts(bool(prismatic[1])), pair(beyond))
+    A = (rho(way) @ moved)[:, kept]
+    A = np.where(np.all(np.isfinite(A), axis=(1, 2), keepdims=True), A, 0.0)
+    U, s, Vh = np.linalg.svd(A[:, :, 1:], full_matrices=False)
+    g = np.einsum("nai,na->ni", U.conj(), pair(goal)[kept] - A[:, :, 0])
+    used = s > _FLAT * s[:, :1]
+    flat = np.flatnonzero(~used[:, 1])
+    g = np.where(used, g / np.where(used, s, 1.0), 0.0)
+    f = np.einsum("nij,ni->nj", Vh.conj(), g)
+    single = f[:, 0] if prismatic[1] else _angle(f[:, 0], f[:, 1])
+    single[flat], other = _crossings(bool(prismatic[1]), Vh[flat, 0], g[flat, 0])
+    return np.concatenate([np.arange(len(single)), flat]), np.concatenate([single, other])
+
+
+def _crossings(prismatic: bool, n: Complex, g: Complex) -> tuple[Complex, Complex]:
+    """Both roots of n0 r + n1 r^2 = g, or of n0 cos q + n1 sin q = g."""
+    if not prismatic:
+        # (n0 - i n1) z^2 - 2 g z + n0 + i n1 = 0 with z = e^(i q)
+        root, below = np.sqrt(g**2 - n[:, 0] ** 2 - n[:, 1] ** 2), n[:, 0] - 1j * n[:, 1]
+        return -1j * np.log((g + root) / below), -1j * np.log((g - root) / below)
+    root = np.sqrt(n[:, 0] ** 2 + 4 * n[:, 1] * g)
+    root = np.where(np.real(n[:, 0].conj() * root) < 0, -root, root)
+    larger = -0.5 * (n[:, 0] + root)
+    low = -g / larger
+    # less is rounding, and the second root is infinite
+    return low, np.where(np.abs(n[:, 1]) > _FLAT * np.abs(n[:, 0]), larger / n[:, 1], low)
+
+
+# Which of them are configurations, each its own: a certificate.
+
+
+_NEWTON = 4
+"""Steps: candidates are known to 1e-6 at least, from where two or three are enough, or they are
+none."""
+_CERTAIN = 0.03
+"""Of the product of Newton's step, the norm of the inverse and the bend: below one half there is
+one root near; room for rounding."""
+_NEAR = 0.1
+"""Of |X - 1| and of what a change moves it: the bound of the second derivative is below two then,
+and a rotation whose skew part vanishes is the identity."""
+_ROUNDING = 1e-14
+"""Of a pose, in lengths of the loop: what Newton's step cannot fall below."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CertifiedRoots:
+    """Complex configurations of an arm, each with one root near it.
+
+    Attributes:
+        q: (r, 6) [rad or lengths of the loop].
+        radius: (r,) farther away its root is not, in any position.
+    """
+
+    q: Complex
+    radius: Array
+
+    @property
+    def real(self) -> NDArray[np.bool_]:
+        """(r,) whether a root is real: the conjugate of one that is not would be near too."""
+        real: NDArray[np.bool_] = np.max(np.abs(self.q.imag), axis=1, initial=0.0) <= self.radius
+        return real
+
+
+def certified_roots(arm: Arm, T: Array, candidates: Complex) -> CertifiedRoots:
+    """The roots near candidates, each once.
+
+    X = e^(S4 d4) e^(S5 d5) e^(S6 d6) X0 e^(S1 d1) e^(S2 d2) e^(S3 d3) for a change d of a
+    configuration, S its twists seen from the middle, so that the second derivative of X is at most
+    |S_j| |S_k| e^(sum |S d|) |X0|. The rows are the place of X and the skew part of its rotation,
+    which vanish near the identity only there.
+
+    Args:
+        arm: of six joints.
+        T: (4, 4) target pose [m].
+        candidates: (m, 6) [rad or m].
+    """
+    length = loop_length(arm)
+    inner, target = _inner(arm, T, length)
+    q = np.where(arm.prismatic, candidates / length, candidates)
+    with np.errstate(all="ignore"):
+        for _ in range(_NEWTON):
+            rows, J, *_ = _rows(inner, target, q)
+            finite = np.all(np.isfinite(J), axis=(1, 2)) & np.all(np.isfinite(rows), axis=1)
+            q, rows, J = q[finite], rows[finite], J[finite]
+            q = q - solved(J, rows[..., None])[..., 0]
+        # of two that are conjugate rounding may have spoilt one
+        q = np.concatenate([q, q.conj()])
+        rows, J, norms, gap = _rows(inner, target, q)
+        W = solved(J, np.broadcast_to(np.eye(6, dtype=np.complex128), J.shape))
+        gain = np.sum(norms * np.linalg.norm(W, axis=2), axis=1)
+        step = np.sum(norms * np.abs(np.einsum("mij,mj->mi", W, rows)), axis=1)
+        # Newton's step, in the norm in which the second derivative is below e^(sum |S d|) |X0|
+        radius = 2 * (step + gain * _ROUNDING * np.max(norms, axis=1, initial=0.0))
+        certain = (gain * radius < _CERTAIN) & (radius < _NEAR) & (gap < _NEAR)
+    q, radius = q[certain], radius[certain]
+    kept = list[int]()
+    for k in np.argsort(radius, kind="stable"):
+        gap = q[k] - q[kept]
+        turn = np.where(arm.prismatic, 0.0, np.round(gap.real / (2 * np.pi)) * 2 * np.pi)
+        if np.all(np.max(np.abs(gap - turn), axis=1, initial=0.0) > radius[k] + radius[kept]):
+            kept.append(int(k))
+    return CertifiedRoots(q[kept], radius[kept])
+
+
+def _inner(arm: Arm, T: Array, length: float) -> tuple[Arm, Array]:
+    """The arm between its first and its last joint, lengths in units, and its target."""
+    first, last = inverse(arm.gaps[0]), inverse(arm.gaps[-1])
+    gaps, target = arm.gaps.copy(), first @ T @ last
+    gaps[0], gaps[-1] = np.eye(4), np.eye(4)
+    gaps[:, :3, 3] /= length
+    target[:3, 3] /= length
+    return Arm(arm.names, arm.prismatic, gaps), target
+
+
+def _rows(arm: Arm, target: Array, q: Complex) -> tuple[Complex, Complex, Array, Array]:
+    """The rows (m, 6), derivatives (m, 6, 6), norms of the twists (m, 6) and |X - 1| (m,).
+
+    All are seen from the middle of the arm, where complex angles lengthen the twists least.
+    """
+    moved = [motion(q[:, k], bool(prismatic)) for k, prismatic in enumerate(arm.prismatic)]
+    half = moved[0] @ arm.gaps[1] @ moved[1] @ arm.gaps[2] @ moved[2] @ arm.gaps[3]
+    before = inverse(half)
+    frames = [before, before @ moved[0] @ arm.gaps[1]]
+    frames.append(frames[1] @ moved[1] @ arm.gaps[2])
+    frames.append(np.broadcast_to(np.eye(4), half.shape))
+    for k in (3, 4, 5):
+        frames.append(frames[k] @ moved[k] @ arm.gaps[k + 1])
+    X = frames[6] @ inverse(target) @ half
+    twists = np.zeros((6, len(q), 4, 4), dtype=np.complex128)
+    for k, frame in enumerate(frames[:6]):
+        axis, origin = frame[..., :3, 2], frame[..., :3, 3]
+        if arm.prismatic[k]:
+            twists[k, :, :3, 3] = axis
+        else:
+            twists[k, :, :3, :3] = _skew(axis)
+            twists[k, :, :3, 3] = np.cross(origin, axis)
+    slopes = np.concatenate([X @ twists[:3], twists[3:] @ X])
+    norms = np.linalg.norm(twists, axis=(2, 3)).T
+    gap = np.linalg.norm(X - np.eye(4), axis=(1, 2))
+    return _six(X), np.moveaxis(_six(slopes), 0, -1), norms, gap
+
+
+def _skew(axis: Complex) -> Complex:
+    x, y, z = np.moveaxis(axis, -1, 0)
+    o = np.zeros_like(x)
+    return np.moveaxis(np.array([[o, -z, y], [z, o, -x], [-y, x, o]]), (0, 1), (-2, -1))
+
+
+def _six(X: Complex) -> Complex:
+    """(..., 6) the place of matrices (..., 4, 4), and the skew parts of their rotations."""
+    R = X[..., :3, :3]
+    turned = [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]]
+    return np.concatenate([X[..., :3, 3], 0.5 * np.stack(turned, axis=-1)], axis=-1)
+
+
+# All real configurations, and whether that is proved.
+
+
+_POSES, _SEED = 4, 20260411
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CertifiedArm:
+    """An arm ready for the general method, and how many complex configurations a pose has.
+
+    Attributes:
+        general: the arm.
+        count: at almost every pose.
+    """
+
+    general: General
+    count: int
+
+
+def certified_arm(arm: General) -> CertifiedArm:
+    """The configurations of some random poses, counted."""
+    q = random_configurations(arm.arm, np.eye(4), _POSES, _SEED)
+    return CertifiedArm(
+        arm,
+        max(
+            len(certified_roots(arm.arm, T, complex_candidates(arm.prepared, T)).q)
+            for T in arm.arm.pose(q)
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Configurations:
+    """The configurations that reach a pose.
+
+    Attributes:
+        q: (m, 6) [rad or m].
+        proof: what is certain, as part of a sentence.
+        complete: whether that proves that these are all.
+    """
+
+    q: Array
+    proof: str
+    complete: bool
+
+
+def certified_configurations(arm: CertifiedArm, T: Array) -> Configurations:
+    """The real configurations of a pose, T (4, 4) [m], with what proves them."""
+    own, found = arm.general.arm, general(arm.general, T)
+    candidates = np.concatenate([complex_candidates(arm.general.prepared, T), found])
+    roots = certified_roots(own, T, candidates)
+    real = np.where(own.prismatic, roots.q.real * loop_length(own), roots.q.real)[roots.real]
+    q, alone = list(found), len(found)
+    for root in real:
+        gaps = [np.max(np.abs(own.wrapped(root - other)), initial=0.0) for other in found]
+        if min(gaps, default=np.inf) < _SAME:
+            alone -= 1
+        else:
+            q.append(own.wrapped(root))
+    # configurations that are no roots of their own: two roots meet in each
+    certain = len(roots.q)
+    complete = certain + 2 * alone == arm.count
+    meet = f", and {2 * alone} where configurations meet" if alone and complete else ""
+    proof = f"the general inverse geometric model, certified: {certain} of {arm.count} roots{meet}"
+    return Configurations(np.array(q).reshape(-1, 6), proof, complete)
+
+
+_SAME = 1e-6
+"""Difference [rad or m] between a certified root and the configuration that it is: both are exact
+to 1e-9 unless roots all but meet."""

@@ -26,6 +26,7 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
 /* Rows beyond which the fill of pivots costs more than they tell: the last pivot is nearer to the
  * smallest singular value than the smallest of pivots in order, by a factor of two. */
 #define MANY 32
+#define LIGHT 1e-6 /* part of rows that count less; smaller ones would come behind dependent rows */
 #define LAST_MOVE 1e-9  /* after a move this small the next one is rounding */
 /* Part of the velocities, or of what they make of a step, by which a state may differ from where the
  * velocities and accelerations of the stages lead. What error control lets pass is a hundredth of it;
@@ -75,6 +76,7 @@ typedef struct {
     int *row;            /* and its row k in row[k]; the rows that no reflection has come last */
     double *size;        /* squares of what is left of columns, in that order, */
     mask *where;         /* and the rows in which they may have elements, WORDS(n) for each */
+    int *last;           /* of columns in their order, the last one that may have an element in a row */
 } factors;
 
 /* Rows and forces at a point, and the tangents there. */
@@ -217,6 +219,7 @@ static void look_at(factors *f, int n, int k) {
     for (i = 0; i < n; i++) {
         if (column[i] == 0.0) continue;
         where[i / BITS] |= (mask)1 << i % BITS;
+        f->last[i] = k;
         size += column[i] * column[i];
     }
     f->size[k] = size;
@@ -273,12 +276,22 @@ static void reflect_column(factors *f, int n, int k, int j, int sums) {
         f->size[j] += column[f->row[i]] * column[f->row[i]];
 }
 
+/* Behind the last column that meets reflection k: it may have elements in all of its rows then. */
+static int reach_of(factors *f, int n, int k) {
+    const int *rows = f->moved + k * n;
+    int end = k + 1, i;
+    for (i = 0; i < f->count[k]; i++)
+        if (f->last[rows[i]] >= end) end = f->last[rows[i]] + 1;
+    for (i = 0; i < f->count[k]; i++) f->last[rows[i]] = end - 1;
+    return end;
+}
+
 /* A (n, m) = Q R up to a rank, or until what remains is shorter than a part of the first one; the rank.
  * The longest remaining column is next. Of many that are all needed it is the first: in their order
  * those of a chain of loops have reflections of few rows. */
 static int factorize(factors *f, int n, int m, int rank, double least) {
     double first = 0.0;
-    int i, j, k, in_order = m > MANY && rank == m && least == 0.0;
+    int i, j, k, end, in_order = m > MANY && rank == m && least == 0.0;
     for (i = 0; i < n; i++) f->row[i] = i;
     for (j = 0; j < m; j++) {
         f->order[j] = j;
@@ -292,7 +305,8 @@ static int factorize(factors *f, int n, int m, int rank, double least) {
         if (f->size[longest] < least * least * first) return k;
         if (longest != k) exchange(f, n, k, longest);
         make_reflection(f, n, k, m > MANY);
-        for (j = k + 1; j < m; j++) reflect_column(f, n, k, j, !in_order);
+        end = in_order ? reach_of(f, n, k) : m;
+        for (j = k + 1; j < end; j++) reflect_column(f, n, k, j, !in_order);
     }
     return rank;
 }
@@ -878,8 +892,11 @@ static void square(const passage *g, const passage_rows *rows, int transposed, d
 
 /* The side of the singular configuration on which a point is, by the sign of a determinant. */
 static int side_of(const passage *g, const passage_rows *rows) {
+    int n = g->size.nv, rank = g->base.rank, j, k;
     square(g, rows, 0, g->K);
-    return eliminate(g->K, g->size.nv, NULL, 0);
+    for (j = 0; j < n && rank > MANY; j++) /* rows that touch all joints are to be the last pivots */
+        for (k = rank; k < n; k++) g->K[j * n + k] *= LIGHT;
+    return eliminate(g->K, n, NULL, 0);
 }
 
 /* How far the rows are from holding where they are dependent: what of them no move of the positions
@@ -1254,7 +1271,8 @@ static int *lay_numbers(factors *f, size_t n, size_t m, int *numbers) {
     f->order = numbers;
     f->row = f->order + m;
     f->count = f->row + n;
-    f->moved = f->count + n;
+    f->last = f->count + n;
+    f->moved = f->last + n;
     return f->moved + n * n;
 }
 
@@ -1320,7 +1338,7 @@ passage *passage_new(stepper *s, const passage_size *size, const passage_model *
     g->model = *model;
     g->memory = memory;
     g->block = calloc(lay(g, NULL), sizeof *g->block);
-    g->numbers = calloc(2 * (m + nv * (nv + 2)) + rows + nq * (nq + 2) + 1, sizeof *g->numbers);
+    g->numbers = calloc(2 * (m + nv * (nv + 3)) + rows + nq * (nq + 3) + 1, sizeof *g->numbers);
     if (!g->block || !g->numbers) {
         passage_free(g);
         return NULL;

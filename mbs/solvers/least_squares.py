@@ -45,7 +45,8 @@ def smallest_solution(A: Array, b: Array, gap: float) -> Array:
             dependent.
     """
     if (library := _library()) is not None:
-        A, b, x = np.ascontiguousarray(A), np.ascontiguousarray(b), np.empty(A.shape[1])
+        A, b = (np.ascontiguousarray(given, dtype=float) for given in (A, b))
+        x = np.empty(A.shape[1])
         if library.mbs_smallest_solution(*A.shape, _at(A), _at(b), gap, _at(x)):
             raise MemoryError(f"no memory is left for {A.shape} equations")
         return x

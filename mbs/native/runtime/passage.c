@@ -66,8 +66,8 @@ typedef unsigned long long mask;
 #define BITS 64
 #define WORDS(n) (((n) + BITS - 1) / BITS)
 
-/* A (n, m) = Q R by reflections, each of the rows alone in which its column has elements: rows of loops
- * touch few joints. */
+/* A (n, m) = Q R by reflections, each of the rows alone in which its column has elements: rows of
+ * loops touch few joints. */
 typedef struct {
     double *A, *weight;  /* columns of R */
     double *tails;       /* what reflection k is made of, from k n on, */
@@ -76,7 +76,7 @@ typedef struct {
     int *row;            /* and its row k in row[k]; the rows that no reflection has come last */
     double *size;        /* squares of what is left of columns, in that order, */
     mask *where;         /* and the rows in which they may have elements, WORDS(n) for each */
-    int *last;           /* of columns in their order, the last one that may have an element in a row */
+    int *last;           /* the last column that may have an element in a row, in their order */
 } factors;
 
 /* Rows and forces at a point, and the tangents there. */
@@ -238,8 +238,8 @@ static void exchange(factors *f, int n, int k, int j) {
     }
 }
 
-/* Column k of R becomes what its reflection leaves, an element in the next row; of many columns, in the
- * first row where it has one. */
+/* Column k of R becomes what its reflection leaves, an element in the next row; of many columns,
+ * in the first row where it has one. */
 static void make_reflection(factors *f, int n, int k, int many) {
     double *column = f->A + f->order[k] * n, *tail = f->tails + k * n;
     mask *where = f->where + k * WORDS(n);
@@ -259,8 +259,8 @@ static void make_reflection(factors *f, int n, int k, int many) {
     f->row[k] = rows[0];
 }
 
-/* The column at place j after reflection k: where they meet its rows may have elements now, but row k
- * is done. What is left of it is summed where somebody asks for it. */
+/* The column at place j after reflection k: where they meet its rows may have elements now, but
+ * row k is done. What is left of it is summed where somebody asks for it. */
 static void reflect_column(factors *f, int n, int k, int j, int sums) {
     int i, words = WORDS(n), done = f->row[k];
     mask *where = f->where + j * words;
@@ -286,9 +286,9 @@ static int reach_of(factors *f, int n, int k) {
     return end;
 }
 
-/* A (n, m) = Q R up to a rank, or until what remains is shorter than a part of the first one; the rank.
- * The longest remaining column is next. Of many that are all needed it is the first: in their order
- * those of a chain of loops have reflections of few rows. */
+/* A (n, m) = Q R up to a rank, or until what remains is shorter than a part of the first column; the
+ * rank. The longest remaining column is next. Of many that are all needed it is the first: in
+ * their order those of a chain of loops have reflections of few rows. */
 static int factorize(factors *f, int n, int m, int rank, double least) {
     double first = 0.0;
     int i, j, k, end, in_order = m > MANY && rank == m && least == 0.0;
@@ -500,8 +500,8 @@ static int newton_step(passage *g, int rows, double *r) {
     return 0;
 }
 
-/* The same where there are as many rows as positions: on the rows of the loops, which touch few joints
- * each, then along them by the last rows of K, those of xi, which touch all. */
+/* The same where there are as many rows as positions: onto the rows of the loops, which touch few
+ * joints each, then along them by the last rows of K, those of xi, which touch all. */
 static int sparse_newton_step(passage *g, double *r) {
     factors *f = &g->other;
     int n = g->size.nq, d = g->d, m = n - d, i, j, k;
@@ -854,8 +854,10 @@ static void error_of(const passage *g, double h, double *error) {
             move += T[k * nv + i] * e[k];
             error[nq + i] += T[k * nv + i] * e[d + k];
         }
-        for (j = 0; j < nq && nq > nv; j++) error[j] += N[i * nq + j] * move;
-        if (nq == nv) error[i] += move;
+        if (nq == nv)
+            error[i] += move;
+        else
+            for (j = 0; j < nq; j++) error[j] += N[i * nq + j] * move;
     }
     memcpy(error + nq + nv, e + 2 * d, sizeof(double) * (size_t)nz);
 }
@@ -883,9 +885,11 @@ static void square(const passage *g, const passage_rows *rows, int transposed, d
             double value = 0.0;
             if (k < g->base.rank)
                 value = rows->J[j * m + g->base.qr.order[k]];
+            else if (nq == nv)
+                value = g->C[j * g->d + k - g->base.rank];
             else
-                for (i = nq == nv ? j : 0; i < (nq == nv ? j + 1 : nq); i++)
-                    value += g->C[i * g->d + k - g->base.rank] * (nq == nv ? 1.0 : rows->N[j * nq + i]);
+                for (i = 0; i < nq; i++)
+                    value += g->C[i * g->d + k - g->base.rank] * rows->N[j * nq + i];
             K[transposed ? k * nv + j : j * nv + k] = value;
         }
 }

@@ -16,7 +16,7 @@ from mbs.assembly.tree import norm_rows, quaternion_slices
 from mbs.errors import Unclosable
 from mbs.loops.closure import closure_rows, facing, position_rows, velocity_row_units
 from mbs.numbers import OnArrays, on_arrays
-from mbs.solvers.least_squares import MANY, Entries, Root, gauss_newton
+from mbs.solvers.least_squares import MANY, Entries, NewtonEquations, gauss_newton
 
 # What rows of a closure are measured by: lengths by the size of the mechanism, cosines as such.
 #
@@ -207,7 +207,7 @@ class Closing:
             return self._functions().values(_replace(start, free, x), self.p)[0].ravel()
 
         tolerance = TOLERANCE * self.sizes
-        compiled = self._functions().root.near(start, self.p, free, tolerance)
+        compiled = self._functions().newton.near(start, self.p, free, tolerance)
         if compiled is not None:
             found, root = compiled
             return Closed(found, root.residual, root.converged and self.faces(found))
@@ -266,7 +266,7 @@ class ClosingFunctions(NamedTuple):
         values: ``(q, p) -> r`` alone.
         facing: ``(q, p)``, positive where no axis is opposed.
         sizes: ``(p)``, the size of the mechanism and what each row is measured by.
-        root: the rows, to be solved in machine code.
+        newton: the rows, to be solved in machine code.
     """
 
     equations: OnArrays
@@ -275,7 +275,7 @@ class ClosingFunctions(NamedTuple):
     values: OnArrays
     facing: OnArrays
     sizes: OnArrays
-    root: Root
+    newton: NewtonEquations
 
 
 def closure_parameters(system: System, values: Mapping[str, float] | None = None) -> Vector:
@@ -312,7 +312,7 @@ def _functions(system: System) -> ClosingFunctions:
         values=on_arrays(values),
         facing=arrays("facing", [q, system.p], [facing(system, q)]),
         sizes=arrays("sizes", [system.p], [mechanism_size(system), sizes]),
-        root=Root(equations, values),
+        newton=NewtonEquations(equations, values),
     )
 
 

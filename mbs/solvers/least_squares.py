@@ -45,7 +45,8 @@ def smallest_solution(A: Array, b: Array, gap: float) -> Array:
             dependent.
     """
     if (library := _library()) is not None:
-        A, b, x = np.ascontiguousarray(A), np.ascontiguousarray(b), np.empty(A.shape[1])
+        A, b = (np.ascontiguousarray(given, dtype=float) for given in (A, b))
+        x = np.empty(A.shape[1])
         if library.mbs_smallest_solution(*A.shape, _at(A), _at(b), gap, _at(x)):
             raise MemoryError(f"no memory is left for {A.shape} equations")
         return x
@@ -141,7 +142,7 @@ def _compiled() -> ctypes.CDLL | None:
         return None
     pointer, integer, real = ctypes.c_void_p, ctypes.c_int, ctypes.c_double
     library.mbs_smallest_solution.argtypes = [integer, integer, pointer, pointer, real, pointer]
-    library.mbs_gauss_newton.argtypes = [ctypes.POINTER(_Equations), ctypes.POINTER(real)]
+    library.mbs_gauss_newton.argtypes = [ctypes.POINTER(_GaussNewton), ctypes.POINTER(real)]
     return library
 
 
@@ -152,7 +153,7 @@ def _at(array: NDArray[Any]) -> int:
 _EVALUATE = ctypes.CFUNCTYPE(ctypes.c_int)
 
 
-class _Equations(ctypes.Structure):
+class _GaussNewton(ctypes.Structure):
     """`least_squares` of `native/runtime/least_squares.h`."""
 
     _fields_ = (
@@ -320,7 +321,7 @@ def gauss_newton(
     return LeastSquaresResult(x, norm, bool((np.abs(r) <= tolerance).all()))
 
 
-class Root:
+class NewtonEquations:
     """Equations r(q, p) = 0 that are solved for some of q, again and again.
 
     What `gauss_newton` does with them is machine code, which calls their Functions by itself, for
@@ -335,7 +336,7 @@ class Root:
             values: `values(q, p) -> r`.
         """
         self._functions = equations, values
-        self._rooms: list[_Room] = []  # each is for one thread at a time
+        self._workspaces: list[_Workspace] = []  # each is for one thread at a time
 
     def near(
         self, q: Vector, p: Vector, free: Sequence[int], tolerance: Vector
@@ -355,15 +356,15 @@ class Root:
         if library is None:
             return None
         try:
-            room = self._rooms.pop()
+            workspace = self._workspaces.pop()
         except IndexError:
-            room = _Room(*self._functions)
-        found = room.solved(library, q, p, free, tolerance)
-        self._rooms.append(room)
+            workspace = _Workspace(*self._functions)
+        found = workspace.solved(library, q, p, free, tolerance)
+        self._workspaces.append(workspace)
         return found
 
 
-class _Room:
+class _Workspace:
     """Memory from which Functions read and in which they write, and what calls them there."""
 
     def __init__(self, equations: Function, values: Function) -> None:
@@ -404,7 +405,7 @@ class _Room:
         free: Sequence[int],
         tolerance: Vector,
     ) -> tuple[Vector, LeastSquaresResult]:
-        """What `Root.near` gives.
+        """What `NewtonEquations.near` gives.
 
         Args:
             library: the machine code.
@@ -421,7 +422,7 @@ class _Room:
         arrays: tuple[NDArray[Any], ...] = (self.q, self.r, self.e)
         arrays += (indices, self.row, self.column, limits)
         sizes = (len(q), len(self.r), len(free), len(self.e))
-        given = _Equations(*sizes, *map(_at, arrays), _RANK, _ITERATIONS, *self.calls)
+        given = _GaussNewton(*sizes, *map(_at, arrays), _RANK, _ITERATIONS, *self.calls)
         status = library.mbs_gauss_newton(ctypes.byref(given), ctypes.byref(residual))
         if (error := self.error) is not None:
             self.error = None

@@ -104,7 +104,7 @@ def test_a_miss_is_named_where_it_is_larger_than_rounding(monkeypatch):
 
 
 def test_the_rows_of_many_loops_in_their_order_lead_to_the_same_motion(monkeypatch):
-    """As if few were many: without pivots, by reflections of the rows where columns are not zero."""
+    """As if few were many: without pivots, by reflections of rows where columns are not zero."""
 
     def motion():
         system = mbs.robots.n_four_bar(4).assemble(active=["a0"])

@@ -8,7 +8,7 @@ from mbs.native import compiler_found
 from mbs.solvers import least_squares
 from mbs.solvers.least_squares import (
     Entries,
-    Root,
+    NewtonEquations,
     gauss_newton,
     plain_solution,
     smallest_solution,
@@ -181,7 +181,7 @@ def test_equations_that_fail_in_machine_code_say_so(monkeypatch):
     equations = casadi.Function("equations", [q, p], [q - 1, casadi.SX(1)])
     values, one = Broken(), np.ones(1)
     with pytest.raises(RuntimeError):
-        Root(equations, values).near(2 * one, one, [0], 1e-12 * one)
-    found = Root(equations, equations).near(2 * one, one, [0], 1e-12 * one)
+        NewtonEquations(equations, values).near(2 * one, one, [0], 1e-12 * one)
+    found = NewtonEquations(equations, equations).near(2 * one, one, [0], 1e-12 * one)
     assert found is not None
     assert found[0] == 1.0

@@ -23,9 +23,10 @@ typedef struct {
     int (*equations)(void), (*values)(void); /* r and e, r alone */
 } least_squares;
 
-/* Damped Gauss-Newton from q, which becomes the last iterate. */
+/* Failed: a function has no value, or memory is lacking. */
 enum { LEAST_SQUARES_OPEN, LEAST_SQUARES_CONVERGED, LEAST_SQUARES_FAILED };
 
+/* Damped Gauss-Newton from q, which becomes the last iterate; *residual: Euclidean norm there. */
 int mbs_gauss_newton(least_squares *s, double *residual);
 
 #endif

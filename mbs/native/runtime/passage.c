@@ -26,6 +26,7 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
 /* Rows beyond which the fill of pivots costs more than they tell: the last pivot is nearer to the
  * smallest singular value than the smallest of pivots in order, by a factor of two. */
 #define MANY 32
+#define LIGHT 1e-6 /* part of rows that count less; smaller ones would come behind dependent rows */
 #define LAST_MOVE 1e-9  /* after a move this small the next one is rounding */
 /* Part of the velocities, or of what they make of a step, by which a state may differ from where the
  * velocities and accelerations of the stages lead. What error control lets pass is a hundredth of it;
@@ -65,8 +66,8 @@ typedef unsigned long long mask;
 #define BITS 64
 #define WORDS(n) (((n) + BITS - 1) / BITS)
 
-/* A (n, m) = Q R by reflections, each of the rows alone in which its column has elements: rows of loops
- * touch few joints. */
+/* A (n, m) = Q R by reflections, each of the rows alone in which its column has elements: rows of
+ * loops touch few joints. */
 typedef struct {
     double *A, *weight;  /* columns of R */
     double *tails;       /* what reflection k is made of, from k n on, */
@@ -75,6 +76,7 @@ typedef struct {
     int *row;            /* and its row k in row[k]; the rows that no reflection has come last */
     double *size;        /* squares of what is left of columns, in that order, */
     mask *where;         /* and the rows in which they may have elements, WORDS(n) for each */
+    int *last;           /* the last column that may have an element in a row, in their order */
 } factors;
 
 /* Rows and forces at a point, and the tangents there. */
@@ -217,6 +219,7 @@ static void look_at(factors *f, int n, int k) {
     for (i = 0; i < n; i++) {
         if (column[i] == 0.0) continue;
         where[i / BITS] |= (mask)1 << i % BITS;
+        f->last[i] = k;
         size += column[i] * column[i];
     }
     f->size[k] = size;
@@ -235,8 +238,8 @@ static void exchange(factors *f, int n, int k, int j) {
     }
 }
 
-/* Column k of R becomes what its reflection leaves, an element in the next row; of many columns, in the
- * first row where it has one. */
+/* Column k of R becomes what its reflection leaves, an element in the next row; of many columns,
+ * in the first row where it has one. */
 static void make_reflection(factors *f, int n, int k, int many) {
     double *column = f->A + f->order[k] * n, *tail = f->tails + k * n;
     mask *where = f->where + k * WORDS(n);
@@ -256,8 +259,8 @@ static void make_reflection(factors *f, int n, int k, int many) {
     f->row[k] = rows[0];
 }
 
-/* The column at place j after reflection k: where they meet its rows may have elements now, but row k
- * is done. What is left of it is summed where somebody asks for it. */
+/* The column at place j after reflection k: where they meet its rows may have elements now, but
+ * row k is done. What is left of it is summed where somebody asks for it. */
 static void reflect_column(factors *f, int n, int k, int j, int sums) {
     int i, words = WORDS(n), done = f->row[k];
     mask *where = f->where + j * words;
@@ -273,12 +276,22 @@ static void reflect_column(factors *f, int n, int k, int j, int sums) {
         f->size[j] += column[f->row[i]] * column[f->row[i]];
 }
 
-/* A (n, m) = Q R up to a rank, or until what remains is shorter than a part of the first one; the rank.
- * The longest remaining column is next. Of many that are all needed it is the first: in their order
- * those of a chain of loops have reflections of few rows. */
+/* Behind the last column that meets reflection k: it may have elements in all of its rows then. */
+static int reach_of(factors *f, int n, int k) {
+    const int *rows = f->moved + k * n;
+    int end = k + 1, i;
+    for (i = 0; i < f->count[k]; i++)
+        if (f->last[rows[i]] >= end) end = f->last[rows[i]] + 1;
+    for (i = 0; i < f->count[k]; i++) f->last[rows[i]] = end - 1;
+    return end;
+}
+
+/* A (n, m) = Q R up to a rank, or until what remains is shorter than a part of the first column; the
+ * rank. The longest remaining column is next. Of many that are all needed it is the first: in
+ * their order those of a chain of loops have reflections of few rows. */
 static int factorize(factors *f, int n, int m, int rank, double least) {
     double first = 0.0;
-    int i, j, k, in_order = m > MANY && rank == m && least == 0.0;
+    int i, j, k, end, in_order = m > MANY && rank == m && least == 0.0;
     for (i = 0; i < n; i++) f->row[i] = i;
     for (j = 0; j < m; j++) {
         f->order[j] = j;
@@ -292,7 +305,8 @@ static int factorize(factors *f, int n, int m, int rank, double least) {
         if (f->size[longest] < least * least * first) return k;
         if (longest != k) exchange(f, n, k, longest);
         make_reflection(f, n, k, m > MANY);
-        for (j = k + 1; j < m; j++) reflect_column(f, n, k, j, !in_order);
+        end = in_order ? reach_of(f, n, k) : m;
+        for (j = k + 1; j < end; j++) reflect_column(f, n, k, j, !in_order);
     }
     return rank;
 }
@@ -486,8 +500,8 @@ static int newton_step(passage *g, int rows, double *r) {
     return 0;
 }
 
-/* The same where there are as many rows as positions: on the rows of the loops, which touch few joints
- * each, then along them by the last rows of K, those of xi, which touch all. */
+/* The same where there are as many rows as positions: onto the rows of the loops, which touch few
+ * joints each, then along them by the last rows of K, those of xi, which touch all. */
 static int sparse_newton_step(passage *g, double *r) {
     factors *f = &g->other;
     int n = g->size.nq, d = g->d, m = n - d, i, j, k;
@@ -840,8 +854,10 @@ static void error_of(const passage *g, double h, double *error) {
             move += T[k * nv + i] * e[k];
             error[nq + i] += T[k * nv + i] * e[d + k];
         }
-        for (j = 0; j < nq && nq > nv; j++) error[j] += N[i * nq + j] * move;
-        if (nq == nv) error[i] += move;
+        if (nq == nv)
+            error[i] += move;
+        else
+            for (j = 0; j < nq; j++) error[j] += N[i * nq + j] * move;
     }
     memcpy(error + nq + nv, e + 2 * d, sizeof(double) * (size_t)nz);
 }
@@ -869,17 +885,22 @@ static void square(const passage *g, const passage_rows *rows, int transposed, d
             double value = 0.0;
             if (k < g->base.rank)
                 value = rows->J[j * m + g->base.qr.order[k]];
+            else if (nq == nv)
+                value = g->C[j * g->d + k - g->base.rank];
             else
-                for (i = nq == nv ? j : 0; i < (nq == nv ? j + 1 : nq); i++)
-                    value += g->C[i * g->d + k - g->base.rank] * (nq == nv ? 1.0 : rows->N[j * nq + i]);
+                for (i = 0; i < nq; i++)
+                    value += g->C[i * g->d + k - g->base.rank] * rows->N[j * nq + i];
             K[transposed ? k * nv + j : j * nv + k] = value;
         }
 }
 
 /* The side of the singular configuration on which a point is, by the sign of a determinant. */
 static int side_of(const passage *g, const passage_rows *rows) {
+    int n = g->size.nv, rank = g->base.rank, j, k;
     square(g, rows, 0, g->K);
-    return eliminate(g->K, g->size.nv, NULL, 0);
+    for (j = 0; j < n && rank > MANY; j++) /* rows that touch all joints are to be the last pivots */
+        for (k = rank; k < n; k++) g->K[j * n + k] *= LIGHT;
+    return eliminate(g->K, n, NULL, 0);
 }
 
 /* How far the rows are from holding where they are dependent: what of them no move of the positions
@@ -1254,7 +1275,8 @@ static int *lay_numbers(factors *f, size_t n, size_t m, int *numbers) {
     f->order = numbers;
     f->row = f->order + m;
     f->count = f->row + n;
-    f->moved = f->count + n;
+    f->last = f->count + n;
+    f->moved = f->last + n;
     return f->moved + n * n;
 }
 
@@ -1320,7 +1342,7 @@ passage *passage_new(stepper *s, const passage_size *size, const passage_model *
     g->model = *model;
     g->memory = memory;
     g->block = calloc(lay(g, NULL), sizeof *g->block);
-    g->numbers = calloc(2 * (m + nv * (nv + 2)) + rows + nq * (nq + 2) + 1, sizeof *g->numbers);
+    g->numbers = calloc(2 * (m + nv * (nv + 3)) + rows + nq * (nq + 3) + 1, sizeof *g->numbers);
     if (!g->block || !g->numbers) {
         passage_free(g);
         return NULL;

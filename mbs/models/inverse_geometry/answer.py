@@ -113,7 +113,22 @@ def roots(
         if _on(target, found, k, [m for m in alone if m not in dropped]):
             dropped.add(k)
         dropped |= _on(target, found, k, [m for m in unsettled if m != k])
-    return _merged_again(target, [root for k, root in enumerate(found) if k not in dropped])
+    left = [root for k, root in enumerate(found) if k not in dropped]
+    return _merged_again(target, _without_points(target, left))
+
+
+def _without_points(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
+    """Without the solutions that are configurations of a self-motion among them.
+
+    Whether a solution is found to be one of a self-motion, or of its own, rounding decides where
+    the self-motion is one but for the tolerance; on which one it lies does not depend on that.
+    """
+    alone = [m for m, root in enumerate(found) if root.family is None]
+    points = set[int]()
+    for k, root in enumerate(found):
+        if root.family is not None:
+            points |= _on(target, found, k, [m for m in alone if m not in points])
+    return [root for m, root in enumerate(found) if m not in points]
 
 
 def new_among(target: Target, found: list[ChainRoot], more: Gathered) -> Gathered:

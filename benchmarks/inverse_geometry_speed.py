@@ -82,7 +82,9 @@ def _contenders(robot: str) -> dict[str, Contender]:
     solved, single = solver(system), [pose.copy() for pose in T[:200]]
     found = {
         "solve_many": Contender("solve_many", lambda: solve_many(system, T), _MOST),
-        "solve": Contender("solve", lambda: [solve(system, pose) for pose in T[:4]], 4),
+        "solve": Contender(
+            "solve", lambda: [solve(system, pose).q for pose in single], len(single)
+        ),
         "solver": Contender(
             "solver", lambda: [solved(pose).labels for pose in single], len(single)
         ),

@@ -30,6 +30,7 @@ _ONE_ROOT = 1e-6
 """Distance [rad or arm lengths] from the middle of meeting roots up to which they count as one; a
 solution that is farther from it stands for itself, however little the forward model tells it
 from its neighbour."""
+_MOST_ROOTS = 16  # of six joints; fewer joints have fewer
 _EXACT = 0.02
 """Part of the tolerance of solutions, 2e-14 of the length, that rounding leaves: a singular root at
 which no others meet, and that misses by more, is not certain to be isolated."""
@@ -44,12 +45,16 @@ class ChainRoot:
         label: of the branch it comes from, "" where it comes from none.
         multiplicity: how many roots meet in it, 0 on a self-motion.
         family: the self-motion that it stands for.
+        branches: of a closed form that meet in it.
+        at_most: whether the multiplicity is an upper bound.
     """
 
     q: Array
     label: str
     multiplicity: int
     family: Family | None = None
+    branches: frozenset[str] = frozenset()
+    at_most: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,7 +98,7 @@ def roots(
         if key not in known:
             known[key] = _examine(target, found[k], chain)
         root, settled = known[key]
-        found[k] = replace(root, label=found[k].label)
+        found[k] = replace(root, label=found[k].label, branches=found[k].branches)
         if not settled:
             unsettled.append(k)
         dropped |= _on(target, found, k, [m for m in singular if m > k])
@@ -108,7 +113,22 @@ def roots(
         if _on(target, found, k, [m for m in alone if m not in dropped]):
             dropped.add(k)
         dropped |= _on(target, found, k, [m for m in unsettled if m != k])
-    return _merged_again(target, [root for k, root in enumerate(found) if k not in dropped])
+    left = [root for k, root in enumerate(found) if k not in dropped]
+    return _merged_again(target, _without_points(target, left))
+
+
+def _without_points(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
+    """Without the solutions that are configurations of a self-motion among them.
+
+    Whether a solution is found to be one of a self-motion, or of its own, rounding decides where
+    the self-motion is one but for the tolerance; on which one it lies does not depend on that.
+    """
+    alone = [m for m, root in enumerate(found) if root.family is None]
+    points = set[int]()
+    for k, root in enumerate(found):
+        if root.family is not None:
+            points |= _on(target, found, k, [m for m in alone if m not in points])
+    return [root for m, root in enumerate(found) if m not in points]
 
 
 def new_among(target: Target, found: list[ChainRoot], more: Gathered) -> Gathered:
@@ -138,7 +158,8 @@ def _merge(target: Target, gathered: Gathered) -> list[ChainRoot]:
         # a branch of a closed form first, then the better one
         best = min(group, key=lambda k: (not gathered.labels[k], float(residual[k])))
         label = next((gathered.labels[k] for k in group if gathered.labels[k]), "")
-        found.append(ChainRoot(gathered.q[best], label, 1))
+        branches = frozenset(gathered.labels[k] for k in group) - {""}
+        found.append(ChainRoot(gathered.q[best], label, 1, branches=branches))
     return found
 
 
@@ -176,14 +197,16 @@ def _isolate(target: Target, root: ChainRoot) -> tuple[ChainRoot, bool]:
     q, count = root.q, 1
     inexact = float(target.residual(q)) >= _EXACT * target.tolerance
     for _ in range(_REFINEMENTS):
-        count, better = multiplicity(reduction(target, q))
+        count, better, exact = multiplicity(reduction(target, q))
+        if not exact:
+            return replace(root, multiplicity=count, at_most=True), False
         moved = float(np.max(np.abs(target.wrapped((better - q) / target.unit))))
         if count > 1 and not inexact and _distance(target, better, root.q) > _ONE_ROOT:
             return replace(root, multiplicity=1), True
         q = better
         if moved < _SETTLED:
-            exact = count > 1 or float(target.residual(q)) < _EXACT * target.tolerance
-            return replace(root, q=q, multiplicity=count), exact
+            settled = count > 1 or float(target.residual(q)) < _EXACT * target.tolerance
+            return replace(root, q=q, multiplicity=count), settled
     return replace(root, q=q, multiplicity=count), False
 
 
@@ -203,10 +226,20 @@ def _on(target: Target, found: list[ChainRoot], k: int, others: list[int]) -> se
 
 
 def _merged_again(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
-    """Without the copies of a multiple root that were moved to its middle."""
+    """Without the copies of a multiple root that were moved to its middle.
+
+    Of a closed form as many roots meet as branches do, at most; a branch has no other root.
+    """
     q = np.array([root.q for root in found]).reshape(len(found), target.arm.size)
-    branches = [root.label for root in found]
-    return [found[group[0]] for group in distinct(target, q, branches)]
+    closed_form = any(root.branches for root in found)
+    result = []
+    for group in distinct(target, q, [root.label for root in found]):
+        root, met = found[group[0]], frozenset[str]().union(*(found[k].branches for k in group))
+        if met or root.at_most:
+            most = max(1, len(met)) if closed_form else _MOST_ROOTS
+            root = replace(root, multiplicity=min(root.multiplicity, most))
+        result.append(root)
+    return result
 
 
 # From the solutions of a chain to those of the robot: names of branches, loops, reasons.

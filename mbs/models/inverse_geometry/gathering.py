@@ -140,8 +140,11 @@ def along_valleys(target: Target, gathered: Gathered) -> Gathered:
     """What was gathered, and the solutions along the motions that singular ones nearly allow."""
     if not len(gathered.q) or target.arm.size != 6:
         return gathered
-    singular = target.singular_values(gathered.q)[:, -1] < SINGULAR
+    s = target.singular_values(gathered.q)
+    singular, twice = s[:, -1] < SINGULAR, s[:, -2] < SINGULAR
     found = _far_ends(target, gathered.q[singular] / target.unit) if np.any(singular) else []
+    if np.any(twice):
+        found += _around(target, gathered.q[twice] / target.unit)
     if not found:
         return gathered
     q = wrapped(target.arm, np.concatenate(found) * target.unit)
@@ -167,6 +170,57 @@ def _far_ends(target: Target, start: Array) -> list[Array]:
         if not len(valley.x):
             break
     return found
+
+
+_FREE = 0.3
+"""Part of a joint in a direction that leaves the frame, from which on the joint leads along it."""
+
+
+def _around(target: Target, start: Array) -> list[Array]:
+    """Solutions x, (k, 6), along the turn of a joint, from where two singular configurations meet.
+
+    No direction of the smallest singular value leads on there, but the joint does that nearly turns
+    alone; where the arm comes nearest to the pose on the way, a solution may lie.
+    """
+    null = np.linalg.svd(target.excess(start)[1])[2][:, -2:]
+    leads = (np.max(np.abs(null), axis=1) > _FREE) & ~target.arm.prismatic
+    rows, joints = np.nonzero(leads)
+    if not len(rows):
+        return []
+    x, held = start[rows], np.eye(6)[joints]
+    every = [x]
+    for _ in range(_STEPS_ALONG):
+        guess = every[-1] + _ALONG * held
+        every.append(target.corrected(guess, held[:, None], np.sum(held * guess, axis=1)[:, None]))
+    points = np.array(every)
+    residual = target.residual(points * target.unit)
+    lowest = (residual[1:-1] < residual[:-2]) & (residual[1:-1] < residual[2:])
+    lowest &= residual[1:-1] < _NEARLY_MOVES * max(1.0, target.arm.length)
+    step, row = np.nonzero(lowest)
+    if not len(step):
+        return []
+    after = residual[step + 2, row] < residual[step, row]
+    other = points[np.where(after, step + 2, step), row]
+    return [_nearest_between(target, points[step + 1, row], other, held[row])]
+
+
+def _nearest_between(target: Target, x: Array, other: Array, held: Array) -> Array:
+    """(m, 6) where all equations hold, near points x of which they nearly do and others, (m, 6).
+
+    By secants in the position of one joint: the equations are nearly linear in it.
+    """
+    best, least = x, target.residual(x * target.unit)
+    for _ in range(_CROSSINGS):
+        e, slope = (target.excess(point)[0] for point in (x, other))
+        slope = slope - e
+        size = np.maximum(np.sum(slope * slope, axis=1), NONZERO)
+        part = np.clip(-np.sum(e * slope, axis=1) / size, -1.0, 2.0)
+        guess = x + part[:, None] * (other - x)
+        x, other = target.corrected(guess, held[:, None], np.sum(held * guess, axis=1)[:, None]), x
+        residual = target.residual(x * target.unit)
+        best = np.where((residual < least)[:, None], x, best)
+        least = np.fmin(residual, least)
+    return best
 
 
 class _Valley(NamedTuple):

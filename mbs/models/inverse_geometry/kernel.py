@@ -86,14 +86,31 @@ class PoseKernel:
                 self._code = _pose_code(self.chain, self.p, self._solves)
             return self._code
 
-    def draft(self, T: Any) -> PoseDraft | None:
+    def draft(self, T: Array) -> PoseDraft:
+        """The solutions for a rigid transform T, (4, 4); rounded again it would be another."""
+        return self._by_code(T) or self._by_arrays(T)
+
+    def draft_of(self, T: Any) -> PoseDraft | None:
         """The solutions for a pose (4, 4) of any type; None where it is no rigid transform."""
+        draft = self._by_code(T)
+        if draft is not None:
+            return draft
+        library, numbers = core.core_of(self.arm), pose_numbers(T)
+        if numbers is None or numbers.shape != (4, 4):
+            return None
+        if library is not None:
+            pose = core.rounded_by(library, numbers)
+            return None if pose is None else self._by_arrays(pose)
+        pose, good = rounded(numbers)
+        return self._by_arrays(pose) if good else None
+
+    def _by_code(self, T: Any) -> PoseDraft | None:
+        """From one compiled call; None where there is none, or it does not take the pose."""
         self._asked += 1
         code = self._code
         if code is None and (isinstance(self._solves, General) or self._asked > MANY):
             code = self.code()  # of the general method nothing is compiled but the core
-        draft = None if code is None else self._read(code.call(T, code.solver))
-        return draft or self._by_arrays(T)
+        return None if code is None else self._read(code.call(T, code.solver))
 
     def _read(self, found: Any) -> PoseDraft | None:
         """What the compiled call gave; None where it does not take the pose."""
@@ -107,21 +124,15 @@ class PoseKernel:
         own = q.T[:m] if self._plain else q.T[:m, self._indices]
         return PoseDraft(own, residual[:m], branch[:m].astype(int), state == CERTAIN)
 
-    def _by_arrays(self, T: Any) -> PoseDraft | None:
+    def _by_arrays(self, T: Array) -> PoseDraft:
         """Without machine code of the closed form."""
-        library, numbers = core.core_of(self.arm), pose_numbers(T)
-        if numbers is None or numbers.shape != (4, 4):
-            return None
+        library = core.core_of(self.arm)
         if library is not None and isinstance(self._solves, StepSequence):
-            own = core.rounded_by(library, numbers)
-            return None if own is None else self._settled(library, own, self._solves)
-        pose, good = rounded(numbers)
-        if not good:
-            return None
+            return self._settled(library, T, self._solves)
         if isinstance(self._solves, General):
-            draft = general_draft(self._solves, pose[None])
+            draft = general_draft(self._solves, T[None])
         else:
-            draft = draft_solutions(self.chain, self._solves, self.p, pose[None], np.zeros((1, 0)))
+            draft = draft_solutions(self.chain, self._solves, self.p, T[None], np.zeros((1, 0)))
         valid = np.flatnonzero(draft.valid[0])
         q = draft.q[0, valid]
         turned = np.where(self.arm.prismatic | (np.abs(q) <= np.pi), q, self.arm.wrapped(q))

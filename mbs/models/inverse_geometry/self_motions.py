@@ -251,6 +251,9 @@ _MOVES = 1e-6
 moves: points of a curve are solved to 1e-12, of singular ones to the root of it."""
 _SAME = 1e-6
 """Distance [rad or arm lengths] from a curve of configurations that belong to it, likewise."""
+_AS_NEAR = 1e-3
+"""Difference of distances [rad or arm lengths] of samples that are as near: the ends of a curve are
+known to 1e-5, the root of the tolerance over the curvature, and samples are 0.1 apart."""
 _REFINEMENTS = 5
 _COMPARABLE = 0.5
 """Part of the widest motion from which a joint nearer the base is the free one."""
@@ -307,10 +310,17 @@ class Family:
         return next(iter(self.configurations_from(value))) if q is None else q
 
     def configurations_from(self, value: float) -> Array:
-        """The samples of the chain (k, n), those whose free joint is near a value first."""
+        """The samples of the chain (k, n), those whose free joint is near a value first.
+
+        Of those that are as near on either side, such as both ends of half a turn, the ones
+        beyond the value come first, not those that rounding brings nearer.
+        """
         motion = self._motion
         away = motion.target.wrapped(self._motion.curve.x - value / motion.target.unit)
-        order = np.argsort(np.abs(away[:, motion.free]), kind="stable")
+        ahead = away[:, motion.free]
+        size = np.abs(ahead)
+        as_near = size <= np.min(size) + _AS_NEAR
+        order = np.lexsort((size, as_near & (ahead < 0), ~as_near))
         return np.asarray((motion.curve.x * motion.target.unit)[order])
 
     def contains(self, q: Array) -> bool:

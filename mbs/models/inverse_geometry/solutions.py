@@ -187,7 +187,7 @@ class Solution:
         sigma_min: smallest singular value of the Jacobian of the joints that were solved for,
             lengths divided by the arm's length; zero at a singular configuration.
         multiplicity: how many roots meet in it; 1 but at a singular configuration, 0 where it is
-            one of a self-motion.
+            one of a self-motion; an upper bound where two singular configurations meet.
         within_limits: whether every joint is within its limits.
         family: the self-motion that it stands for, or None.
     """

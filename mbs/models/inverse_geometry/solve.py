@@ -131,7 +131,7 @@ class _Shell:
     def solutions(self, T: Any, seed: Seed) -> Solutions | None:
         """The solutions of a regular pose; None where they are found, or not found, otherwise."""
         kernel, wishes = self.kernel, self.plain
-        draft = kernel.draft(T)
+        draft = kernel.draft_of(T)
         if draft is None or not draft.certain or not len(draft.q):
             return None
         if seed is not None:

@@ -293,20 +293,22 @@ def reduction(target: Target, q: Array) -> TargetReduction:
     return TargetReduction(target, x, U[:, rank:], U[:, :rank], Vt[rank:].T, following)
 
 
-def multiplicity(reduced: TargetReduction) -> tuple[int, Array]:
+def multiplicity(reduced: TargetReduction) -> tuple[int, Array, bool]:
     """How many roots meet in an isolated solution, and where.
 
     Args:
         reduced: the equations near it.
 
     Returns:
-        the number of roots, and the configuration q (n,) [rad or m] in their middle.
+        the number of roots, the configuration q (n,) [rad or m] in their middle, and whether both
+        are certain: where two singular configurations nearly meet, terms that are nearly zero
+        decide, and the number is an upper bound.
     """
     if reduced.corank == 0:
-        return 1, reduced.x * reduced.target.unit
+        return 1, reduced.x * reduced.target.unit, True
     if reduced.corank == 1:
-        return _order(reduced)
-    return _dual_dimension(reduced), reduced.x * reduced.target.unit
+        return *_order(reduced), True
+    return _dual_dimension(reduced), reduced.x * reduced.target.unit, False
 
 
 def _order(reduced: TargetReduction) -> tuple[int, Array]:

@@ -34,7 +34,7 @@ def test_a_regular_configuration_counts_once():
 @pytest.mark.parametrize("q2", [0.0, math.pi])
 def test_two_elbows_meet_in_a_straight_or_folded_arm(q2):
     q = [0.3, q2, -0.4]
-    count, middle = counted(planar(0.5, 0.4, 0.3), q)
+    count, middle, _ = counted(planar(0.5, 0.4, 0.3), q)
     assert count == 2
     assert np.max(np.abs(middle - q)) < 1e-9
 
@@ -43,7 +43,7 @@ def test_an_inexact_double_root_is_moved_to_its_middle():
     arm, exact = planar(0.5, 0.4, 0.3), np.array([0.3, 0.0, -0.4])
     target = Target(arm, arm.pose(exact))
     null = reduction(target, exact).null[:, 0]
-    count, middle = multiplicity(reduction(target, exact + 2e-7 * null))
+    count, middle, _ = multiplicity(reduction(target, exact + 2e-7 * null))
     assert count == 2
     assert np.max(np.abs(middle - exact)) < 1e-9
     assert target.residual(middle) < 1e-15

@@ -78,3 +78,33 @@ def test_two_branches_of_a_closed_form_are_told_apart_from_a_ten_millionth_on():
         near = [s for s in solve(system, arm.pose(q)) if distance(arm, s.q, q) < 1e-3]
         assert len(near) == count
         assert {s.multiplicity for s in near} == {3 - count}
+
+
+def test_two_ways_list_the_same_self_motions(monkeypatch):
+    """A configuration on a self-motion is not listed beside it, whichever is found first."""
+    T = plain("rx90").pose(near_singular("rx90", "wrist and elbow", 20))
+    compiled = solve(robot("rx90"), T)
+    monkeypatch.setattr(core, "compiler_found", lambda: False)
+    other = solve(robot("rx90"), T)
+    assert len(compiled) == len(other) == 4
+    assert all(s.family is not None for s in (*compiled, *other))
+    apart = [np.min(distance(plain("rx90"), other.q, q)) for q in compiled.q]
+    assert max(apart) < 1e-2  # ends of curves that are ones but for rounding
+
+
+def test_where_two_singular_configurations_meet_the_other_shoulder_is_found():
+    """The closed form has one side only; no direction of the null space leads to the other."""
+    q = near_singular("rx90", "elbow and shoulder", 3)
+    found = solve(robot("rx90"), plain("rx90").pose(q))
+    turned = np.mod(found.q[:, 0] - q[0] + 1, 2 * np.pi) - 1
+    assert np.sum(np.abs(turned) < 1e-2) == np.sum(np.abs(turned - np.pi) < 1e-2) == 2
+
+
+def test_a_branch_of_a_closed_form_is_one_root():
+    """Terms that nearly vanish had it counted four times."""
+    found = solve(robot("kr6"), plain("kr6").pose(near_singular("kr6", "elbow and shoulder", 8)))
+    assert [s.multiplicity for s in found] == [1] * 8
+    met = solve(
+        robot("puma560"), plain("puma560").pose(near_singular("puma560", "elbow and shoulder", 1))
+    )
+    assert sum(s.multiplicity for s in met) == 8

@@ -810,6 +810,9 @@ def _settled(led: Follower, x: Array, T: Array) -> Array | None:
     # what a singular configuration leaves free stays: to move it changes rounding alone
     y = gauss_newton(residual, x, rank_tolerance=SINGULAR).x
     most = _OFF if led.chain is None else SOLVED
+    # else by all that is left of its rank, or downhill
+    if missing(y) > most:
+        y = gauss_newton(residual, y).x
     if missing(y) > most:
         y = _descended(led, x, T)
     near = float(np.max(np.abs(y - x))) < _BESIDE
@@ -928,8 +931,8 @@ def _jump(led: Follower, x: Array, T: Array) -> str:
     behind = _nearest_solution(led, x, T)
     if led.redundant and behind is None and led.chain is not None:
         return (
-            "; no configuration beside it takes the pose behind, as what is redundant has no room"
-            " left; another redundancy or another start may lead past"
+            "; beside it no configuration was found for the pose behind, as where what is redundant"
+            " has no room left; another redundancy or another start may lead past"
         )
     if led.redundant or behind is None:
         return ""

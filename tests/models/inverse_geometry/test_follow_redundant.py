@@ -175,7 +175,7 @@ def test_where_redundant_joints_have_no_room_left_is_told(panda, arm):
     assert found.reached == 10
     where = "stopped between poses 10 and 11 of 21, at 0.501"
     assert found.reason.startswith(where)
-    assert "no configuration beside it takes the pose behind" in found.reason
+    assert "beside it no configuration was found for the pose behind" in found.reason
     assert "another redundancy or another start may lead past" in found.reason
     able = follow(panda, path, start, samples=21, limits=False, redundancy="manipulability")
     assert able.reason == ""

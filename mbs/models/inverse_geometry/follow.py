@@ -1394,10 +1394,10 @@ def follow(
     """The configurations along a path of poses, on the branch of the first one.
 
     Between two poses the frame is led along a straight line and turned about a fixed axis, in
-    steps so small that no other branch can be taken. Where the branch ends, or the joints can move
-    while the frame stays, it stops before; also where the path could go on beyond. Fewer than six
-    joints need poses that they can take; between these the frame is led as near to the line as they
-    can.
+    steps so small that no other branch can be taken; the poses of a function need not be straight.
+    Singular configurations are passed where the joints go on smoothly behind them; where they do
+    not, it stops before, and says where and why. Fewer than six joints need poses that they can
+    take; between these the frame is led as near to the line as they can.
 
     Args:
         system: open, or with closed loops, which stay closed in the way they are at the start.

@@ -245,7 +245,7 @@ def _merged_again(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
 # From the solutions of a chain to those of the robot: names of branches, loops, reasons.
 
 
-_NO_LOOP = "the loops stay open: the joints on the way to the frame reach the pose, the others not"
+NO_LOOP = "the loops stay open: the joints on the way to the frame reach the pose, the others not"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -299,7 +299,7 @@ def answer(question: Question, found: list[ChainRoot], method: str) -> Solutions
     drafts = _drafts(question, found)
     if why_searched(question.chain.system, question.chain) is not None:
         method += ", loops by search"
-    return question.wishes.solutions(drafts, method, "" if drafts else _NO_LOOP)
+    return question.wishes.solutions(drafts, method, "" if drafts else NO_LOOP)
 
 
 def _drafts(question: Question, found: list[ChainRoot]) -> list[RobotSolution]:

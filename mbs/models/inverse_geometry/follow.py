@@ -755,8 +755,6 @@ def _runs(led: Follower, poses: Path, number: int, known: Runs | None) -> Runs |
 # through the poses does.
 
 
-_TRAIL = 40
-"""Configurations on the way that are kept: from step to step the way left is halved."""
 _NEAREST = 1e-4
 """Of the way between two poses, before a singular configuration: rounding, magnified there, is
 still far below the way itself."""
@@ -793,181 +791,10 @@ _NEAR_STEPS = 3.0
 singular configuration, may vanish."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Leap:
-    """A way past a singular configuration.
-
-    Attributes:
-        x: (k, n) configurations at the next k poses.
-        u: number at which it ends; between two poses it is broken.
-        end: (n,) the configuration there.
-    """
-
-    x: Array
-    u: float
-    end: Array
-
-
-def _smooth_step(
-    led: Follower,
-    poses: Path,
-    curve: Callable[[float], Array],
-    runs: Runs,
-    found: Array,
-    number: int,
-) -> tuple[Array, float] | None:
-    """The configuration at the next pose, where joints go on smoothly there by a closed form.
-
-    Returns:
-        It and by how much it misses the pose; None where that is in doubt.
-    """
-    if number < 3:
-        return None
-    nodes, x = [float(k) for k in range(number - 3, number)], found[number - 3 : number]
-    predicted = _lagrange(nodes, x, float(number))
-    own = runs.nearest(number, predicted)
-    if own is None or _added(predicted, own[0], x[-1]) > _FAIR or not led.tracker.may(own[0]):
-        return None
-    nodes, x = [*nodes[1:], float(number)], np.vstack([x[1:], own[0]])
-    predicted = _lagrange(nodes, x, number + 1.0)
-    beyond = runs.nearest(number + 1, predicted)
-    if beyond is not None and _added(predicted, beyond[0], own[0]) <= _FAIR:
-        nodes, x = [*nodes, number + 1.0], np.vstack([x, beyond[0]])
-    return own if _is_fair(led, poses, curve, nodes, x, number, number) else None
-
-
-def _known(
-    tracker: Tracker, poses: Path, found: Array, number: int
-) -> list[tuple[float, PathPoint]]:
-    """The last poses up to a number."""
-    numbers = range(max(0, number - 2), number + 1)
-    return [(float(k), point_at(tracker, found[k], poses.poses[k])) for k in numbers]
-
-
-def _turns_off(tracker: Tracker, found: Array, number: int, point: PathPoint) -> bool:
-    """Whether a step next to a singular configuration is another one than those before lead to."""
-    if number < 2:
-        return False
-    first = max(0, number - 3)
-    known = found[first:number]
-    predicted = _lagrange(range(first, number), known, number)
-    before = float(np.linalg.norm(known[-1] - known[-2]))
-    if float(np.linalg.norm(point.x - predicted)) <= max(_TURN_OFF * before, _SMALL):
-        return False
-    longest = max(before, float(np.linalg.norm(point.x - known[-1])))
-    return smallest(tracker, point.J) < _NEAR_STEPS * longest
-
-
-def _leap(
-    led: Follower,
-    poses: Path,
-    curve: Callable[[float], Array],
-    trail: list[tuple[float, PathPoint]],
-    found: Array,
-    number: int,
-    stopped: bool,
-) -> Leap | None:
-    """The joints behind a singular configuration; None where they do not go on smoothly.
-
-    Args:
-        led: what follows.
-        poses: the path.
-        curve: the same as a function.
-        trail: the last configurations on the way.
-        found: (N, n) configurations at the poses before `number`.
-        number: of the next pose.
-        stopped: whether the way ends before it.
-    """
-    near = trail[-1][1]
-    if stopped and smallest(led.tracker, near.J) > _WATCHED:
-        return None
-    if poses.function is None and led.chain is not None:
-        between = _leap_between(led, poses, curve, trail, found, number, stopped)
-        if between is not None:
-            return between
-    if stopped:
-        return _leap_along(led, poses, curve, trail, number, _NEAREST)
-    if led.redundant and poses.function is not None:
-        singular = [smallest(led.tracker, point.J) for _, point in trail]
-        before = trail[: int(np.argmin(singular)) + 1]
-        return _leap_along(led, poses, curve, before, number, _LEAST_LEAP)
-    return None
-
-
-def _leap_along(
-    led: Follower,
-    poses: Path,
-    curve: Callable[[float], Array],
-    trail: list[tuple[float, PathPoint]],
-    number: int,
-    least: float,
-) -> Leap | None:
-    """Along the curve itself, from one side of the singular configuration to the other."""
-    tracker, at, end = led.tracker, trail[-1][0], float(poses.count - 1)
-    # lines between given poses have corners there
-    start = max(trail[0][0], number - 1.0 if poses.function is None else min(0.0, at - 1.0))
-    way, before = min((at - start) / 3, _LONGEST_LEAP), np.inf
-    while way > least:
-        nodes = [at - 3 * way, at - 2 * way, at - way]
-        x = [_configuration_at(tracker, curve, trail, u) for u in nodes]
-        if any(one is None for one in x):
-            return None
-        to = min(at + way, end)
-        predicted = _lagrange(nodes, np.array(x), to)
-        if to - at < _NEAREST:  # the path ends at the singular configuration
-            behind = _settled(led, predicted, poses.poses[-1])
-        else:
-            corrected = _correct(tracker, predicted, curve(to))
-            behind = None if corrected is None else corrected.x
-        ratio = np.inf
-        if behind is not None and tracker.may(behind):
-            ratio = _added(predicted, behind, np.asarray(x[-1]))
-        smooth = ratio < _FAIR and ratio < max(_LITTLE, _SMOOTH * before)
-        if behind is not None and smooth and _goes_across(led, np.asarray(x[-1]), behind):
-            every = np.array([*x, behind])
-            numbers = range(number, math.floor(to) + 1)
-            passed = _passed(led, poses, [*nodes, to], every, numbers)
-            return None if passed is None else Leap(passed, to, behind)
-        way, before = way / 2, ratio if ratio < _FAIR else 1.0
-    return None
-
-
 def _added(predicted: Array, found: Array, last: Array) -> float:
     """What was added to a prediction, relative to the way."""
     way = max(float(np.linalg.norm(found - last)), NONZERO)
     return float(np.linalg.norm(found - predicted)) / way
-
-
-def _configuration_at(
-    tracker: Tracker,
-    curve: Callable[[float], Array],
-    trail: list[tuple[float, PathPoint]],
-    u: float,
-) -> Array | None:
-    """(n,) the configuration at a number on the way that was followed."""
-    known = [one for one in trail if one[0] <= u]
-    if not known:
-        return None
-    at, point = known[-1]
-    if at == u:
-        return point.x
-    segment = _segment(curve, at, u)
-    last, reached, _ = carried(tracker, point, segment, 1.0, curved=True)
-    return last.x if reached == 1.0 else None
-
-
-def _passed(
-    led: Follower, poses: Path, nodes: Sequence[float], x: Array, numbers: range
-) -> Array | None:
-    """(k, n) configurations at poses between those, (m, n), at nodes; None where one has none."""
-    passed = list[Array]()
-    for k in numbers:
-        own = [y for u, y in zip(nodes, x, strict=True) if u == k]
-        y = own[0] if own else _settled(led, _lagrange(nodes, x, float(k)), poses.poses[k])
-        if y is None or not led.tracker.may(y):
-            return None
-        passed.append(y)
-    return np.array(passed).reshape(len(passed), x.shape[1])
 
 
 def _settled(led: Follower, x: Array, T: Array) -> Array | None:
@@ -983,6 +810,9 @@ def _settled(led: Follower, x: Array, T: Array) -> Array | None:
     # what a singular configuration leaves free stays: to move it changes rounding alone
     y = gauss_newton(residual, x, rank_tolerance=SINGULAR).x
     most = _OFF if led.chain is None else SOLVED
+    # else by all that is left of its rank, or downhill
+    if missing(y) > most:
+        y = gauss_newton(residual, y).x
     if missing(y) > most:
         y = _descended(led, x, T)
     near = float(np.max(np.abs(y - x))) < _BESIDE
@@ -1001,86 +831,6 @@ def _descended(led: Follower, x: Array, T: Array) -> Array:
         return -r, J
 
     return levenberg_marquardt(residual, x).x
-
-
-def _leap_between(
-    led: Follower,
-    poses: Path,
-    curve: Callable[[float], Array],
-    trail: list[tuple[float, PathPoint]],
-    found: Array,
-    number: int,
-    stopped: bool,
-) -> Leap | None:
-    """From the poses before a singular configuration to those behind it."""
-    before = _before(trail, found, number)
-    if before is None:
-        return None
-    # the next pose may be the singular one itself
-    beyond = number + 1
-    ends = [beyond if stopped and number - trail[-1][0] < _AT_POSE else number]
-    if led.redundant and ends[0] < beyond < poses.count:
-        ends.append(beyond)
-    leaps = (_leap_to(led, poses, curve, *before, number, to) for to in ends)
-    return next((leap for leap in leaps if leap is not None), None)
-
-
-def _leap_to(
-    led: Follower,
-    poses: Path,
-    curve: Callable[[float], Array],
-    nodes: list[float],
-    x: Array,
-    number: int,
-    to: int,
-) -> Leap | None:
-    """From configurations (k, n) at nodes to the pose of a number."""
-    tracker = led.tracker
-    predicted = _lagrange(nodes, x, float(min(to, poses.count - 1)))
-    if to >= poses.count:  # the path ends at the singular configuration
-        last = _settled(led, predicted, poses.poses[-1])
-        if last is None or _added(predicted, last, x[-1]) > _FAIR or not tracker.may(last):
-            return None
-        return Leap(last[None], number, last)
-    behind = _smooth_solution(led, poses, predicted, to, x[-1])
-    if behind is None or not tracker.may(behind):
-        return None
-    if not _goes_across(led, x[-1], behind):
-        return None
-    nodes, x = [*nodes[-2:], float(to)], np.vstack([x[-2:], behind])
-    beyond = None
-    if to + 1 < poses.count:
-        beyond = _smooth_solution(led, poses, _lagrange(nodes, x, to + 1.0), to + 1, behind)
-    if beyond is not None:
-        nodes, x = [*nodes, to + 1.0], np.vstack([x, beyond])
-    if not _is_fair(led, poses, curve, nodes, x, number, to):
-        return None
-    passed = _passed(led, poses, nodes, x, range(number, to + 1))
-    return None if passed is None else Leap(passed, float(to), behind)
-
-
-def _before(
-    trail: list[tuple[float, PathPoint]], found: Array, number: int
-) -> tuple[list[float], Array] | None:
-    """Two or three configurations before a pose, and their numbers; None where there is one."""
-    if number >= 2:
-        first = max(0, number - 3)
-        return [float(k) for k in range(first, number)], found[first:number]
-    at = trail[-1][0]
-    inner = [one for one in trail if 0 < one[0] < at]
-    if number == 0 or not inner:
-        return None
-    u, point = min(inner, key=lambda one: abs(one[0] - at / 2))
-    return [0.0, u], np.array([found[0], point.x])
-
-
-def _smooth_solution(
-    led: Follower, poses: Path, predicted: Array, number: int, last: Array
-) -> Array | None:
-    """(n,) the configuration at a pose that is near the prediction, measured by the way to it."""
-    found = _nearest_solution(led, predicted, poses.poses[number])
-    most = _FAIR if led.redundant else _HALF
-    return None if found is None or _added(predicted, found, last) > most else found
 
 
 def _goes_across(led: Follower, before: Array, behind: Array) -> bool:
@@ -1115,29 +865,6 @@ def _nearest_solution(led: Follower, x: Array, T: Array) -> Array | None:
     away = led.chain.arm(p).wrapped(q / led.scale - x)
     nearest: Array = x + away[int(np.argmin(np.linalg.norm(away, axis=1)))]
     return nearest
-
-
-def _is_fair(
-    led: Follower,
-    poses: Path,
-    curve: Callable[[float], Array],
-    nodes: Sequence[float],
-    x: Array,
-    number: int,
-    to: int,
-) -> bool:
-    """Whether a smooth curve through joints leaves the path as little as one through the poses."""
-    before, middle = number - 1, (number - 1 + to) / 2
-    T = poses.poses[before]
-    rows = np.array([gap_to(curve(u), T) for u in nodes])
-    middle_pose = moved(T, _lagrange(nodes, rows, middle))
-    if to > number:
-        middle_pose = poses.poses[number]
-    line = straight(T, poses.poses[to])(0.5)
-    units = np.array([led.length] * 3 + [1.0] * 3)
-    chord = float(np.max(np.abs(gap_to(line, middle_pose) / units)))
-    gap = float(np.max(np.abs(led.rows(_lagrange(nodes, x, middle), middle_pose)[0])))
-    return gap <= _UNCERTAIN * chord + _OFF
 
 
 def _lagrange(nodes: Sequence[float] | range, values: Array, u: float) -> Array:
@@ -1204,8 +931,8 @@ def _jump(led: Follower, x: Array, T: Array) -> str:
     behind = _nearest_solution(led, x, T)
     if led.redundant and behind is None and led.chain is not None:
         return (
-            "; no configuration beside it takes the pose behind, as what is redundant has no room"
-            " left; another redundancy or another start may lead past"
+            "; beside it no configuration was found for the pose behind, as where what is redundant"
+            " has no room left; another redundancy or another start may lead past"
         )
     if led.redundant or behind is None:
         return ""
@@ -1259,12 +986,351 @@ def _singular(led: Follower, q: Array) -> str:
     return f"{name} = {q[index]:.3f}, smallest singular value {round(value(x), 12):.1g}"
 
 
-# A path of poses followed on one branch: the joints move continuously, or stop with a reason.
+# The walk along a path: runs of a closed form, single poses, steps, and leaps.
 
 
+_TRAIL = 40
+"""Configurations on the way that are kept: from step to step the way left is halved."""
 _OFF = 1e-9
 """Largest row at a pose that was reached: solutions are found to 1e-12, and next to singular
 configurations rounding is larger."""
+_AFTER_STOP, _AFTER_LEAP = 1e-3, 1e-2
+"""First steps, in parts of the next segment: after a narrow passage ten doublings lead back to all
+of it; behind a singular configuration steps are short."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Leap:
+    """A way past a singular configuration.
+
+    Attributes:
+        x: (k, n) configurations at the next k poses.
+        u: number at which it ends; between two poses it is broken.
+        end: (n,) the configuration there.
+    """
+
+    x: Array
+    u: float
+    end: Array
+
+
+@dataclass(slots=True, eq=False)
+class Walk:
+    """How far the joints have followed a path; `walk` makes it at the start.
+
+    Attributes:
+        led: what follows.
+        tracker: the numbers of it.
+        poses: the path.
+        curve: the same as a function of the number of a pose, from -1 at the start.
+        start: (nq,) the configuration there.
+        found: (N, n) configurations at the poses before `number`.
+        residual: (N,) by how much they miss them.
+        number: of the next pose.
+        u: number at which it stands, a broken one between two poses.
+        point: the configuration there.
+        trail: the last configurations on the way, each with its number.
+        step: the next one to try, in parts of the way to the next pose.
+        runs: the branches of the closed form at the poses around.
+    """
+
+    led: Follower
+    tracker: Tracker
+    poses: Path
+    curve: Callable[[float], Array]
+    start: Array
+    found: Array
+    residual: Array
+    number: int
+    u: float
+    point: PathPoint
+    trail: list[tuple[float, PathPoint]]
+    step: float = 1.0
+    runs: Runs | None = None
+
+    def go(self) -> str:
+        """Walk to the end of the path, or to where it cannot be followed; the reason of that."""
+        while self.number < self.poses.count:
+            at_pose = self.u == self.number - 1 and self.number > 0
+            if at_pose and (self._run() or self._smooth_step()):
+                continue
+            reason = self._on()
+            if reason:
+                return reason
+        return ""
+
+    def _arrive(self, x: Array, residual: Array | list[float]) -> None:
+        """Note configurations (k, n) at the next poses, and stand at the last one of them."""
+        first, self.number = self.number, self.number + len(x)
+        self.found[first : self.number], self.residual[first : self.number] = x, residual
+        self.u, self.trail = self.number - 1.0, self._last_poses()
+        self.point = self.trail[-1][1]
+
+    def _last_poses(self) -> list[tuple[float, PathPoint]]:
+        """The last poses that were reached, as a trail."""
+        numbers = range(max(0, self.number - 3), self.number)
+        found, T = self.found, self.poses.poses
+        return [(float(k), point_at(self.tracker, found[k], T[k])) for k in numbers]
+
+    # many poses at once, and single ones next to a singular configuration
+
+    def _run(self) -> bool:
+        """Take a run of poses on one branch of the closed form; whether there is one."""
+        self.runs = _runs(self.led, self.poses, self.number - 1, self.runs)
+        if self.runs is None:
+            return False
+        run, missed = self.runs.after(self.number - 1, self.point.x)
+        if len(run):
+            self._arrive(run, missed)
+        return bool(len(run))
+
+    def _smooth_step(self) -> bool:
+        """Go to the next pose, where joints go on smoothly there by a closed form; else False."""
+        number, found, runs = self.number, self.found, self.runs
+        if runs is None or self.poses.function is not None or number < 3:
+            return False
+        nodes, x = [float(k) for k in range(number - 3, number)], found[number - 3 : number]
+        predicted = _lagrange(nodes, x, float(number))
+        own = runs.nearest(number, predicted)
+        if own is None or _added(predicted, own[0], x[-1]) > _FAIR or not self.tracker.may(own[0]):
+            return False
+        nodes, x = [*nodes[1:], float(number)], np.vstack([x[1:], own[0]])
+        predicted = _lagrange(nodes, x, number + 1.0)
+        beyond = runs.nearest(number + 1, predicted)
+        if beyond is not None and _added(predicted, beyond[0], own[0]) <= _FAIR:
+            nodes, x = [*nodes, number + 1.0], np.vstack([x, beyond[0]])
+        if not self._is_fair(nodes, x, number):
+            return False
+        self._arrive(own[0][None], [own[1]])
+        return True
+
+    # step by step
+
+    def _on(self) -> str:
+        """Go to the next pose, or past a singular configuration before it; why not, else ""."""
+        led, number, way = self.led, self.number, list[tuple[float, PathPoint]]()
+        allowed = not led.redundant or self.tracker.may(self.point.x)
+        segment = _segment(self.curve, self.u, number)
+        last, at = self.point, 0.0
+        if allowed:
+            curved, first = self.poses.function is not None, min(1.0, self.step)
+            last, at, self.step = carried(self.tracker, self.point, segment, first, way, curved)
+        u, way_left = self.u, number - self.u
+        self.trail = self.trail[-_TRAIL:] + [(u + s * way_left, passed) for s, passed in way]
+        self.u = float(number) if at == 1.0 else u + at * way_left
+        self.step = max(self.step, _AFTER_STOP)
+        stopped = at < 1.0 or last.left > _OFF
+        leap = self._leap(stopped) if allowed and (stopped or self._turns_off(last)) else None
+        if leap is not None:
+            self._land(leap)
+            return ""
+        self.point = last
+        q = led.whole(self.start, last.x)
+        if stopped:
+            return stop_reason(led, self.poses, number, q, self.u - number + 1)
+        self.found[number] = last.x
+        self.residual[number] = led.residual(q, self.poses.poses[number])
+        self.number += 1
+        return ""
+
+    def _turns_off(self, point: PathPoint) -> bool:
+        """Whether a step beside a singular configuration goes elsewhere than those before lead."""
+        number, found = self.number, self.found
+        if number < 2:
+            return False
+        first = max(0, number - 3)
+        known = found[first:number]
+        predicted = _lagrange(range(first, number), known, number)
+        before = float(np.linalg.norm(known[-1] - known[-2]))
+        if float(np.linalg.norm(point.x - predicted)) <= max(_TURN_OFF * before, _SMALL):
+            return False
+        longest = max(before, float(np.linalg.norm(point.x - known[-1])))
+        return smallest(self.tracker, point.J) < _NEAR_STEPS * longest
+
+    def _land(self, leap: Leap) -> None:
+        """Go on from the end of a leap."""
+        passed = slice(self.number, self.number + len(leap.x))
+        self.found[passed] = leap.x
+        self.residual[passed] = [
+            self.led.residual(self.led.whole(self.start, x), T)
+            for x, T in zip(leap.x, self.poses.poses[passed], strict=True)
+        ]
+        self.number, self.u, self.step = self.number + len(leap.x), leap.u, _AFTER_LEAP
+        self.point = point_at(self.tracker, leap.end, self.curve(self.u))
+        at_pose = self.u == self.number - 1
+        self.trail = self._last_poses() if at_pose else [(self.u, self.point)]
+
+    # past a singular configuration
+
+    def _leap(self, stopped: bool) -> Leap | None:
+        """The joints behind a singular configuration; None where they do not go on smoothly.
+
+        Args:
+            stopped: whether the way ends before the next pose.
+        """
+        near = self.trail[-1][1]
+        if stopped and smallest(self.tracker, near.J) > _WATCHED:
+            return None
+        if self.poses.function is None and self.led.chain is not None:
+            between = self._leap_between(stopped)
+            if between is not None:
+                return between
+        if stopped:
+            return self._leap_along(self.trail, _NEAREST)
+        if self.led.redundant and self.poses.function is not None:
+            singular = [smallest(self.tracker, point.J) for _, point in self.trail]
+            return self._leap_along(self.trail[: int(np.argmin(singular)) + 1], _LEAST_LEAP)
+        return None
+
+    def _leap_along(self, trail: list[tuple[float, PathPoint]], least: float) -> Leap | None:
+        """Along the curve itself, from one side of the singular configuration to the other.
+
+        Args:
+            trail: the way up to the singular configuration.
+            least: the shortest way to either side that is tried.
+        """
+        tracker, poses, number = self.tracker, self.poses, self.number
+        at, end = trail[-1][0], float(poses.count - 1)
+        # lines between given poses have corners there
+        start = max(trail[0][0], number - 1.0 if poses.function is None else min(0.0, at - 1.0))
+        way, before = min((at - start) / 3, _LONGEST_LEAP), np.inf
+        while way > least:
+            nodes = [at - 3 * way, at - 2 * way, at - way]
+            x = [self._configuration_at(trail, u) for u in nodes]
+            if any(one is None for one in x):
+                return None
+            to = min(at + way, end)
+            predicted = _lagrange(nodes, np.array(x), to)
+            if to - at < _NEAREST:  # the path ends at the singular configuration
+                behind = _settled(self.led, predicted, poses.poses[-1])
+            else:
+                corrected = _correct(tracker, predicted, self.curve(to))
+                behind = None if corrected is None else corrected.x
+            ratio = np.inf
+            if behind is not None and tracker.may(behind):
+                ratio = _added(predicted, behind, np.asarray(x[-1]))
+            smooth = ratio < _FAIR and ratio < max(_LITTLE, _SMOOTH * before)
+            if behind is not None and smooth and _goes_across(self.led, np.asarray(x[-1]), behind):
+                numbers = range(number, math.floor(to) + 1)
+                passed = self._passed([*nodes, to], np.array([*x, behind]), numbers)
+                return None if passed is None else Leap(passed, to, behind)
+            way, before = way / 2, ratio if ratio < _FAIR else 1.0
+        return None
+
+    def _configuration_at(self, trail: list[tuple[float, PathPoint]], u: float) -> Array | None:
+        """(n,) the configuration at a number on the way that was followed."""
+        known = [one for one in trail if one[0] <= u]
+        if not known:
+            return None
+        at, point = known[-1]
+        if at == u:
+            return point.x
+        segment = _segment(self.curve, at, u)
+        last, reached, _ = carried(self.tracker, point, segment, 1.0, curved=True)
+        return last.x if reached == 1.0 else None
+
+    def _leap_between(self, stopped: bool) -> Leap | None:
+        """From the poses before a singular configuration to those behind it."""
+        before, number = self._before(), self.number
+        if before is None:
+            return None
+        # the next pose may be the singular one itself
+        beyond = number + 1
+        ends = [beyond if stopped and number - self.trail[-1][0] < _AT_POSE else number]
+        if self.led.redundant and ends[0] < beyond < self.poses.count:
+            ends.append(beyond)
+        leaps = (self._leap_to(*before, to) for to in ends)
+        return next((leap for leap in leaps if leap is not None), None)
+
+    def _leap_to(self, nodes: list[float], x: Array, to: int) -> Leap | None:
+        """From configurations (k, n) at nodes to the pose of a number."""
+        led, poses, number, may = self.led, self.poses, self.number, self.tracker.may
+        predicted = _lagrange(nodes, x, float(min(to, poses.count - 1)))
+        if to >= poses.count:  # the path ends at the singular configuration
+            last = _settled(led, predicted, poses.poses[-1])
+            if last is None or _added(predicted, last, x[-1]) > _FAIR or not may(last):
+                return None
+            return Leap(last[None], number, last)
+        behind = self._smooth_solution(predicted, to, x[-1])
+        if behind is None or not may(behind) or not _goes_across(led, x[-1], behind):
+            return None
+        nodes, x = [*nodes[-2:], float(to)], np.vstack([x[-2:], behind])
+        beyond = None
+        if to + 1 < poses.count:
+            beyond = self._smooth_solution(_lagrange(nodes, x, to + 1.0), to + 1, behind)
+        if beyond is not None:
+            nodes, x = [*nodes, to + 1.0], np.vstack([x, beyond])
+        if not self._is_fair(nodes, x, to):
+            return None
+        passed = self._passed(nodes, x, range(number, to + 1))
+        return None if passed is None else Leap(passed, float(to), behind)
+
+    def _before(self) -> tuple[list[float], Array] | None:
+        """Two or three configurations before the next pose, and their numbers; None if only one."""
+        number, found = self.number, self.found
+        if number >= 2:
+            first = max(0, number - 3)
+            return [float(k) for k in range(first, number)], found[first:number]
+        at = self.trail[-1][0]
+        inner = [one for one in self.trail if 0 < one[0] < at]
+        if number == 0 or not inner:
+            return None
+        u, point = min(inner, key=lambda one: abs(one[0] - at / 2))
+        return [0.0, u], np.array([found[0], point.x])
+
+    def _smooth_solution(self, predicted: Array, number: int, last: Array) -> Array | None:
+        """(n,) the configuration at a pose, near the prediction beside the way to it."""
+        found = _nearest_solution(self.led, predicted, self.poses.poses[number])
+        most = _FAIR if self.led.redundant else _HALF
+        return None if found is None or _added(predicted, found, last) > most else found
+
+    def _passed(self, nodes: Sequence[float], x: Array, numbers: range) -> Array | None:
+        """(k, n) configurations at poses between those, (m, n), at nodes; None where one is not."""
+        passed = list[Array]()
+        for k in numbers:
+            own = [y for u, y in zip(nodes, x, strict=True) if u == k]
+            T, predicted = self.poses.poses[k], _lagrange(nodes, x, float(k))
+            y = own[0] if own else _settled(self.led, predicted, T)
+            if y is None or not self.tracker.may(y):
+                return None
+            passed.append(y)
+        return np.array(passed).reshape(len(passed), x.shape[1])
+
+    def _is_fair(self, nodes: Sequence[float], x: Array, to: int) -> bool:
+        """Whether a smooth curve through joints leaves the path as little as one through the poses.
+
+        Args:
+            nodes: numbers around the way from the last pose to that of a number.
+            x: (k, n) configurations there.
+            to: this number.
+        """
+        led, poses, before = self.led, self.poses.poses, self.number - 1
+        T, middle = poses[before], (before + to) / 2
+        rows = np.array([gap_to(self.curve(u), T) for u in nodes])
+        middle_pose = moved(T, _lagrange(nodes, rows, middle))
+        if to > self.number:
+            middle_pose = poses[self.number]
+        line = straight(T, poses[to])(0.5)
+        units = np.array([led.length] * 3 + [1.0] * 3)
+        chord = float(np.max(np.abs(gap_to(line, middle_pose) / units)))
+        gap = float(np.max(np.abs(led.rows(_lagrange(nodes, x, middle), middle_pose)[0])))
+        return gap <= _UNCERTAIN * chord + _OFF
+
+
+def walk(led: Follower, poses: Path, q: Array) -> Walk:
+    """What stands at a configuration (nq,) before the first pose."""
+    tracker, x, curve = led.tracker, led.scaled(q), poses.curve(led.pose(q))
+    point = point_at(tracker, x, curve(-1.0))
+    found, residual = np.empty((poses.count, x.size)), np.empty(poses.count)
+    return Walk(led, tracker, poses, curve, q, found, residual, 0, -1.0, point, [(-1.0, point)])
+
+
+def _segment(curve: Callable[[float], Array], u: float, to: float) -> Callable[[float], Array]:
+    """The poses from one number to another, of a number between 0 and 1."""
+    return lambda s: curve(to if s == 1.0 else u + s * (to - u))
+
+
+# A path of poses followed on one branch: the joints move continuously, or stop with a reason.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -1328,10 +1394,10 @@ def follow(
     """The configurations along a path of poses, on the branch of the first one.
 
     Between two poses the frame is led along a straight line and turned about a fixed axis, in
-    steps so small that no other branch can be taken. Where the branch ends, or the joints can move
-    while the frame stays, it stops before; also where the path could go on beyond. Fewer than six
-    joints need poses that they can take; between these the frame is led as near to the line as they
-    can.
+    steps so small that no other branch can be taken; the poses of a function need not be straight.
+    Singular configurations are passed where the joints go on smoothly behind them; where they do
+    not, it stops before, and says where and why. Fewer than six joints need poses that they can
+    take; between these the frame is led as near to the line as they can.
 
     Args:
         system: open, or with closed loops, which stay closed in the way they are at the start.
@@ -1360,79 +1426,13 @@ def follow(
     poses = path_of(system, path, samples)
     q = _start(system, start, locked)
     target = goal(system, name, np.eye(4), None, parameters)
-    return _follow(follower(target, q, locked, limits, redundancy), poses, q)
-
-
-def _follow(led: Follower, poses: Path, q: Array) -> Followed:
-    tracker, x = led.tracker, led.scaled(q)
-    curve = poses.curve(led.pose(q))
-    point, step, reason = point_at(tracker, x, curve(-1.0)), 1.0, ""
-    trail, u, number = [(-1.0, point)], -1.0, 0
-    found, residual = np.empty((poses.count, x.size)), np.empty(poses.count)
-    runs: Runs | None = None
-    while number < poses.count:
-        # a run of poses on one branch of the closed form
-        if u == number - 1 and number > 0:
-            runs = _runs(led, poses, number - 1, runs)
-            run, missed = _no_run(x.size) if runs is None else runs.after(number - 1, point.x)
-            if len(run):
-                found[number : number + len(run)] = run
-                residual[number : number + len(run)] = missed
-                number += len(run)
-                u, trail = number - 1.0, _known(tracker, poses, found, number - 1)
-                point = trail[-1][1]
-                continue
-            # next to a singular configuration pose by pose, as smoothly as before
-            smooth = None
-            if runs is not None and poses.function is None:
-                smooth = _smooth_step(led, poses, curve, runs, found, number)
-            if smooth is not None:
-                found[number], residual[number] = smooth
-                number += 1
-                u, trail = number - 1.0, _known(tracker, poses, found, number - 1)
-                point = trail[-1][1]
-                continue
-        # else step by step towards the next pose
-        way: list[tuple[float, PathPoint]] = []
-        allowed = not led.redundant or tracker.may(point.x)
-        segment = _segment(curve, u, number)
-        last, at = point, 0.0
-        if allowed:
-            curved = poses.function is not None
-            last, at, step = carried(tracker, point, segment, min(1.0, step), way, curved)
-        trail = trail[-_TRAIL:] + [(u + s * (number - u), passed) for s, passed in way]
-        u = float(number) if at == 1.0 else u + at * (number - u)
-        # a part of the next segment: after a narrow passage ten doublings lead back to all of it
-        step = max(step, 1e-3)
-        stopped = at < 1.0 or last.left > _OFF
-        # behind a singular configuration, where the joints go on smoothly
-        leap = None
-        if allowed and (stopped or _turns_off(tracker, found, number, last)):
-            leap = _leap(led, poses, curve, trail, found, number, stopped)
-        if leap is not None:
-            passed = slice(number, number + len(leap.x))
-            found[passed] = leap.x
-            residual[passed] = [
-                led.residual(led.whole(q, x), T)
-                for x, T in zip(leap.x, poses.poses[passed], strict=True)
-            ]
-            # next to the singular configuration steps are short: a hundredth of the next segment
-            number, u, step = number + len(leap.x), leap.u, 1e-2
-            point = point_at(tracker, leap.end, curve(u))
-            trail = _known(tracker, poses, found, number - 1) if u == number - 1 else [(u, point)]
-            continue
-        point = last
-        whole = led.whole(q, point.x)
-        if stopped:
-            reason = stop_reason(led, poses, number, whole, u - number + 1)
-            break
-        found[number], residual[number] = point.x, led.residual(whole, poses.poses[number])
-        number += 1
-    rows = np.tile(q, (number, 1))
-    rows[:, list(led.indices)] = found[:number] * led.scale
-    last_q, x = led.whole(q, point.x), found[:number]
-    conditioning = _conditioning(led, poses, x)
-    return Followed(rows, number - 1, reason, residual[:number], last_q, conditioning)
+    led = follower(target, q, locked, limits, redundancy)
+    way = walk(led, poses, q)
+    reason, number = way.go(), way.number
+    rows, x = np.tile(q, (number, 1)), way.found[:number]
+    rows[:, list(led.indices)] = x * led.scale
+    last, missed = led.whole(q, way.point.x), way.residual[:number]
+    return Followed(rows, number - 1, reason, missed, last, _conditioning(led, poses, x))
 
 
 def _conditioning(led: Follower, poses: Path, x: Array) -> Conditioning:
@@ -1441,11 +1441,6 @@ def _conditioning(led: Follower, poses: Path, x: Array) -> Conditioning:
         return Conditioning(led.chain.arm(led.target.closing.p), x)
     J = [led.rows(one, T)[1] for one, T in zip(x, poses.poses, strict=False)]
     return Conditioning(None, np.array([smallest(led.tracker, one) for one in J]))
-
-
-def _segment(curve: Callable[[float], Array], u: float, to: float) -> Callable[[float], Array]:
-    """The poses from one number to another, of a number between 0 and 1."""
-    return lambda s: curve(to if s == 1.0 else u + s * (to - u))
 
 
 def _start(system: System, start: Any, locked: Mapping[str, float] | None) -> Array:

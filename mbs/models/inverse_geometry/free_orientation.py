@@ -14,13 +14,28 @@ from mbs.closed_forms.arm import Arm, Array
 from mbs.components import Body, Mechanism, Prismatic, Revolute
 from mbs.errors import ModelError
 from mbs.models.geometry import terminal_frame
-from mbs.models.inverse_geometry.chain import frame_chain, target_pose, target_poses
+from mbs.models.inverse_geometry.answer import NO_LOOP
+from mbs.models.inverse_geometry.chain import (
+    FrameChain,
+    frame_chain,
+    target_pose,
+    target_poses,
+)
 from mbs.models.inverse_geometry.follow import Followed, Redundancy
 from mbs.models.inverse_geometry.follow import follow as follow_poses
 from mbs.models.inverse_geometry.many import ManySolutions, solve_many
 from mbs.models.inverse_geometry.redundancy import Locked, Redundant
-from mbs.models.inverse_geometry.solutions import Given, Solution, Solutions, bounds
+from mbs.models.inverse_geometry.solutions import (
+    Given,
+    RobotSolution,
+    Solution,
+    Solutions,
+    Wishes,
+    bounds,
+    leaves_out,
+)
 from mbs.models.inverse_geometry.solve import solve
+from mbs.models.inverse_geometry.whole_robot import close, why_searched
 from mbs.text import did_you_mean, quoted
 
 # Behind the frame stand joints that do not exist: one about the free axis, or three that meet in
@@ -48,15 +63,22 @@ class FreeOrientation:
         system: the robot.
         free: what is free.
         robot: the joints on the way to the frame, and behind it one or three for what is free.
-        arm: the first of them in numbers.
-        indices: their indices in q.
+        chain: the first of them.
+        arm: these in numbers.
+        p: (np,) parameters.
     """
 
     system: System
     free: str
     robot: System
+    chain: FrameChain
     arm: Arm
-    indices: tuple[int, ...]
+    p: Array
+
+    @property
+    def indices(self) -> tuple[int, ...]:
+        """Indices in q of the joints on the way to the frame."""
+        return self.chain.indices
 
     def solve(
         self,
@@ -80,17 +102,22 @@ class FreeOrientation:
             redundant: positions of joints that take many.
 
         Returns:
-            Solutions; their residual is that of the part, sigma_min of its rows. One of a
-            self-motion has multiplicity 0 and no `family`.
+            Solutions; their residual is that of the part and of the loops, sigma_min of the rows
+            of the part for the joints on the way. One of a self-motion has multiplicity 0 and no
+            `family`. Of a robot with loops those of the joints on the way, in every way in which
+            the loops close.
         """
         target = target_pose(self.system, self._pose(T))
         near = np.array(self.system.position(seed))
         still = {*(locked or {}), *(redundant or {})}
         start = None if seed is None else self._start(near)
-        own = self._limits(limits)
+        # of a robot with loops the limits of other joints count too
+        own = None if self.system.is_closed else self._limits(limits)
         found = solve(
             self.robot, target, "tool", method, own, start, locked=locked, redundant=redundant
         )
+        if self.system.is_closed:
+            return self._closed(found, target, still, limits, seed)
         kept = list[Solution]()
         for solution in found:
             x = solution.q[: self.arm.size]
@@ -129,7 +156,11 @@ class FreeOrientation:
         Returns:
             ManySolutions; their residual is that of the whole pose of what the joints that do not
             exist carry.
+
+        Raises:
+            ModelError: the robot has loops.
         """
+        self._require_open("solve_many", "call solve for each pose")
         target = target_poses(self.system, self._poses(T))
         own = self._limits(limits)
         many = solve_many(self.robot, target, "tool", method, own, locked, redundant=redundant)
@@ -163,7 +194,11 @@ class FreeOrientation:
             locked: positions of joints that stay where they are.
             limits: which are kept.
             redundancy: what joints do that are not determined.
+
+        Raises:
+            ModelError: the robot has loops.
         """
+        self._require_open("follow", "call solve for each pose, with the one before as seed")
         given = getattr(start, "q", start)
         near = np.array(self.system.position(given))
         own = self._start(near)
@@ -186,6 +221,45 @@ class FreeOrientation:
         )
         q, last = self._whole(found.q, near), self._whole(found.stopped_at, near)
         return replace(found, q=q, stopped_at=last)
+
+    def _closed(
+        self,
+        found: Solutions,
+        target: Array,
+        still: Container[str],
+        limits: bool | Given | None,
+        seed: Mapping[str, float] | Sequence[float] | None,
+    ) -> Solutions:
+        """Solutions of the joints on the way, with every loop closed in every way."""
+        system, n = self.system, self.arm.size
+        near = np.array(system.position(seed))
+        held = {k for k, c in enumerate(system.coordinates) if c.name in still}
+        held |= {k for coupling in system.couplings for k in coupling.coordinates}
+        ends = bounds(system, limits, set(range(system.nq)) - held)
+        wishes = Wishes(system, near, ends, leaves_out(limits), seed is not None)
+        drafts, others = list[RobotSolution](), list[Array]()
+        for solution in found:
+            x = solution.q[:n]
+            if any(self._is_same(x, other) for other in others):
+                continue
+            others.append(x)
+            missed, sigma = self._missed(x, target), self._singular_value(x, still)
+            for one in close(system, self.chain, x[None], self.p, near):
+                label = "; ".join(part for part in (self._branch(solution), one.label) if part)
+                missed_at, count = max(missed, one.residual), self._count(solution)
+                drafts.append(RobotSolution(one.q, label, missed_at, sigma, count))
+        method = found.method
+        if why_searched(system, self.chain) is not None:
+            method += ", loops by search"
+        reason = found.reason or ("" if drafts else NO_LOOP)
+        return wishes.solutions(drafts, method, reason)
+
+    def _require_open(self, what: str, instead: str) -> None:
+        if self.system.is_closed:
+            raise ModelError(
+                f"{self.system.name}: its loops must be closed too, and {what} of poses of which a"
+                f" part counts is for open chains; {instead}"
+            )
 
     def _gradient(self, given: Redundancy | None, near: Array) -> Redundancy | None:
         if not callable(given):
@@ -249,22 +323,29 @@ class FreeOrientation:
         x = solution.q[: self.arm.size]
         windings = np.unique(solution.windings[:, : self.arm.size], axis=0)
         order = np.argsort(np.linalg.norm(windings - near[list(self.indices)], axis=1))
-        count, family = solution.multiplicity, solution.family
-        if family is not None:  # of joints that do not exist alone it is none
-            count = 0 if set(family.moving) & set(self.arm.names) else 1
-        branch = solution.branch
-        if self.free == "orientation":
-            parts = [part for part in branch.split(", ") if part not in ("flip", "no flip")]
-            branch = ", ".join(parts)
         return Solution(
             self._whole(solution.q, near),
-            branch,
+            self._branch(solution),
             self._missed(x, target),
             self._singular_value(x, still),
-            count,
+            self._count(solution),
             solution.within_limits,
             self._whole(windings[order], near).copy,
         )
+
+    def _branch(self, solution: Solution) -> str:
+        """The name of a branch, less that of a wrist that does not exist."""
+        if self.free != "orientation":
+            return solution.branch
+        parts = solution.branch.split(", ")
+        return ", ".join(part for part in parts if part not in ("flip", "no flip"))
+
+    def _count(self, solution: Solution) -> int:
+        """How many solutions meet in one; a self-motion of joints that do not exist is none."""
+        family = solution.family
+        if family is None:
+            return solution.multiplicity
+        return 0 if set(family.moving) & set(self.arm.names) else 1
 
     def _missed(self, x: Array, target: Array) -> float:
         """Largest difference of what counts: the position, and the axis that is not free."""
@@ -297,29 +378,25 @@ def free_orientation(
     """A frame whose rotation about an axis of its own is free, or whose orientation is.
 
     Args:
-        system: a serial robot or a tree.
+        system: a serial robot, a tree, or a robot with loops.
         free: "x", "y", "z" for the rotation about this axis of the frame, as of a tool that
             spins; "orientation" where the position alone counts.
         frame: a body, a named frame, the number of a link, or None for the terminal frame.
         parameters: values of symbols, the others at their defaults.
 
     Returns:
-        FreeOrientation with the methods `solve`, `solve_many` and `follow`. Six joints determine
+        FreeOrientation with the methods `solve` and, of open chains, `solve_many` and `follow`. Six
+        joints determine
         what counts where the arm has five of them, or three with a free orientation; further ones
         are locked or redundant.
 
     Raises:
-        ModelError: there is no such axis or frame, the system is closed, or a joint of the way is
-            neither revolute nor prismatic.
+        ModelError: there is no such axis or frame, or a joint of the way is neither revolute nor
+            prismatic.
     """
     require_system(system)
     if free not in FREE:
         raise ModelError(f"{system.name}: free is {quoted(free)}; {did_you_mean(free, FREE)}")
-    if system.is_closed:
-        raise ModelError(
-            f"{system.name}: its loops must be closed too, and poses of which a part counts are for"
-            " open chains; use mbs.loops.solve_pose with rows="
-        )
     name = terminal_frame(system) if frame is None else frame
     p = np.array(system.parameter_values(parameters))
     chain = frame_chain(system, name, most=len(system.tree.links))
@@ -327,7 +404,7 @@ def free_orientation(
 
     def build() -> FreeOrientation:
         robot = _with_free_joints(system, arm, free)
-        return FreeOrientation(system, free, robot, arm, chain.indices)
+        return FreeOrientation(system, free, robot, chain, arm, p)
 
     key = ("free orientation", free, *chain.key, p.tobytes())
     found: FreeOrientation = system.cached(key, build)

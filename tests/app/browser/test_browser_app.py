@@ -88,6 +88,18 @@ def test_every_configuration_of_a_pose_can_be_shown(visitor):
     visitor.until_joint(5, found[other][5])
     np.testing.assert_allclose(visitor.joints, found[other], atol=1.1e-4)
     visitor.until_other_picture(before)
+    # of seven joints the last one stays where the visitor says
+    _open(visitor, "panda")
+    visitor.button("Present pose").click()
+    for field, choice in (("joint", "q7"), ("redundant joint q7", "stays at a position")):
+        visitor.page.get_by_label(field, exact=True).click()
+        visitor.page.get_by_role("option", name=choice).click()
+    visitor.page.get_by_label("q7 [rad]", exact=True).fill("pi/6")
+    visitor.button("Solve").click()
+    visitor.page.get_by_text("locked: q7 = 0.5236").wait_for()
+    assert rows.count() == 4
+    last = [float(row.locator("td").all_inner_texts()[8]) for row in rows.all()]
+    np.testing.assert_allclose(last, np.pi / 6, atol=6e-5)
 
 
 def test_a_four_bar_is_simulated_and_leaves_as_an_fmu(visitor, tmp_path):

@@ -23,6 +23,14 @@ def test_a_seventh_joint_stays_or_takes_many_positions(monkeypatch):
         assert not at.visible
         user.find("Solve").click()
         await user.should_see("16 positions of q3", retries=PATIENT)
+        (joint,) = user.find(marker="redundant").elements
+        assert joint.options == [f"q{k}" for k in range(1, 8)]
+        joint.set_value("q7")  # with which there is a closed form
+        positions.set_value("present")
+        (method,) = user.find(marker="method").elements
+        method.set_value("pieper")
+        user.find("Solve").click()
+        await user.should_see("by pieper; locked: q7 = ", retries=PATIENT)
 
     visited(build_menus, "panda", visit, monkeypatch)
 

@@ -221,6 +221,24 @@ def test_a_function_is_a_path(puma):
     np.testing.assert_allclose(poses(puma, 6, found.q)[3], circle(3 / 8), atol=1e-13)
 
 
+def test_a_function_may_write_its_poses_over_each_other(puma):
+    """In a run of the closed form, as given poses are: to the last digit."""
+    start, T = ELBOW_UP - np.array([0, 0, 0.8, 0, 0, 0]), np.empty((4, 4))
+    T0 = poses(puma, 6, [start])[0]
+
+    def lift(s):
+        T[:] = T0
+        T[2, 3] += 0.1 * s
+        return T
+
+    found = follow(puma, lift, start, samples=40, limits=False)
+    same = follow(puma, [lift(s).copy() for s in np.linspace(0, 1, 40)], start, limits=False)
+    assert found.reason == ""
+    np.testing.assert_array_equal(found.q, same.q)
+    with pytest.raises(ModelError, match=r"pose 20 of 40, counted from 0: .* rigid"):
+        follow(puma, lambda s: lift(s) * (1 + (s > 0.5)), start, samples=40)
+
+
 def test_start_near_the_first_pose(puma):
     path = poses(puma, 6, line(ELBOW_UP, ELBOW_UP + 0.3, 4))
     names = {f"q{k + 1}": x for k, x in enumerate(ELBOW_UP + 0.05)}

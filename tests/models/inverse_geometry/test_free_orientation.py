@@ -157,12 +157,37 @@ def test_a_path_with_a_tool_that_spins():
     assert np.max(missed(arm, along.q, T, None)) < 1e-11
 
 
+@pytest.mark.parametrize(("free", "count"), [("z", 16), ("orientation", 8)])
+def test_loops_are_closed_in_every_way(free, count):
+    """The arm of an SR400 stands on a parallelogram, which closes in two ways."""
+    system = catalogue_system("sr400")
+    q = mbs.loops.solve(system, {"q1": 0.2, "q2": -1.2, "q4": 0.3, "q5": 0.5, "q6": 0.1, "q7": 0.4})
+    closure, pose = mbs.loops.closure(system), mbs.models.transform(system, 6)
+    T, task = np.array(pose(q)), free_orientation(system, free, 6)
+    held = ("q6",) if free == "z" else ("q4", "q5", "q6")
+    locked = {name: float(q[int(name[1]) - 1]) for name in held}
+    found = task.solve(T, locked=locked, seed=q)
+    assert len(found) == count
+    np.testing.assert_allclose(found[0].q, q, atol=1e-12)
+    at = slice(2, 4) if free == "z" else slice(3, 4)
+    for solution in found:
+        assert np.abs(np.array(closure(solution.q))).max() < 1e-12
+        np.testing.assert_allclose(np.array(pose(solution.q))[:3, at], T[:3, at], atol=1e-12)
+    within = task.solve(T, locked=locked, limits={"q7": (0.3, 0.5)})
+    near = [solution for solution in found if 0.3 < solution.q[6] < 0.5]
+    assert 0 < len(within) == len(near) < count
+    with pytest.raises(ModelError, match="sr400: its loops must be closed too, and follow of"):
+        task.follow([T], q, locked=locked)
+    with pytest.raises(ModelError, match=r"solve_many .* open chains; call solve for each pose"):
+        task.solve_many([T], locked=locked)
+
+
 @pytest.mark.parametrize(
     ("robot", "given", "message"),
     [
         ("puma560", {"free": "w"}, "free is 'w'"),
         ("puma560", {"frame": "tol"}, "no frame 'tol'"),
-        ("sr400", {}, "its loops must be closed too"),
+        ("delta", {}, "joint platform of the chain is free"),
     ],
 )
 def test_refusals(robot, given, message):

@@ -40,7 +40,7 @@ from mbs.app.web.panels.text_view import column
 from mbs.assembly import System
 from mbs.errors import MbsError
 from mbs.expressions import number as number_of
-from mbs.models.catalogue.configurations import surplus_joints
+from mbs.models.catalogue.configurations import moving_joints, surplus_joints
 from mbs.models.geometry import terminal_frame
 
 # The configurations that solve the inverse geometry as a table whose rows move the picture.
@@ -273,7 +273,7 @@ _MEANINGS = {
 _PRESENT, _GIVEN = "present", "given"
 _POSITIONS = {
     _PRESENT: "stays as in the picture",
-    _GIVEN: "stays at [rad or m]",
+    _GIVEN: "stays at a position",
     "16": "takes 16 positions",
     "64": "takes 64 positions",
 }
@@ -301,25 +301,27 @@ class _ConfigurationsPanel:
         system = app.system()
         kept = cast(dict[str, Any], app.session.notes.setdefault(KEY, {}))
         names = _frames(system)
-        frame = kept.get("frame")
+        frame, self._last = kept.get("frame"), terminal_frame(system)
         with app.open("Inverse geometry", key=KEY):
             left, self._shown = two_sides()
         with left, ui.element("div").classes("app-form"):
             self._frame = ui.select(
                 names,
                 label="frame",
-                value=frame if frame in names else terminal_frame(system),
+                value=frame if frame in names else self._last,
                 on_change=self._framed,
             )
             self._frame.props(FIELD).style("flex: 1 1 90px").mark("frame")
             self._method = ui.select(_MEANINGS, label="method", value=entry(key).solver or "auto")
             self._method.props(FIELD).style("flex: 2 1 190px").mark("method")
         with left, ui.element("div").classes("app-form") as self._surplus:
+            self._joint = ui.select([], label="joint", on_change=self._surplus_changed)
+            self._joint.props(FIELD).style("flex: 1 1 90px").mark("redundant")
+            self._joint.tooltip("A joint beyond the six that a pose determines")
             self._many = ui.select(_POSITIONS, value=_PRESENT, on_change=self._surplus_changed)
             self._many.props(FIELD).style("flex: 2 1 190px").mark("positions")
-            self._at = ui.input("position").props(FIELD).mark("position")
-            self._at.style("flex: 1 1 90px")
-        self._surplus_changed()
+            self._at = ui.input().props(FIELD).mark("position").style("flex: 1 1 100%")
+        self._offer_joints()
         with left:
             self._pose = PoseFields()
             with in_a_row():
@@ -334,26 +336,39 @@ class _ConfigurationsPanel:
         app.on_robot(self._robot_changed)
 
     def _robot_changed(self) -> None:
-        """Offer the frames of the new robot."""
+        """Offer the frames of the new robot; its last one where it was the last one."""
         if self._frame.is_deleted:
             return
         system = self._app.system()
-        names = _frames(system)
-        value = self._frame.value if self._frame.value in names else terminal_frame(system)
-        self._frame.set_options(names, value=value)
+        names, last = _frames(system), terminal_frame(system)
+        kept = self._frame.value in names and self._frame.value != self._last
+        self._last = last
+        self._frame.set_options(names, value=self._frame.value if kept else last)
+        self._offer_joints()
+
+    def _offer_joints(self) -> None:
+        """Offer the joints of which one may be redundant; nothing where there are six at most."""
+        system, frame = self._app.system(), self._frame.value
+        surplus = surplus_joints(system, frame) if frame else ()
+        joints = list(moving_joints(system, frame)) if surplus else []
+        kept = self._joint.value
+        self._joint.set_options(joints, value=kept if kept in joints else next(iter(surplus), None))
         self._surplus_changed()
 
-    def _surplus_joint(self) -> str:
-        """The joint beyond six that a visitor places; "" where there is none."""
-        frame = self._frame.value
-        return next(iter(surplus_joints(self._app.system(), frame)), "") if frame else ""
-
     def _surplus_changed(self) -> None:
-        """Offer positions for the joint beyond six, where there is one."""
-        joint = self._surplus_joint()
+        """Show the field of a position where the redundant joint stays at one."""
+        joint = self._joint.value
         self._surplus.set_visibility(bool(joint))
-        self._many.props(f'label="redundant joint {joint}"')
         self._at.set_visibility(self._many.value == _GIVEN)
+        if joint:
+            self._many.props(f'label="redundant joint {joint}"')
+            self._at.props(f'label="{joint} [{self._coordinate(joint)[1]}]"')
+
+    def _coordinate(self, joint: str) -> tuple[int, str]:
+        """The number of a joint's coordinate, and its unit."""
+        coordinates = self._app.system().coordinates
+        number = [coordinate.name for coordinate in coordinates].index(joint)
+        return number, coordinates[number].unit
 
     def _redundant(self) -> dict[str, Any]:
         """What is asked of the joint beyond six, for `configurations`.
@@ -361,14 +376,17 @@ class _ConfigurationsPanel:
         Raises:
             MbsError: its position has no value.
         """
-        joint, many = self._surplus_joint(), self._many.value
-        if not joint or many == _PRESENT:
+        joint, many = self._joint.value, self._many.value
+        if not joint:
             return {}
-        if many != _GIVEN:
+        if many not in (_PRESENT, _GIVEN):
             return {"redundant": {joint: int(many)}}
-        system = self._app.system()
-        locked = locked_by_default(system, self._frame.value, self._app.q)
-        return {"locked": {**locked, joint: number_of(str(self._at.value or "0"), joint)}}
+        at = float(self._app.q[self._coordinate(joint)[0]])
+        if many == _GIVEN:
+            at = number_of(str(self._at.value or "0"), joint)
+        locked = locked_by_default(self._app.system(), self._frame.value, self._app.q)
+        locked.pop(joint if joint in locked else next(iter(locked)))
+        return {"locked": {**locked, joint: at}}
 
     async def take_present(self) -> None:
         """Write the pose that the frame has in the picture into the fields."""
@@ -400,7 +418,7 @@ class _ConfigurationsPanel:
     async def _framed(self) -> None:
         notes = cast(dict[str, Any], self._app.session.notes[KEY])
         notes["frame"] = self._frame.value
-        self._surplus_changed()
+        self._offer_joints()
         await self.take_present()
 
     async def _equations(self, key: str) -> None:

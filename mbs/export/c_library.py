@@ -486,8 +486,8 @@ def _source(entries: Sequence[_Entry], library: _Library, where: str) -> str:
     parts.append("#include <float.h>\n#include <math.h>\n#include <string.h>\n")
     if scalar:
         parts += [NOINLINE, bare_source(scalar, library.real)[0]]
-    if others:
-        parts.append(generated(others, with_header=False, casadi_int="long long int"))
+    if others:  # what CasADi adds to them is visible, and another library has it too
+        parts.append(generated(others, library.name, with_header=False, casadi_int="long long int"))
         if problem := unwritten(parts[-1]):
             raise ModelError(f"{where}: {problem}")
     if library.checked and entries:

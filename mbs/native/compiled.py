@@ -311,17 +311,18 @@ def c_source(function: casadi.Function, *, derivatives: int = 0) -> str:
     return generated([function, *_all_derivatives(function, derivatives)])
 
 
-def generated(functions: Iterable[casadi.Function], **options: Any) -> str:
+def generated(functions: Iterable[casadi.Function], name: str = "generated", **options: Any) -> str:
     """C text of Functions with different names, and of all that they call; see `unwritten`.
 
     Args:
         functions: what to write.
+        name: what the names of functions that CasADi adds begin with.
         options: of `casadi.CodeGenerator`.
 
     Raises:
         ModelError: an input or output is called by what would end a comment or a string of C.
     """
-    generator, every = casadi.CodeGenerator("generated", options), list(functions)
+    generator, every = casadi.CodeGenerator(name, options), list(functions)
     for function in every:
         require_names(function)
         generator.add(function)

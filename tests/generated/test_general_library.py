@@ -65,6 +65,20 @@ def test_the_program_beside_it_prints_poses_that_are_reached(functions, tmp_path
     assert np.max(plain_arm(functions["crx"].system).residual(own, found)) < 1e-12
 
 
+def test_two_libraries_stand_in_one_program(functions, tmp_path):
+    command = [*find_compiler().command, "-O0", "main.c", "-o", "main"]
+    for name in ("left", "right"):
+        folder = c_library({name: functions["other"]}, tmp_path / f"{name}_arm")
+        command.append(str(folder / f"{name}_arm.c"))
+    lines = [f'#include "{name}_arm/{name}_arm.h"' for name in ("left", "right")]
+    called = "double T[16] = {0}, q[96], v[16], n, c, w[LEFT_SZ_W];"
+    calls = (f"{name}_eval(T, q, v, &n, &c, w)" for name in ("left", "right"))
+    lines.append(f"int main(void) {{ {called} return {' | '.join(calls)}; }}\n")
+    (tmp_path / "main.c").write_text("\n".join(lines))
+    subprocess.run([*command, "-lm"], cwd=tmp_path, check=True)
+    assert subprocess.run(["./main"], cwd=tmp_path, check=False).returncode == 0
+
+
 def test_zig_compiles_it_too(functions, tmp_path):
     pytest.importorskip("ziglang")
     folder = c_library(functions["other"], tmp_path / "arm")

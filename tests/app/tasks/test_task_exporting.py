@@ -43,6 +43,14 @@ def test_options_reach_the_model(four_bar):
     assert re.search(r"@param\[in\]  v +\(3, 1\)", header)
 
 
+def test_the_general_inverse_model_is_exported_whole():
+    """As source text its characteristic matrices are written, in C all configurations."""
+    content = c_library(catalogue_system("crx10"), ["igm-general"])
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        header = archive.read("crx10/crx10.h").decode()
+    assert "igm_general(T) -> q, valid, count, certain" in header
+
+
 def test_an_fmu_moves_like_the_system(four_bar, tmp_path):
     settings = FmuSettings(
         fmi="3.0", outputs=("closure",), stop_time="0.4", step_size=0.02, solver="rodas"

@@ -1,8 +1,10 @@
 import ctypes
+import functools
 import hashlib
 import os
 import subprocess
 import sys
+import zipfile
 from collections import Counter
 
 import casadi as ca
@@ -14,6 +16,7 @@ from support.catalogue_systems import catalogue_system
 from support.random_trees import random_tree
 
 import mbs
+from mbs.export.c_library import example_input
 from mbs.native import batch, compiled, find_compiler, repeats
 from mbs.native.bare_source import bare_source
 from mbs.native.c_code import blocks, plain_order, slots
@@ -94,11 +97,11 @@ def test_windows_that_differ_stay_straight_lines(tmp_path):
 
 
 def test_length_follows_what_differs_not_how_many_there_are():
-    short, long = windows(60), windows(120)
+    short, long = windows(42), windows(84)
     assert lines(short) < short.n_instructions() / 8
     # one row of each table for a window, and its elements of outputs
-    assert lines(long) - lines(short) < 60 * 5
-    assert long.n_instructions() - short.n_instructions() > 60 * 100
+    assert lines(long) - lines(short) < 42 * 5
+    assert long.n_instructions() - short.n_instructions() > 42 * 100
 
 
 @pytest.mark.parametrize("kind", ["wide", "slow"])
@@ -327,6 +330,7 @@ def test_places_are_free_again_after_their_last_use():
 
 
 SCRIPT = """
+import functools
 import hashlib, sys
 sys.path.insert(0, "tests/native")
 from test_repeats import windows
@@ -341,3 +345,47 @@ def test_the_text_is_the_same_in_every_process():
     other = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     own = plain_source([windows(50)])[0]
     assert other.stdout.strip() == hashlib.sha256(own.encode()).hexdigest()
+
+
+# Text that leaves the package.
+
+
+@pytest.mark.parametrize("real", ["double", "float"])
+def test_libraries_for_processors_without_files(real, tmp_path):
+    x = ca.SX.sym("x", 60)
+    p = ca.SX.sym("p", 2)
+    function = ca.Function("windows", [x, p], [windows(60)(x, p)[0]], ["x", "p"], ["y"])
+    folder = mbs.export.c_library([function], tmp_path / "lib", target="bare", real=real)
+    assert "windows_repeat0" in (folder / "lib.c").read_text()
+    sources = [str(path) for path in folder.glob("*.c")]
+    command = [*find_compiler().command, *STRICT, "-O1", "-ffp-contract=off", *sources]
+    subprocess.run([*command, "-o", "example", "-lm"], cwd=folder, check=True)
+    run = subprocess.run([folder / "example"], check=True, capture_output=True, text=True)
+    found = np.array([float(word) for word in run.stdout.splitlines()[0].split()[2:]])
+    inputs = [ca.DM(example_input(function, k)) for k in range(2)]
+    wanted = function(*inputs).full().ravel()
+    if real == "double":
+        np.testing.assert_array_equal(found, wanted)
+    else:  # 2^-24 of each of some ten operations of a window, carried on by the next ones
+        np.testing.assert_allclose(found, wanted, atol=1e-4)
+
+
+@pytest.mark.sweep
+def test_an_fmu_moves_as_without_repeats(tmp_path, monkeypatch):
+    system = mbs.robots.n_four_bar(4).assemble()
+    ends = []
+    for least in (0, sys.maxsize):
+        monkeypatch.setattr(repeats, "_SHARE", 2.0)
+        calls = functools.partial(_from, least)
+        monkeypatch.setattr("mbs.native.plain_source.with_calls", calls)
+        path = mbs.export.fmu(system, tmp_path / f"fmu{len(ends)}.fmu")
+        with zipfile.ZipFile(path) as archive:
+            text = archive.read("sources/model.c").decode()
+        assert ("operations, done" in text) == (least == 0)
+        result = mbs.simulate.fmu(path, 0.2, step=0.05, quiet=True)
+        ends.append(np.concatenate([np.asarray(result[name]) for name in ("a0.q", "a0.v")]))
+    np.testing.assert_array_equal(*ends)
+
+
+def _from(least, graph, steps, _):
+    return with_calls(graph, steps, least)

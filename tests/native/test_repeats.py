@@ -99,8 +99,8 @@ def test_windows_that_differ_stay_straight_lines(tmp_path):
 def test_length_follows_what_differs_not_how_many_there_are():
     short, long = windows(42), windows(84)
     assert lines(short) < short.n_instructions() / 8
-    # one row of each table for a window, and its elements of outputs
-    assert lines(long) - lines(short) < 42 * 5
+    # of a window a row of each table and its elements of outputs, not its 155 operations
+    assert lines(long) - lines(short) < 42 * 8
     assert long.n_instructions() - short.n_instructions() > 42 * 100
 
 

@@ -358,8 +358,10 @@ def slots(
                 copied.setdefault(_first(graph, n, begins or {}), []).append((k, element, n))
 
     def place(n: int) -> int:
-        port, element = graph.nodes[n].args if n not in of else (-1, 0)
-        return of[n] if port < 0 else inputs[port] + element
+        if n in of:
+            return of[n]
+        port, element = graph.nodes[n].args
+        return inputs[port] + element
 
     repeats = dict.fromkeys(step.repeat for step in calls)
     tables = {repeat: table_of(repeat, place) for repeat in repeats}

@@ -41,7 +41,7 @@ _ACCESSES = 1.25  # of memory per operation of a sequence
 _BIG = 40_000  # operations beyond which straight lines leave the near caches, and calls are faster
 
 
-class Group(Protocol):
+class SeveralNodes(Protocol):
     """A step that computes several nodes at once."""
 
     def taken(self) -> tuple[int, ...]:
@@ -51,10 +51,10 @@ class Group(Protocol):
         """The nodes that are known afterwards."""
 
 
-S = TypeVar("S", bound=int | Group)
+S = TypeVar("S", bound=int | SeveralNodes)
 
 
-class Taken(NamedTuple):
+class OccurrenceNodes(NamedTuple):
     """An operand of a sequence that it does not compute, or a result that others use.
 
     Attributes:
@@ -82,9 +82,9 @@ class Repeat:
 
     graph: Graph
     steps: tuple[int, ...]
-    constants: tuple[Taken, ...]
-    taken: tuple[Taken, ...]
-    given: tuple[Taken, ...]
+    constants: tuple[OccurrenceNodes, ...]
+    taken: tuple[OccurrenceNodes, ...]
+    given: tuple[OccurrenceNodes, ...]
     count: int
 
 
@@ -165,7 +165,7 @@ def _replaced(
 # What recurs: sequences of equal operations, whose near operands are equally near.
 
 
-def _tokens(graph: Graph, steps: Sequence[int | Group]) -> list[Hashable]:
+def _tokens(graph: Graph, steps: Sequence[int | SeveralNodes]) -> list[Hashable]:
     """What a step must share with another one to stand in its place."""
     place = {step: k for k, step in enumerate(steps)}
     nodes = graph.nodes
@@ -288,7 +288,7 @@ def _intervals(common: Sequence[int]) -> list[tuple[int, int, int]]:
 class _Order:
     """The steps of a graph, and where each node is computed and used."""
 
-    def __init__(self, graph: Graph, steps: Sequence[int | Group]) -> None:
+    def __init__(self, graph: Graph, steps: Sequence[int | SeveralNodes]) -> None:
         count = len(graph.nodes)
         self._graph = graph
         self._nodes = np.array([s if isinstance(s, int) else -1 for s in steps], np.int64)
@@ -326,7 +326,7 @@ class _Order:
                 stored[own, at[own]] = True
             within.add(self._graph.nodes[self._nodes[every[0, offset]]].op, operands)
         given = (
-            Taken(within.steps[offset], tuple(self._nodes[every[:, offset]].tolist()))
+            OccurrenceNodes(within.steps[offset], tuple(self._nodes[every[:, offset]].tolist()))
             for offset in np.flatnonzero(stored.any(axis=0))
         )
         return within.repeat(tuple(given), len(places))
@@ -346,8 +346,8 @@ class _Sequence:
         self.steps: list[int] = []
         self._whole = graph
         self._nodes: list[Node] = []
-        self._constants: list[Taken] = []
-        self._taken: list[Taken] = []
+        self._constants: list[OccurrenceNodes] = []
+        self._taken: list[OccurrenceNodes] = []
         self._known: dict[Hashable, int] = {}
 
     def add(self, op: int, operands: Sequence[int]) -> None:
@@ -366,17 +366,19 @@ class _Sequence:
         element = Node(casadi.OP_INPUT, (0, len(self._constants)))
         return self._once(values, element, self._constants, nodes)
 
-    def repeat(self, given: tuple[Taken, ...], count: int) -> Repeat:
+    def repeat(self, given: tuple[OccurrenceNodes, ...], count: int) -> Repeat:
         """What has been made."""
         constants = Port("constants", Sparsity.dense(len(self._constants)))
         graph = Graph(self._whole.name, (constants,), (), tuple(self._nodes), ())
         own = tuple(self._constants), tuple(self._taken)
         return Repeat(graph, tuple(self.steps), *own, given, count)
 
-    def _once(self, key: Hashable, node: Node, lists: list[Taken], nodes: tuple[int, ...]) -> int:
+    def _once(
+        self, key: Hashable, node: Node, lists: list[OccurrenceNodes], nodes: tuple[int, ...]
+    ) -> int:
         if key not in self._known:
             self._known[key] = self._new(node)
-            lists.append(Taken(self._known[key], nodes))
+            lists.append(OccurrenceNodes(self._known[key], nodes))
         return self._known[key]
 
     def _new(self, node: Node) -> int:
@@ -387,7 +389,7 @@ class _Sequence:
 # Where an occurrence finds what it takes, and leaves what it gives.
 
 
-class Table(NamedTuple):
+class CallTable(NamedTuple):
     """Indices of a work array, by occurrence.
 
     Attributes:
@@ -400,7 +402,7 @@ class Table(NamedTuple):
     rows: tuple[tuple[int, ...], ...]
 
 
-def table_of(repeat: Repeat, place: Callable[[int], int]) -> Table:
+def table_of(repeat: Repeat, place: Callable[[int], int]) -> CallTable:
     """The table of a sequence; indices that always differ by as much share one element of a row.
 
     Args:
@@ -417,4 +419,4 @@ def table_of(repeat: Repeat, place: Callable[[int], int]) -> Table:
             texts[node] = f"at[{bases.setdefault(beyond, len(bases))}] + {least}"
         else:
             texts[node] = str(least)
-    return Table(texts, tuple(zip(*bases, strict=True)) if bases else ((),) * repeat.count)
+    return CallTable(texts, tuple(zip(*bases, strict=True)) if bases else ((),) * repeat.count)

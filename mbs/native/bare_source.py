@@ -82,7 +82,7 @@ def bare_source(functions: Iterable[Function], real: Real = "double") -> tuple[s
 
     Each is ``static int NAME(const REAL **arg, REAL **res, long long *iw, REAL *w, int mem)``,
     where no pointer in `arg` and `res` may be NULL and `iw` is not looked at. It calls the
-    functions of math.h and memset at most.
+    functions of math.h, memset and memcpy at most.
 
     Args:
         functions: made of scalar operations, or to be expanded to them, their inputs and outputs

@@ -15,7 +15,7 @@ import casadi
 from casadi import Function
 
 from mbs.errors import ModelError
-from mbs.native.repeats import Calls, Repeat, Table, table_of
+from mbs.native.repeats import Calls, CallTable, Repeat, table_of
 from mbs.operations.graph import Graph, Node
 from mbs.operations.text import CODES, NAMES
 from mbs.text import in_c_comment
@@ -321,7 +321,7 @@ class Slots:
     count: int
     blocks: int
     inputs: Mapping[int, int] = field(default_factory=dict)
-    tables: Mapping[Repeat, Table] = field(default_factory=dict)
+    tables: Mapping[Repeat, CallTable] = field(default_factory=dict)
     last: Sequence[tuple[int, int, int]] = ()
 
 
@@ -358,8 +358,10 @@ def slots(
                 copied.setdefault(_first(graph, n, begins or {}), []).append((k, element, n))
 
     def place(n: int) -> int:
-        port, element = graph.nodes[n].args if n not in of else (-1, 0)
-        return of[n] if port < 0 else inputs[port] + element
+        if n in of:
+            return of[n]
+        port, element = graph.nodes[n].args
+        return inputs[port] + element
 
     repeats = dict.fromkeys(step.repeat for step in calls)
     tables = {repeat: table_of(repeat, place) for repeat in repeats}
@@ -479,7 +481,7 @@ class BlockCode:
         """The functions of the sequences that recur, and their tables."""
         return [self._repeat(*item) for item in self.where.tables.items()]
 
-    def _repeat(self, repeat: Repeat, table: Table) -> str:
+    def _repeat(self, repeat: Repeat, table: CallTable) -> str:
         """The C function of a sequence, and its tables."""
         index, name = _index(self.where.count), self._repeat_name(repeat)
         columns = (taken.nodes for taken in repeat.constants)

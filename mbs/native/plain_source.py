@@ -14,7 +14,7 @@ from casadi import Function
 from mbs.native.c_code import BlockCode, Memory, blocks, plain_order, slots
 from mbs.native.compiler import FLAGS
 from mbs.native.kernel import BLOCK, EXPORT, function_table
-from mbs.native.repeats import with_calls
+from mbs.native.repeats import LEAST, with_calls
 from mbs.operations.graph import graph_of
 
 _HEAD = """\
@@ -44,7 +44,9 @@ class Work(NamedTuple):
         return Work(*map(max, self, other))
 
 
-def plain_source(functions: Iterable[Function], block: int = BLOCK) -> tuple[str, Work]:
+def plain_source(
+    functions: Iterable[Function], block: int = BLOCK, least: int = LEAST
+) -> tuple[str, Work]:
     """One C file of Functions with different names, in CasADi's calling convention.
 
     It holds `int NAME(const double **arg, double **res, long long *iw, double *w, int mem)` for
@@ -53,6 +55,7 @@ def plain_source(functions: Iterable[Function], block: int = BLOCK) -> tuple[str
     Args:
         functions: made of scalar operations, or to be expanded to them.
         block: assignments in one piece.
+        least: operations of a Function from which sequences of them that recur are written once.
 
     Returns:
         the text, and what is enough for each of them.
@@ -63,7 +66,7 @@ def plain_source(functions: Iterable[Function], block: int = BLOCK) -> tuple[str
     """
     texts, most = [_HEAD], Work()
     for function in functions:
-        text, work = _function(function, block)
+        text, work = _function(function, block, least)
         texts.append(text)
         most = most.covering(work)
     return "\n".join(texts), most
@@ -103,9 +106,9 @@ def plain_flags(source: str) -> tuple[str, ...]:
     return ("-O1" if source.count("\n") > _LONG else FLAGS[0], *FLAGS[1:])
 
 
-def _function(function: Function, block: int) -> tuple[str, Work]:
+def _function(function: Function, block: int, least: int) -> tuple[str, Work]:
     name, graph = function.name(), graph_of(function)
-    pieces = blocks(graph, with_calls(graph, plain_order(graph)), block)
+    pieces = blocks(graph, with_calls(graph, plain_order(graph), least), block)
     where = slots(graph, pieces)
     code = BlockCode(graph, where, "")
     memory = Memory(function, graph, where.count)

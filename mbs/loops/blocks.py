@@ -680,7 +680,7 @@ def single_loops(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
         if plain and _LEAST_JOINTS <= len(ring.joints) <= _JOINTS:
             loop = _SingleLoop.of(work, ring)
             indices = tuple(_index(joint) for joint in loop.joints)
-            if len(indices) < _JOINTS and loop.moves(*_assembled(work.system)):
+            if len(indices) < _JOINTS and not loop.is_locked(*_assembled(work.system)):
                 continue
             yield LoopBlock(work.system.cuts[number].edge.joint.name, indices, loop.roots)
 
@@ -725,16 +725,17 @@ class _SingleLoop:
         q = found.q[np.all(np.abs(found.q[:, n:]) < _AT_ZERO, axis=1), :n]
         return Roots(q * signs, found.proof, found.complete)
 
-    def moves(self, q: Vector, p: Vector) -> bool:
-        """Whether joints can move while all that is known stays."""
-        gaps, n = _side_by_side(self.gaps, q, p), len(self.joints)
-        arm = self._arm(gaps).general.arm
-        x = np.zeros((1, _JOINTS))
-        for own in self.roots(q, p).values:
-            x[0, :n] = own * [joint.sign for joint in self.joints]
-            if rank(arm.pose_and_jacobian(x)[1][0, :, :n], _LOCKED) < n:
-                return True
-        return False
+    def is_locked(self, q: Vector, p: Vector) -> bool:
+        """Whether its roots are known, and no joint can move while all that is known stays."""
+        try:
+            roots = self.roots(q, p)
+        except NoClosedForm:
+            return False
+        n = len(self.joints)
+        x = np.zeros((len(roots.values), _JOINTS))
+        x[:, :n] = roots.values * [joint.sign for joint in self.joints]
+        J = self._arm(_side_by_side(self.gaps, q, p)).general.arm.pose_and_jacobian(x)[1]
+        return all(rank(own, _LOCKED) == n for own in J[:, :, :n])
 
     def _arm(self, gaps: Matrix) -> CertifiedArm:
         key = gaps[1:].tobytes()

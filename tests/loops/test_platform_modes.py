@@ -72,11 +72,10 @@ def test_plane_linkages(kind, seed):
     assert len(found) in range(1, 2 * degree + 1)  # the four-bar has two modes
 
 
-@pytest.mark.parametrize(("sliding", "degree"), [(("OA", "QD"), 18), (("OA", "OD", "PQ"), 14)])
-def test_three_plane_loops_with_slides(sliding, degree):
+def test_three_plane_loops_with_slides():
     joints, _, _ = LINKAGES["two four-bars with a common coupler point"]
-    found = check(planar_linkage(1, joints, sliding=sliding).assemble(), starts=60)
-    assert found.proof == f"homotopy, certified: {degree} of {degree} paths"
+    found = check(planar_linkage(1, joints, sliding=("OA", "QD")).assemble(), starts=60)
+    assert found.proof == "homotopy, certified: 18 of 18 paths"
 
 
 def test_a_loop_behind_a_platform_follows():

@@ -23,6 +23,7 @@ from support import leg_platforms, plane_equations
 from support.configurations import active, same, searched
 from support.platforms import planar_platform
 from support.random_trees import random_rotation
+from support.ring_loops import line_symmetric_loop
 
 from mbs.closed_forms import arm_search
 from mbs.closed_forms.arm import Arm
@@ -86,6 +87,12 @@ def system_modes(build, starts):
         return Row(certified, found.complete, lost, search, len(others), missed, spent)
 
     return run
+
+
+def movable_loop(seed):
+    """A line-symmetric loop that is not assembled where it is rigid."""
+    tried = (line_symmetric_loop(seed + 10000 * k) for k in range(100))
+    return next(m for m in tried if m.assemble().closure.mobility)
 
 
 POSES = 10
@@ -172,6 +179,7 @@ CASES = {
     "three plane loops, two on links": plane(three_loops([0, 1]), 600),
     "three plane loops, one on the ground, two on links": plane(three_loops([KNOWN, 0, 1]), 600),
     **{f"loop R{kinds}": loop(kinds, 500) for kinds in ("RRRRRR", "RPRRPR", "RRPRRR", "PRRRRP")},
+    "line-symmetric loop RRRRRR": system_modes(movable_loop, 40),
     **{f"six legs {kind}": legs(kind, 60) for kind in leg_platforms.DEGREES},
 }
 

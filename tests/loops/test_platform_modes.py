@@ -6,7 +6,7 @@ from support.configurations import active, same, searched
 from support.flat_loops import flat_loop
 from support.messages import refused
 from support.platforms import hexapod, planar_linkage, planar_platform
-from support.ring_loops import ring_loop
+from support.ring_loops import line_symmetric_loop, ring_loop
 
 import mbs
 import mbs.simulate
@@ -116,6 +116,14 @@ def test_bricards_loop(moved):
     assert found.proof.endswith("certified: 6 of 6 roots")
     for q in searched(system, q_a, starts=20):
         assert any(same(system, q, mode.q) for mode in found)
+
+
+def test_a_line_symmetric_loop():
+    """It moves although its six joints are in no special place."""
+    system = line_symmetric_loop(1).assemble()
+    found = check(system, starts=20)
+    assert found.proof.endswith("certified: 16 of 16 roots")
+    assert len(found) == 2
 
 
 @pytest.mark.parametrize("q_a", [(0.0, 0.0), (0.3, -0.8), (300.0, 1.0)])

@@ -23,13 +23,14 @@ from support import leg_platforms, plane_equations
 from support.configurations import active, same, searched
 from support.platforms import planar_platform
 from support.random_trees import random_rotation
+from support.ring_loops import line_symmetric_loop
 
 from mbs.closed_forms import arm_search
 from mbs.closed_forms.arm import Arm
 from mbs.closed_forms.arm_certificate import certified_arm, certified_configurations
 from mbs.closed_forms.arm_search import general_of
 from mbs.closed_forms.hexapod import poses
-from mbs.closed_forms.planar_loops import planar_roots
+from mbs.closed_forms.planar_loops import KNOWN, planar_roots
 from mbs.loops import modes
 
 
@@ -45,20 +46,28 @@ class Row(NamedTuple):
     spent: float
 
 
-def plane(kinds, starts):
-    """Plane loops in numbers: that many coupled ones, or a platform on these legs."""
+def three_loops(carriers=()):
+    """Three plane loops, with prismatic joints that these links carry."""
+
+    def build(rng):
+        angles = plane_equations.complex_numbers(rng, 3, 6 - len(carriers))
+        slides = plane_equations.complex_numbers(rng, 3, len(carriers))
+        return plane_equations.closed(rng, angles, slides, list(carriers))
+
+    return build
+
+
+def plane(build, starts):
+    """Plane loops in numbers."""
 
     def run(seed, search):
-        rng = np.random.default_rng(seed)
-        if isinstance(kinds, int):
-            loops = plane_equations.closed_loops(rng, kinds)
-        else:
-            loops = plane_equations.triad(rng, kinds)
+        loops = build(np.random.default_rng(seed))
         roots, spent = timed(planar_roots, loops)
         found = plane_equations.searched(loops, starts if search else 0, seed)
         missed = plane_equations.missed(loops, roots, found)
         lost = len(roots.theta) == 0
-        return Row(False, roots.complete, lost, search, len(found), missed, spent)
+        certified = roots.complete and all("certified" in method for method in roots.methods)
+        return Row(certified, roots.complete, lost, search, len(found), missed, spent)
 
     return run
 
@@ -78,6 +87,12 @@ def system_modes(build, starts):
         return Row(certified, found.complete, lost, search, len(others), missed, spent)
 
     return run
+
+
+def movable_loop(seed):
+    """A line-symmetric loop that is not assembled where it is rigid."""
+    tried = (line_symmetric_loop(seed + 10000 * k) for k in range(100))
+    return next(m for m in tried if m.assemble().closure.mobility)
 
 
 POSES = 10
@@ -149,15 +164,22 @@ PLATFORMS = {
 
 CASES = {
     **{
-        f"triad {' '.join(kinds)}": plane(kinds, 200)
+        f"triad {' '.join(kinds)}": plane(
+            functools.partial(plane_equations.triad, kinds=kinds), 200
+        )
         for kinds in combinations_with_replacement(["RR", "PR", "RP"], 3)
     },
     **{
         name: system_modes(lambda seed, how=how: planar_platform(seed, *how), 60)
         for name, how in PLATFORMS.items()
     },
-    "three plane loops": plane(3, 1000),
+    "three plane loops": plane(three_loops(), 1000),
+    "three plane loops, a prismatic joint on the ground": plane(three_loops([KNOWN]), 600),
+    "three plane loops, three on the ground": plane(three_loops([KNOWN] * 3), 600),
+    "three plane loops, two on links": plane(three_loops([0, 1]), 600),
+    "three plane loops, one on the ground, two on links": plane(three_loops([KNOWN, 0, 1]), 600),
     **{f"loop R{kinds}": loop(kinds, 500) for kinds in ("RRRRRR", "RPRRPR", "RRPRRR", "PRRRRP")},
+    "line-symmetric loop RRRRRR": system_modes(movable_loop, 40),
     **{f"six legs {kind}": legs(kind, 60) for kind in leg_platforms.DEGREES},
 }
 

@@ -211,9 +211,9 @@ def certified_roots(arm: Arm, T: Array, candidates: Complex) -> CertifiedRoots:
     q, radius = q[certain], radius[certain]
     kept = list[int]()
     for k in np.argsort(radius, kind="stable"):
-        gap = q[k] - q[kept]
-        turn = np.where(arm.prismatic, 0.0, np.round(gap.real / (2 * np.pi)) * 2 * np.pi)
-        if np.all(np.max(np.abs(gap - turn), axis=1, initial=0.0) > radius[k] + radius[kept]):
+        apart = q[k] - q[kept]
+        turns = np.where(arm.prismatic, 0.0, np.round(apart.real / (2 * np.pi)) * 2 * np.pi)
+        if np.all(np.max(np.abs(apart - turns), axis=1, initial=0.0) > radius[k] + radius[kept]):
             kept.append(int(k))
     return CertifiedRoots(q[kept], radius[kept])
 
@@ -273,6 +273,7 @@ def _six(X: Complex) -> Complex:
 
 
 _POSES, _SEED = 4, 20260411
+"""Of which the most roots count: at one of them a root may be too far away to be certified."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -330,7 +331,8 @@ def certified_configurations(arm: CertifiedArm, T: Array) -> Configurations:
             q.append(own.wrapped(root))
     # configurations that are no roots of their own: two roots meet in each
     certain = len(roots.q)
-    complete = certain + 2 * alone == arm.count
+    # of an arm that reaches no general pose nothing is counted
+    complete = certain + 2 * alone == arm.count > 0
     meet = f", and {2 * alone} where configurations meet" if alone and complete else ""
     proof = f"the general inverse geometric model, certified: {certain} of {arm.count} roots{meet}"
     return Configurations(np.array(q).reshape(-1, 6), proof, complete)

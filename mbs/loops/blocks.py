@@ -191,7 +191,7 @@ def _connected(links: dict[int, set[int]]) -> list[list[int]]:
 
 
 _MOST_TURNS = 4
-"""Loops of a gear train: of each whole turns are tried, five or more numbers of them."""
+"""Loops of a gear train at most: whole turns of all are tried together, some five of each."""
 _SAME_ANGLE = 1e-9
 """Angles [rad] that are equal: sums of a few leave 1e-15."""
 
@@ -660,8 +660,7 @@ class _Draughtsman:
 # fewer joints, such as Bricard's, gets revolute joints that must be at zero.
 
 
-_JOINTS = 6
-_LEAST_JOINTS = 3
+_JOINTS, _LEAST_JOINTS = 6, 3
 _AT_ZERO = 1e-6
 """Angle [rad] below which an added joint is at zero: at a fold a root is known to 1e-7, and joints
 added at random are elsewhere by more."""
@@ -680,7 +679,7 @@ def single_loops(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
         if plain and _LEAST_JOINTS <= len(ring.joints) <= _JOINTS:
             loop = _SingleLoop.of(work, ring)
             indices = tuple(_index(joint) for joint in loop.joints)
-            if len(indices) < _JOINTS and loop.moves(*_assembled(work.system)):
+            if len(indices) < _JOINTS and not loop.is_locked(*_assembled(work.system)):
                 continue
             yield LoopBlock(work.system.cuts[number].edge.joint.name, indices, loop.roots)
 
@@ -725,26 +724,27 @@ class _SingleLoop:
         q = found.q[np.all(np.abs(found.q[:, n:]) < _AT_ZERO, axis=1), :n]
         return Roots(q * signs, found.proof, found.complete)
 
-    def moves(self, q: Vector, p: Vector) -> bool:
-        """Whether joints can move while all that is known stays."""
-        gaps, n = _side_by_side(self.gaps, q, p), len(self.joints)
-        arm = self._arm(gaps).general.arm
-        x = np.zeros((1, _JOINTS))
-        for own in self.roots(q, p).values:
-            x[0, :n] = own * [joint.sign for joint in self.joints]
-            if rank(arm.pose_and_jacobian(x)[1][0, :, :n], _LOCKED) < n:
-                return True
-        return False
+    def is_locked(self, q: Vector, p: Vector) -> bool:
+        """Whether its roots are known, and no joint can move while all that is known stays."""
+        try:
+            roots = self.roots(q, p)
+        except NoClosedForm:
+            return False
+        n = len(self.joints)
+        x = np.zeros((len(roots.values), _JOINTS))
+        x[:, :n] = roots.values * [joint.sign for joint in self.joints]
+        J = self._arm(_side_by_side(self.gaps, q, p)).general.arm.pose_and_jacobian(x)[1]
+        return all(rank(own, _LOCKED) == n for own in J[:, :, :n])
 
     def _arm(self, gaps: Matrix) -> CertifiedArm:
         key = gaps[1:].tobytes()
         if self.arm is None or self.arm[0] != key:
             added = _JOINTS - len(self.joints)
-            turns = [not joint.is_rotational for joint in self.joints] + [False] * added
+            prismatic = [not joint.is_rotational for joint in self.joints] + [False] * added
             names = [joint.name for joint in self.joints] + ["added"] * added
             more = _added_gaps(added, float(np.sum(np.linalg.norm(gaps[:, :3, 3], axis=1))))
             between = np.concatenate([np.eye(4)[None], gaps[1:], more])
-            arm = Arm(tuple(names), np.array(turns), between)
+            arm = Arm(tuple(names), np.array(prismatic), between)
             self.arm = (key, certified_arm(general_of(arm)))
         return self.arm[1]
 
@@ -894,33 +894,6 @@ class _Distance(NamedTuple):
     length: float
 
 
-def _require_held(work: PlanWork, waiting: Sequence[int]) -> None:
-    """Refuse a platform that no lengths of its legs hold.
-
-    Raises:
-        NoClosedForm: says so.
-    """
-    system = work.system
-    links = {
-        number: _unknown_links(work, number)
-        for number in waiting
-        if number < len(system.cuts) and not is_bound(system, number)
-    }
-    for numbers in _connected(links):
-        edges, frames = _edges(work, numbers, sorted(set().union(*(links[n] for n in numbers))))
-        found = _legs(edges)
-        if found is None:
-            continue
-        at = _side_by_side(frames, *_assembled(system))
-        legs = [leg for leg in (_distance(leg, at, slides=True) for leg in found[1]) if leg]
-        if len(legs) == LEGS and not holds(*(np.array([leg[k] for leg in legs]) for k in (0, 1))):
-            raise NoClosedForm(
-                f"{system.name}: the ends of its six legs lie so that they hold the platform at no"
-                " pose, as on similar hexagons, and the length of one leg follows from the others;"
-                " move an end, or use mbs.loops.solve without branch"
-            )
-
-
 def _distance(leg: _Leg, frames: Matrix, *, slides: bool = False) -> _Distance | None:
     """The two centres of a leg; None where it is no such leg.
 
@@ -1051,6 +1024,33 @@ class _Hexapod:
             else found.proof
         )
         return Roots(every, told, found.complete and not lost)
+
+
+def _require_held(work: PlanWork, waiting: Sequence[int]) -> None:
+    """Refuse a platform that no lengths of its legs hold.
+
+    Raises:
+        NoClosedForm: says so.
+    """
+    system = work.system
+    links = {
+        number: _unknown_links(work, number)
+        for number in waiting
+        if number < len(system.cuts) and not is_bound(system, number)
+    }
+    for numbers in _connected(links):
+        edges, frames = _edges(work, numbers, sorted(set().union(*(links[n] for n in numbers))))
+        found = _legs(edges)
+        if found is None:
+            continue
+        at = _side_by_side(frames, *_assembled(system))
+        legs = [leg for leg in (_distance(leg, at, slides=True) for leg in found[1]) if leg]
+        if len(legs) == LEGS and not holds(*(np.array([leg[k] for leg in legs]) for k in (0, 1))):
+            raise NoClosedForm(
+                f"{system.name}: the ends of its six legs lie so that they hold the platform at no"
+                " pose, as on similar hexagons, and the length of one leg follows from the others;"
+                " move an end, or use mbs.loops.solve without branch"
+            )
 
 
 def _side_by_side(frames: Function, q: Vector, p: Vector) -> Matrix:

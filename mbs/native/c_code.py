@@ -371,7 +371,8 @@ def slots(
 
 def _input_places(graph: Graph, calls: Sequence[Calls]) -> tuple[dict[int, int], int]:
     """Where the inputs begin that recurring sequences take, and how long they are together."""
-    taken = {n for step in calls for column in step.repeat.taken for n in column.nodes}
+    repeats = {step.repeat for step in calls}
+    taken = {n for repeat in repeats for column in repeat.taken for n in column.nodes}
     nodes = (graph.nodes[n] for n in taken)
     ports = sorted({node.args[0] for node in nodes if node.op == casadi.OP_INPUT})
     ends = list(accumulate((graph.inputs[k].sparsity.nnz() for k in ports), initial=0))

@@ -36,7 +36,23 @@ def ring_loop(seed, kinds, active=(0,), cut=None, parallel=()):
     turns = [random_rotation(rng) for _ in letters]
     for first, second in parallel:
         turns[second] = turns[first]
-    m = Mechanism(f"ring{seed}_{kinds}")
+    return _closed(f"ring{seed}_{kinds}", rng, letters, places, turns, active, cut)
+
+
+def line_symmetric_loop(seed):
+    """Six revolute joints, three of them the images of the others about a line: it moves.
+
+    Source: Bricard 1897.
+    """
+    rng = np.random.default_rng(seed)
+    image = np.diag([-1.0, -1.0, 1.0])
+    half = [(rng.uniform(-1, 1, 3), random_rotation(rng)) for _ in range(3)]
+    places = [*half, *((image @ place, image @ turn) for place, turn in half)]
+    return _closed(f"symmetric{seed}", rng, "R" * 6, *zip(*places, strict=True), (0,), None)
+
+
+def _closed(name, rng, letters, places, turns, active, cut):
+    m = Mechanism(name)
     bodies = [m.world, *(m.add(random_body(rng, f"body{k}")) for k in range(1, len(letters)))]
     homes = [(np.zeros(3), np.eye(3))]
     homes += [(rng.uniform(-1, 1, 3), random_rotation(rng)) for _ in bodies[1:]]

@@ -9,7 +9,7 @@
 enum { OFFSETS = 8 };
 static const double FIRST_OFFSET = 0.2731; /* [rad], an angle that no design prefers */
 static const double WELL = 1e-3;           /* a regularity with which no other offset is tried */
-static const double FAR_ROUNDING = 1e-15;      /* of pivots */
+static const double FAR_ROUNDING = 1e-15;  /* of pivots */
 static const double OFF_CIRCLE = 0.5;      /* |log| of the size of e^(iu) of roots that are kept */
 
 /* The matrix where x = tan((u - offset) / 2) is infinite. */
@@ -29,21 +29,23 @@ static void factorize_at(const roth_matrix *m, double offset, dense_qr *f) {
     dense_factorize(f);
 }
 
-/* An offset at which that matrix, transposed, is well conditioned, and its factors. */
-static double well_placed(const roth_matrix *m, dense_qr *f) {
+/* An offset at which that matrix, transposed, is well conditioned. */
+static double well_placed(const roth_matrix *m) {
+    double far[ROTH_SIZE * ROTH_SIZE];
+    dense_qr f;
     double best = 0.0, most = -1.0;
     int i;
     for (i = 0; i < OFFSETS; i++) {
         double offset = FIRST_OFFSET + i * PI / 4.0, regularity;
-        factorize_at(m, offset, f);
-        regularity = dense_regularity(f);
+        f.A = far;
+        factorize_at(m, offset, &f);
+        regularity = dense_regularity(&f);
         if (regularity > WELL) return offset;
         if (regularity > most) {
             most = regularity;
             best = offset;
         }
     }
-    factorize_at(m, best, f);
     return best;
 }
 
@@ -64,13 +66,13 @@ static void lower_factors(const roth_matrix *m, double offset, double *lower) {
 }
 
 /* The companion matrix, its rows being unknowns 1, x; the polynomial is taken transposed. */
-static int companion(const roth_matrix *m, double *offset, double *A) {
+static int companion(const roth_matrix *m, double offset, double *A) {
     double far[ROTH_SIZE * ROTH_SIZE], lower[2 * ROTH_SIZE * ROTH_SIZE];
     int i, j, n = m->size, degree = m->parts - 1, all = degree * n;
     dense_qr f;
     f.A = far;
-    *offset = well_placed(m, &f);
-    lower_factors(m, *offset, lower);
+    factorize_at(m, offset, &f);
+    lower_factors(m, offset, lower);
     dense_solve(&f, lower, all, FAR_ROUNDING);
     memset(A, 0, (size_t)(all * all) * sizeof(double));
     for (i = 0; i < all - n; i++) A[i * all + n + i] = 1.0;
@@ -90,9 +92,16 @@ static int ascending(double *u, int count) {
 }
 
 int roth_roots(const roth_matrix *m, double *u) {
-    double A[ROTH_ROOTS * ROTH_ROOTS], real[ROTH_ROOTS], imaginary[ROTH_ROOTS], offset;
-    int i, count = 0, all = companion(m, &offset, A);
-    if (eigenvalues(all, A, real, imaginary)) return 0;
+    double A[ROTH_ROOTS * ROTH_ROOTS], real[ROTH_ROOTS], imaginary[ROTH_ROOTS];
+    double offset = well_placed(m);
+    int i, count = 0, all = companion(m, offset, A), failed = eigenvalues(all, A, real, imaginary);
+    /* the steps may go round without end where many roots are one, as of three translations */
+    for (i = 0; failed && i < OFFSETS; i++) {
+        offset = FIRST_OFFSET + i * PI / 4.0;
+        all = companion(m, offset, A);
+        failed = eigenvalues(all, A, real, imaginary);
+    }
+    if (failed) return 0;
     for (i = 0; i < all; i++) {
         double x = real[i], y = imaginary[i];
         double above = x * x + (1.0 - y) * (1.0 - y), below = x * x + (1.0 + y) * (1.0 + y);

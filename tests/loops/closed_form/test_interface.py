@@ -127,7 +127,7 @@ def test_loops_without_closed_form_say_why():
     system = mechanism.assemble(guess=guess)
     with pytest.raises(NoClosedForm, match=r"closing has no closed form known here, 6 positions"):
         function(system)
-    assert modes(system).proof == "the general inverse geometric model, of degree 16"
+    assert modes(system).proof == "the general inverse geometric model, certified: 16 of 16 roots"
     with pytest.raises(LoopError, match=r"use mbs\.loops\.solve without branch"):
         function(system)
     with pytest.raises(NoClosedForm):

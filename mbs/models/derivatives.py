@@ -32,7 +32,7 @@ from mbs.models.symbols import (
     surroundings,
     symbols_of,
 )
-from mbs.models.tree_table import STAGED, TreeLoops
+from mbs.models.tree_table import TreeLoops
 from mbs.operations.counts import cheapest
 from mbs.recursions.composite_body import (
     TreeFactor,
@@ -219,6 +219,9 @@ _COMPARED = 6
 """Velocities from the base to a leaf up to which both methods are built and their operations
 counted; in longer trees differentiation takes more."""
 
+_STAGED = 10
+"""Velocities from which the columns of -A^-1 dtau are a map, not written out one by one."""
+
 
 def inverse_dynamics_derivatives(
     system: System,
@@ -328,7 +331,7 @@ def direct_dynamics_derivatives(
             return inputs, _outputs("a" + s.suffix, s, names, blocks, a)
 
         key = ("ddm_derivatives", chosen, coordinates, names)
-        if chosen == "implicit" and not system.is_closed and system.nv >= STAGED:
+        if chosen == "implicit" and not system.is_closed and system.nv >= _STAGED:
             staged: Function = system.cached(key, lambda: _stage(system, names))
             return staged
         check = configuration_check(system, coordinates)
@@ -468,31 +471,6 @@ def with_implicit_jacobian(system: System, ddm: Function) -> Function:
     if isinstance(made, ModelFunction):
         made.loops = TreeLoops(system, "ddm", normalises=True)
     return made
-
-
-def jacobian_of_accelerations(system: System, ddm: Function) -> Function:
-    """The Jacobian of the direct model of a large open chain, under the names of CasADi's own.
-
-    It is made by the implicit formula, whose equations are several times shorter than those of
-    the differentiated model; both have their zeros in the same places.
-
-    Args:
-        system: an open chain without quaternions.
-        ddm: its `direct_dynamics`.
-    """
-    names, output = ddm.name_in(), ddm.name_out()[0]
-    slopes = direct_dynamics_derivatives(system, "implicit", with_respect_to=names)
-    inputs = {name: MX.sym(name, *ddm.size_in(name)) for name in names}
-    found = slopes.call([inputs[name] for name in slopes.name_in()])
-    blocks = dict(zip(slopes.name_out(), found, strict=True))
-    patterns = {name: ddm.jac_sparsity(0, k) for k, name in enumerate(names)}
-    return Function(
-        f"jac_{ddm.name()}",
-        [*inputs.values(), MX(*ddm.size_out(0))],
-        [casadi.project(blocks[f"da_d{name}"], patterns[name]) for name in names],
-        [*names, f"out_{output}"],
-        [f"jac_{output}_{name}" for name in names],
-    )
 
 
 def _check(system: System, ddm: Function) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -62,9 +61,6 @@ _LONGEST = {"inertia": 30, "idm_derivatives": 13, "ddm_derivatives": 16, "idm": 
 _LONGEST_OF_JACOBIAN = {"idm": 9, "ddm": 8}
 """The same for the Jacobian by q, v and a or tau."""
 
-STAGED = 10
-"""Velocities from which the columns of -A^-1 dtau are a map, not written out one by one."""
-
 _MANY = 60_000
 """Operations of straight lines beyond which loops are taken in any case: these compile for ten
 seconds and more, and no cache of a processor holds them."""
@@ -112,21 +108,6 @@ class TreeLoops:
         names = [name] * value + [f"jac_{name}"] * jacobian
         files = tree_files(table, {x: shapes[x] for x in names})
         return LoopCode(files, COMMON, value, jacobian, jacobian and table.dependent is not None)
-
-    def jacobian(self, function: Function) -> Callable[[], Function] | None:
-        """What gives equations of the Jacobian, where these are shorter than what CasADi derives.
-
-        Args:
-            function: the equations of the model.
-        """
-        system = self.system
-        wide = not system.is_closed and system.nv >= STAGED and not quaternion_slices(system.tree)
-        if self.name != "ddm" or function.name() != "ddm" or not wide:
-            return None
-        # derivatives are made of the models that refer to this table
-        from mbs.models.derivatives import jacobian_of_accelerations
-
-        return functools.partial(jacobian_of_accelerations, system, function)
 
 
 def _shape(function: Function) -> list[object]:

@@ -4,7 +4,7 @@ import contextlib
 import ctypes
 import functools
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,8 +18,6 @@ from mbs.native.derivatives_on_demand import (
     by_parameters,
     derivatives_of,
     fill,
-    promise_jacobian,
-    promised_jacobian,
     read_record,
     source,
     write_record,
@@ -74,14 +72,11 @@ def compiled(
     like: Any = getattr(function, "like", None)
     library = None
     if compiler_found():
-        offer: Any = getattr(function, "loops", None)
-        looped: LoopCode | None = None
-        if offer is not None and fast and loops:
-            looped = offer.code(function, derivatives)
+        offer: Any = getattr(function, "loops", None) if fast and loops else None
+        looped: LoopCode | None = None if offer is None else offer.code(function, derivatives)
         if looped is not None and looped.value:
             library = _looped_library(function, derivatives, looped)
-        jacobian = None if offer is None or looped is not None else offer.jacobian(function)
-        library = library or _library(function, derivatives, fast, looped, jacobian)
+        library = library or _library(function, derivatives, fast, looped)
     if library is None:
         result: Any = with_array_calls(casadi.Function(function), None, like)
     else:
@@ -94,11 +89,7 @@ def compiled(
 
 
 def _library(
-    function: casadi.Function,
-    derivatives: int,
-    fast: bool,
-    loops: LoopCode | None,
-    jacobian: Callable[[], casadi.Function] | None = None,
+    function: casadi.Function, derivatives: int, fast: bool, loops: LoopCode | None
 ) -> Path | None:
     """The library of a Function and its derivatives; None when they cannot be written as C.
 
@@ -107,8 +98,6 @@ def _library(
         derivatives: how often it can be differentiated.
         fast: of which kind the code is.
         loops: what its Jacobian is made of; None for straight lines.
-        jacobian: gives equations of its Jacobian; where left out they are those of the Function,
-            differentiated.
     """
     if calls_machine_code([function]):
         return None
@@ -123,8 +112,6 @@ def _library(
     record = write_record(key, text, every, fast, loops) if derivatives else None
     if derivatives and record is None:  # nothing can be kept on disk: all at once
         return _built(function, derivatives, fast)
-    if record is not None and jacobian is not None:
-        promise_jacobian(record, jacobian)
     later = {} if record is None else {"derivatives.c": source(every, record)}
     return indexed_library(key, lambda: _compiled([function], fast, later))
 
@@ -264,15 +251,7 @@ def fetch_derivatives(record: str, number: int, table: int) -> None:
         later = {"derivatives.c": source(every, Path(record), own)} if own else {}
         return fill(table, loops.library(later), every, number)
 
-    own_name = part.name == f"jac_{function.name()}"
-    equations = promised_jacobian(Path(record)) if own_name else None
-
     def make() -> Path | None:
-        if equations is not None:
-            made = equations()
-            if part.pattern:
-                return cached_library({"patterns.c": pattern_source(made)})
-            return _compiled([made], fast, {})
         if not part.pattern:
             return _compiled([part.of(function)], fast, {})
         inner = Derivative(part.name.removeprefix("jac_")).of(function)
@@ -281,7 +260,7 @@ def fetch_derivatives(record: str, number: int, table: int) -> None:
         text = pattern_source(inner.jacobian()) if known else patterns_source([inner])
         return cached_library({"patterns.c": text})
 
-    options = f"{'fast' if fast else 'exact'}, {part}{', by its own equations' * bool(equations)}"
+    options = f"{'fast' if fast else 'exact'}, {part}"
     found = index_key(function, options)
     library = make() if found is None else indexed_library(found[0], make)
     if library is None:

@@ -220,7 +220,6 @@ class DerivativeSource(NamedTuple):
 
 
 _PROMISED: dict[Path, DerivativeSource] = {}
-_JACOBIANS: dict[Path, Callable[[], casadi.Function]] = {}
 
 
 def promise(record: Path, content: DerivativeSource) -> None:
@@ -231,24 +230,6 @@ def promise(record: Path, content: DerivativeSource) -> None:
         content: of it.
     """
     _PROMISED[record] = content
-
-
-def promise_jacobian(record: Path, build: Callable[[], casadi.Function]) -> None:
-    """Have the Jacobian of a Function made in this process by other equations than its own.
-
-    Another process, which finds the record alone, differentiates the Function: its Jacobian is the
-    same but for rounding.
-
-    Args:
-        record: the file of the Function.
-        build: gives the Jacobian, with the inputs, outputs and patterns of CasADi's.
-    """
-    _JACOBIANS[record] = functools.cache(build)
-
-
-def promised_jacobian(record: Path) -> Callable[[], casadi.Function] | None:
-    """What gives the Jacobian of a Function; None where it is differentiated."""
-    return _JACOBIANS.get(record)
 
 
 @functools.lru_cache(maxsize=1)  # one derivative is often followed by another

@@ -120,29 +120,3 @@ def test_parameters_and_checks():
         f(state[0], state[1][:9], state[2])
     fast = compiled(f, derivatives=0, fast=True)
     assert_close(fast(*map(np.array, state))[:1], g(*state, p)[:1], 1e-12)
-
-
-def test_the_jacobian_of_machine_code_is_made_by_the_implicit_formula(monkeypatch, tmp_path):
-    """Two chains on one base, with a parameter: values, patterns and names are those of CasADi."""
-    monkeypatch.setenv("MBS_CACHE_DIR", str(tmp_path))
-    m = Mechanism("arms", gravity=(0, -9.81, 0), parameters={"mu": 0.3})
-    for arm, joints in (("a", 4), ("b", 6)):
-        before = m.world
-        for k in range(joints):
-            name = f"{arm}{k}"
-            body = m.add(Body(name, mass="mu", com=(0.5, 0, 0), inertia=np.eye(3) / 9))
-            m.connect(before, Revolute(f"j{name}", Fv=0.1), body)
-            before = body.at(1.0)
-    system = m.assemble()
-    ddm = mbs.models.direct_dynamics(system)
-    assert ddm.loops.jacobian(mbs.models.inverse_dynamics(system)) is None
-    found, exact = compiled(ddm).jacobian(), ddm.jacobian()
-    assert (found.name_in(), found.name_out()) == (exact.name_in(), exact.name_out())
-    q, v, tau = np.random.default_rng(0).uniform(-1, 1, (3, 10))
-    blocks, expected = (f(q, v, tau, 0.7, 0) for f in (found, exact))
-    for block, wanted in zip(blocks, expected, strict=True):
-        assert block.sparsity() == wanted.sparsity()
-        error = np.abs(block.full() - wanted.full()).max() / np.abs(wanted.full()).max()
-        assert error < 1e-11
-    assert blocks[0].nnz() <= 4**2 + 6**2  # no arm accelerates the other one
-    assert not np.array_equal(blocks[0].full(), expected[0].full())  # it is another formula

@@ -114,7 +114,7 @@ def test_the_rows_of_many_loops_in_their_order_lead_to_the_same_motion(monkeypat
     scale(monkeypatch, "MANY", 0)
     ordered = motion()
     difference = np.abs(ordered.values - pivots.values).max(axis=0)
-    assert 0 < difference.max()
+    assert difference.max() > 0
     uprights = [f"a{k}.q" for k in range(5)]
     for name in uprights:
         np.testing.assert_allclose(ordered[name], pivots[name], atol=1e-7)

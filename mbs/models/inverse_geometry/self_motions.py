@@ -71,8 +71,8 @@ def freedoms(reduced: TargetReduction) -> tuple[int, Array]:
         return c, (probes[0] - reduced.x) / np.linalg.norm(probes[0] - reduced.x)
     if c > 1:
         around = _nearest_on_sphere(reduced, np.array(directions))
+        # on the sphere, not fallen back to its centre, at a distance of 0 in place of 1
         on = np.abs(np.linalg.norm(around - reduced.x, axis=1) / _AWAY - 1) < 1e-3
-        # on the sphere, not fallen back to its centre
         for x in around[on & (target.residual(around * target.unit) < target.tolerance)]:
             return 1, (x - reduced.x) / np.linalg.norm(x - reduced.x)
     return 0, np.zeros(reduced.x.size)

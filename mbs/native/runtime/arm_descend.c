@@ -14,6 +14,7 @@ static const double DEPENDENT = 1e-12; /* singular values below it are rounding,
 static const double ZERO = 2e-6;       /* those of a self-motion, known to the root of 1e-12 */
 static const double LONGEST = 0.3;     /* step [rad or arm lengths] in which all is nearly linear */
 static const double DEPENDENT_THERE = 1e-10; /* likewise on a sphere, where motions meet */
+static const double STRAIGHT = 0.9;    /* cosine of 26 degrees: curves hardly ever cross at less */
 static const double FINISHED = 1e-14;  /* step that is rounding of angles of about one */
 static const double SETTLED = 1e-12;   /* step that is hardly more than rounding, likewise */
 
@@ -154,14 +155,16 @@ void arm_tangent(const arm *a, const double *x, const double *before, double *ta
     held_step(a, &p, none, before, 1.0, ZERO, tangent);
 }
 
-/* From the direction before to that of a self-motion; straight on where it has turned by 84 degrees. */
-static void turn(const arm *a, const double *x, const double *before, double *along) {
+/* From the direction before to that of a self-motion; straight on, and 0, where it has turned by 84
+ * degrees. */
+static int turn(const arm *a, const double *x, const double *before, double *along) {
     double tangent[ARM_JOINTS], part = 0.0;
     int k;
     arm_tangent(a, x, before, tangent);
     for (k = 0; k < a->n; k++) part += tangent[k] * tangent[k];
     part = sqrt(part); /* one over the cosine between them */
     for (k = 0; k < a->n; k++) along[k] = part < 10.0 ? tangent[k] / part : before[k];
+    return part < 10.0;
 }
 
 /* Which way round a curve is seen at x: the sign of det [[J, left], [along', 0]], with the direction
@@ -234,7 +237,8 @@ long long arm_walk(const arm *a, const double *target, const double *tangent, do
     double step = longest;
     long long count = 1;
     double left[ARM_JOINTS] = {0.0}, beyond[ARM_JOINTS], on[ARM_JOINTS];
-    int k, n = a->n, seen = 0;
+    int k, n = a->n, seen = 0, sharp;
+    const int strict = sided;
     *closed = 0;
     memcpy(along, tangent, (size_t)n * sizeof(double));
     sided = sided && n == 6;
@@ -244,7 +248,7 @@ long long arm_walk(const arm *a, const double *target, const double *tangent, do
     }
     while (count < most && step > shortest) {
         const double *last = points + (count - 1) * n;
-        double value = 0.0, far = 0.0, away = 0.0, ahead = 0.0;
+        double value = 0.0, far = 0.0, away = 0.0, ahead = 0.0, cosine = 0.0;
         for (k = 0; k < n; k++) {
             x[k] = last[k] + step * along[k];
             value += along[k] * x[k];
@@ -262,10 +266,14 @@ long long arm_walk(const arm *a, const double *target, const double *tangent, do
             continue;
         }
         for (k = 0; k < n; k++) moved[k] /= far;
-        turn(a, x, moved, on);
+        sharp = !turn(a, x, moved, on);
+        for (k = 0; k < n; k++) cosine += on[k] * along[k];
+        sharp = strict && (sharp || cosine < STRAIGHT);
         memcpy(beyond, left, sizeof beyond);
         k = sided ? side(a, x, on, beyond) : 0;
-        if (k != seen && step > 2.0 * shortest) { /* onto another curve that passes close by */
+        /* onto another curve that passes close by: straight on its side changes, and to either
+         * hand the direction does */
+        if ((sharp || k != seen) && step > 2.0 * shortest) {
             step *= 0.5;
             continue;
         }

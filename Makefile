@@ -18,7 +18,8 @@ OTHER_KERNELS := tests/solvers/test_shortest_steps.py tests/solvers/test_partial
     tests/loops/test_configuration.py tests/robots/test_benchmarks_pendulum.py \
     tests/simulate/test_over_constrained.py \
     tests/bridges/test_opti.py::test_four_bar_finds_its_optimum \
-    tests/identification/exciting/test_excitation.py::test_a_platform_that_follows_keeps_its_height
+    tests/identification/exciting/test_excitation.py::test_a_platform_that_follows_keeps_its_height \
+    tests/models/inverse_geometry/test_families.py::test_a_shoulder_singularity_turns_all_the_way_round
 
 # What needs no compiler, no browser and no long motion.
 FAST := tests/assembly tests/components tests/formats tests/operations \

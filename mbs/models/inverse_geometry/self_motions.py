@@ -22,6 +22,8 @@ from mbs.numbers import NONZERO
 _STEP, _SMALLEST_STEP = 0.1, 1e-5
 """Lengths of a step along a self-motion [rad or arm lengths]: 63 to a turn, and the shortest: a
 curve that even this does not follow ends there, and one that is nearer is crossed."""
+_STRAIGHT = 0.9
+"""Cosine of 26 degrees, by which a step may turn: curves hardly ever cross at less."""
 _MOST_STEPS, _FEW_STEPS = 2000, 60
 _SHORTEST = 1.0
 _AWAY = 0.05
@@ -183,10 +185,13 @@ class _Way:
             if far or target.residual(x * target.unit) > self.limit:
                 step /= 2
                 continue
-            ahead = _tangent(target, x, moved / np.linalg.norm(moved))
+            ahead, turned = _tangent(target, x, moved / np.linalg.norm(moved))
             there = _Side.at(target, x, ahead, side.left)
-            if self.sided and there.sign != side.sign and step > 2 * _SMALLEST_STEP:
-                step /= 2  # onto another curve that passes close by
+            # onto another curve that passes close by: straight on its side changes, and to either
+            # hand the direction does
+            sharp = turned or ahead @ tangent < _STRAIGHT
+            if self.sided and (sharp or there.sign != side.sign) and step > 2 * _SMALLEST_STEP:
+                step /= 2
                 continue
             tangent, side = ahead, there
             points.append(x)
@@ -231,16 +236,18 @@ def _step(target: Target, x: Array, tangent: Array, step: float) -> Array:
     return target.corrected(ahead, held, held @ ahead, 12)
 
 
-def _tangent(target: Target, x: Array, before: Array) -> Array:
-    """The direction along which the equations stay solved, nearest the one before."""
+def _tangent(target: Target, x: Array, before: Array) -> tuple[Array, bool]:
+    """The direction along which the equations stay solved, nearest the one before.
+
+    Straight on, and true, where the null space has turned away from it by 84 degrees.
+    """
     J = target.excess(x)[1]
     _, s, Vt = np.linalg.svd(J)
     rank = min(int(np.sum(s > _ZERO)), x.size - 1)
     null = Vt[rank:].T
     along: Array = null @ (null.T @ before)
     size = float(np.linalg.norm(along))
-    # where the null space has turned away, by 84 degrees, straight on
-    return along / size if size > 0.1 else before
+    return (along / size, False) if size > 0.1 else (before, True)
 
 
 Whole = Callable[[Array], Array]

@@ -58,9 +58,6 @@ void arm_correct(const arm *a, const double *target, const double *held, double 
 void arm_reach_sphere(const arm *a, const double *target, const double *centre, double radius,
                       double *x);
 
-/* What of a direction the pose does not feel at x = q / unit, divided by the square of its part. */
-void arm_tangent(const arm *a, const double *x, const double *before, double *tangent);
-
 /* Follows a self-motion from points[0], in x = q / unit, along a tangent while residuals are within
  * the limit, and on its side of curves that pass close by if `sided`; gives how many points there are,
  * *closed where the last is the first again. There must be room for one more than the most. */

@@ -14,6 +14,8 @@ static const double DEPENDENT = 1e-12; /* singular values below it are rounding,
 static const double ZERO = 2e-6;       /* those of a self-motion, known to the root of 1e-12 */
 static const double LONGEST = 0.3;     /* step [rad or arm lengths] in which all is nearly linear */
 static const double DEPENDENT_THERE = 1e-10; /* likewise on a sphere, where motions meet */
+static const double STRAIGHT = 0.9;    /* cosine of 26 degrees, by which a step may turn: curves
+                                          hardly ever cross at less */
 static const double FINISHED = 1e-14;  /* step that is rounding of angles of about one */
 static const double SETTLED = 1e-12;   /* step that is hardly more than rounding, likewise */
 
@@ -145,42 +147,61 @@ void arm_reach_sphere(const arm *a, const double *target, const double *centre, 
     }
 }
 
-void arm_tangent(const arm *a, const double *x, const double *before, double *tangent) {
-    static const double none[6] = {0.0}, home[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-    configuration p;
-    int k;
-    for (k = 0; k < a->n; k++) p.q[k] = arm_unit(a, k) * x[k];
-    arm_examine(a, home, &p);
-    held_step(a, &p, none, before, 1.0, ZERO, tangent);
+/* The unit vector nearest `before`, one too, that p->J does not feel; gives the cosine between them.
+ * One damped projection leaves a part of what singular values of a few times ZERO feel, three do
+ * not. */
+static double null_direction(const arm *a, const configuration *p, const double *before, double *along) {
+    static const double none[6] = {0.0};
+    double found[ARM_JOINTS], cosine = 0.0;
+    int k, pass;
+    memcpy(found, before, (size_t)a->n * sizeof(double));
+    for (pass = 0; pass < 3; pass++) {
+        double size = 0.0;
+        held_step(a, p, none, found, 1.0, ZERO, found);
+        for (k = 0; k < a->n; k++) size += found[k] * found[k];
+        for (k = 0; k < a->n; k++) found[k] /= sqrt(size);
+    }
+    for (k = 0; k < a->n; k++) cosine += found[k] * before[k];
+    memcpy(along, found, (size_t)a->n * sizeof(double));
+    return cosine;
 }
 
-/* From the direction before to that of a self-motion; straight on where it has turned by 84 degrees. */
-static void turn(const arm *a, const double *x, const double *before, double *along) {
-    double tangent[ARM_JOINTS], part = 0.0;
+/* The Jacobian at x = q / unit. */
+static void differentiate(const arm *a, const double *x, configuration *p) {
+    static const double home[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
     int k;
-    arm_tangent(a, x, before, tangent);
-    for (k = 0; k < a->n; k++) part += tangent[k] * tangent[k];
-    part = sqrt(part); /* one over the cosine between them */
-    for (k = 0; k < a->n; k++) along[k] = part < 10.0 ? tangent[k] / part : before[k];
+    for (k = 0; k < a->n; k++) p->q[k] = arm_unit(a, k) * x[k];
+    arm_examine(a, home, p);
+}
+
+static void transpose(const configuration *p, configuration *turned) {
+    int i, k;
+    for (i = 0; i < 6; i++)
+        for (k = 0; k < 6; k++) turned->J[k][i] = p->J[i][k];
+}
+
+/* From the direction before to that of a self-motion; straight on, and 0, where it has turned by 84
+ * degrees. */
+static int turn(const arm *a, const double *x, const double *before, double *along) {
+    configuration p;
+    differentiate(a, x, &p);
+    if (null_direction(a, &p, before, along) > 0.1) return 1;
+    memcpy(along, before, (size_t)a->n * sizeof(double));
+    return 0;
 }
 
 /* Which way round a curve is seen at x: the sign of det [[J, left], [along', 0]], with the direction
  * `left` of the equations that the joints do not change, which is continued. It changes where two curves
  * cross, and nowhere else (Allgower and Georg 1990, chapter 8). 0 for fewer than six joints. */
 static int side(const arm *a, const double *x, const double *along, double *left) {
-    static const double none[6] = {0.0}, home[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
     configuration p, turned;
-    double B[7][7], size = 0.0;
+    double B[7][7];
     int i, j, k, sign = 1;
     if (a->n != 6) return 0;
-    for (k = 0; k < 6; k++) p.q[k] = arm_unit(a, k) * x[k];
-    arm_examine(a, home, &p);
-    for (i = 0; i < 6; i++)
-        for (k = 0; k < 6; k++) turned.J[k][i] = p.J[i][k];
-    held_step(a, &turned, none, left, 1.0, ZERO, left);
-    for (k = 0; k < 6; k++) size += left[k] * left[k];
+    differentiate(a, x, &p);
+    transpose(&p, &turned);
+    null_direction(a, &turned, left, left);
     for (i = 0; i < 6; i++) {
-        left[i] /= sqrt(size);
         for (k = 0; k < 6; k++) B[i][k] = p.J[k][i];
         B[i][6] = left[i];
         B[6][i] = along[i];
@@ -206,24 +227,19 @@ static int side(const arm *a, const double *x, const double *along, double *left
 
 /* The equations' direction that the joints do not change at x, from the best of six guesses. */
 static void left_direction(const arm *a, const double *x, double *left) {
-    double least = HUGE_VAL, along[ARM_JOINTS] = {0.0};
-    int k, m;
+    configuration p, turned;
+    double most = 0.0;
+    int k;
+    differentiate(a, x, &p);
+    transpose(&p, &turned);
     for (k = 0; k < 6; k++) {
-        configuration p, turned;
-        double guess[ARM_JOINTS] = {0.0}, found[ARM_JOINTS], size = 0.0;
-        static const double none[6] = {0.0},
-                            home[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+        double guess[ARM_JOINTS] = {0.0}, found[ARM_JOINTS], cosine;
         guess[k] = 1.0;
-        for (m = 0; m < 6; m++) p.q[m] = arm_unit(a, m) * x[m];
-        arm_examine(a, home, &p);
-        for (m = 0; m < 36; m++) turned.J[m / 6][m % 6] = p.J[m % 6][m / 6];
-        held_step(a, &turned, none, guess, 1.0, ZERO, found);
-        for (m = 0; m < 6; m++) size += found[m] * found[m];
-        if (!(size < least)) continue;
-        least = size;
-        for (m = 0; m < 6; m++) along[m] = found[m] / sqrt(size);
+        cosine = null_direction(a, &turned, guess, found);
+        if (!(cosine > most)) continue;
+        most = cosine;
+        memcpy(left, found, 6 * sizeof(double));
     }
-    memcpy(left, along, 6 * sizeof(double));
 }
 
 long long arm_walk(const arm *a, const double *target, const double *tangent, double limit,
@@ -234,17 +250,17 @@ long long arm_walk(const arm *a, const double *target, const double *tangent, do
     double step = longest;
     long long count = 1;
     double left[ARM_JOINTS] = {0.0}, beyond[ARM_JOINTS], on[ARM_JOINTS];
-    int k, n = a->n, seen = 0;
+    int k, n = a->n, seen = 0, sharp;
+    const int told = sided && n == 6; /* which side the curve is seen from */
     *closed = 0;
     memcpy(along, tangent, (size_t)n * sizeof(double));
-    sided = sided && n == 6;
-    if (sided) {
+    if (told) {
         left_direction(a, points, left);
         seen = side(a, points, along, left);
     }
     while (count < most && step > shortest) {
         const double *last = points + (count - 1) * n;
-        double value = 0.0, far = 0.0, away = 0.0, ahead = 0.0;
+        double value = 0.0, far = 0.0, away = 0.0, ahead = 0.0, cosine = 0.0;
         for (k = 0; k < n; k++) {
             x[k] = last[k] + step * along[k];
             value += along[k] * x[k];
@@ -262,10 +278,14 @@ long long arm_walk(const arm *a, const double *target, const double *tangent, do
             continue;
         }
         for (k = 0; k < n; k++) moved[k] /= far;
-        turn(a, x, moved, on);
+        sharp = !turn(a, x, moved, on);
+        for (k = 0; k < n; k++) cosine += on[k] * along[k];
+        sharp = sided && (sharp || cosine < STRAIGHT);
         memcpy(beyond, left, sizeof beyond);
-        k = sided ? side(a, x, on, beyond) : 0;
-        if (k != seen && step > 2.0 * shortest) { /* onto another curve that passes close by */
+        k = told ? side(a, x, on, beyond) : 0;
+        /* onto another curve that passes close by: straight on its side changes, and to either
+         * hand the direction does */
+        if ((sharp || k != seen) && step > 2.0 * shortest) {
             step *= 0.5;
             continue;
         }

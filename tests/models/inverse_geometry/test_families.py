@@ -78,6 +78,9 @@ def test_a_shoulder_singularity_turns_all_the_way_round():
     families = [solution.family for solution in solve(system, T)]
     assert len(families) == 4  # two elbows, flipped or not
     assert all(family.free == "q1" and family.range is None for family in families)
+    # once, not on from one to the other: flipped and not they pass at 6e-4
+    turned = [abs(family.samples[-1] - family.samples[0])[0] for family in families]
+    assert turned == pytest.approx([2 * math.pi] * 4)
     own = next(family for family in families if family.contains(q))
     assert own.relations == ()
     for sample in own.samples[::7]:

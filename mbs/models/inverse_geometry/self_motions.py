@@ -247,6 +247,7 @@ def _tangent(target: Target, x: Array, before: Array) -> tuple[Array, bool]:
     null = Vt[rank:].T
     along: Array = null @ (null.T @ before)
     size = float(np.linalg.norm(along))
+    # the cosine of 84 degrees: less is no direction but what rounding leaves of one
     return (along / size, False) if size > 0.1 else (before, True)
 
 

@@ -1256,8 +1256,9 @@ double passage_regularity(passage *g, double t, const double *x) {
     return regularity_at(g, t, x) / g->memory[LARGEST];
 }
 
-/* The next count doubles of a block, or only how many there are so far. */
-static double *take(double *block, size_t *used, size_t count) {
+/* Room for the next count doubles of a block, or numbers that are no longer; without a block only
+   how much is taken so far. */
+static void *take(double *block, size_t *used, size_t count) {
     double *found = block ? block + *used : NULL;
     *used += count + 1;
     return found;
@@ -1268,7 +1269,7 @@ static void lay_factors(factors *f, size_t n, size_t m, double *block, size_t *u
     f->weight = take(block, used, n);
     f->tails = take(block, used, n * n);
     f->size = take(block, used, m);
-    f->where = (mask *)take(block, used, m * WORDS(n));
+    f->where = take(block, used, m * WORDS(n));
 }
 
 static int *lay_numbers(factors *f, size_t n, size_t m, int *numbers) {
@@ -1291,7 +1292,7 @@ static void lay_frame(frame *p, const passage_size *z, double *block, size_t *us
     p->rows.bend = take(block, used, nq);
     p->rows.rank = take(block, used, 1);
     p->M = take(block, used, nv * nv);
-    p->end = (int *)take(block, used, nv);
+    p->end = take(block, used, nv);
     p->f = take(block, used, nv);
     p->rate = take(block, used, (size_t)z->nz);
     lay_factors(&p->qr, nv, m, block, used);

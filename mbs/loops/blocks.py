@@ -187,6 +187,18 @@ def _connected(links: dict[int, set[int]]) -> list[list[int]]:
     return found
 
 
+def _free_groups(work: PlanWork, waiting: Sequence[int]) -> Iterator[tuple[list[int], list[int]]]:
+    """Loops that joints close and that share unknown links, in groups, with these links."""
+    system = work.system
+    links = {
+        number: _unknown_links(work, number)
+        for number in waiting
+        if number < len(system.cuts) and not is_bound(system, number)
+    }
+    for numbers in _connected(links):
+        yield numbers, sorted(set().union(*(links[n] for n in numbers)))
+
+
 # Loops of revolute joints about one line, with gears between them: linear equations in angles.
 
 
@@ -770,13 +782,8 @@ def _added_gaps(count: int, size: float) -> Matrix:
 def platforms(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
     """The block of a platform on six legs, with all loops that share its unknown joints."""
     system = work.system
-    links = {
-        number: _unknown_links(work, number)
-        for number in waiting
-        if number < len(system.cuts) and not is_bound(system, number)
-    }
-    for numbers in _connected(links):
-        hexapod = _Hexapod.of(work, numbers, sorted(set().union(*(links[n] for n in numbers))))
+    for numbers, links in _free_groups(work, waiting):
+        hexapod = _Hexapod.of(work, numbers, links)
         if hexapod is not None:
             cuts = [system.cuts[number].edge.joint.name for number in numbers]
             yield LoopBlock(", ".join(cuts), hexapod.indices, hexapod.roots)
@@ -1033,13 +1040,8 @@ def _require_held(work: PlanWork, waiting: Sequence[int]) -> None:
         NoClosedForm: says so.
     """
     system = work.system
-    links = {
-        number: _unknown_links(work, number)
-        for number in waiting
-        if number < len(system.cuts) and not is_bound(system, number)
-    }
-    for numbers in _connected(links):
-        edges, frames = _edges(work, numbers, sorted(set().union(*(links[n] for n in numbers))))
+    for numbers, links in _free_groups(work, waiting):
+        edges, frames = _edges(work, numbers, links)
         found = _legs(edges)
         if found is None:
             continue

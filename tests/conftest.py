@@ -4,6 +4,7 @@ import gc
 import os
 import sys
 
+from hypothesis import settings
 from support.sweeps import EVERY_CASE, left_out
 
 # Each worker of a run fills a core: threads of linear algebra would only wait for one another.
@@ -27,6 +28,10 @@ os.environ.setdefault("MBS_KEEP_EQUATIONS", "0")
 # Which part of a sweep runs is the same everywhere, so that what passed passes; another seed tries
 # another part.
 os.environ.setdefault("MBS_TEST_SEED", "739943")
+
+# What passed passes again: examples are the same in every run.
+settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.load_profile("repeatable")
 
 
 def pytest_configure(config):

@@ -245,9 +245,8 @@ def through_memory(graph, items, inputs, size=12):
                 for k, element, n in where.outputs.get(item, ()):
                     results[k][element] = local[n]
                 continue
-            table = where.tables[item.repeat]
-            for row in table.rows[item.first : item.first + item.count]:
-                run_occurrence(graph, item, row, table, w)
+            for number in range(item.first, item.first + item.count):
+                run_occurrence(graph, item, number, where.tables[item.repeat], w)
     for k, element, place in where.last:
         results[k][element] = w[place]
     return results
@@ -262,10 +261,8 @@ def run_step(graph, step, known, local, where, w):
         w[int(where.of[step])] = local[step]
 
 
-def run_occurrence(graph, calls, at, table, w):
-    repeat = calls.repeat
-    number = table.rows.index(at)  # equal rows give equal values
-    assert table.rows.count(at) == 1
+def run_occurrence(graph, calls, number, table, w):
+    repeat, at = calls.repeat, table.rows[number]
     own = {n: x.value for n, x in enumerate(repeat.graph.nodes) if x.op == ca.OP_CONST}
     own |= {t.node: graph.nodes[t.nodes[number]].value for t in repeat.constants}
     given = {t.node for t in repeat.given}

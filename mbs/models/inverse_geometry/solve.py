@@ -169,12 +169,15 @@ def _shell_of(
     parameters: Mapping[str, float] | None,
 ) -> _Shell | None:
     """What is kept for poses of a frame; None where only the slow methods hold."""
-    own = tuple(limits.items()) if isinstance(limits, Mapping) else limits
-    given = (tuple(x.items()) if x else None for x in (locked, parameters))
-    key = (frame, method, type(limits), own, *given)
+    # what is no dict keeps its type in the key, and is refused where it is read
+    given = (
+        (type(x), tuple(x.items()) if isinstance(x, Mapping) else x)
+        for x in (limits, locked, parameters)
+    )
+    key = (frame, method, *given)
     try:
         hash(key)
-    except TypeError:
+    except TypeError:  # what cannot be looked up is read anew
         return None
 
     def made() -> _Shell | None:

@@ -226,6 +226,11 @@ def test_wrong_arguments_are_named():
         solve(assembled("scara"), T, method="general")
     with pytest.raises(ModelError, match="5 values"):
         solve(system, T, seed=[0.0] * 5)
+    for locked in (["q6"], "q6"):
+        with pytest.raises(ModelError, match=r"locked is .*give a dict of joint names"):
+            solve(system, T, locked=locked)
+    with pytest.raises(ModelError, match=r"the parameters are .*give a dict of names"):
+        solve(system, T, parameters=np.array([1.0, 2.0]))
     T[0, 0] = np.nan
     with pytest.raises(ModelError, match="row"):
         solve(system, T)

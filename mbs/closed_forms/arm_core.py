@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mbs.closed_forms.arm import Arm, Array
 from mbs.closed_forms.raghavan_roth.numbers import Prepared
 from mbs.native import cached_library, compiler_found
-from mbs.native.handwritten import handwritten
+from mbs.native.handwritten import RUNTIME_FLAGS, handwritten
 
 Hits: TypeAlias = NDArray[np.int64]
 
@@ -33,7 +33,6 @@ _CALLS = (
     *("arm_nearest.h", "arm_nearest.c", "arm_reduce.h", "arm_reduce.c"),
     "arm_calls.c",
 )  # for callers in Python
-_FLAGS = ("-O3", "-ffp-contract=off", "-fPIC", "-shared")
 _JOINTS = 7  # for which the core has room
 
 _pointer, _real, _integer = ctypes.c_void_p, ctypes.c_double, ctypes.c_longlong
@@ -116,7 +115,7 @@ def _files(sources: tuple[str, ...]) -> dict[str, str]:
 
 @functools.cache
 def _load() -> ctypes.CDLL:
-    library = ctypes.CDLL(str(cached_library(_files((*_SOURCES, *_CALLS)), _FLAGS)))
+    library = ctypes.CDLL(str(cached_library(_files((*_SOURCES, *_CALLS)), RUNTIME_FLAGS)))
     for name, (result, arguments) in _SIGNATURES.items():
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments

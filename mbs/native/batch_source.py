@@ -10,20 +10,15 @@ import casadi
 from casadi import Function
 
 from mbs.native.c_code import BlockCode, LaneCode, SinCosGroup, blocks, schedule, slots
-from mbs.native.kernel import BLOCK, HEADERS
+from mbs.native.kernel import BLOCK, EXPORT, HEADERS
 from mbs.native.repeats import with_calls
 from mbs.operations.graph import Graph, graph_of
 
-_HEAD = """\
+_HEAD = f"""\
 #include "elementary.h"
 #include "rows.h"
 #define NOINLINE __attribute__((noinline))
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-EXPORT int mbs_batch_lanes(void) { return MBS_LANES; }
+{EXPORT}EXPORT int mbs_batch_lanes(void) {{ return MBS_LANES; }}
 """
 _INLINE = 16  # angles whose code stands in the function; more are called
 _WIDEST = 8  # lanes for which work space is counted

@@ -11,21 +11,14 @@ from types import MappingProxyType
 import casadi
 from casadi import Function
 
-from mbs.native.compiler import cached_library
-from mbs.native.kernel import function_table
+from mbs.native.compiler import FLAGS, cached_library
+from mbs.native.kernel import EXPORT, function_table
 
 FUNCTION = "FUNCTION"
 """What stands for the name of the function in its C text."""
 
-_FLAGS = ("-O3", "-ffp-contract=off", "-fPIC", "-shared")
-_HEAD = """\
-#define casadi_int long long int
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-"""
+RUNTIME_FLAGS = ("-O3", *FLAGS[1:])
+"""Of the run-time: what it does is loops, which the highest level makes faster."""
 _INTERNAL = """\
 #undef INTERNAL
 #ifdef __GNUC__
@@ -90,11 +83,11 @@ def handwritten(
     ]
     files = {
         **common,
-        "function.c": _HEAD + own,
-        "table.c": "#include <math.h>\n" + _HEAD + "\n".join(table) + "\n",
+        "function.c": EXPORT + own,
+        "table.c": "#include <math.h>\n" + EXPORT + "\n".join(table) + "\n",
     }
     runtime = [file for file in common if file.endswith(".c")]
-    library = cached_library(files, _FLAGS, common=runtime)
+    library = cached_library(files, RUNTIME_FLAGS, common=runtime)
     _known[name] = HandwrittenC(own, MappingProxyType(dict(common)))
     return casadi.external(name, str(library))
 

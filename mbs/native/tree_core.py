@@ -16,7 +16,7 @@ from casadi import DM, MX, SX, Function, Sparsity
 
 from mbs.native.compiled import generated
 from mbs.native.derivatives_on_demand import by_parameters
-from mbs.native.kernel import function_table, processor
+from mbs.native.kernel import EXPORT, function_table, processor
 
 ROWS = {
     **{"C": 0, "T": 9, "mass": 12, "h": 13, "J": 16, "turn": 22, "slide": 23, "inner": 24},
@@ -213,12 +213,7 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
         "#include <string.h>",
         "#include <stdint.h>",
         '#include "tree_core.h"',
-        "#define casadi_int long long int",
-        "#ifdef _WIN32",
-        "#define EXPORT __declspec(dllexport)",
-        "#else",
-        '#define EXPORT __attribute__((visibility("default")))',
-        "#endif",
+        EXPORT,
         *(_integers(name, table.lists[name]) for name in _LIST_NAMES),
         "static const double numbers[] __attribute__((aligned(64))) = {"
         f"{_wrapped(map(_number, table.numbers))}}};",

@@ -175,7 +175,8 @@ class Rodas(Stepper):
     def _interpolate(self, a: float) -> Array:
         b = 1.0 - a
         y0, y1, bend, third, fourth = self.dense
-        y: Array = b * y0 + a * (y1 + b * (bend + a * (third + a * fourth)))
+        # a mode, which is constant, keeps its value bit for bit
+        y: Array = y0 + a * ((y1 - y0) + b * (bend + a * (third + a * fourth)))
         return y
 
 

@@ -173,7 +173,8 @@ static void interpolate(const stepper *s, double a, double *row) {
     int i;
     for (i = 0; i < s->n; i++) {
         double bend = dense(s, 2)[i] + a * (dense(s, 3)[i] + a * dense(s, 4)[i]);
-        row[i] = b * dense(s, 0)[i] + a * (dense(s, 1)[i] + b * bend);
+        /* a mode, which is constant, keeps its value bit for bit */
+        row[i] = dense(s, 0)[i] + a * ((dense(s, 1)[i] - dense(s, 0)[i]) + b * bend);
     }
 }
 

@@ -147,7 +147,7 @@ class ExpSine(Sine):
 
     def _wave(self, at: Any, begun: SX) -> SX:
         # fmax keeps exp from overflowing before the begin, where the value is not used
-        return Sine._wave(self, at, begun) * casadi.exp(-at.damping * casadi.fmax(begun, 0))
+        return SX(Sine._wave(self, at, begun) * casadi.exp(-at.damping * casadi.fmax(begun, 0)))
 
 
 class KinematicPTP(Source):
@@ -190,9 +190,10 @@ class KinematicPTP(Source):
     def shortest_duration(self) -> float | None:
         """Shortest duration that the limits allow [s]; None if one of the numbers is a symbol."""
         found = [self._number(name) for name in ("begin", "end", "v_max", "a_max")]
-        if any(value is None for value in found):
+        known = [SX(value) for value in found if value is not None]
+        if len(known) < len(found):
             return None
-        times = _ptp_times(*(SX(value) for value in found))
+        times = _ptp_times(*known)
         return float(casadi.evalf(times[-1]))
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
@@ -546,7 +547,9 @@ class Table(Source):
                     )
             found.append(tuple(map(float, picked)))
         times, values = zip(*found, strict=True) if found else ((), ())
-        return cls(name, times, values, smoothness, extrapolation)
+        make: Any = cls  # the fields of a Custom are made when the class is
+        table: Table = make(name, times, values, smoothness, extrapolation)
+        return table
 
     def _intervals(self) -> tuple[Array, Array]:
         """Begins of the intervals (n + 1,) [s], and their polynomials (n + 1, 4), c0 first.

@@ -32,7 +32,7 @@ from mbs.text import did_you_mean, quoted
 Array = NDArray[np.float64]
 
 
-class Source(SignalBlock):
+class SignalSource(SignalBlock):
     """Base class of signals that depend on time alone.
 
     Attributes:
@@ -55,7 +55,7 @@ def _held(begun: SX, signal: SX) -> SX:
 # Sources with a finite number of bends.
 
 
-class Step(Source):
+class Step(SignalSource):
     """A step: y = offset before start_time and offset + height from then on.
 
     Attributes:
@@ -77,7 +77,7 @@ class Step(Source):
         return {"start": at.clock - at.start_time}
 
 
-class Ramp(Source):
+class Ramp(SignalSource):
     """A ramp: y rises linearly from offset to offset + height within the duration.
 
     Attributes:
@@ -103,7 +103,7 @@ class Ramp(Source):
         return {"start": begun, "end": begun - at.duration}
 
 
-class Sine(Source):
+class Sine(SignalSource):
     """A sine: y = offset + amplitude sin(2 pi frequency (t - start_time) + phase).
 
     Before start_time y is the offset.
@@ -150,7 +150,7 @@ class ExpSine(Sine):
         return SX(Sine._wave(self, at, begun) * casadi.exp(-at.damping * casadi.fmax(begun, 0)))
 
 
-class KinematicPTP(Source):
+class KinematicPTP(SignalSource):
     """A point-to-point motion along a line in least time, with limits of speed and acceleration.
 
     The velocity is a trapezoid, or a triangle if the distance is too short to reach v_max. With a
@@ -248,7 +248,7 @@ def _ptp_times(begin: SX, end: SX, v_max: SX, a_max: SX) -> tuple[SX, SX, SX]:
 # Periodic sources. A period is a sequence of phases; an event ends each of them.
 
 
-class PeriodicSource(Source):
+class PeriodicSource(SignalSource):
     """Base class of periodic sources: an event ends each phase of a period.
 
     Attributes:
@@ -294,7 +294,7 @@ class PeriodicSource(Source):
     def rates(self, at: Any) -> Mapping[str, SX]:
         """Rates of the clock and of the time to the next event; zero behind the last period."""
         over = SX(0) if at.count is None else at.number >= at.count
-        return {**Source.rates(self, at), "left": casadi.if_else(over, 0, -1)}
+        return {**SignalSource.rates(self, at), "left": casadi.if_else(over, 0, -1)}
 
     def events(self, at: Any) -> Mapping[str, Event]:
         """End of a phase; at the first time, the phase at that time is found."""
@@ -422,7 +422,7 @@ EXTRAPOLATION = ("hold", "linear", "periodic")
 """How a table is read before its first and behind its last point."""
 
 
-class Table(Source):
+class Table(SignalSource):
     """A signal from a table of times and values.
 
     An event at each time of the table sets the polynomial of the next interval. The cost of a step
@@ -579,7 +579,7 @@ class Table(Source):
     def rates(self, at: Any) -> Mapping[str, SX]:
         """Rates of the clock and of the time to the next event, which stops behind the table."""
         last = len(self._intervals()[0]) - 1
-        return {**Source.rates(self, at), "left": casadi.if_else(at.row == last, 0, -1)}
+        return {**SignalSource.rates(self, at), "left": casadi.if_else(at.row == last, 0, -1)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """Polynomial of the present interval."""

@@ -4,6 +4,7 @@ from mbs.operations.counts import Count, count
 from mbs.operations.pipeline import (
     PASSES,
     Pass,
+    PassReport,
     Simplification,
     Split,
     Step,
@@ -16,6 +17,7 @@ __all__ = [
     "PASSES",
     "Count",
     "Pass",
+    "PassReport",
     "Simplification",
     "Split",
     "Step",

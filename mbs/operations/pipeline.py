@@ -55,7 +55,7 @@ _MOST_ROUNDS = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class PassReport:
     """One pass over a Function.
 
     Attributes:
@@ -73,6 +73,10 @@ class Step:
     kept: bool
 
 
+Step = PassReport
+"""Former name of `PassReport`."""
+
+
 @dataclass(frozen=True, slots=True)
 class Simplification:
     """What the passes made of a Function.
@@ -85,7 +89,7 @@ class Simplification:
 
     function: Function
     graph: Graph
-    steps: tuple[Step, ...]
+    steps: tuple[PassReport, ...]
 
     def __str__(self) -> str:
         """A table of the passes: multiplications/additions before and after, seconds."""
@@ -142,7 +146,7 @@ def simplification(
     with the given Function at random points, and undone if it takes more operations.
     """
     chosen, names = _choose(passes), tuple(parameters)
-    graph, steps = graph_of(function), list[Step]()
+    graph, steps = graph_of(function), list[PassReport]()
     proof = witness(function)
     simplifying = [p for p in chosen if p.name != "order"]
     idle = 0
@@ -169,7 +173,7 @@ def _choose(passes: Iterable[str] | None) -> Sequence[Pass]:
 
 def _make(
     one: Pass, graph: Graph, parameters: tuple[str, ...], proof: Witness
-) -> tuple[Graph, Step]:
+) -> tuple[Graph, PassReport]:
     started = time.perf_counter()
     made = one.apply(graph, parameters)
     before, after = count_graph(graph, parameters), count_graph(made, parameters)
@@ -179,7 +183,7 @@ def _make(
     if kept:
         proof.require_equal(function_of(made), f"the pass {one.name}")
     seconds = time.perf_counter() - started
-    return made if kept else graph, Step(one.name, seconds, before, after, kept)
+    return made if kept else graph, PassReport(one.name, seconds, before, after, kept)
 
 
 def _function_like(function: Function, graph: Graph) -> Function:

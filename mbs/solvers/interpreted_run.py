@@ -19,7 +19,7 @@ from mbs.solvers.problem import (
     interrupted,
 )
 from mbs.solvers.rodas import Rodas
-from mbs.solvers.stepper import EPSILON, Array, Projection, Stepper, Table
+from mbs.solvers.stepper import EPSILON, Array, Projection, RowTable, Stepper
 
 # Location of events and jumps in plain Python: the twin of `native/runtime/events.c`.
 #
@@ -92,7 +92,7 @@ class EventStepper:
             t, h, x = self.solver.t, self.solver.h, self.solver.x
             raise failed(t, h, str(failure), state=x.tolist()) from failure
 
-    def fill(self, table: Table, budget: int) -> bool:
+    def fill(self, table: RowTable, budget: int) -> bool:
         """Fill the next rows of a table, in about `budget` steps, at most to the next event.
 
         Args:
@@ -315,7 +315,7 @@ def run_interpreted(problem: IntegrationProblem, progress: Progress | None) -> E
     """
     p = problem.p.copy()
     solver = _stepper(problem, p)
-    table = Table(problem.times, np.empty((len(problem.times), len(problem.x0))))
+    table = RowTable(problem.times, np.empty((len(problem.times), len(problem.x0))))
     log: list[IntegrationEvent] = []
     stop: SolverError | Interrupted | None = None
     try:

@@ -37,7 +37,7 @@ method ends with: its error is then a hundredth of the one that is allowed."""
 
 
 @dataclass(slots=True)
-class Table:
+class RowTable:
     """States at given times, as far as they are reached.
 
     Attributes:
@@ -121,7 +121,7 @@ class Stepper(ABC):
     def _interpolate(self, a: float) -> Array:
         """State at a part a of the last step."""
 
-    def fill(self, table: Table, budget: int) -> None:
+    def fill(self, table: RowTable, budget: int) -> None:
         """Fill the next rows of a table, in about `budget` steps.
 
         Args:

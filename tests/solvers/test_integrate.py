@@ -8,7 +8,7 @@ import pytest
 from mbs.errors import CompilerError, ModelError, SolverError
 from mbs.solvers import integrate
 from mbs.solvers.dopri5 import Dopri5
-from mbs.solvers.stepper import Table
+from mbs.solvers.stepper import RowTable
 
 T, X, P = ca.SX.sym("t"), ca.SX.sym("x", 2), ca.SX.sym("p")
 OSCILLATOR = ca.Function("oscillator", [T, X, P], [ca.vertcat(X[1], -(P**2) * X[0])])
@@ -70,11 +70,11 @@ def test_order_five_in_the_number_of_steps():
         solver = Dopri5(slope, None, 0.0, start, tolerance, tolerance)
         times = np.linspace(0, 20, 2001)
         while solver.t < 20.0:
-            solver.fill(Table(np.array([20.0]), np.empty((1, 2))), 1)
+            solver.fill(RowTable(np.array([20.0]), np.empty((1, 2))), 1)
         steps_error.append(abs(solver.x[0] - np.cos(20.0)))
         work.append(calls[0])
         solver = Dopri5(slope, None, 0.0, start, tolerance, tolerance)
-        table = Table(times, np.empty((len(times), 2)))
+        table = RowTable(times, np.empty((len(times), 2)))
         solver.fill(table, 10**6)
         assert table.full
         dense_error.append(np.max(np.abs(table.rows[:, 0] - np.cos(times))))

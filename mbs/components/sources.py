@@ -703,6 +703,6 @@ class ReferenceFilter(SignalBlock):
         return {"q": at.x, "v": at.w, "a": self._acceleration(at)}
 
     def _acceleration(self, at: Any) -> SX:
-        # Bessel filter of order 2: 1 / (1 + 1.3617 s/w + 0.6180 (s/w)^2), -3 dB at w
         w = 2 * math.pi * at.frequency
+        # Bessel filter of order 2: 1 / (1 + 1.3617 s/w + 0.6180 (s/w)^2), -3 dB at w
         return SX((w * (at.u - at.x) - 1.3617 * at.w) * w / 0.6180)

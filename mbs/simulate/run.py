@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_motion, require_system
+from mbs.assembly.parts import WireSource
 from mbs.assembly.system import Packed, content_of, packed, unpacked
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
-from mbs.components.custom import OneWay
+from mbs.components.custom import OneWay, Signal
 from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.files import read_sealed, write_sealed
 from mbs.loops.analysis import rows_at
@@ -53,6 +54,7 @@ from mbs.models.state.signals import (
     untraceable,
 )
 from mbs.models.state.tree import FullState, full_state
+from mbs.models.symbols import part_equations
 from mbs.native import compiled
 from mbs.native.compiler import cache_dir
 from mbs.numbers import OnArrays, on_arrays
@@ -733,10 +735,10 @@ def _next(system: System, q: Array, p: Array) -> tuple[System, Limit | None]:
     return chosen, limit
 
 
-# Prescribed motions of a simulation: laws of time by the names of positions and rates.
+# Prescribed motions of a simulation: laws of time, or signals, by the names of positions and rates.
 
 
-Motion = Mapping[str, float | Function | Callable[[Any], Any]] | None
+Motion = Mapping[str, float | str | Signal | Function | Callable[[Any], Any]] | None
 _KINDS = ("q", "v", "a")
 
 
@@ -745,11 +747,12 @@ def prescribed_motions(system: System, motion: Motion) -> list[Prescribed]:
 
     Args:
         system: open or closed.
-        motion: for each name a number, or a function of the time made of CasADi operations.
+        motion: for each name a number, a function of the time made of CasADi operations, or a
+            signal of a component, itself or by its name.
 
     Raises:
-        ModelError: a name is unknown, a law is no function of time, or the loops tie what is
-            prescribed.
+        ModelError: a name is unknown, a law is no function of time, a signal follows from the
+            motion, or the loops tie what is prescribed.
     """
     if not isinstance(motion, Mapping | None):
         raise ModelError(
@@ -770,9 +773,17 @@ def prescribed_motions(system: System, motion: Motion) -> list[Prescribed]:
 
 
 def start_positions(
-    system: System, motions: list[Prescribed], q0: Values, v0: Values
+    system: System, motions: list[Prescribed], q0: Values, v0: Values, z0: Array, p: Array
 ) -> tuple[Values, Values]:
     """The start of a motion, with what is prescribed of it at the time zero.
+
+    Args:
+        system: open or closed.
+        motions: what is prescribed.
+        q0: positions by name.
+        v0: velocities by name.
+        z0: (nz,) states of components at the start.
+        p: (np,) parameters.
 
     Raises:
         ModelError: a start is given for what is prescribed, or not by name.
@@ -786,7 +797,7 @@ def start_positions(
             )
     positions, velocities = dict(q0 or {}), dict(v0 or {})  # type: ignore[arg-type]
     for one in motions:
-        position, speed, _ = (float(value) for value in one.law(SX(0)))
+        position, speed, _ = (float(value) for value in one.laws.call([DM(0), DM(z0), DM(p)]))
         if one.position is not None:
             _put(system, positions, one.name, position, "q0")
         if one.holds_speed:
@@ -815,15 +826,51 @@ def _prescribe(system: System, name: str, law: Any) -> Prescribed:
             f" acceleration; {did_you_mean(str(name), known)}"
         )
     t = SX.sym("t")
-    value = _value(system, name, law, t)
-    rate = casadi.jacobian(value, t)
+    if isinstance(law, str | Signal):
+        value, z_rate = _signal(system, name, str(law))
+    else:
+        value, z_rate = _value(system, name, law, t), SX.zeros(system.z.numel())
+
+    def rate_of(expression: SX) -> SX:
+        by_states = casadi.jtimes(expression, system.z, z_rate) if system.z.numel() else SX(0)
+        return casadi.jacobian(expression, t) + by_states
+
+    rate = rate_of(value)
     laws = {
-        "q": (value, rate, casadi.jacobian(rate, t)),
+        "q": (value, rate, rate_of(rate)),
         "v": (SX(0), value, rate),
         "a": (SX(0), SX(0), value),
     }[kind]
     position = positions.index(base) if kind == "q" else None
-    return Prescribed(base, speeds.index(base), position, kind != "a", t, laws)
+    inputs = [t, system.z, system.p]
+    function = Function("motion", inputs, list(laws), {"allow_free": True})
+    if function.has_free():
+        raise ModelError(
+            f"{system.name}: the motion of {name} is {law}, which follows from"
+            f" {', '.join(function.get_free())}; give a signal that follows from states of"
+            " components and parameters alone"
+        )
+    return Prescribed(base, speeds.index(base), position, kind != "a", function)
+
+
+def _signal(system: System, name: str, given: str) -> tuple[SX, SX]:
+    """A signal of a component, and the rates of all states that it follows from."""
+    q, v = (
+        casadi.vertcat(SX(0, 1), *(SX.sym(f"{row.name}.{letter}") for row in rows))
+        for letter, rows in (("q", system.coordinates), ("v", system.speeds))
+    )
+    sources = {
+        f"{part.name}.{signal}": WireSource(part.name, signal)
+        for part in system.parts
+        for signal in [*part.states, *part.element.output_names]
+    }
+    if given not in sources:
+        raise ModelError(
+            f"{system.name}: the motion of {name} is {quoted(given)}, which is no output or state"
+            f" of a component; {did_you_mean(given, list(sources))}"
+        )
+    _, z_rate, parts = part_equations(system, q, v)
+    return parts.signal(sources[given]), z_rate
 
 
 def _value(system: System, name: str, law: Any, t: SX) -> SX:
@@ -1105,8 +1152,9 @@ class Simulator:
         steps = count_steps(duration, positive(step, "step [s]", system.name), system.name)
         own = system.parameter_values(parameters)
         p = np.array([*own, *self._values(inputs)])
-        placed = start_positions(system, motions, q0, v0)
-        x0 = np.concatenate([*_started(system, *placed, p), device_states(system, z0)])
+        z = device_states(system, z0)
+        placed = start_positions(system, motions, q0, v0, z, own)
+        x0 = np.concatenate([*_started(system, *placed, p), z])
         times = np.linspace(0.0, duration, steps + 1)
         rtol, atol = step_tolerances(tolerance)
         with progress(f"simulating {system.name}", 0.0, duration, quiet=quiet) as reached:
@@ -1281,9 +1329,11 @@ def run(
         tau: joint efforts [N m or N]: constants of motors by name, or a function of (t, q, v) made
             of CasADi operations, or a casadi.Function, that returns (nv, 1) efforts, zero where
             there is no motor; or a dict that names joints, also such as have no motor.
-        motion: laws of time for coordinates that drives move: by name such as "j1.q" a position,
-            "j1.v" a velocity, "j1.a" an acceleration, each a number or a smooth function of t made
-            of CasADi operations. The column `j1.tau` is the whole effort, the drive's included.
+        motion: laws for coordinates that drives move: by name such as "j1.q" a position, "j1.v" a
+            velocity, "j1.a" an acceleration. Each law is a number, a smooth function of t made of
+            CasADi operations, or a signal of a component, itself or by its name, such as
+            "filter.q". A signal follows from states of components and parameters alone. The column
+            `j1.tau` is the whole effort, with the drive's.
         u: inputs of the devices of drive lines, such as voltages: constants by the name of the
             device, or a function of (t, q, v) as for tau; zero when left out. What the devices
             deliver is added to tau.

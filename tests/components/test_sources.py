@@ -1,5 +1,7 @@
 """Sources beside formulas in plain numbers, in run and in FMUs."""
 
+import pickle
+
 import fmpy
 import numpy as np
 import pytest
@@ -18,7 +20,7 @@ from mbs.components import (
     TorqueSource,
     Trapezoid,
 )
-from mbs.errors import DescriptionError
+from mbs.errors import DescriptionError, ModelError
 
 
 def driven(*sources, torque=None, symbols=()):
@@ -271,4 +273,71 @@ def test_files_that_are_no_tables_are_refused(tmp_path, text, arguments, words):
 def test_what_a_source_cannot_be_made_with_is_refused(make, words):
     with pytest.raises(DescriptionError) as caught:
         make()
+    assert all(word in str(caught.value) for word in words)
+
+
+def filtered():
+    """A shaft of 2 kg m^2 beside a filter of a pulse."""
+    pulse, smooth = Pulse("s", 1.5, 1.0, 0.5), ReferenceFilter("f", 3.0)
+    m = mbs.Mechanism("shaft")
+    shaft, drive = ShaftInertia("i", 2.0), TorqueSource("drive")
+    m.connect(drive.flange, shaft.flange_a)
+    m.add(pulse)
+    m.add(smooth)
+    m.wire(pulse.y, smooth.u)
+    return m.assemble(), smooth
+
+
+def test_a_signal_prescribes_a_position_with_its_rates():
+    system, smooth = filtered()
+    for law in ("f.q", smooth.q):
+        result = run(system, motion={"i.q": law})
+        for joint, signal in (("i.q", "f.q"), ("i.v", "f.v"), ("i.a", "f.a")):
+            assert np.array_equal(result[joint], result[signal])
+        np.testing.assert_allclose(result["i.tau"], 2 * result["f.a"], rtol=0, atol=1e-12)
+        assert 1.0 < result["i.q"].max() < 1.01  # overshoot of a Bessel filter of order 2
+
+
+def test_a_signal_prescribes_a_velocity_or_an_acceleration():
+    system, _ = filtered()
+    for kind in "va":
+        result = run(system, motion={f"i.{kind}": "f.q"})
+        assert np.array_equal(result[f"i.{kind}"], result["f.q"])
+
+
+def test_a_motion_along_a_signal_starts_where_its_states_start():
+    system, _ = filtered()
+    simulator = mbs.simulate.Simulator(system, motion={"i.q": "f.q"})
+    again = pickle.loads(pickle.dumps(simulator))
+    first, second = (one(1.0, z0={"f.x": 0.3}) for one in (simulator, again))
+    assert first["i.q"][0] == 0.3
+    assert np.array_equal(first["i.q"], second["i.q"])
+
+
+def test_a_source_drives_the_crank_of_a_closed_mechanism():
+    four_bar = mbs.load("four_bar")
+    start = float(run(four_bar.assemble(), 0.01, step=0.01)["j1.q"][0])
+    source = KinematicPTP("go", start, start + 0.4, 1.0, 4.0)
+    four_bar.add(source)
+    result = run(four_bar.assemble(), 1.0, step=0.05, motion={"j1.q": source.y})
+    s = result.time  # speeds up for 0.25 s, moves at 1 rad/s, slows down from 0.4 s on
+    moved = np.where(s < 0.25, 2 * s**2, s - 0.125)
+    moved = np.where(s > 0.4, 0.4 - 2 * np.maximum(0.65 - s, 0) ** 2, moved)
+    np.testing.assert_allclose(result["j1.q"], start + moved, rtol=0, atol=1e-9)
+    assert np.abs(result["closure_residual"]).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        ("f.zz", ["the motion of i.q is 'f.zz'", "f.q"]),
+        ("i.q", ["no output or state of a component"]),
+        ("drive.w", ["follows from i.v", "states of components"]),
+    ],
+)
+def test_signals_that_cannot_prescribe_are_refused(law, words):
+    smooth = ReferenceFilter("f", 3.0)
+    system = driven(smooth)
+    with pytest.raises(ModelError) as caught:
+        run(system, motion={"i.q": law})
     assert all(word in str(caught.value) for word in words)

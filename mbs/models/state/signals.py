@@ -272,7 +272,7 @@ def given_inputs(system: System, names: Sequence[str]) -> tuple[GivenInput, ...]
     return tuple(found.values())
 
 
-# Motions that are prescribed as functions of time.
+# Motions that are prescribed as functions of time, or by signals.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -284,21 +284,20 @@ class Prescribed:
         velocity: its index in v.
         position: index in q where the position is prescribed, None where it is free.
         holds_speed: whether the velocity is prescribed; an acceleration alone leaves it free.
-        time: symbol of the time in the laws [s].
-        laws: position, velocity and acceleration as functions of it; what is free is zero.
+        laws: `laws(t, z, p)` -> position, velocity and acceleration, of the time [s], the states of
+            components (nz, 1) and the parameters (np, 1); what is free is zero.
     """
 
     name: str
     velocity: int
     position: int | None
     holds_speed: bool
-    time: SX
-    laws: tuple[SX, SX, SX]
+    laws: Function
 
-    def law(self, t: SX) -> tuple[SX, SX, SX]:
-        """Position, velocity and acceleration at a time."""
-        values = casadi.substitute(list(self.laws), [self.time], [t])
-        return SX(values[0]), SX(values[1]), SX(values[2])
+    def law(self, t: SX, z: SX, p: SX) -> tuple[SX, SX, SX]:
+        """Position, velocity and acceleration at a time, states of components and parameters."""
+        position, velocity, acceleration = self.laws.call([t, z, p])
+        return SX(position), SX(velocity), SX(acceleration)
 
 
 # Values of states and inputs of components by name.

@@ -95,7 +95,7 @@ def project_step(
         return normalised(system.tree, q), v, SX(0)
     symbols = SX.sym("q", system.nq)
     norms = norm_rows(system.tree, symbols)
-    laws = [motion.law(t) for motion in motions]
+    laws = [motion.law(t, system.z, system.p) for motion in motions]
     positions = [
         symbols[motion.position] - law[0]
         for motion, law in zip(motions, laws, strict=True)
@@ -243,7 +243,7 @@ def passage(
         -scale * bend,
     )
     count, held = loops[0].numel(), list[int]()
-    laws = [motion.law(t) for motion in motions]
+    laws = [motion.law(t, system.z, system.p) for motion in motions]
     unit = SX(DM.eye(nv))
     drives = [m.velocity for m in motions]
     driven_rows = [q[number] - law[0] for number, law in zip(driven, laws, strict=True)]
@@ -570,9 +570,8 @@ def full_state(
     delivered, z_rate, parts = part_equations(system, q, v)
     tau += delivered
     known = SX(tau)
-    contact = contact_equations(
-        system, q, v, tau, {motion.velocity: motion.law(t)[2] for motion in motions}
-    )
+    driven = {one.velocity: one.law(t, system.z, system.p)[2] for one in motions}
+    contact = contact_equations(system, q, v, tau, driven)
     a, tau = (contact.a, contact.tau) if contact else _accelerations(system, q, v, tau, motions, t)
     rate = casadi.vertcat(position_rate(system.tree, q, v), a, z_rate)
     through = passage(system, (t, x, p), known, z_rate, motions, contact, given_inputs=u)
@@ -651,7 +650,7 @@ def _accelerations(
         ddm = direct_dynamics(system, coordinates="tree")
         return outputs_of(system, ddm, q, v, tau)[0], tau
     hybrid = hybrid_dynamics(system, [motion.name for motion in motions])
-    given = casadi.vertcat(*(motion.law(t)[2] for motion in motions))
+    given = casadi.vertcat(*(motion.law(t, system.z, system.p)[2] for motion in motions))
     a, drives, *_ = outputs_of(system, hybrid, q, v, tau, given)
     every = SX(tau)
     for row, motion in enumerate(motions):

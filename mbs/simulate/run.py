@@ -773,7 +773,12 @@ def prescribed_motions(system: System, motion: Motion) -> list[Prescribed]:
 
 
 def start_positions(
-    system: System, motions: list[Prescribed], q0: Values, v0: Values, z0: Array, p: Array
+    system: System,
+    motions: list[Prescribed],
+    q0: Values,
+    v0: Values,
+    z0: Sequence[float],
+    p: Sequence[float],
 ) -> tuple[Values, Values]:
     """The start of a motion, with what is prescribed of it at the time zero.
 

@@ -196,13 +196,13 @@ def skeleton(system: System) -> Skeleton:
     """The points and axes of all joints, and the lines that stand for the links.
 
     Args:
-        system: open or closed; every symbol in its geometry has a value.
+        system: open or closed.
 
     Returns:
         what to draw, with the Function that places it at positions q.
 
     Raises:
-        ModelError: `system` is not a System, or a symbol has no value.
+        ModelError: `system` is not a System.
     """
     require_system(system)
     answer: Skeleton = system.cached("skeleton", lambda: _built(system))
@@ -226,10 +226,17 @@ class _Marks:
         return len(self.directions) - 1
 
     def local(self, numbers: Sequence[int]) -> NDArray[np.float64]:
-        """(k, 3) points in the frames of their links, at the defaults of the parameters."""
-        places = casadi.horzcat(*(self.points[k][1].p for k in numbers))
-        p = self.system.parameter_values()
-        return np.array(Function("places", [self.system.p], [places])(p)).T
+        """(k, 3) points in the frames of their links."""
+        return self.places([self.points[k][1] for k in numbers])
+
+    def places(self, poses: Sequence[Pose]) -> NDArray[np.float64]:
+        """(k, 3) origins of poses, by which lines join the points of a link.
+
+        Symbols have their defaults, or one if they have none.
+        """
+        p = [1.0 if np.isnan(value) else value for value in self.system.parameter_values(needed=())]
+        origins = casadi.horzcat(*(pose.p for pose in poses))
+        return np.array(Function("places", [self.system.p], [origins])(p)).T
 
 
 def _built(system: System) -> Skeleton:
@@ -354,9 +361,7 @@ def _farthest_frame(marks: _Marks, number: int, joint: int, centre: int | None) 
         return None
     columns = [joint] if centre is None else [joint, centre]
     known = marks.local(columns)
-    every = casadi.horzcat(*(pose.p for pose in places))
-    p = marks.system.parameter_values()
-    at = np.array(Function("places", [marks.system.p], [every])(p)).T
+    at = marks.places(places)
     away = np.linalg.norm(at - known[0], axis=1)
     far = int(np.argmax(away))
     same = np.linalg.norm(known - at[far], axis=1) <= _SAME * max(float(np.abs(at).max()), 1.0)
@@ -366,9 +371,11 @@ def _farthest_frame(marks: _Marks, number: int, joint: int, centre: int | None) 
 
 
 def _mass_centre(marks: _Marks, number: int) -> int | None:
-    inertia = marks.system.tree.links[number - 1].inertia
-    mass = Function("mass", [marks.system.p], [inertia.m])(marks.system.parameter_values())
-    if not float(mass) > 0:
+    """The column of the centre of mass; None without mass, or if symbols in it have no default."""
+    inertia, system = marks.system.tree.links[number - 1].inertia, marks.system
+    known = casadi.vertcat(inertia.m, inertia.ms)
+    at = Function("centre", [system.p], [known])(system.parameter_values(needed=()))
+    if not at.is_regular() or not float(at[0]) > 0:
         return None
     return marks.point((number - 1, Pose.translation(inertia.ms / inertia.m)))
 

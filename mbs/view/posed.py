@@ -27,7 +27,7 @@ class PosedLinks:
 
     Attributes:
         system: the mechanism.
-        parameters: value of every symbol.
+        parameters: value of every symbol; NaN if the picture needs none.
         parts: its skeleton.
         points: (n, 3) of the skeleton, in the base frame [m].
         directions: (m, 3) of the skeleton, in the base frame.
@@ -83,9 +83,9 @@ def pose_links(
     Raises:
         ModelError: a symbol has no value, or a place is no number.
     """
-    p = system.parameter_values(parameters)
+    p = system.parameter_values(parameters, picture_symbols(system))
     parts = skeleton(system)
-    given = (list(q), p) if system.parameters else (list(q),)
+    given = (list(q), _placed(p)) if system.parameters else (list(q),)
     points, directions = (np.array(m).T.reshape(-1, 3) for m in parts.function(*given))
     poses = pose_rows(system, np.array(given[0]).reshape(-1, 1), p)[:, 0]
     gravity = Function("gravity", [system.p], [casadi.densify(system.tree.gravity)])
@@ -101,7 +101,26 @@ def pose_links(
     )
 
 
+def picture_symbols(system: System) -> frozenset[str]:
+    """Names of the symbols on which the places of links, joints and frames depend."""
+
+    def found() -> frozenset[str]:
+        if not system.parameters:
+            return frozenset()
+        names = [parameter.name for parameter in system.parameters]
+        columns: set[int] = set()
+        for function in (_pose_function(system), skeleton(system).function):
+            for output in range(function.n_out()):
+                pattern = function.jac_sparsity(output, function.n_in() - 1)
+                columns.update(pattern.get_triplet()[1])
+        return frozenset(names[k] for k in columns)
+
+    answer: frozenset[str] = system.cached("picture symbols", found)
+    return answer
+
+
 def _up(gravity: Array) -> Array:
+    """The direction against gravity; z without gravity, or if its symbol has no value."""
     size = float(np.linalg.norm(gravity))
     return -gravity / size if size > 0 else np.array([0.0, 0.0, 1.0])
 
@@ -115,8 +134,13 @@ def pose_rows(system: System, q: Array, p: Sequence[float]) -> Array:
     function = _pose_function(system)
     if not system.parameters:
         return np.array(function(DM(q)))
-    every = np.repeat(np.array(p).reshape(-1, 1), q.shape[1], axis=1)
+    every = np.repeat(np.array(_placed(p)).reshape(-1, 1), q.shape[1], axis=1)
     return np.array(function(DM(q), DM(every)))
+
+
+def _placed(p: Sequence[float]) -> list[float]:
+    """The parameters with a number for each symbol without a value: no place depends on it."""
+    return [0.0 if np.isnan(value) else value for value in p]
 
 
 def _pose_function(system: System) -> Function:

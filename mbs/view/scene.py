@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -19,6 +20,7 @@ from mbs.view.posed import (
     bounds_of,
     floor_of,
     measures,
+    picture_symbols,
     pose_links,
     pose_rows,
     position_of,
@@ -72,7 +74,7 @@ class Scene:
         floor: the ground grid.
         views: unit vectors towards who looks: iso, front, side, top.
         q: (nq,) configuration that it was made at.
-        parameters: value of every symbol.
+        parameters: values of the symbols that have one.
         notes: sentences on meshes that are missing or were thinned out.
     """
 
@@ -111,14 +113,18 @@ class Scene:
             ModelError: a name is unknown, or the numbers do not fit.
         """
         place = self.q if q is None else position_of(self.system, q)
-        p = self.system.parameter_values({**self.parameters, **(parameters or {})})
+        p = self._values(parameters)
         flat: list[float] = pose_rows(self.system, np.reshape(place, (-1, 1)), p).ravel().tolist()
         return flat
 
     def motion(self, q: Array) -> Array:
         """(n, 12 links) poses, as `poses` gives them, at each of n configurations q (n, nq)."""
-        p = self.system.parameter_values(self.parameters)
+        p = self._values(None)
         return pose_rows(self.system, np.transpose(q), p).T
+
+    def _values(self, parameters: Mapping[str, float] | None) -> list[float]:
+        values = {**self.parameters, **(parameters or {})}
+        return self.system.parameter_values(values, picture_symbols(self.system))
 
     def spanning(self, q: Array) -> Scene:
         """The same scene with bounds and ground for all of n configurations q (n, nq)."""
@@ -158,7 +164,8 @@ def scene(
     and frames follow from the size of the mechanism.
 
     Args:
-        system: open or closed; every symbol in its geometry has a value.
+        system: open or closed. Symbols on which places of links depend need a value; masses and
+            gravity need none.
         q: configuration that bounds and ground are for, and the poses unless others are asked for:
             (nq,) [rad or m], or by name; the assembled one when left out. Loops are not closed
             here.
@@ -209,7 +216,7 @@ def scene(
         floor,
         views(at),
         tuple(place),
-        at.parameters,
+        {name: value for name, value in at.parameters.items() if not math.isnan(value)},
         tuple(notes),
     )
 

@@ -294,3 +294,21 @@ def test_figures_are_refused_where_the_mechanism_is_assembled(figures, parts):
     m.connect(m.world, Prismatic("x"), body)
     m.add(Thing("thing", body))
     refused(AssemblyError, *parts, by=m.assemble)
+
+
+def test_a_picture_needs_values_of_lengths_only():
+    described = {
+        "name": "symbolic",
+        "gravity": [0, "G", 0],
+        "frame": [{"antecedent": 0}, {"antecedent": 1, "d": "L"}],
+        "body": [{"frame": 1, "M": "M1"}, {"frame": 2, "M": "M2", "MX": "MX2"}],
+    }
+    system = mbs.load(described).assemble()
+    with pytest.raises(ModelError, match="'L' has no value"):
+        mbs.view.scene(system)
+    drawn = mbs.view.scene(system, [0.0, 0.0], parameters={"L": 0.4})
+    assert drawn.parameters == {"L": 0.4}
+    assert drawn.up == (0.0, 0.0, 1.0)
+    rows = np.reshape(drawn.poses([np.pi / 2, 0.0]), (3, 3, 4))
+    np.testing.assert_allclose(rows[2, :, 3], [0, 0.4, 0], atol=1e-12)
+    assert np.isfinite(drawn.motion(np.zeros((3, 2)))).all()

@@ -24,6 +24,7 @@ from mbs.app.web.style import VIEW
 from mbs.assembly import System
 from mbs.errors import MbsError
 from mbs.view import Scene, scene
+from mbs.view.posed import picture_symbols
 
 # What every part of the app needs: the session, the page, one thread, and words to say.
 
@@ -53,6 +54,7 @@ class AppBase:
         self._on_robot: list[Listener] = []
         self._on_configuration: list[Listener] = []
         self._on_document: list[Listener] = []
+        self._on_clear: list[Listener] = []
 
     @property
     def document(self) -> Document:
@@ -131,6 +133,10 @@ class AppBase:
         """Call a function after each robot that could be assembled."""
         self._on_robot.append(listener)
 
+    def on_clear(self, listener: Listener) -> None:
+        """Call a function when another robot is opened, before it is assembled."""
+        self._on_clear.append(listener)
+
     def on_configuration(self, listener: Listener) -> None:
         """Call a function after each change of the configuration."""
         self._on_configuration.append(listener)
@@ -162,6 +168,7 @@ class AppPicture(AppBase):
     def __init__(self, session: Session) -> None:
         super().__init__(session)
         self._scene: Scene | None = None
+        self._robot = session.robot
         self._camera: str | None = "iso"
         self._wanted: dict[int, float] = {}
         self._is_moving = False
@@ -176,6 +183,13 @@ class AppPicture(AppBase):
         self._scene = drawn
         self._send("mount", VIEW, drawn.as_dict(), self._camera)
         self._camera = None
+
+    def _clear(self) -> None:
+        """Take the picture and the joints of the former robot away."""
+        self._robot, self._scene, self._camera = self.session.robot, None, "iso"
+        self._wanted.clear()
+        self._send("clear")
+        self._tell(self._on_clear)
 
     async def set_configuration(self, q: Sequence[float]) -> None:
         """Show the mechanism at another configuration.
@@ -223,7 +237,8 @@ class AppPicture(AppBase):
             self._tell(self._on_configuration)
             return
         if self.session.system is system:
-            self.session.refusal = ""
+            if self._scene is not None:  # else it says why there is no picture
+                self.session.refusal = ""
             await self.set_configuration(q)
 
     async def _pose(self, q: Vector) -> None:
@@ -312,15 +327,37 @@ class App(AppPicture):
         await self._settle()
 
     async def open_robot(self, make: Callable[..., Document], *args: Any) -> bool:
-        """Show the document that `make(*args)` gives; whether it could be had."""
-        try:
-            document = await self.aside(make, *args)
-        except Exception as error:
-            self.complain(error)
+        """Show the robot that `make(*args)` describes, without anything of the present robot.
+
+        Returns:
+            whether there is a document; without one the present robot stays.
+        """
+        document = await self._made(make, *args)
+        if document is None:
             return False
-        self._camera = "iso"
+        self.session.open(document)
+        await self._settle()
+        return True
+
+    async def describe_anew(self, make: Callable[..., Document]) -> bool:
+        """Show another description of the same robot, in the present configuration.
+
+        Returns:
+            whether there is a document; without one the present description stays.
+        """
+        document = await self._made(make)
+        if document is None:
+            return False
         await self.change(document)
         return True
+
+    async def _made(self, make: Callable[..., Document], *args: Any) -> Document | None:
+        try:
+            document: Document = await self.aside(make, *args)
+        except Exception as error:
+            self.complain(error)
+            return None
+        return document
 
     async def undo(self) -> None:
         """Take back the last change."""
@@ -336,6 +373,8 @@ class App(AppPicture):
         """Assemble and draw the document; a later edit makes this one stop."""
         self._edit += 1
         edit, document, session = self._edit, self.document, self.session
+        if session.robot != self._robot:
+            self._clear()
 
         def assembled() -> tuple[Vector, Scene | None, str] | None:
             if edit != self._edit or document.problems:
@@ -427,10 +466,13 @@ async def warm_up() -> None:
 
 def _drawn(system: System, q: Vector) -> tuple[Scene | None, str]:
     """The picture, or None and a sentence."""
+    needed = picture_symbols(system)
     values = zip(system.parameters, system.parameter_values(needed=()), strict=True)
-    open_symbols = [parameter.name for parameter, value in values if value != value]
-    if open_symbols:
-        return None, f"{', '.join(open_symbols)}: no value yet; write one in the table Symbols"
+    unknown = [symbol.name for symbol, value in values if value != value and symbol.name in needed]
+    if unknown:
+        return None, (
+            f"The picture needs values of {', '.join(unknown)}; write them in the table Symbols"
+        )
     try:
         drawn = scene(system, q)
         drawn.poses(q)

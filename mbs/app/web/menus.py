@@ -208,7 +208,7 @@ class FilesMenu:
         await self._app.open_robot(Document.blank)
 
     async def _to_table(self) -> None:
-        if await self._app.open_robot(self._app.document.as_table):
+        if await self._app.describe_anew(self._app.document.as_table):
             self._app.tell("Its links are rows of a table now, and can be changed")
 
     async def _save(self, kind: str) -> None:

@@ -64,8 +64,18 @@ class JointSliders:
                 self._mode.props("dense options-dense borderless")
                 self._mode_note = ui.label().classes("app-note")
         app.on_robot(self.rebuild)
+        app.on_clear(self.clear)
         app.on_configuration(self.refresh)
         self.rebuild()
+
+    def clear(self) -> None:
+        """Take the joints away."""
+        self._sliders, self._follow, self._modes, self._shape = [], {}, (), ()
+        self._held = self._typed = None
+        self._grid.clear()
+        self._others.clear()
+        self._mode_row.set_visibility(False)
+        self._kind.set_text("")
 
     def rebuild(self) -> None:
         """Make the sliders of the present mechanism, unless they are those already."""
@@ -74,10 +84,8 @@ class JointSliders:
         names = () if system is None else tuple(c.name for c in system.coordinates)
         if (found, names) == self._shape or system is None:
             return
+        self.clear()
         self._shape = (found, names)
-        self._sliders, self._follow = [], {}
-        self._grid.clear()
-        self._others.clear()
         with self._grid:
             for handle in found:
                 self._sliders.append(self._slider(handle))

@@ -202,8 +202,9 @@ class Session:
         tables: what of `good` is shown in the grids.
         q: (nq,) present configuration of `system` [rad or m].
         refusal: why `document` could not be assembled, "" if it could.
-        past: documents before the present one, the oldest first.
-        future: documents that were undone, the next one last.
+        robot: number of the opened robot. Edits of a robot keep it.
+        past: documents before the present one with the numbers of their robots, the oldest first.
+        future: documents that were undone, with the same numbers, the next one last.
         shown: roles of the picture that were switched, by name.
         notes: what panels keep for a reload, by names of their own.
     """
@@ -214,8 +215,9 @@ class Session:
     tables: Tables | None = None
     q: Vector = ()
     refusal: str = ""
-    past: list[Document] = field(default_factory=list)
-    future: list[Document] = field(default_factory=list)
+    robot: int = 0
+    past: list[tuple[Document, int]] = field(default_factory=list)
+    future: list[tuple[Document, int]] = field(default_factory=list)
     shown: dict[str, bool] = field(default_factory=dict)
     notes: dict[str, object] = field(default_factory=dict)
 
@@ -233,25 +235,44 @@ class Session:
         """Put another document in the place of the present one, which can be had back."""
         if document == self.document:
             return
-        self.past.append(self.document)
+        self._keep()
+        self.document = document
+
+    def open(self, document: Document) -> None:
+        """Put another robot in the place of the present one, which can be had back.
+
+        The new robot starts in the configuration of its own description.
+        """
+        self._keep()
+        self._enter(document, max([self.robot, *(robot for _, robot in self.past)]) + 1)
+
+    def _keep(self) -> None:
+        """Remember the present document."""
+        self.past.append((self.document, self.robot))
         del self.past[:-_LONGEST_HISTORY]
         self.future.clear()
+
+    def _enter(self, document: Document, robot: int) -> None:
+        """Take a document; of another robot nothing is carried over."""
         self.document = document
+        if robot != self.robot:
+            self.robot, self.good, self.system, self.tables = robot, None, None, None
+            self.q, self.refusal = (), ""
 
     def undo(self) -> bool:
         """Take back the last change; whether there was one."""
         if not self.past:
             return False
-        self.future.append(self.document)
-        self.document = self.past.pop()
+        self.future.append((self.document, self.robot))
+        self._enter(*self.past.pop())
         return True
 
     def redo(self) -> bool:
         """Make the last change that was taken back again; whether there was one."""
         if not self.future:
             return False
-        self.past.append(self.document)
-        self.document = self.future.pop()
+        self.past.append((self.document, self.robot))
+        self._enter(*self.future.pop())
         return True
 
     def settle(self, document: Document, q: Vector) -> None:

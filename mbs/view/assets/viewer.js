@@ -43,8 +43,9 @@
       return wanted === "auto" ? (this.dark.matches ? "dark" : "light") : wanted;
     }
 
-    /** Draw another scene; the camera stays where it is. */
+    /** Draw another scene. A motion is of one scene only and ends. The camera stays where it is. */
     setScene(scene) {
+      if (scene !== this.scene) this.forget();
       this.clear();
       this.scene = scene;
       const colours = scene.palette[this.theme];
@@ -63,7 +64,7 @@
       for (const item of scene.primitives) this.add(item, colours);
       this.light(scene, colours);
       for (const { role, object } of this.parts) object.visible = this.shows(role);
-      this.setPoses(scene.poses);
+      this.setPoses(this.motion ? this.posesAt(this.time) : scene.poses);
     }
 
     add(item, colours) {
@@ -122,6 +123,11 @@
 
     /** Move the links: 12 numbers (rows of R|p) for the base and each link, in one flat array. */
     setPoses(flat) {
+      const wanted = 12 * this.links.length;
+      if (flat.length !== wanted || !flat.every(Number.isFinite)) {
+        console.error(`the picture needs ${wanted} finite numbers, it got ${flat.length}`);
+        return;
+      }
       this.links.forEach((group, k) => {
         const at = 12 * k;
         group.matrix.set(...Array.prototype.slice.call(flat, at, at + 12), 0, 0, 0, 1);
@@ -229,8 +235,22 @@
       this.running = undefined;
     }
 
-    /** Show the motion at a time [s], between frames on straight lines. */
+    /** End the motion. */
+    forget() {
+      this.pause();
+      this.motion = undefined;
+    }
+
+    /** Show the motion at a time [s]. */
     seek(time) {
+      if (!this.motion) return;
+      this.time = time;
+      this.setPoses(this.posesAt(time));
+      this.options.onTime?.(time);
+    }
+
+    /** Poses of the motion at a time [s], between frames on straight lines. */
+    posesAt(time) {
       const { times, poses } = this.motion;
       let k = 0;
       for (let high = times.length - 1; high - k > 1; ) {
@@ -241,9 +261,7 @@
       const [a, b] = [poses[k], poses[Math.min(k + 1, poses.length - 1)]];
       const span = times[k + 1] - times[k];
       const part = span > 0 ? Math.min(1, Math.max(0, (time - times[k]) / span)) : 0;
-      this.time = time;
-      this.setPoses(Array.from(a, (value, n) => value + part * (b[n] - value)));
-      this.options.onTime?.(time);
+      return Array.from(a, (value, n) => value + part * (b[n] - value));
     }
 
     clear() {

@@ -131,6 +131,47 @@ def test_a_four_bar_is_simulated_and_leaves_as_an_fmu(visitor, tmp_path):
     np.testing.assert_allclose(moved["j1.q"], direct["j1.q"], atol=1e-6)
 
 
+def test_the_film_of_a_robot_ends_when_another_is_opened(visitor, tmp_path):
+    visitor.arrive()
+    _open(visitor, "planar_2r")
+    visitor.choose("Simulate", "Motion")
+    before = visitor.picture
+    visitor.button("Run").click()
+    visitor.until_other_picture(before)
+    visitor.page.wait_for_function("() => appView.viewer.playing")
+    _open(visitor, "kr6")
+    visitor.page.wait_for_function("() => appView.viewer && appView.viewer.scene.name === 'kr6'")
+    assert visitor.page.evaluate("() => appView.viewer.playing") is False
+    first = visitor.picture
+    visitor.page.wait_for_timeout(500)
+    assert visitor.picture == first
+    visitor.button("Play or pause").click()
+    visitor.page.get_by_text("the motion is of another robot; simulate this one").wait_for()
+    assert visitor.picture == first
+    visitor.page.evaluate("() => appView.poses([1, 2, 3])")
+    assert visitor.picture == first
+    visitor.page.evaluate("() => appView.camera('iso')")
+    assert visitor.picture == first  # the camera was put in front of the new robot
+
+
+def test_a_robot_without_lengths_takes_the_former_picture_away(visitor, tmp_path):
+    visitor.arrive()
+    _open(visitor, "panda")
+    robot = tmp_path / "long.toml"
+    robot.write_text(
+        'name = "long"\n[[frame]]\nantecedent = 0\n[[frame]]\nantecedent = 1\nd = "L"\n'
+    )
+    visitor.choose("Robot", "Open a file")
+    visitor.page.locator("input[type=file]").set_input_files(robot)
+    visitor.page.locator(".app-veil", has_text="needs values of L").wait_for()
+    assert visitor.page.evaluate("() => appView.viewer === null")
+    visitor.page.get_by_text("Symbols", exact=True).click()
+    visitor.write(0, "value", "0.4")
+    visitor.page.wait_for_function("() => appView.viewer && appView.viewer.scene.name === 'long'")
+    visitor.move([0.3, -0.7])
+    assert visitor.joints == [0.3, -0.7]
+
+
 def test_a_reload_loses_nothing_and_visitors_are_apart(visitor, launched, address):
     visitor.arrive()
     before = visitor.picture

@@ -163,9 +163,65 @@ def test_two_visitors_have_robots_of_their_own(monkeypatch):
         await other.open_robot(Document.of_name, "scara")
         assert one.document.name == "planar_2r"
         assert other.document.name == "scara"
-        assert other.session.past == [Document.of_name("planar_2r")]
+        assert other.session.past == [(Document.of_name("planar_2r"), 0)]
 
     visit(monkeypatch, "planar_2r", story, count=2)
+
+
+def test_a_robot_that_is_opened_starts_in_its_own_configuration(monkeypatch):
+    async def story(user, apps, menus):
+        (app,) = apps
+        own = Document.of_name("kr6").system().configuration
+        await app.set_configuration([0.3, -0.4, 0.5, 0.2, -0.7, 0.1])
+        await app.open_robot(Document.of_name, "kr6")
+        assert app.q == own
+        await app.set_configuration([0.1] * 6)
+        await app.edit(Cell("geometry", 1, "d"), "0.9")
+        assert app.q == (0.1,) * 6
+        await app.undo()
+        assert app.q == (0.1,) * 6
+        await app.undo()
+        assert (app.document.name, app.q) == (
+            "rx90",
+            Document.of_name("rx90").system().configuration,
+        )
+
+    visit(monkeypatch, "rx90", story)
+
+
+SYMBOLIC = b"""
+name = "long"
+gravity = [0, 0, "G"]
+[[frame]]
+antecedent = 0
+[[frame]]
+antecedent = 1
+d = "L"
+[[body]]
+frame = 2
+M = "m"
+"""
+
+
+def test_a_robot_without_lengths_has_no_picture_and_not_that_of_the_former_one(monkeypatch):
+    async def story(user, apps, menus):
+        (app,) = apps
+        sent = []
+        monkeypatch.setattr(app, "_send", lambda method, *args: sent.append(method))
+        await app.open_robot(Document.of_upload, SYMBOLIC, ".toml")
+        await user.should_see("The picture needs values of L; write them in the table Symbols")
+        assert app.document.name == "long"
+        assert sent[0] == "clear"
+        assert "mount" not in sent
+        await app.move(0, 0.2)
+        assert app.session.refusal.startswith("The picture needs values of L")
+        await app.move(0, 0.0)
+        await app.edit(Cell("symbols", app.document.symbols.index("L"), "value"), "0.4")
+        assert sent[-1] == "mount"
+        await app.move(1, 0.3)
+        assert (sent[-1], app.q) == ("poses", (0.0, 0.3))
+
+    visit(monkeypatch, "panda", story)
 
 
 def test_a_reload_loses_nothing_and_a_doubled_tab_goes_its_own_way(monkeypatch):

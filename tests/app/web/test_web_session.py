@@ -37,7 +37,7 @@ def test_undo_and_redo_walk_through_the_history():
 
 def test_a_doubled_session_goes_its_own_way():
     first = Document.of_name("planar_2r")
-    session = Session(first, past=[edited(first, "0.7")], notes={"options idm": {"frame": 1}})
+    session = Session(first, past=[(edited(first, "0.7"), 0)], notes={"options idm": {"frame": 1}})
     double = session.doubled()
     assert double == session
     double.undo()
@@ -47,6 +47,26 @@ def test_a_doubled_session_goes_its_own_way():
     assert session.future == []
     assert session.shown == {}
     assert session.notes == {"options idm": {"frame": 1}}
+
+
+def test_a_robot_that_is_opened_has_nothing_of_the_former_one():
+    first = Document.of_name("planar_2r")
+    session = Session(first)
+    session.settle(first, (0.3, -0.6))
+    session.change(edited(first, "0.7"))
+    assert session.q == (0.3, -0.6)
+    session.open(Document.of_name("scara"))
+    assert (session.good, session.system, session.tables, session.q) == (None, None, None, ())
+    session.settle(session.document, (0.1, 0.2, 0.3, 0.4))
+    assert session.undo()
+    assert (session.robot, session.document, session.q) == (0, edited(first, "0.7"), ())
+    assert session.redo()
+    assert (session.robot, session.document.name, session.system) == (1, "scara", None)
+    session.undo()
+    session.open(Document.of_name("rx90"))
+    assert session.robot == 1
+    session.open(Document.of_name("rx90"))
+    assert session.robot == 2
 
 
 def test_the_history_has_an_end():

@@ -11,13 +11,21 @@ window.appView = (() => {
       if (viewer) viewer.dispose();
       element = found;
       viewer = mbs.viewer(element, scene, { theme: theme(), onTime: tell });
-      new MutationObserver(() => viewer.setTheme(theme()))
-        .observe(document.body, { attributes: true, attributeFilter: ["class"] });
     }
     Object.entries(wanted).forEach(([role, on]) => viewer.setVisible(role, on));
     if (camera) viewer.setCamera(camera);
     drawn += 1;
   }
+
+  // An empty picture, until the next mount.
+  function clear() {
+    if (!viewer) return;
+    viewer.dispose();
+    viewer = element = null;
+  }
+
+  new MutationObserver(() => viewer && viewer.setTheme(theme()))
+    .observe(document.body, { attributes: true, attributeFilter: ["class"] });
 
   const theme = () => (document.body.classList.contains("body--dark") ? "dark" : "light");
 
@@ -30,6 +38,7 @@ window.appView = (() => {
 
   return {
     mount,
+    clear,
     get drawn() { return drawn; },
     get viewer() { return viewer; },
     poses(flat) { if (viewer) { viewer.setPoses(flat); drawn += 1; } },

@@ -228,6 +228,7 @@ class Player:
 
     def __init__(self, app: App, film: Film) -> None:
         self._app, self._film = app, film
+        self._robot = app.session.robot
         self._playing = False
         first, last = float(film.times[0]), float(film.times[-1])
         with ui.element("div").classes("app-player app-small"):
@@ -243,9 +244,13 @@ class Player:
             self._speed = ui.select(_SPEEDS, value=1.0, on_change=self._restart)
             self._speed.props("dense options-dense borderless").style("width: 118px")
         app.on_time(self._reached)
+        app.on_robot(self.stop)
+        app.on_clear(self.stop)
 
     async def play(self) -> None:
         """Play again and again, from the beginning."""
+        if not self._is_of_robot():
+            return
         self._playing = True
         self._button.props("icon=pause")
         times, speed = self._film.times.tolist(), float(self._speed.value)
@@ -256,7 +261,8 @@ class Player:
         if self._playing:
             self._playing = False
             self._app.pause()
-            self._button.props("icon=play_arrow")
+            if not self._button.is_deleted:
+                self._button.props("icon=play_arrow")
 
     async def _toggle(self) -> None:
         if self._playing:
@@ -277,8 +283,17 @@ class Player:
 
     async def _keep(self, instant: float) -> None:
         """Make the configuration of this instant that of the app, its sliders included."""
+        if not self._is_of_robot():
+            return
         row = int(np.abs(self._film.times - instant).argmin())
         await self._app.set_configuration(self._film.configurations[row].tolist())
+
+    def _is_of_robot(self) -> bool:
+        """Whether the robot of the film is still open; if not, this is told."""
+        if self._robot == self._app.session.robot:
+            return True
+        self._app.complain("the motion is of another robot; simulate this one")
+        return False
 
     def _reached(self, instant: float) -> None:
         """What the picture shows now, where it plays this film; a closed panel ends it."""

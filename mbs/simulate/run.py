@@ -500,10 +500,11 @@ def _motion(
     rhs, project, passage = state.rhs, state.project, state.passage
     own, count, prepared = events, 0, state.prepared
     if state.crossings is not None:
-        own, wrapped = with_crossings(state, x0, times[0], events, p)
+        span = float(times[0]), float(times[-1])
+        own, wrapped = with_crossings(state, x0, span, events, p)
         rhs, project, passage = wrapped
         prepared = state.prepared.setdefault("runs with crossings", {})
-        count = state.crossings.numel_out(0)
+        count = np.size(own.modes) - (0 if events is None else np.size(events.modes))
     motion = integrate_events(
         rhs,
         x0,
@@ -514,23 +515,40 @@ def _motion(
         passage=passage,
         partial=True,
         prepared=prepared,
+        stops=_stops(state, float(times[0]), float(times[-1]), p),
         **options,
     )
     return _without_crossings(motion, events, count) if count else motion
 
 
+def _stops(
+    state: FullState, begin: float, end: float, p: Array
+) -> tuple[Array, NDArray[np.bool_]] | None:
+    """Times at which laws of time jump, bend or are short; the last ones found are kept."""
+    if state.timing is None:
+        return None
+    own = p[: state.timing.p]
+    key = begin, end, own.tobytes()
+    known = state.prepared.get("stops")
+    if known is None or known[0] != key:
+        known = state.prepared["stops"] = key, state.timing.stops(begin, end, own)
+    found: tuple[Array, NDArray[np.bool_]] = known[1]
+    return found
+
+
 def with_crossings(
-    state: FullState, x0: Array, t0: float, events: Events | None, p: Array
+    state: FullState, x0: Array, span: tuple[float, float], events: Events | None, p: Array
 ) -> tuple[Events, tuple[Function, Function | None, Passage | None]]:
     """Events with the crossings behind them, and the functions of the state with their modes.
 
     On which side of a crossing the motion is, 1 or -1, is its mode; nothing jumps there, so that
-    it does not matter whether a step stops a little before or behind it.
+    it does not matter whether a step stops a little before or behind it. The modes of guarded
+    crossings are as `_guard` has them.
 
     Args:
         state: with crossings.
         x0: (nx,) at the start.
-        t0: time of it [s].
+        span: times of the start and the end [s].
         events: others; None where there are none.
         p: (np,) parameters, without modes.
     """
@@ -539,8 +557,12 @@ def with_crossings(
     if "crossings" not in state.prepared:
         state.prepared["crossings"] = _watch_crossings(state, events, len(x0), len(p), len(modes))
     (indicators, jump), functions = state.prepared["crossings"]
+    t0, end = span
     start = np.array(state.crossings(t0, x0, [*p, *modes]))[:, 0]
-    sides = np.where(start > 0, 1.0, -1.0)
+    plain, few = np.split(start, [len(start) - state.guarded])
+    sides = [*np.where(plain > 0, 1.0, -1.0), *np.sign(few)]
+    if state.guarded:
+        sides += [*np.zeros(len(few)), *np.full(len(few), t0), end - t0]
     return Events(indicators, jump, [*modes, *sides], _FIRST_STEP), functions
 
 
@@ -557,25 +579,38 @@ def _watch_crossings(
         modes: number of the modes of the others.
     """
     assert state.crossings is not None
-    count, n_p = state.crossings.numel_out(0), own + modes
+    count, n_p, few = state.crossings.numel_out(0), own + modes, state.guarded
+    plain, more = count - few, _GUARD_MODES * few + 1 if few else 0
     first = 0 if events is None else events.indicators.numel_out(0)
     t, x, pm, fired = (
         SX.sym(name, size)
-        for name, size in (("t", 1), ("x", n), ("p", n_p + count), ("fired", first + count))
+        for name, size in (
+            ("t", 1),
+            ("x", n),
+            ("p", n_p + plain + more),
+            ("fired", first + count),
+        )
     )
-    at, sides = [t, x, pm[:n_p]], pm[n_p:]
+    parameters, sides, guards = casadi.vertsplit(pm, [0, n_p, n_p + plain, n_p + plain + more])
+    fired_first, fired_plain, fired_few = casadi.vertsplit(
+        fired, [0, first, first + plain, first + count]
+    )
+    at = [t, x, parameters]
 
     def wide(function: Function) -> Function:
         return Function(function.name(), [t, x, pm], function.call(at))
 
-    indicators, state_after, after = [sides * state.crossings.call(at)[0]], x, [SX(0, 1)]
+    values, few_values = casadi.vertsplit(state.crossings.call(at)[0], [0, plain, count])
+    guarded, then = _guard(t, few_values, guards, fired_few)
+    indicators = [sides * values, guarded]
+    state_after, after = x, [SX(0, 1)]
     if events is not None:
         indicators.insert(0, events.indicators.call(at)[0])
-        jumps = casadi.mmax(fired[:first])
-        there, *changed = events.jump.call([*at, fired[:first]])  # modes where there are some
+        jumps = casadi.mmax(fired_first)
+        there, *changed = events.jump.call([*at, fired_first])  # modes where there are some
         state_after = casadi.if_else(jumps, there, x)
-        after = [casadi.if_else(jumps, values, pm[own:n_p]) for values in changed]
-    after.append(casadi.if_else(fired[first:] > 0, -sides, sides))
+        after = [casadi.if_else(jumps, now, pm[own:n_p]) for now in changed]
+    after += [casadi.if_else(fired_plain > 0, -sides, sides), then]
     watched = (
         Function("indicators", [t, x, pm], [casadi.vertcat(*indicators)]),
         Function("jump", [t, x, pm, fired], [state_after, casadi.vertcat(*after)]),
@@ -592,10 +627,63 @@ def _watch_crossings(
     return watched, (wide(state.rhs), project, passage)
 
 
-def _without_crossings(motion: EventMotion, events: Events | None, count: int) -> EventMotion:
-    """The motion with the modes and events of others alone."""
+_GUARD_MODES = 3
+"""Modes of a guarded crossing: its side, a count and a time."""
+_OFTEN = 4
+"""Number of crossings in a row after which a crossing is not watched for a while: a body that
+bounces between two sides of a law, or that comes to rest at a friction, passes it without end."""
+_CROWDED = 1e-5
+"""Part of the duration within which crossings follow each other in a row."""
+_SHORTEST_PAUSE, _LONGEST_PAUSE = 1e-6, 0.02
+"""Parts of the duration for which a crossing is not watched. The pauses double, so that 16 of them
+come to the longest one, and 50 of these to the duration."""
+
+
+def _guard(t: SX, values: SX, modes: SX, fired: SX) -> tuple[SX, SX]:
+    """Indicators and next modes of guarded crossings.
+
+    The modes are the sides, 1 or -1, or 0 where the crossing is not watched; counts of crossings in
+    a row; times of the last changes; and the duration. A crossing that is exactly zero, or that
+    was passed many times in a row, is not watched for a pause, in which error control alone
+    follows the law.
+
+    Args:
+        t: time [s].
+        values: (k, 1) of the crossings.
+        modes: (3 k + 1, 1), empty where k is zero.
+        fired: (k, 1) 1 for each indicator that is not positive.
+    """
+    k = values.numel()
+    if not k:
+        return SX(0, 1), SX(0, 1)
+    sides, counts, last, duration = modes[:k], modes[k : 2 * k], modes[2 * k : 3 * k], modes[3 * k]
+    pause = duration * casadi.fmin(_SHORTEST_PAUSE * 2**counts, _LONGEST_PAUSE)
+    indicators = casadi.if_else(sides == 0, last + pause - t, sides * values)
+    in_row = casadi.if_else(
+        casadi.logic_or(sides == 0, t - last < _CROWDED * duration), counts + 1, 0
+    )
+    other = casadi.if_else(in_row > _OFTEN, 0, -sides)
+    side = casadi.if_else(sides == 0, casadi.sign(values), other)
+    happened = fired > 0
+    then = casadi.vertcat(
+        casadi.if_else(happened, side, sides),
+        casadi.if_else(happened, in_row, counts),
+        casadi.if_else(happened, t, last),
+        duration,
+    )
+    return indicators, then
+
+
+def _without_crossings(motion: EventMotion, events: Events | None, modes: int) -> EventMotion:
+    """The motion with the modes and events of others alone.
+
+    Args:
+        motion: with crossings.
+        events: others; None where there are none.
+        modes: number of the modes of crossings.
+    """
     first = 0 if events is None else events.indicators.numel_out(0)
-    kept = motion.modes.shape[1] - count
+    kept = motion.modes.shape[1] - modes
     reported = tuple(
         replace(event, fired=others, modes=event.modes[:kept])
         for event in motion.events

@@ -212,6 +212,7 @@ def _load(path: Path, has_events: bool, has_passage: bool) -> ctypes.CDLL:
             ctypes.c_int,
             [handle, pointer, pointer, integer, pointer, ctypes.POINTER(integer), integer],
         ),
+        "mbs_stops": (None, [handle, pointer, pointer, integer]),
         "mbs_time": (real, [handle]),
         "mbs_step": (real, [handle]),
     }
@@ -233,6 +234,7 @@ def _opened(library: ctypes.CDLL, problem: IntegrationProblem) -> Iterator[ctype
     indicators = problem.equations.indicators
     afresh = problem.equations.first_step
     control = np.array([problem.rtol, problem.atol, problem.max_step, afresh])
+    ends, jumps = problem.stops[0], problem.stops[1].astype(float)  # kept while the driver lives
     driver = library.mbs_open(n, len(p), _pointer(p), _pointer(control), start)
     full = not driver
     try:
@@ -241,6 +243,8 @@ def _opened(library: ctypes.CDLL, problem: IntegrationProblem) -> Iterator[ctype
         if driver and not full and (through := problem.equations.passage) is not None:
             sizes = (ctypes.c_int * len(through.size))(*through.size)
             full = library.mbs_pass(driver, sizes, through.typical) != 0
+        if driver and len(ends):
+            library.mbs_stops(driver, _pointer(ends), _pointer(jumps), len(ends))
         if full:
             raise SolverError(f"no memory is left to integrate {n} states; close other programs")
         yield driver
@@ -334,6 +338,7 @@ def integrate_events(
     rtol: float = 1e-8,
     atol: float = 1e-8,
     max_step: float = math.inf,
+    stops: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
     progress: Progress | None = None,
     compiled: bool = True,
     partial: bool = False,
@@ -362,6 +367,9 @@ def integrate_events(
         rtol: relative tolerance of the error of one step.
         atol: absolute tolerance of the error of one step, in the units of the states.
         max_step: the longest step, s; only the error limits it by default.
+        stops: times at which steps end, s, in increasing order, and for each whether functions may
+            jump there as functions of time. Up to such a time they are asked before it, then
+            behind it, and a step begins anew. None when left out.
         progress: called now and then with the time reached, s.
         compiled: False for the same algorithm in Python.
         partial: True for what was reached, with its `stop`, where the integration cannot go on or
@@ -386,7 +394,7 @@ def integrate_events(
         kept[key] = made, library_of(made) if key[1] else None
     functions, library = kept[key]
     modes = () if events is None else events.modes
-    given = problem(functions, x0, times, p, modes, (rtol, atol), max_step)
+    given = problem(functions, x0, times, p, modes, (rtol, atol), max_step, stops)
     motion = _run(given, library, progress)
     if motion.stop is not None and not partial:
         raise motion.stop

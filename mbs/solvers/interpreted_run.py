@@ -19,7 +19,7 @@ from mbs.solvers.problem import (
     interrupted,
 )
 from mbs.solvers.rodas import Rodas
-from mbs.solvers.stepper import EPSILON, Array, Projection, RowTable, Stepper
+from mbs.solvers.stepper import EPSILON, Array, Projection, RowTable, Stepper, Stops
 
 # Location of events and jumps in plain Python: the twin of `native/runtime/events.c`.
 #
@@ -164,7 +164,12 @@ class EventStepper:
 
     def _step(self, limit: float) -> int:
         """One step, cut at its first event; returns how many were tried."""
-        solver, start, armed = self.solver, self.solver.t, self.armed.copy()
+        solver, start = self.solver, self.solver.t
+        if solver.pass_stop():
+            self._judge()
+            if self.due.any():
+                return 0
+        armed = self.armed.copy()
         tried = solver.step(limit)
         found, end = self._first_event(start), solver.t
         if found and found[0] < end and found[0] - start > AT_START * (end - start):
@@ -343,20 +348,22 @@ def _vector(value: casadi.DM) -> Array:
 
 def _stepper(problem: IntegrationProblem, p: Array) -> Stepper:
     functions, start, state = problem.equations, float(problem.times[0]), problem.x0
-    project = _projection(problem, p)
+    stops = Stops(*problem.stops)
+    stops.start(start)
+    project = _projection(problem, p, stops)
     control = problem.rtol, problem.atol, problem.max_step, functions.first_step
 
     def slope(t: float, x: Array) -> Array:
-        return _vector(functions.rhs(t, x, p))
+        return _vector(functions.rhs(stops.law_time(t), x, p))
 
     def jacobian(t: float, x: Array) -> tuple[Array, Array]:
         assert functions.jacobian is not None
-        J, f_t = functions.jacobian(t, x, p)
+        J, f_t = functions.jacobian(stops.law_time(t), x, p)
         return np.asarray(J.full()), _vector(f_t)
 
     if functions.jacobian is None:
-        return Dopri5(slope, project, start, state, *control)
-    return Rodas(slope, project, start, state, *control, jacobian=jacobian)
+        return Dopri5(slope, project, start, state, *control, stops=stops)
+    return Rodas(slope, project, start, state, *control, stops=stops, jacobian=jacobian)
 
 
 def _begin(solver: Stepper) -> Array:
@@ -368,7 +375,7 @@ def _begin(solver: Stepper) -> Array:
         raise failed(solver.t, 0.0, str(failure), state=solver.x.tolist()) from failure
 
 
-def _projection(problem: IntegrationProblem, p: Array) -> Projection | None:
+def _projection(problem: IntegrationProblem, p: Array, stops: Stops) -> Projection | None:
     """Newton steps until the constraints hold to rounding."""
     step = problem.equations.project
     if step is None:
@@ -377,7 +384,7 @@ def _projection(problem: IntegrationProblem, p: Array) -> Projection | None:
     def onto(t: float, x: Array) -> Array:
         for _ in range(ITERATIONS):
             try:
-                moved, residual = step(t, x, p)
+                moved, residual = step(stops.law_time(t), x, p)
             except RuntimeError as error:
                 raise Failure("projection") from error
             x = _vector(moved)
@@ -392,14 +399,14 @@ def _projection(problem: IntegrationProblem, p: Array) -> Projection | None:
 
 def _watch(problem: IntegrationProblem, p: Array, solver: Stepper) -> EventStepper | None:
     """The integration with its events, which has looked at the first state."""
-    functions, project = problem.equations, solver.project
+    functions, project, at = problem.equations, solver.project, solver.stops.law_time
     indicators, rates, jump = functions.indicators, functions.rates, functions.jump
     if indicators is None or rates is None or jump is None:
         return None
 
     def after(t: float, x: Array, fired: Flags) -> Array:
         try:
-            moved, modes = map(_vector, jump(t, x, p, fired))
+            moved, modes = map(_vector, jump(at(t), x, p, fired))
         except RuntimeError as error:
             raise Failure("jump") from error
         if not (np.isfinite(moved).all() and np.isfinite(modes).all()):
@@ -409,8 +416,8 @@ def _watch(problem: IntegrationProblem, p: Array, solver: Stepper) -> EventStepp
 
     watched = EventStepper(
         solver,
-        lambda t, x: _vector(indicators(t, x, p)),
-        lambda t, x: _vector(rates(t, x, p)),
+        lambda t, x: _vector(indicators(at(t), x, p)),
+        lambda t, x: _vector(rates(at(t), x, p)),
         after,
     )
     watched.start()

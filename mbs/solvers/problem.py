@@ -180,6 +180,8 @@ class IntegrationProblem:
         rtol: relative tolerance of the error of one step.
         atol: absolute tolerance of the error of one step.
         max_step: the longest step, s.
+        stops: times at which steps end, s, in increasing order; whether laws of time may jump
+            there, so that a step begins anew.
     """
 
     equations: Equations
@@ -190,6 +192,7 @@ class IntegrationProblem:
     rtol: float
     atol: float
     max_step: float
+    stops: tuple[Array, npt.NDArray[np.bool_]]
 
     def motion(
         self, x: Array, log: Sequence[IntegrationEvent], stop: SolverError | Interrupted | None
@@ -321,6 +324,7 @@ def problem(
     modes: npt.ArrayLike,
     tolerances: tuple[float, float],
     max_step: float,
+    stops: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
 ) -> IntegrationProblem:
     """The integration of given functions.
 
@@ -332,6 +336,7 @@ def problem(
         modes: (nm,) at the first time.
         tolerances: relative and absolute tolerance of the error of one step.
         max_step: the longest step, s; infinite when only the error limits it.
+        stops: as in `IntegrationProblem`; none when left out.
 
     Raises:
         ModelError: an argument does not fit the functions.
@@ -355,8 +360,15 @@ def problem(
         raise ModelError(f"integrate: tolerances {rtol!r} and {atol!r} must be positive numbers")
     if not (isinstance(max_step, (int, float)) and max_step > 0):
         raise ModelError(f"integrate: the longest step {max_step!r} must be a positive number, s")
+    ends = np.empty(0) if stops is None else numbers(stops[0])
+    jumps = np.ones(len(ends), bool) if stops is None else np.array(stops[1], dtype=bool).ravel()
+    if len(jumps) != len(ends) or not np.isfinite(ends).all() or np.any(np.diff(ends) <= 0):
+        raise ModelError(
+            "integrate: stops must be finite times in increasing order, and as many flags"
+        )
+    every = np.concatenate([own, m])
     return IntegrationProblem(
-        functions, x, t, np.concatenate([own, m]), len(m), rtol, atol, max_step
+        functions, x, t, every, len(m), rtol, atol, max_step, (ends, jumps)
     )
 
 

@@ -8,7 +8,7 @@ change there.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,59 @@ not by that of times later on."""
 UNMOVED = 0.01
 """Part of the tolerances by which a projection may move the state and leave the slope that the
 method ends with: its error is then a hundredth of the one that is allowed."""
+
+ASIDE = 1e3 * EPSILON
+"""Part of the time that laws are asked beside a jump: a few roundings of arithmetic on times."""
+GAP = 0.25
+"""Part of the time between two jumps that this is at most."""
+
+
+@dataclass(slots=True)
+class Stops:
+    """Times at which steps end.
+
+    Attributes:
+        times: (m,) s, increasing.
+        hard: (m,) whether laws of time may jump there, so that a step begins anew.
+        next: index of the first one that lies ahead.
+        side: laws of time are asked between these times: on one side of their jumps.
+    """
+
+    times: Array
+    hard: npt.NDArray[np.bool_]
+    next: int = 0
+    side: tuple[float, float] = (-math.inf, math.inf)
+
+    def start(self, t: float) -> None:
+        """Begin at a time."""
+        self.next = int(np.searchsorted(self.times, t, side="right"))
+        self._find_side(t)
+
+    def limit(self, limit: float) -> float:
+        """The next stop, or a limit before it."""
+        return min(limit, float(self.times[self.next])) if self.next < len(self.times) else limit
+
+    def pass_at(self, t: float) -> bool:
+        """Go on behind a stop at a time, if there is one; whether laws of time may have jumped."""
+        first = self.next
+        self.next += int(np.searchsorted(self.times[first:], t, side="right"))
+        jumps = bool(self.hard[first : self.next].any())
+        if jumps:
+            self._find_side(t)
+        return jumps
+
+    def law_time(self, t: float) -> float:
+        """A time moved to the side of the jumps of laws on which the present step is."""
+        return min(max(t, self.side[0]), self.side[1])
+
+    def _find_side(self, t: float) -> None:
+        jumps = self.times[self.hard]
+        place = int(np.sum(self.hard[: self.next]))
+        first = float(jumps[place - 1]) if place else -math.inf
+        last = float(jumps[place]) if place < len(jumps) else math.inf
+        end = abs(float(self.times[-1])) if len(self.times) else 0.0
+        aside = min(ASIDE * max(end, abs(t)), GAP * (last - first))
+        self.side = first + aside, last - aside
 
 
 @dataclass(slots=True)
@@ -76,6 +129,7 @@ class Stepper(ABC):
         t: present time.
         x: present state, (n,).
         max_step: the longest step, s.
+        stops: times at which steps end.
         afresh: length of the first step after a jump, s; estimated where 0.
         h: step that error control wants next; 0 before the first one.
         slope: slope at the present state, or None when it is not known.
@@ -100,6 +154,7 @@ class Stepper(ABC):
     moved: bool = False
     slope: Array | None = None
     dense: tuple[Array, ...] = ()
+    stops: Stops = field(default_factory=lambda: Stops(np.empty(0), np.empty(0, bool)))
 
     @abstractmethod
     def _open(self, slope: Array) -> None:
@@ -164,6 +219,13 @@ class Stepper(ABC):
         """Go on from another state at the present time, with a new first step."""
         self.x, self.slope, self.h, self.error = x, None, self.afresh, LEAST_ERROR
 
+    def pass_stop(self) -> bool:
+        """Go on behind a stop at the present time; whether laws of time may have jumped there."""
+        jumps = self.stops.pass_at(self.t)
+        if jumps:
+            self.restart(self.x)
+        return jumps
+
     def step(self, limit: float) -> int:
         """Try steps towards limit until one is accepted.
 
@@ -174,6 +236,8 @@ class Stepper(ABC):
             Failure: none can be accepted.
         """
         tried = 0
+        self.pass_stop()
+        limit = self.stops.limit(limit)
         slope = self._opened(limit)
         while True:
             self.since_output += 1

@@ -44,6 +44,7 @@ from mbs.models.state.independent import (
     point_of,
     with_laws,
 )
+from mbs.models.state.laws import TimeLaws, conditions_of, time_laws
 from mbs.models.state.signals import GivenInput, Prescribed
 from mbs.models.symbols import dense_function, outputs_of, part_equations, state_count
 from mbs.recursions.parts import PartsAt, after_events
@@ -528,6 +529,10 @@ class FullState:
         passage: for steps through singular configurations of the loops; None where there are none.
         crossings: `crossings(t, x, p)`, what passes through zero where the laws of components have
             bends; None where there are none.
+        guarded: number of the last crossings that may stay at zero or pass it without end, such as
+            the velocity in a law of dry friction.
+        timing: what efforts, inputs and prescribed motions say of the time alone; None where they
+            say nothing.
         prepared: what integrations keep between runs.
     """
 
@@ -537,6 +542,8 @@ class FullState:
     events: tuple[Function, Function] | None = None
     passage: Passage | None = None
     crossings: Function | None = None
+    guarded: int = 0
+    timing: TimeLaws | None = None
     prepared: dict[Any, Any] = field(default_factory=dict)
 
 
@@ -586,7 +593,8 @@ def full_state(
     keeps = system.is_closed or motions or touch or quaternion_slices(system.tree)
     corrected = [casadi.vertcat(*kept, z), residual]
     p = casadi.vertcat(p, contact.values) if contact else p
-    crossed = parts.crossings()
+    timing, watched = _law_conditions(system, (t, q, v), (effort, inputs), motions)
+    crossed = casadi.vertcat(parts.crossings(), watched)
     rate, *observed = with_inputs(system, [rate, *observed], u)
     return FullState(
         rhs=dense_function("rhs", [t, x, p], [rate]),
@@ -595,7 +603,30 @@ def full_state(
         events=_events(system, contact, parts, [t, x, p], u),
         passage=through,
         crossings=dense_function("crossings", [t, x, p], [crossed]) if crossed.numel() else None,
+        guarded=watched.numel(),
+        timing=timing,
     )
+
+
+def _law_conditions(
+    system: System,
+    point: tuple[SX, SX, SX],
+    signals: Sequence[Function | None],
+    motions: Sequence[Prescribed],
+) -> tuple[TimeLaws | None, SX]:
+    """What laws say of the time alone, and what passes through zero where they jump or bend.
+
+    Args:
+        system: open or closed.
+        point: t, q and v.
+        signals: functions of (t, q, v, p).
+        motions: coordinates that drives move along laws.
+    """
+    t, q, v = point
+    values = [signal(t, q, v, system.p) for signal in signals if signal is not None]
+    values += [law for one in motions for law in one.law(t, system.z, system.p)]
+    found = conditions_of(casadi.vertcat(SX(0, 1), *values), t, q, system.p)
+    return time_laws(found, t, system.p), casadi.vertcat(SX(0, 1), *found.crossings)
 
 
 def _events(

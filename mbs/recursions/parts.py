@@ -385,6 +385,29 @@ class PartsAt:
                 found += map(SX, part.element.crossings(self.at(part)).values())
         return casadi.vertcat(*found)
 
+    def modes(self) -> SX:
+        """(nm, 1) symbols of the modes of all components."""
+        found = [SX(0, 1)]
+        for part in self.parts:
+            found += [part.states[name] for name in part.element.names_of("mode")]
+        return casadi.vertcat(*found)
+
+    def laws(self) -> SX:
+        """Loads and rates of all components that do not give their own crossings, (n, 1)."""
+        found = [SX(0, 1)]
+        for part in self.parts:
+            element = part.element
+            if element.has("crossings"):
+                continue
+            for load in self.loads(part).values() if element.acts else ():
+                if isinstance(load, FrameLoad):
+                    found += [load.force, load.moment]
+                else:
+                    found.append(SX(load))
+            if part.states:
+                found += [SX(value) for value in element.rates(self.at(part)).values()]
+        return casadi.vertcat(*found)
+
     def outputs(self, lam: SX | None = None) -> SX:
         """(ny, 1) outputs of all components.
 

@@ -629,6 +629,8 @@ def _watch_crossings(
 
 _GUARD_MODES = 3
 """Modes of a guarded crossing: its side, a count and a time."""
+_ASLEEP = 2
+"""Side of a guarded crossing that is not watched."""
 _OFTEN = 4
 """Number of crossings in a row after which a crossing is not watched for a while: a body that
 bounces between two sides of a law, or that comes to rest at a friction, passes it without end."""
@@ -642,10 +644,10 @@ come to the longest one, and 50 of these to the duration."""
 def _guard(t: SX, values: SX, modes: SX, fired: SX) -> tuple[SX, SX]:
     """Indicators and next modes of guarded crossings.
 
-    The modes are the sides, 1 or -1, or 0 where the crossing is not watched; counts of crossings in
-    a row; times of the last changes; and the duration. A crossing that is exactly zero, or that
-    was passed many times in a row, is not watched for a pause, in which error control alone
-    follows the law.
+    The modes are the sides; counts of crossings in a row; times of the last changes; and the
+    duration. The side is 1 or -1, or 0 where the value is exactly zero, until it is not. It is 2
+    where the crossing was passed many times in a row: it is then not watched for a pause, in which
+    error control alone follows the law.
 
     Args:
         t: time [s].
@@ -658,12 +660,15 @@ def _guard(t: SX, values: SX, modes: SX, fired: SX) -> tuple[SX, SX]:
         return SX(0, 1), SX(0, 1)
     sides, counts, last, duration = modes[:k], modes[k : 2 * k], modes[2 * k : 3 * k], modes[3 * k]
     pause = duration * casadi.fmin(_SHORTEST_PAUSE * 2**counts, _LONGEST_PAUSE)
-    indicators = casadi.if_else(sides == 0, last + pause - t, sides * values)
-    in_row = casadi.if_else(
-        casadi.logic_or(sides == 0, t - last < _CROWDED * duration), counts + 1, 0
-    )
-    other = casadi.if_else(in_row > _OFTEN, 0, -sides)
-    side = casadi.if_else(sides == 0, casadi.sign(values), other)
+    asleep = sides == _ASLEEP
+    at_zero = casadi.if_else(values == 0, 1, -1)
+    awake = casadi.if_else(sides == 0, at_zero, sides * values)
+    indicators = casadi.if_else(asleep, last + pause - t, awake)
+    soon = t - last < _CROWDED * duration
+    in_row = casadi.if_else(casadi.logic_or(asleep, soon), counts + 1, 0)
+    other = casadi.if_else(in_row > _OFTEN, _ASLEEP, -sides)
+    found = casadi.logic_or(asleep, sides == 0)
+    side = casadi.if_else(found, casadi.sign(values), other)
     happened = fired > 0
     then = casadi.vertcat(
         casadi.if_else(happened, side, sides),

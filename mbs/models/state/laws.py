@@ -212,6 +212,26 @@ def _terms(walk: _Walk, roots: Sequence[SX]) -> list[SX]:
     return list(terms.values())
 
 
+_DEPTH = 50
+"""Levels of operations to which expressions are compared: more than conditions of laws have."""
+
+
+def distinct(values: Sequence[SX], known: Sequence[SX]) -> list[SX]:
+    """Those expressions that are equal to none before them, up to the sign.
+
+    Args:
+        values: the expressions.
+        known: expressions that are left out too.
+    """
+    every, found = list(known), list[SX]()
+    for value in values:
+        twins = (value, -value)
+        if not any(casadi.is_equal(one, twin, _DEPTH) for one in every for twin in twins):
+            found.append(value)
+            every.append(value)
+    return found
+
+
 # Times at which steps end.
 
 

@@ -44,7 +44,7 @@ from mbs.models.state.independent import (
     point_of,
     with_laws,
 )
-from mbs.models.state.laws import TimeLaws, conditions_of, time_laws
+from mbs.models.state.laws import TimeLaws, conditions_of, distinct, time_laws
 from mbs.models.state.signals import GivenInput, Prescribed
 from mbs.models.symbols import dense_function, outputs_of, part_equations, state_count
 from mbs.recursions.parts import PartsAt, after_events
@@ -593,7 +593,7 @@ def full_state(
     keeps = system.is_closed or motions or touch or quaternion_slices(system.tree)
     corrected = [casadi.vertcat(*kept, z), residual]
     p = casadi.vertcat(p, contact.values) if contact else p
-    timing, watched = _law_conditions(system, (t, q, v), (effort, inputs), motions)
+    timing, watched = _law_conditions(system, (t, q, v), u, (effort, inputs), motions, parts)
     crossed = casadi.vertcat(parts.crossings(), watched)
     rate, *observed = with_inputs(system, [rate, *observed], u)
     return FullState(
@@ -611,22 +611,35 @@ def full_state(
 def _law_conditions(
     system: System,
     point: tuple[SX, SX, SX],
+    u: SX,
     signals: Sequence[Function | None],
     motions: Sequence[Prescribed],
+    parts: PartsAt,
 ) -> tuple[TimeLaws | None, SX]:
     """What laws say of the time alone, and what passes through zero where they jump or bend.
 
     Args:
         system: open or closed.
         point: t, q and v.
+        u: (nu, 1) values of the inputs of components.
         signals: functions of (t, q, v, p).
         motions: coordinates that drives move along laws.
+        parts: all components.
     """
     t, q, v = point
     values = [signal(t, q, v, system.p) for signal in signals if signal is not None]
     values += [law for one in motions for law in one.law(t, system.z, system.p)]
-    found = conditions_of(casadi.vertcat(SX(0, 1), *values), t, q, system.p)
-    return time_laws(found, t, system.p), casadi.vertcat(SX(0, 1), *found.crossings)
+    laws = casadi.vertcat(SX(0, 1), *values)
+    found = conditions_of(laws, t, q, casadi.vertcat(system.p, parts.modes()))
+    own = conditions_of(parts.laws(), SX(0, 1), q, casadi.vertcat(system.p, parts.modes()))
+    known = casadi.vertsplit(parts.crossings()) if parts.crossings().numel() else []
+    for value in distinct([*found.crossings, *with_inputs(system, own.crossings, u)], known):
+        if casadi.depends_on(value, casadi.vertcat(q, v, system.z)):
+            known.append(value)
+        elif casadi.depends_on(value, t):
+            found.zeros.append(value)
+    crossings = known[parts.crossings().numel() :]
+    return time_laws(found, t, system.p), casadi.vertcat(SX(0, 1), *crossings)
 
 
 def _events(

@@ -30,6 +30,7 @@ from mbs.components.custom import (
 )
 from mbs.errors import AssemblyError
 from mbs.expressions import to_sx
+from mbs.expressions.conditions import LawConditions, law_conditions
 from mbs.recursions.poses import link_poses
 from mbs.recursions.readings import Readings, coordinate_readings, frame_readings
 from mbs.recursions.route import BASE, relative_motion
@@ -384,6 +385,25 @@ class PartsAt:
             if part.element.has("crossings"):
                 found += map(SX, part.element.crossings(self.at(part)).values())
         return casadi.vertcat(*found)
+
+    def conditions(self, x: SX) -> LawConditions:
+        """Conditions in the laws of components of users that declare no crossings of their own.
+
+        Args:
+            x: symbols of all states.
+        """
+        laws = [SX(0, 1)]
+        for part in self.parts:
+            element = part.element
+            if type(element).__module__.startswith("mbs.") or element.has("crossings"):
+                continue
+            for load in self.loads(part).values():
+                is_frame = isinstance(load, FrameLoad)
+                laws += [SX(load.force), SX(load.moment)] if is_frame else [SX(load)]
+            for method in ("rates", "outputs"):
+                if element.has(method):
+                    laws += map(SX, getattr(element, method)(self.at(part)).values())
+        return law_conditions(casadi.vertcat(*map(casadi.vec, laws)), SX(0, 1), x)
 
     def outputs(self, lam: SX | None = None) -> SX:
         """(ny, 1) outputs of all components.

@@ -64,7 +64,8 @@ from mbs.result import Result
 from mbs.simulate.arguments import count_steps, positive
 from mbs.solvers import EventMotion, Events, integrate_events
 from mbs.solvers.integrate import is_compilable
-from mbs.solvers.problem import IntegrationEvent, Passage, failed
+from mbs.solvers.limits import step_limits
+from mbs.solvers.problem import NO_LIMITS, IntegrationEvent, Passage, StepLimits, failed
 from mbs.text import did_you_mean, quoted
 
 # Rigid stops and Coulomb friction in a simulation: how they start, and what a result says of them.
@@ -496,14 +497,21 @@ def _motion(
     p: Array,
     options: dict[str, Any],
 ) -> EventMotion:
-    """The motion as far as it comes; its steps end where laws of components have bends."""
+    """The motion as far as it comes; its steps end where laws jump or bend.
+
+    A condition that switches without end, as the sign of a velocity at rest, is not watched from
+    there on.
+    """
     rhs, project, passage = state.rhs, state.project, state.passage
     own, count, prepared = events, 0, state.prepared
+    limits, leave = _limits(state, times, p), None
     if state.crossings is not None:
         own, wrapped = with_crossings(state, x0, times[0], events, p)
         rhs, project, passage = wrapped
         prepared = state.prepared.setdefault("runs with crossings", {})
         count = state.crossings.numel_out(0)
+        first = 0 if events is None else events.indicators.numel_out(0)
+        leave = _Chatter(state, first, float(times[-1] - times[0]))
     motion = integrate_events(
         rhs,
         x0,
@@ -514,9 +522,93 @@ def _motion(
         passage=passage,
         partial=True,
         prepared=prepared,
+        limits=limits,
+        leave=leave,
         **options,
     )
-    return _without_crossings(motion, events, count) if count else motion
+    if not count:
+        return motion
+    found = _without_crossings(motion, events, count)
+    if motion.left is None:
+        return found
+    assert leave is not None
+    time, x = motion.left
+    going_on = events
+    if events is not None and found.events:
+        going_on = replace(events, modes=found.events[-1].modes)
+    rest = np.concatenate([[time], times[len(found.x) :]])
+    calm = leave.calm(motion.events)
+    after = _motion(calm, x.copy(), rest, going_on, p, options)
+    return replace(
+        after,
+        x=np.vstack([found.x, after.x[1:]]),
+        modes=np.vstack([found.modes, after.modes[1:]]),
+        events=(*found.events, *after.events),
+        first_slope=found.first_slope,
+    )
+
+
+_MANY = 30
+"""Events by which a condition is known to switch without end: a law that holds switches once."""
+_SHORT = 1e-3
+"""Part of a motion in which so many events are switching without end, not a law that is fast."""
+
+
+class _Chatter:
+    """Whether conditions on states switch without end, and the equations that do not watch them."""
+
+    def __init__(self, state: FullState, first: int, duration: float) -> None:
+        assert state.crossings is not None
+        self._state, self._first, self._span = state, first, _SHORT * duration
+        pattern = state.crossings.jac_sparsity(0, 1)
+        rows = set(pattern.row())
+        sides = state.crossings.numel_out(0) - state.counts
+        # indicators of a count: below, then above
+        self._rows = [*range(sides + state.counts), *range(sides, sides + state.counts)]
+        self._of_states = frozenset(first + k for k, row in enumerate(self._rows) if row in rows)
+
+    def __call__(self, events: Sequence[IntegrationEvent]) -> bool:
+        """Whether the last events are switching without end."""
+        if len(events) < _MANY or events[-1].time - events[-_MANY].time > self._span:
+            return False
+        return all(set(event.fired) <= self._of_states for event in events[-_MANY:])
+
+    def calm(self, events: Sequence[IntegrationEvent]) -> FullState:
+        """The equations without the conditions of the last events."""
+        state = self._state
+        assert state.crossings is not None
+        left_out = {self._rows[k - self._first] for e in events[-_MANY:] for k in e.fired}
+        key = "calm", tuple(sorted(left_out))
+        if key not in state.prepared:
+            total = state.crossings.numel_out(0)
+            kept = [k for k in range(total) if k not in left_out]
+            counts = sum(k >= total - state.counts for k in kept)
+            crossings = None
+            if kept:
+                inputs = state.crossings.sx_in()
+                values = state.crossings.call(inputs)[0]
+                crossings = Function("crossings", inputs, [values[kept]])
+            state.prepared[key] = replace(state, crossings=crossings, counts=counts, prepared={})
+        made: FullState = state.prepared[key]
+        return made
+
+
+def _limits(state: FullState, times: Array, p: Array) -> StepLimits:
+    """The longest steps by what laws have of time; those of the last motion of equal length."""
+    if state.time_parts is None or len(times) < 2:
+        return NO_LIMITS
+    own = p[: state.time_parts.numel_in(1)]
+    asked = (float(times[0]), float(times[-1]), own.tobytes())
+    known = state.prepared.get("limits")
+    if known is None or known[0] != asked:
+        part = state.time_parts
+
+        def law(at: Array) -> Array:
+            return np.array(part(at.reshape(1, -1), np.tile(own[:, None], len(at))))
+
+        known = state.prepared["limits"] = asked, step_limits(law, asked[0], asked[1])
+    limits: StepLimits = known[1]
+    return limits
 
 
 def with_crossings(
@@ -524,8 +616,7 @@ def with_crossings(
 ) -> tuple[Events, tuple[Function, Function | None, Passage | None]]:
     """Events with the crossings behind them, and the functions of the state with their modes.
 
-    On which side of a crossing the motion is, 1 or -1, is its mode; nothing jumps there, so that
-    it does not matter whether a step stops a little before or behind it.
+    The mode of a crossing is its side, 1 or -1, or its count. The state does not jump there.
 
     Args:
         state: with crossings.
@@ -540,8 +631,9 @@ def with_crossings(
         state.prepared["crossings"] = _watch_crossings(state, events, len(x0), len(p), len(modes))
     (indicators, jump), functions = state.prepared["crossings"]
     start = np.array(state.crossings(t0, x0, [*p, *modes]))[:, 0]
-    sides = np.where(start > 0, 1.0, -1.0)
-    return Events(indicators, jump, [*modes, *sides], _FIRST_STEP), functions
+    count = len(start) - state.counts
+    own = [*np.where(start[:count] > 0, 1.0, -1.0), *np.floor(start[count:])]
+    return Events(indicators, jump, [*modes, *own], _FIRST_STEP), functions
 
 
 def _watch_crossings(
@@ -561,21 +653,33 @@ def _watch_crossings(
     first = 0 if events is None else events.indicators.numel_out(0)
     t, x, pm, fired = (
         SX.sym(name, size)
-        for name, size in (("t", 1), ("x", n), ("p", n_p + count), ("fired", first + count))
+        for name, size in (
+            ("t", 1),
+            ("x", n),
+            ("p", n_p + count),
+            ("fired", first + count + state.counts),
+        )
     )
-    at, sides = [t, x, pm[:n_p]], pm[n_p:]
+    at, last = [t, x, pm[:n_p]], n_p + count - state.counts
+    _, sides, counts = casadi.vertsplit(pm, [0, n_p, last, n_p + count])
+    values, counted = casadi.vertsplit(state.crossings.call(at)[0], [0, sides.numel(), count])
 
     def wide(function: Function) -> Function:
         return Function(function.name(), [t, x, pm], function.call(at))
 
-    indicators, state_after, after = [sides * state.crossings.call(at)[0]], x, [SX(0, 1)]
+    # a count is left where it falls below its integer, or reaches the next one
+    own_indicators = [sides * values, counted - counts, counts + 1 - counted]
+    indicators, state_after, after = [casadi.vertcat(*own_indicators)], x, [SX(0, 1)]
     if events is not None:
         indicators.insert(0, events.indicators.call(at)[0])
         jumps = casadi.mmax(fired[:first])
         there, *changed = events.jump.call([*at, fired[:first]])  # modes where there are some
         state_after = casadi.if_else(jumps, there, x)
         after = [casadi.if_else(jumps, values, pm[own:n_p]) for values in changed]
-    after.append(casadi.if_else(fired[first:] > 0, -sides, sides))
+    end = first + sides.numel()
+    ends = [0, first, end, end + state.counts, end + 2 * state.counts]
+    _, passed, below, above = casadi.vertsplit(fired, ends)
+    after += [sides * (1 - 2 * passed), counts + above - below]
     watched = (
         Function("indicators", [t, x, pm], [casadi.vertcat(*indicators)]),
         Function("jump", [t, x, pm, fired], [state_after, casadi.vertcat(*after)]),
@@ -871,8 +975,9 @@ def _signal(system: System, name: str, given: str) -> tuple[SX, SX]:
     }
     if given not in sources:
         raise ModelError(
-            f"{system.name}: the motion of {name} is {quoted(given)}, which is no output or state"
-            f" of a component; {did_you_mean(given, list(sources))}"
+            f"{system.name}: the motion of {name} is {quoted(given)}; give a finite number, or a"
+            " function of the time made of CasADi operations, or an output or a state of a"
+            f" component; {did_you_mean(given, list(sources))}"
         )
     _, z_rate, parts = part_equations(system, q, v)
     return parts.signal(sources[given]), z_rate
@@ -1133,6 +1238,7 @@ class Simulator:
         parameters: Mapping[str, float] | None = None,
         step: float = 0.01,
         tolerance: float = 1e-8,
+        max_step: float | None = None,
         quiet: bool = True,
     ) -> Result:
         """One motion.
@@ -1146,6 +1252,7 @@ class Simulator:
             parameters: as of `run`, likewise the others.
             step: likewise.
             tolerance: likewise.
+            max_step: likewise.
             quiet: likewise.
 
         Raises:
@@ -1154,6 +1261,9 @@ class Simulator:
         system, motions = self.system, self._motions
         duration = positive(duration, "duration [s]", system.name)
         tolerance = positive(tolerance, "tolerance", system.name)
+        longest = math.inf
+        if max_step is not None:
+            longest = positive(max_step, "max_step [s]", system.name)
         steps = count_steps(duration, positive(step, "step [s]", system.name), system.name)
         own = system.parameter_values(parameters)
         p = np.array([*own, *self._values(inputs)])
@@ -1172,6 +1282,7 @@ class Simulator:
                 method=self._method,
                 rtol=rtol,
                 atol=atol,
+                max_step=longest,
                 progress=reached,
             )
         if motions and legs[0].first_slope is not None:
@@ -1311,6 +1422,7 @@ def run(
     parameters: Mapping[str, float] | None = None,
     step: float = 0.01,
     tolerance: float = 1e-8,
+    max_step: float | None = None,
     method: str = "dopri5",
     quiet: bool = False,
 ) -> Result:
@@ -1347,6 +1459,8 @@ def run(
         step: time between the rows of the result [s]; it does not change the accuracy.
         tolerance: what the error of the motion should stay near [rad, m, rad/s or m/s]. A step
             may err by a twenty-fifth of it, and by a thousandth relative to large coordinates.
+        max_step: the longest step of the integration [s]; only errors and laws limit it by default.
+            It is needed where a law is short in space and smooth, such as a narrow potential well.
         method: "dopri5", Dormand and Prince's explicit pair, or "rodas", the linearly implicit
             RODAS5P for stiff systems.
         quiet: no progress bar.
@@ -1376,6 +1490,7 @@ def run(
         parameters=parameters,
         step=step,
         tolerance=tolerance,
+        max_step=max_step,
         quiet=quiet,
     )
 

@@ -1,7 +1,7 @@
 """Integrations run by the Python twins of the compiled driver."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import casadi
 import numpy as np
@@ -14,6 +14,7 @@ from mbs.solvers.problem import (
     Failure,
     IntegrationEvent,
     IntegrationProblem,
+    Leave,
     failed,
     fired_of,
     interrupted,
@@ -306,18 +307,22 @@ shortened."""
 _CHUNK = 50  # steps between two calls of progress
 
 
-def run_interpreted(problem: IntegrationProblem, progress: Progress | None) -> EventMotion:
+def run_interpreted(
+    problem: IntegrationProblem, progress: Progress | None, leave: Leave | None = None
+) -> EventMotion:
     """The motion at the times of a problem, as far as it comes.
 
     Args:
         problem: what to integrate.
         progress: called now and then with the time reached, s.
+        leave: asked after each event.
     """
     p = problem.p.copy()
     solver = _stepper(problem, p)
     table = RowTable(problem.times, np.empty((len(problem.times), len(problem.x0))))
     log: list[IntegrationEvent] = []
     stop: SolverError | Interrupted | None = None
+    left: tuple[float, Array] | None = None
     try:
         if solver.project is not None:
             solver.x = _begin(solver)
@@ -328,13 +333,16 @@ def run_interpreted(problem: IntegrationProblem, progress: Progress | None) -> E
             elif watched.fill(table, _CHUNK):
                 modes = p[len(p) - problem.modes :].copy()
                 log.append(IntegrationEvent(solver.t, fired_of(watched.fired), modes))
+                if leave is not None and leave(log):
+                    left = solver.t, solver.x
+                    break
             if progress is not None:
                 progress(solver.t)
     except SolverError as error:
         stop = error
     except KeyboardInterrupt:
         stop = interrupted(solver.t)
-    return problem.motion(table.rows[: table.done], log, stop)
+    return replace(problem.motion(table.rows[: table.done], log, stop), left=left)
 
 
 def _vector(value: casadi.DM) -> Array:
@@ -344,7 +352,7 @@ def _vector(value: casadi.DM) -> Array:
 def _stepper(problem: IntegrationProblem, p: Array) -> Stepper:
     functions, start, state = problem.equations, float(problem.times[0]), problem.x0
     project = _projection(problem, p)
-    control = problem.rtol, problem.atol, problem.max_step, functions.first_step
+    control = problem.rtol, problem.atol, problem.max_step, functions.first_step, problem.limits
 
     def slope(t: float, x: Array) -> Array:
         return _vector(functions.rhs(t, x, p))

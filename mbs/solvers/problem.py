@@ -1,6 +1,6 @@
 """An integration, its functions brought into one form and its arguments checked."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import casadi
@@ -95,6 +95,7 @@ class EventMotion:
         stop: why not all the times were reached; None where they were.
         first_slope: (nx,) rates at the first time where constraints are dependent there, those of
             the branch that the motion leaves on; None elsewhere.
+        left: time and state at which the caller left the motion; None if it went on.
     """
 
     x: Array
@@ -102,6 +103,7 @@ class EventMotion:
     events: tuple[IntegrationEvent, ...]
     stop: SolverError | Interrupted | None = None
     first_slope: Array | None = None
+    left: tuple[float, Array] | None = None
 
 
 def fired_of(flags: npt.ArrayLike) -> tuple[int, ...]:
@@ -121,6 +123,9 @@ def modes_at(times: Array, first: Array, events: tuple[IntegrationEvent, ...]) -
     passed = np.searchsorted([event.time for event in events], times, side="right")
     return values[passed]
 
+
+Leave = Callable[[Sequence[IntegrationEvent]], bool]
+"""Whether to leave a motion, by its events so far."""
 
 METHODS = ("dopri5", "rodas")
 
@@ -168,6 +173,22 @@ class Equations:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class StepLimits:
+    """The longest steps in parts of a motion, of which each lasts until the next one begins.
+
+    Attributes:
+        begins: (k,) times at which the parts begin, increasing [s].
+        lengths: (k,) the longest step in each part [s].
+    """
+
+    begins: Array
+    lengths: Array
+
+
+NO_LIMITS = StepLimits(np.empty(0), np.empty(0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class IntegrationProblem:
     """An integration, its arguments checked.
 
@@ -180,6 +201,7 @@ class IntegrationProblem:
         rtol: relative tolerance of the error of one step.
         atol: absolute tolerance of the error of one step.
         max_step: the longest step, s.
+        limits: the longest steps in parts of the motion.
     """
 
     equations: Equations
@@ -190,6 +212,7 @@ class IntegrationProblem:
     rtol: float
     atol: float
     max_step: float
+    limits: StepLimits
 
     def motion(
         self, x: Array, log: Sequence[IntegrationEvent], stop: SolverError | Interrupted | None
@@ -321,6 +344,7 @@ def problem(
     modes: npt.ArrayLike,
     tolerances: tuple[float, float],
     max_step: float,
+    limits: StepLimits,
 ) -> IntegrationProblem:
     """The integration of given functions.
 
@@ -332,6 +356,7 @@ def problem(
         modes: (nm,) at the first time.
         tolerances: relative and absolute tolerance of the error of one step.
         max_step: the longest step, s; infinite when only the error limits it.
+        limits: the longest steps in parts of the motion.
 
     Raises:
         ModelError: an argument does not fit the functions.
@@ -356,7 +381,7 @@ def problem(
     if not (isinstance(max_step, (int, float)) and max_step > 0):
         raise ModelError(f"integrate: the longest step {max_step!r} must be a positive number, s")
     return IntegrationProblem(
-        functions, x, t, np.concatenate([own, m]), len(m), rtol, atol, max_step
+        functions, x, t, np.concatenate([own, m]), len(m), rtol, atol, max_step, limits
     )
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mbs.solvers.problem import MAX_STEPS, Failure, failed
+from mbs.solvers.problem import MAX_STEPS, NO_LIMITS, Failure, StepLimits, failed
 
 Array = npt.NDArray[np.float64]
 RightHandSide = Callable[[float, Array], Array]
@@ -76,6 +76,7 @@ class Stepper(ABC):
         t: present time.
         x: present state, (n,).
         max_step: the longest step, s.
+        limits: the longest steps in parts of the motion.
         afresh: length of the first step after a jump, s; estimated where 0.
         h: step that error control wants next; 0 before the first one.
         slope: slope at the present state, or None when it is not known.
@@ -92,6 +93,7 @@ class Stepper(ABC):
     atol: float
     max_step: float = math.inf
     afresh: float = 0.0
+    limits: StepLimits = NO_LIMITS
     h: float = 0.0
     error: float = LEAST_ERROR
     since_output: int = 0
@@ -190,8 +192,17 @@ class Stepper(ABC):
             self._open(self.slope)
         if self.h <= 0.0:
             self.h = self._first_step(self.slope, limit - self.t)
-        self.h = min(self.h, self.max_step)
+        self.h = self._longest_step(min(self.h, self.max_step))
         return self.slope
+
+    def _longest_step(self, h: float) -> float:
+        """The longest step from now. It may enter a later part by no more than a step of that."""
+        begins, lengths = self.limits.begins, self.limits.lengths
+        for k in range(max(int(np.searchsorted(begins, self.t, "right")) - 1, 0), len(begins)):
+            if begins[k] >= self.t + h:
+                break
+            h = min(h, max(begins[k] - self.t, lengths[k]))
+        return h
 
     def _try_step(self, slope: Array, limit: float) -> bool:
         # a rest of a hundredth of a step is taken along, as in DOPRI5

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.tree import norm_rows, normalised, position_rate, quaternion_slices
+from mbs.expressions.conditions import law_conditions, time_parts
 from mbs.loops.closing import constraint_sizes, relative_rows
 from mbs.loops.closure import closure_rows, independent_closure
 from mbs.loops.velocity import (
@@ -526,8 +527,10 @@ class FullState:
         events: `indicators(t, x, p) -> g` and `jump(t, x, p, fired) -> (x, modes)` of rigid stops
             and Coulomb friction, whose modes are then the last of p; None where there are none.
         passage: for steps through singular configurations of the loops; None where there are none.
-        crossings: `crossings(t, x, p)`, what passes through zero where the laws of components have
-            bends; None where there are none.
+        crossings: `crossings(t, x, p)`, values by which laws change: at a sign of the first ones,
+            at an integer of the last ones; None if no law changes.
+        counts: how many values of crossings have integers.
+        time_parts: `time_parts(t, p)`, what laws have of time alone; None if they have none.
         prepared: what integrations keep between runs.
     """
 
@@ -537,6 +540,8 @@ class FullState:
     events: tuple[Function, Function] | None = None
     passage: Passage | None = None
     crossings: Function | None = None
+    counts: int = 0
+    time_parts: Function | None = None
     prepared: dict[Any, Any] = field(default_factory=dict)
 
 
@@ -562,6 +567,7 @@ def full_state(
     t, x = SX.sym("t"), casadi.vertcat(SX.sym("x", n), system.z)
     q, v, z, p = x[:nq], x[nq:n], x[n:], system.p
     tau = SX.zeros(system.nv) if effort is None else casadi.densify(effort(t, q, v, p))
+    tau_of_law = SX(tau)
     u = SX(DM(system.u_default)) if inputs is None else casadi.densify(SX(inputs(t, q, v, p)))
     for one in given:
         symbol = SX.sym(one.name)
@@ -585,9 +591,14 @@ def full_state(
     observed = [a, tau, u, y, contact_efforts, E, U, openness]
     keeps = system.is_closed or motions or touch or quaternion_slices(system.tree)
     corrected = [casadi.vertcat(*kept, z), residual]
-    p = casadi.vertcat(p, contact.values) if contact else p
-    crossed = parts.crossings()
-    rate, *observed = with_inputs(system, [rate, *observed], u)
+    given_p, p = p, casadi.vertcat(p, contact.values) if contact else p
+    prescribed = [one.law(t, system.z, system.p)[one.order] for one in motions]
+    laws = casadi.vertcat(tau_of_law, u, *prescribed)
+    found = law_conditions(laws, t, x) + parts.conditions(x)
+    timed = time_parts(laws, t, casadi.vertcat(x, system.u))
+    of_time = dense_function("time_parts", [t, given_p], [timed]) if timed.numel() else None
+    crossed = casadi.vertcat(parts.crossings(), found.sides, found.counts)
+    rate, crossed, *observed = with_inputs(system, [rate, crossed, *observed], u)
     return FullState(
         rhs=dense_function("rhs", [t, x, p], [rate]),
         project=dense_function("project", [t, x, p], corrected) if keeps else None,
@@ -595,6 +606,8 @@ def full_state(
         events=_events(system, contact, parts, [t, x, p], u),
         passage=through,
         crossings=dense_function("crossings", [t, x, p], [crossed]) if crossed.numel() else None,
+        counts=found.counts.numel(),
+        time_parts=of_time,
     )
 
 

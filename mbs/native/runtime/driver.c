@@ -274,6 +274,13 @@ EXPORT driver *mbs_open(int n, int n_p, const double *p, const double *control, 
     return d;
 }
 
+/* Before mbs_begin; the arrays stay with the caller. */
+EXPORT void mbs_limit(driver *d, integer count, const double *begins, const double *lengths) {
+    d->solver.limits = (long)count;
+    d->solver.limit_begins = begins;
+    d->solver.limit_lengths = lengths;
+}
+
 EXPORT int mbs_begin(driver *d, double *x) {
     double t = stepper_time(&d->solver);
     if (d->solver.project && d->solver.project(d, t, x)) return STEPPER_PROJECTION_FAILED;

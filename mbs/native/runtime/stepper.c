@@ -127,6 +127,21 @@ static int accept(stepper *s, double *x, double t_new, double h) {
     return STEPPER_OK;
 }
 
+/* The longest step from a time. It may enter a later part by no more than a step of that part. */
+static double longest_step(const stepper *s, double t, double h) {
+    long k = 0, end = s->limits;
+    while (end - k > 1) { /* the part of the time t */
+        long middle = k + (end - k) / 2;
+        if (s->limit_begins[middle] <= t)
+            k = middle;
+        else
+            end = middle;
+    }
+    for (; k < s->limits && s->limit_begins[k] < t + h; k++)
+        h = fmin(h, fmax(s->limit_begins[k] - t, s->limit_lengths[k]));
+    return h;
+}
+
 static int open_step(stepper *s, const double *x, double limit) {
     double *m = s->memory;
     if (m[SLOPE_VALID] == 0.0) {
@@ -137,7 +152,7 @@ static int open_step(stepper *s, const double *x, double limit) {
         m[SLOPE_VALID] = 1.0;
     }
     if (m[STEP] <= 0.0) m[STEP] = first_step(s, x, limit - m[TIME]);
-    m[STEP] = fmin(m[STEP], s->h_max);
+    m[STEP] = longest_step(s, m[TIME], fmin(m[STEP], s->h_max));
     return STEPPER_OK;
 }
 

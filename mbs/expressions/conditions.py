@@ -66,11 +66,11 @@ def time_parts(law: SX, t: SX, others: SX) -> SX:
         t: symbol of the time.
         others: symbols that change along a motion as well.
     """
-    changing = {symbol.element_hash() for symbol in others.nonzeros()}
+    changing = {symbol.element_hash() for symbol in _scalars(others)}
     time = t.element_hash()
     known: dict[int, tuple[bool, bool]] = {}  # whether a node depends on time, on others
     parts: dict[int, SX] = {}
-    roots = [SX(value) for value in law.nonzeros()] if law.nnz() else []
+    roots = _scalars(law)
     stack = list(roots)
     while stack:
         node = stack[-1]
@@ -96,12 +96,17 @@ def time_parts(law: SX, t: SX, others: SX) -> SX:
     return casadi.vertcat(SX(0, 1), *{**parts, **whole}.values())
 
 
+def _scalars(law: SX) -> list[SX]:
+    """The elements that are no structural zeros."""
+    return [SX(law.nz[k]) for k in range(law.nnz())]
+
+
 def _conditions(law: SX) -> Iterator[tuple[str, SX]]:
     """Kinds and values of all conditions, those of the same nodes once."""
     seen: set[int] = set()
-    left = list(law.nonzeros()) if law.nnz() else []
+    left = _scalars(law)
     while left:
-        node = SX(left.pop())
+        node = left.pop()
         if node.is_leaf() or node.element_hash() in seen:
             continue
         seen.add(node.element_hash())

@@ -398,8 +398,10 @@ class PartsAt:
             if type(element).__module__.startswith("mbs.") or element.has("crossings"):
                 continue
             for load in self.loads(part).values():
-                is_frame = isinstance(load, FrameLoad)
-                laws += [SX(load.force), SX(load.moment)] if is_frame else [SX(load)]
+                if isinstance(load, FrameLoad):
+                    laws += [SX(load.force), SX(load.moment)]
+                else:
+                    laws.append(SX(load))
             for method in ("rates", "outputs"):
                 if element.has(method):
                     laws += map(SX, getattr(element, method)(self.at(part)).values())

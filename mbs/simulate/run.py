@@ -542,8 +542,8 @@ def with_crossings(
     """Events with the crossings behind them, and the functions of the state with their modes.
 
     On which side of a crossing the motion is, 1 or -1, is its mode; nothing jumps there, so that
-    it does not matter whether a step stops a little before or behind it. The modes of guarded
-    crossings are as `_guard` has them.
+    it does not matter whether a step stops a little before or behind it. The modes of sides and
+    counts are as `_guard` has them.
 
     Args:
         state: with crossings.
@@ -559,11 +559,12 @@ def with_crossings(
     (indicators, jump), functions = state.prepared["crossings"]
     t0, end = span
     start = np.array(state.crossings(t0, x0, [*p, *modes]))[:, 0]
-    plain, few = np.split(start, [len(start) - state.guarded])
-    sides = [*np.where(plain > 0, 1.0, -1.0), *np.sign(few)]
-    if state.guarded:
-        sides += [*np.zeros(len(few)), *np.full(len(few), t0), end - t0]
-    return Events(indicators, jump, [*modes, *sides], _FIRST_STEP), functions
+    few = state.sides + state.counts
+    plain, sides, counts = np.split(start, [len(start) - few, len(start) - state.counts])
+    places = [*np.where(plain > 0, 1.0, -1.0), *np.sign(sides), *np.floor(counts)]
+    if few:  # awake, not in a row, since the start
+        places += [*np.zeros(2 * few), *np.full(few, t0), end - t0]
+    return Events(indicators, jump, [*modes, *places], _FIRST_STEP), functions
 
 
 def _watch_crossings(
@@ -579,29 +580,23 @@ def _watch_crossings(
         modes: number of the modes of the others.
     """
     assert state.crossings is not None
-    count, n_p, few = state.crossings.numel_out(0), own + modes, state.guarded
+    count, n_p, few = state.crossings.numel_out(0), own + modes, state.sides + state.counts
     plain, more = count - few, _GUARD_MODES * few + 1 if few else 0
     first = 0 if events is None else events.indicators.numel_out(0)
+    ends = [0, first, first + plain, first + count + state.counts]
     t, x, pm, fired = (
         SX.sym(name, size)
-        for name, size in (
-            ("t", 1),
-            ("x", n),
-            ("p", n_p + plain + more),
-            ("fired", first + count),
-        )
+        for name, size in (("t", 1), ("x", n), ("p", n_p + plain + more), ("fired", ends[-1]))
     )
     parameters, sides, guards = casadi.vertsplit(pm, [0, n_p, n_p + plain, n_p + plain + more])
-    fired_first, fired_plain, fired_few = casadi.vertsplit(
-        fired, [0, first, first + plain, first + count]
-    )
+    fired_first, fired_plain, fired_few = casadi.vertsplit(fired, ends)
     at = [t, x, parameters]
 
     def wide(function: Function) -> Function:
         return Function(function.name(), [t, x, pm], function.call(at))
 
     values, few_values = casadi.vertsplit(state.crossings.call(at)[0], [0, plain, count])
-    guarded, then = _guard(t, few_values, guards, fired_few)
+    guarded, then = _guard(t, few_values, state.counts, guards, fired_few)
     indicators = [sides * values, guarded]
     state_after, after = x, [SX(0, 1)]
     if events is not None:
@@ -627,10 +622,8 @@ def _watch_crossings(
     return watched, (wide(state.rhs), project, passage)
 
 
-_GUARD_MODES = 3
-"""Modes of a guarded crossing: its side, a count and a time."""
-_ASLEEP = 2
-"""Side of a guarded crossing that is not watched."""
+_GUARD_MODES = 4
+"""Modes of a guarded crossing: its place, whether it is asleep, a number and a time."""
 _OFTEN = 4
 """Number of crossings in a row after which a crossing is not watched for a while: a body that
 bounces between two sides of a law, or that comes to rest at a friction, passes it without end."""
@@ -641,38 +634,60 @@ _SHORTEST_PAUSE, _LONGEST_PAUSE = 1e-6, 0.02
 come to the longest one, and 50 of these to the duration."""
 
 
-def _guard(t: SX, values: SX, modes: SX, fired: SX) -> tuple[SX, SX]:
-    """Indicators and next modes of guarded crossings.
+def _guard(t: SX, values: SX, counts: int, modes: SX, fired: SX) -> tuple[SX, SX]:
+    """Indicators and next modes of crossings that may stay at zero or pass it without end.
 
-    The modes are the sides; counts of crossings in a row; times of the last changes; and the
-    duration. The side is 1 or -1, or 0 where the value is exactly zero, until it is not. It is 2
-    where the crossing was passed many times in a row: it is then not watched for a pause, in which
-    error control alone follows the law.
+    The modes are, for all crossings, the places; whether they are asleep; numbers of crossings in a
+    row; times of the last changes. The last mode is the duration. A place is the side, 1 or -1, or
+    0 where the value is exactly zero, until it is not; of a count it is the whole number. A
+    crossing that was passed many times in a row sleeps for a pause, in which error control alone
+    follows the law.
 
     Args:
         t: time [s].
-        values: (k, 1) of the crossings.
-        modes: (3 k + 1, 1), empty where k is zero.
-        fired: (k, 1) 1 for each indicator that is not positive.
+        values: (k, 1) of the crossings, the counts last.
+        counts: number of counts.
+        modes: (4 k + 1, 1), empty where k is zero.
+        fired: (k + counts, 1) 1 for each indicator that is not positive: of the sides, of counts
+            that fall, of counts that rise.
+
+    Returns:
+        indicators (k + counts, 1) and modes.
     """
     k = values.numel()
     if not k:
         return SX(0, 1), SX(0, 1)
-    sides, counts, last, duration = modes[:k], modes[k : 2 * k], modes[2 * k : 3 * k], modes[3 * k]
-    pause = duration * casadi.fmin(_SHORTEST_PAUSE * 2**counts, _LONGEST_PAUSE)
-    asleep = sides == _ASLEEP
-    at_zero = casadi.if_else(values == 0, 1, -1)
-    awake = casadi.if_else(sides == 0, at_zero, sides * values)
-    indicators = casadi.if_else(asleep, last + pause - t, awake)
-    soon = t - last < _CROWDED * duration
-    in_row = casadi.if_else(casadi.logic_or(asleep, soon), counts + 1, 0)
-    other = casadi.if_else(in_row > _OFTEN, _ASLEEP, -sides)
-    found = casadi.logic_or(asleep, sides == 0)
-    side = casadi.if_else(found, casadi.sign(values), other)
-    happened = fired > 0
+    n = k - counts
+    places, asleep, row, last, duration = casadi.vertsplit(
+        modes, [0, k, 2 * k, 3 * k, 4 * k, 4 * k + 1]
+    )
+    side, count = casadi.vertsplit(places, [0, n, k])
+    on_side, counted = casadi.vertsplit(values, [0, n, k])
+    passed, falls, rises = casadi.vertsplit(fired, [0, n, k, k + counts])
+    # what is watched
+    pause = duration * casadi.fmin(_SHORTEST_PAUSE * 2**row, _LONGEST_PAUSE)
+    stays = casadi.if_else(on_side == 0, 1, -1)
+    awake = casadi.vertcat(
+        casadi.if_else(side == 0, stays, side * on_side), counted - count, count + 1 - counted
+    )
+    both = (
+        casadi.vertcat(asleep, casadi.vertsplit(asleep, [0, n, k])[1]),
+        casadi.vertcat(last + pause, casadi.vertsplit(last + pause, [0, n, k])[1]),
+    )
+    indicators = casadi.if_else(both[0], both[1] - t, awake)
+    # what follows
+    happened = casadi.vertcat(passed, casadi.fmax(falls, rises))
+    here = casadi.vertcat(casadi.sign(on_side), casadi.floor(counted))
+    beyond = casadi.vertcat(
+        casadi.if_else(side == 0, casadi.sign(on_side), -side), count + rises - falls
+    )
+    soon = casadi.logic_or(asleep, t - last < _CROWDED * duration)
+    in_row = casadi.if_else(soon, row + 1, 0)
+    tired = casadi.logic_and(casadi.logic_not(asleep), in_row > _OFTEN)
     then = casadi.vertcat(
-        casadi.if_else(happened, side, sides),
-        casadi.if_else(happened, in_row, counts),
+        casadi.if_else(happened, casadi.if_else(asleep, here, beyond), places),
+        casadi.if_else(happened, tired, asleep),
+        casadi.if_else(happened, in_row, row),
         casadi.if_else(happened, t, last),
         duration,
     )
@@ -964,8 +979,9 @@ def _signal(system: System, name: str, given: str) -> tuple[SX, SX]:
     }
     if given not in sources:
         raise ModelError(
-            f"{system.name}: the motion of {name} is {quoted(given)}, which is no output or state"
-            f" of a component; {did_you_mean(given, list(sources))}"
+            f"{system.name}: the motion of {name} is {quoted(given)}; give a finite number, or a"
+            " function of the time made of CasADi operations, or an output or a state of a"
+            f" component; {did_you_mean(given, list(sources))}"
         )
     _, z_rate, parts = part_equations(system, q, v)
     return parts.signal(sources[given]), z_rate
@@ -1226,6 +1242,7 @@ class Simulator:
         parameters: Mapping[str, float] | None = None,
         step: float = 0.01,
         tolerance: float = 1e-8,
+        max_step: float | None = None,
         quiet: bool = True,
     ) -> Result:
         """One motion.
@@ -1239,6 +1256,7 @@ class Simulator:
             parameters: as of `run`, likewise the others.
             step: likewise.
             tolerance: likewise.
+            max_step: likewise.
             quiet: likewise.
 
         Raises:
@@ -1247,6 +1265,9 @@ class Simulator:
         system, motions = self.system, self._motions
         duration = positive(duration, "duration [s]", system.name)
         tolerance = positive(tolerance, "tolerance", system.name)
+        longest = math.inf
+        if max_step is not None:
+            longest = positive(max_step, "max_step [s]", system.name)
         steps = count_steps(duration, positive(step, "step [s]", system.name), system.name)
         own = system.parameter_values(parameters)
         p = np.array([*own, *self._values(inputs)])
@@ -1265,6 +1286,7 @@ class Simulator:
                 method=self._method,
                 rtol=rtol,
                 atol=atol,
+                max_step=longest,
                 progress=reached,
             )
         if motions and legs[0].first_slope is not None:
@@ -1404,6 +1426,7 @@ def run(
     parameters: Mapping[str, float] | None = None,
     step: float = 0.01,
     tolerance: float = 1e-8,
+    max_step: float | None = None,
     method: str = "dopri5",
     quiet: bool = False,
 ) -> Result:
@@ -1440,6 +1463,8 @@ def run(
         step: time between the rows of the result [s]; it does not change the accuracy.
         tolerance: what the error of the motion should stay near [rad, m, rad/s or m/s]. A step
             may err by a twenty-fifth of it, and by a thousandth relative to large coordinates.
+        max_step: the longest step of the integration [s]; only errors and laws limit it by default.
+            It is needed where a law is short in space and smooth, such as a narrow potential well.
         method: "dopri5", Dormand and Prince's explicit pair, or "rodas", the linearly implicit
             RODAS5P for stiff systems.
         quiet: no progress bar.
@@ -1469,6 +1494,7 @@ def run(
         parameters=parameters,
         step=step,
         tolerance=tolerance,
+        max_step=max_step,
         quiet=quiet,
     )
 

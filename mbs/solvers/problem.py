@@ -367,9 +367,7 @@ def problem(
             "integrate: stops must be finite times in increasing order, and as many flags"
         )
     every = np.concatenate([own, m])
-    return IntegrationProblem(
-        functions, x, t, every, len(m), rtol, atol, max_step, (ends, jumps)
-    )
+    return IntegrationProblem(functions, x, t, every, len(m), rtol, atol, max_step, (ends, jumps))
 
 
 def numbers(values: npt.ArrayLike) -> Array:

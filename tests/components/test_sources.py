@@ -331,7 +331,7 @@ def test_a_source_drives_the_crank_of_a_closed_mechanism():
     ("law", "words"),
     [
         ("f.zz", ["the motion of i.q is 'f.zz'", "f.q"]),
-        ("i.q", ["no output or state of a component"]),
+        ("i.q", ["an output or a state of a component"]),
         ("drive.w", ["follows from i.v", "states of components"]),
     ],
 )

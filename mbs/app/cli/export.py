@@ -131,6 +131,12 @@ Bare = Annotated[
 ]
 StopTime = Annotated[str, typer.Option(metavar="SECONDS", help="Default end.")]
 StepSize = Annotated[str, typer.Option(metavar="SECONDS", help="Default communication step.")]
+MaxStep = Annotated[
+    str,
+    typer.Option(
+        metavar="SECONDS", help="The longest step of dopri5 and rodas.", show_default=False
+    ),
+]
 Tolerance = Annotated[str, typer.Option(metavar="NUMBER", help="Default relative tolerance.")]
 
 
@@ -148,6 +154,7 @@ def export_fmu(
     stop_time: StopTime = "10",
     step_size: StepSize = "0.01",
     tolerance: Tolerance = "1e-8",
+    max_step: MaxStep = "",
     parameter: Parameters = None,
 ) -> None:
     """Export an FMU for Model Exchange and Co-Simulation; it needs a C compiler.
@@ -168,6 +175,7 @@ def export_fmu(
         stop_time=stop_time,
         step_size=step_size,
         tolerance=tolerance,
+        max_step=max_step,
     )
     require_places(target)
     _write(target, exporting.fmu(system(robot, parameter), settings))

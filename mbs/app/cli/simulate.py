@@ -73,6 +73,14 @@ Motion = Annotated[
 Tolerance = Annotated[
     str, typer.Option(metavar="NUMBER", help="What the error of the motion should stay near.")
 ]
+MaxStep = Annotated[
+    str,
+    typer.Option(
+        metavar="SECONDS",
+        help="The longest step of the integration; errors and laws alone limit it by default.",
+        show_default=False,
+    ),
+]
 Method = Annotated[str, typer.Option(metavar="METHOD", help="dopri5, or rodas for stiff systems.")]
 
 
@@ -111,6 +119,7 @@ def simulate(
     motion: Motion = None,
     tolerance: Tolerance = "1e-8",
     method: Method = "dopri5",
+    max_step: MaxStep = "",
     parameter: Parameters = None,
     output: Output = None,
     plot: Plot = None,
@@ -131,7 +140,12 @@ def simulate(
     laws = assigned(q0=q0, v0=v0, tau=tau, input=input_, motion=motion)
     assembled = system(robot, parameter)
     settings = task.SimulationSettings(
-        duration=duration, step=step, tolerance=tolerance, method=method, **laws
+        duration=duration,
+        step=step,
+        tolerance=tolerance,
+        method=method,
+        max_step=max_step,
+        **laws,
     )
     stop = None
     try:

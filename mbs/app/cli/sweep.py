@@ -11,7 +11,7 @@ from mbs.app.cli.arguments import Json, Output, Parameters, Robot, examples
 from mbs.app.cli.loading import system
 from mbs.app.cli.places import require_places
 from mbs.app.cli.printing import note, print_json
-from mbs.app.cli.simulate import Q0, V0, Duration, Method, Step, Tau, Tolerance, assigned
+from mbs.app.cli.simulate import Q0, V0, Duration, MaxStep, Method, Step, Tau, Tolerance, assigned
 
 if TYPE_CHECKING:
     from mbs.app.tasks.sweeping import SweepTable
@@ -53,6 +53,7 @@ def sweep(
     tau: Tau = None,
     tolerance: Tolerance = "1e-8",
     method: Method = "dopri5",
+    max_step: MaxStep = "",
     folder: Folder = None,
     parameter: Parameters = None,
     output: Output = None,
@@ -70,7 +71,12 @@ def sweep(
     grid = sweeping.grid_of(assignments(over, "--over"))
     laws = assigned(q0=q0, v0=v0, tau=tau)
     settings = simulation.SimulationSettings(
-        duration=duration, step=step, tolerance=tolerance, method=method, **laws
+        duration=duration,
+        step=step,
+        tolerance=tolerance,
+        method=method,
+        max_step=max_step,
+        **laws,
     )
     table = sweeping.sweep(system(robot, parameter), grid, settings, folder=folder)
     if output is not None:

@@ -49,6 +49,7 @@ class FmuSettings:
         tolerance: default relative tolerance.
         solver: for co-simulation, one of `SOLVERS`.
         internal_step: of "rk4" [s].
+        max_step: the longest step of the other solvers [s]; none when empty.
         target: "hosted", or "bare" for microcontrollers.
         platforms: such as "x86_64-windows"; this computer when empty.
     """
@@ -63,6 +64,7 @@ class FmuSettings:
     tolerance: float | str = 1e-8
     solver: str = "dopri5"
     internal_step: float | str = 0.001
+    max_step: float | str = ""
     target: str = "hosted"
     platforms: tuple[str, ...] = ()
 
@@ -129,6 +131,9 @@ def fmu(system: System, settings: FmuSettings | None = None) -> bytes:
     given = asdict(settings)
     for what in ("stop_time", "step_size", "tolerance", "internal_step"):
         given[what] = number(given[what], f"{system.name}: {what}")
+    limit = given.pop("max_step")
+    if limit != "":
+        given["max_step"] = number(limit, f"{system.name}: max_step")
     given["platforms"] = list(settings.platforms) or None
     return _write(lambda path: export.fmu(system, path, **given), f"{file_stem(system)}.fmu")
 

@@ -203,6 +203,7 @@ class SimulationSettings:
         parameters: values of symbols of the system, the others at their defaults.
         tolerance: what the error of the motion should stay near.
         method: one of `METHODS`.
+        max_step: the longest step of the integration [s]; none when empty.
     """
 
     duration: float | str = 2.0
@@ -216,6 +217,7 @@ class SimulationSettings:
     parameters: Laws = field(default_factory=dict)
     tolerance: float | str = 1e-8
     method: str = "dopri5"
+    max_step: float | str = ""
 
 
 def simulate(
@@ -272,6 +274,7 @@ def run_arguments(system: System, settings: SimulationSettings) -> dict[str, Any
         or None,
         "parameters": parameters or None,
         "method": settings.method,
+        **_longest(settings, where, known),
     }
 
 
@@ -305,6 +308,14 @@ def _times(
         name: number(getattr(settings, name), f"{where}: {name}", known)
         for name in ("duration", "step", "tolerance")
     }
+
+
+def _longest(
+    settings: SimulationSettings, where: str, known: Mapping[str, float]
+) -> dict[str, float]:
+    if settings.max_step == "":
+        return {}
+    return {"max_step": number(settings.max_step, f"{where}: max_step", known)}
 
 
 def _positions(

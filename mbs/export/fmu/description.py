@@ -87,6 +87,7 @@ def _check_numbers(model: FmuModel) -> None:
         ("tolerance", model.tolerance),
         ("step size", model.step_size),
         ("internal step", model.internal_step),
+        ("longest step", 1.0 if model.max_step is None else model.max_step),
     ):
         known = isinstance(value, (int, float)) and math.isfinite(value)
         if not (known and value > 0):
@@ -472,6 +473,7 @@ class FmuModel:
         solver: of co-simulation: "dopri5", explicit with error control; "rodas", the same for stiff
             equations; "rk4", with the fixed step `internal_step`.
         internal_step: length of the steps of "rk4", s.
+        max_step: the longest step of the other solvers, s; None for no limit.
         target: "hosted", or "bare" for co-simulation alone, by C without heap and files.
         documentation: text for `documentation/index.html`; a blank line starts a paragraph.
         terminals: variables that belong together.
@@ -500,6 +502,7 @@ class FmuModel:
     step_size: float = 0.01
     solver: Solver = "dopri5"
     internal_step: float = 0.001
+    max_step: float | None = None
     target: Target = "hosted"
     documentation: str = ""
     terminals: tuple[Terminal, ...] = ()

@@ -358,6 +358,8 @@ def header(model: FmuModel, guid: str, work: Work, *, adjoint: bool) -> str:
         options += "#define MODEL_RODAS\n"
     elif model.solver == "rk4":
         options += f"#define MODEL_FIXED_STEP {float(model.internal_step)!r}\n"
+    if model.max_step is not None and model.solver != "rk4":
+        options += f"#define MODEL_MAX_STEP {float(model.max_step)!r}\n"
     return _HEADER.format(
         guid=_quote(guid),
         tolerance=repr(float(model.tolerance)),

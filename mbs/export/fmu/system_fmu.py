@@ -52,6 +52,7 @@ def fmu(
     tolerance: float = 1e-8,
     solver: Solver = "dopri5",
     internal_step: float = 0.001,
+    max_step: float | None = None,
     target: Target = "hosted",
     reference: bool = False,
     arrays: bool = False,
@@ -104,6 +105,8 @@ def fmu(
         solver: of co-simulation: "dopri5", Dormand and Prince's explicit pair; "rodas", the
             linearly implicit RODAS5P for stiff systems; "rk4", with a fixed step, for real time.
         internal_step: length of the steps of "rk4" [s].
+        max_step: the longest step of "dopri5" and "rodas" [s]; only the error and events limit it
+            by default.
         target: "hosted", or "bare" for what has no operating system: co-simulation alone, with
             solver="rk4", of a system without events, by C99 without heap, files and variables that
             change outside of functions. In FMI 2.0 its memory comes from the callbacks of the
@@ -134,7 +137,7 @@ def fmu(
     require_version(system.name, fmi)
     require_writable(path_of(path))
     wished = Contents(inputs, outputs, parameters, fixed, flanges, controller, sources)
-    settings = Settings(stop_time, step_size, tolerance, solver, internal_step, target)
+    settings = Settings(stop_time, step_size, tolerance, solver, internal_step, target, max_step)
     if arrays and fmi != "3.0":
         raise ExportError(
             f"{system.name}: arrays are variables of FMI 3.0, and fmi is {fmi!r}; use fmi='3.0' or"
@@ -168,6 +171,7 @@ class Settings:
     solver: Solver = "dopri5"
     internal_step: float = 0.001
     target: Target = "hosted"
+    max_step: float | None = None
 
 
 def fmu_model(

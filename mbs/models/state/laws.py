@@ -27,7 +27,6 @@ _TIME, _POSITION, _OTHER = 1, 2, 4
 
 _DIFFERENCE = {casadi.OP_LT, casadi.OP_LE, casadi.OP_FMIN, casadi.OP_FMAX}
 _SELF = {casadi.OP_SIGN, casadi.OP_FABS}
-_WHOLE = {casadi.OP_FLOOR, casadi.OP_CEIL}
 _STEEP = {casadi.OP_TANH, casadi.OP_ERF, casadi.OP_ATAN}
 _WAVES = {casadi.OP_SIN, casadi.OP_COS, casadi.OP_TAN}
 _LINEAR = {casadi.OP_ADD, casadi.OP_SUB, casadi.OP_NEG, casadi.OP_TWICE}
@@ -49,6 +48,7 @@ class Conditions:
         phases: arguments of waves and of periodic laws, expressions of the time.
         crossings: expressions that also depend on states; a law jumps, bends or is short near their
             zeros.
+        counts: expressions that also depend on states; a law jumps at their whole numbers.
     """
 
     zeros: list[SX] = field(default_factory=list)
@@ -57,11 +57,7 @@ class Conditions:
     hints: list[SX] = field(default_factory=list)
     phases: list[SX] = field(default_factory=list)
     crossings: list[SX] = field(default_factory=list)
-
-    def add(self, other: Conditions) -> None:
-        """Append the conditions of another law."""
-        for name in self.__slots__:
-            getattr(self, name).extend(getattr(other, name))
+    counts: list[SX] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -152,39 +148,57 @@ def _collect(node: SX, depends: int, walk: _Walk, found: Conditions, short: bool
     """Add the condition of one node."""
     if node.is_call() or node.is_output():
         return  # an interpolant is continuous
-    op = node.op()
-    first, *others = operands_of(node)
     alone = depends == _TIME
+    for kind, value in _condition(node.op(), operands_of(node)):
+        if kind == "side":
+            (found.zeros if alone else found.crossings).append(value)
+        elif kind == "count":
+            (found.wholes if alone else found.counts).append(value)
+        if alone and kind in ("count", "phase"):
+            found.phases.append(value)
+        elif alone and kind in ("steep", "negligible"):
+            found.hints.append(value)
+        elif kind == "negligible" and short and depends & _POSITION and not depends & _OTHER:
+            found.crossings.append(value)
+
+
+def _condition(op: int, operands: Sequence[SX]) -> Iterator[tuple[str, SX]]:
+    """Kind and value of the conditions of an operation.
+
+    A law jumps or bends where a side is zero or a count is whole. An exponential is negligible
+    beyond a zero, and a steep function changes near a zero. A phase counts periods.
+    """
+    first, *others = operands
     if op in _DIFFERENCE:
-        (found.zeros if alone else found.crossings).append(first - others[0])
+        yield "side", first - others[0]
     elif op in _SELF:
-        (found.zeros if alone else found.crossings).append(first)
-    elif op in _WHOLE:
-        _add_whole(found, first, alone)
-    elif op in (casadi.OP_FMOD, casadi.OP_REMAINDER):
-        # remainder is zero at whole ratios and jumps halfway between them
-        ratio = first / others[0] + (0.5 if op == casadi.OP_REMAINDER else 0)
-        _add_whole(found, ratio, alone)
-    elif op == casadi.OP_ATAN2 and not alone:
-        found.crossings.append(first)  # it jumps where y = 0 and x < 0
-    elif op == casadi.OP_ATAN2:
-        found.zeros.append(first)
-    elif op == casadi.OP_EXP and alone:
-        found.hints.append(first + _NEGLIGIBLE)
-    elif op in _STEEP and alone:
-        found.hints.append(first)
-    elif op in _WAVES and alone:
-        found.phases.append(first / (2 * math.pi))
-    elif op == casadi.OP_EXP and short and depends & _POSITION and not depends & _OTHER:
-        found.crossings.append(first + _NEGLIGIBLE)
-
-
-def _add_whole(found: Conditions, value: SX, alone: bool) -> None:
-    if alone:
-        found.wholes.append(value)
-        found.phases.append(value)
+        yield "side", first
+    elif op == casadi.OP_COPYSIGN:
+        yield "side", others[0]
+    elif op == casadi.OP_ATAN2:  # it jumps at half a turn
+        yield "side", casadi.if_else(others[0] < 0, first, 1)
+    elif op == casadi.OP_EXP:
+        yield "negligible", first + _NEGLIGIBLE
+    elif op in _STEEP:
+        yield "steep", first
+    elif op in _WAVES:
+        yield "phase", first / (2 * math.pi)
     else:
-        found.crossings.append(casadi.sin(math.pi * value))
+        yield from _whole(op, operands)
+
+
+def _whole(op: int, operands: Sequence[SX]) -> Iterator[tuple[str, SX]]:
+    """Conditions of integer parts and remainders."""
+    first, *others = operands
+    if op == casadi.OP_FLOOR:
+        yield "count", first
+    elif op == casadi.OP_CEIL:
+        yield "count", -first
+    elif op == casadi.OP_FMOD:  # the ratio is cut towards zero
+        yield "side", first
+        yield "count", casadi.fabs(first / others[0])
+    elif op == casadi.OP_REMAINDER:  # the ratio is rounded
+        yield "count", first / others[0] + 0.5
 
 
 def _terms(walk: _Walk, roots: Sequence[SX]) -> list[SX]:
@@ -533,7 +547,7 @@ class _Search:
         if len(levels) > _MOST_POINTS:
             return np.empty(0)  # it varies everywhere, which error control sees
         ends = times[np.searchsorted(varied, levels)]
-        borders = np.unique(np.concatenate([[self.begin], ends, [self.end]]))
+        borders = np.unique(np.concatenate([[self.begin], ends]))
         lengths = np.diff(borders)
         kept = np.flatnonzero(lengths[:-1] > _SHORTER * lengths[1:]) + 1
         return borders[kept]

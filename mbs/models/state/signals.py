@@ -294,6 +294,11 @@ class Prescribed:
     holds_speed: bool
     laws: Function
 
+    @property
+    def order(self) -> int:
+        """What is prescribed: 0 for a position, 1 for a velocity, 2 for an acceleration."""
+        return 0 if self.position is not None else 1 if self.holds_speed else 2
+
     def law(self, t: SX, z: SX, p: SX) -> tuple[SX, SX, SX]:
         """Position, velocity and acceleration at a time, states of components and parameters."""
         position, velocity, acceleration = self.laws.call([t, z, p])

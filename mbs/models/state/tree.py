@@ -527,10 +527,11 @@ class FullState:
         events: `indicators(t, x, p) -> g` and `jump(t, x, p, fired) -> (x, modes)` of rigid stops
             and Coulomb friction, whose modes are then the last of p; None where there are none.
         passage: for steps through singular configurations of the loops; None where there are none.
-        crossings: `crossings(t, x, p)`, what passes through zero where the laws of components have
-            bends; None where there are none.
-        guarded: number of the last crossings that may stay at zero or pass it without end, such as
-            the velocity in a law of dry friction.
+        crossings: `crossings(t, x, p)`, what passes through zero where laws jump or bend; None
+            where there is nothing. First those that components give, then sides, then counts.
+        sides: number of the crossings that may stay at zero or pass it without end, such as the
+            velocity in a law of dry friction.
+        counts: number of the last crossings, at whose whole numbers laws jump.
         timing: what efforts, inputs and prescribed motions say of the time alone; None where they
             say nothing.
         prepared: what integrations keep between runs.
@@ -542,7 +543,8 @@ class FullState:
     events: tuple[Function, Function] | None = None
     passage: Passage | None = None
     crossings: Function | None = None
-    guarded: int = 0
+    sides: int = 0
+    counts: int = 0
     timing: TimeLaws | None = None
     prepared: dict[Any, Any] = field(default_factory=dict)
 
@@ -593,8 +595,9 @@ def full_state(
     keeps = system.is_closed or motions or touch or quaternion_slices(system.tree)
     corrected = [casadi.vertcat(*kept, z), residual]
     p = casadi.vertcat(p, contact.values) if contact else p
-    timing, watched = _law_conditions(system, (t, q, v), u, (effort, inputs), motions, parts)
-    crossed = casadi.vertcat(parts.crossings(), watched)
+    signals = effort, inputs
+    timing, sides, counts = _law_conditions(system, (t, q, v), u, signals, motions, parts)
+    crossed = casadi.vertcat(parts.crossings(), sides, counts)
     rate, *observed = with_inputs(system, [rate, *observed], u)
     return FullState(
         rhs=dense_function("rhs", [t, x, p], [rate]),
@@ -603,7 +606,8 @@ def full_state(
         events=_events(system, contact, parts, [t, x, p], u),
         passage=through,
         crossings=dense_function("crossings", [t, x, p], [crossed]) if crossed.numel() else None,
-        guarded=watched.numel(),
+        sides=sides.numel(),
+        counts=counts.numel(),
         timing=timing,
     )
 
@@ -615,8 +619,8 @@ def _law_conditions(
     signals: Sequence[Function | None],
     motions: Sequence[Prescribed],
     parts: PartsAt,
-) -> tuple[TimeLaws | None, SX]:
-    """What laws say of the time alone, and what passes through zero where they jump or bend.
+) -> tuple[TimeLaws | None, SX, SX]:
+    """What laws say of the time alone, and sides and counts at which they jump or bend.
 
     Args:
         system: open or closed.
@@ -629,17 +633,26 @@ def _law_conditions(
     t, q, v = point
     values = [signal(t, q, v, system.p) for signal in signals if signal is not None]
     values += [law for one in motions for law in one.law(t, system.z, system.p)]
-    laws = casadi.vertcat(SX(0, 1), *values)
-    found = conditions_of(laws, t, q, casadi.vertcat(system.p, parts.modes()))
-    own = conditions_of(parts.laws(), SX(0, 1), q, casadi.vertcat(system.p, parts.modes()))
-    known = casadi.vertsplit(parts.crossings()) if parts.crossings().numel() else []
-    for value in distinct([*found.crossings, *with_inputs(system, own.crossings, u)], known):
-        if casadi.depends_on(value, casadi.vertcat(q, v, system.z)):
-            known.append(value)
-        elif casadi.depends_on(value, t):
-            found.zeros.append(value)
-    crossings = known[parts.crossings().numel() :]
-    return time_laws(found, t, system.p), casadi.vertcat(SX(0, 1), *crossings)
+    constants = casadi.vertcat(system.p, parts.modes())
+    found = conditions_of(casadi.vertcat(SX(0, 1), *values), t, q, constants)
+    own = conditions_of(parts.laws(), SX(0, 1), q, constants)
+    crossings, counts = with_inputs(system, own.crossings, u), with_inputs(system, own.counts, u)
+    given = parts.crossings()
+    known = casadi.vertsplit(given) if given.numel() else []
+    states = casadi.vertcat(q, v, system.z)
+    results = []
+    for every, others, of_time in (
+        ([*found.crossings, *crossings], known, found.zeros),
+        ([*found.counts, *counts], [], found.wholes),
+    ):
+        kept = list[SX]()
+        for value in distinct(every, others):
+            if casadi.depends_on(value, states):
+                kept.append(value)
+            elif casadi.depends_on(value, t):
+                of_time.append(value)
+        results.append(casadi.vertcat(SX(0, 1), *kept))
+    return time_laws(found, t, system.p), results[0], results[1]
 
 
 def _events(

@@ -43,6 +43,7 @@ class FmuAsked:
     step_size: str = "0.01"
     tolerance: str = "1e-8"
     internal_step: str = "0.001"
+    max_step: str = ""
     outputs: list[str] = field(default_factory=list)
     parameters: list[str] = field(default_factory=list)
     more_inputs: str = ""
@@ -61,6 +62,7 @@ class FmuAsked:
             tolerance=self.tolerance,
             solver=self.solver,
             internal_step=self.internal_step,
+            max_step=self.max_step.strip(),
         )
 
 
@@ -83,6 +85,8 @@ def fmu_form(system: System, asked: FmuAsked) -> None:
         _input("Tolerance", asked, "tolerance", "90px")
         inner = _input("Step of rk4 [s]", asked, "internal_step", "110px")
         inner.bind_visibility_from(solver, "value", value="rk4")
+        longest = _input("Longest step [s]", asked, "max_step", "112px")
+        longest.bind_visibility_from(solver, "value", lambda name: name != "rk4")
     beside = "Outputs beside the motion of joints and tool"
     _several(asked, offered, FieldLook(beside, "100%", "outputs"))
     _several(asked, _PARAMETERS, FieldLook("Numbers that become parameters", "100%", "parameters"))

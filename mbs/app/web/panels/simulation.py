@@ -46,6 +46,7 @@ _FIRST = {
     "step": "0.01",
     "tolerance": "1e-8",
     "method": "dopri5",
+    "max_step": "",
     "start": PICTURE,
 }
 
@@ -79,6 +80,7 @@ def settings_of(system: System, texts: Mapping[str, str], q: Sequence[float]) ->
         step=texts["step"],
         tolerance=texts["tolerance"],
         method=texts["method"],
+        max_step=texts["max_step"].strip(),
         q0=_given(texts, "q0", [name for name, unit, *_ in rows if unit]) if typed else {},
         configuration=() if typed else tuple(q),
         v0=_given(texts, "v0", [name for name, *_ in rows]),
@@ -118,6 +120,7 @@ def build_form(system: System, texts: Texts) -> ui.button:
         _text(texts, "step", "Row every [s]", "104px")
         _text(texts, "tolerance", "Tolerance", "96px")
         _choice(texts, "method", _METHODS, "Method", "214px")
+        _text(texts, "max_step", "Longest step [s]", "112px")
     with ui.element("div").classes("app-form").style("align-items: center"):
         start = _choice(texts, "start", {x: x for x in (PICTURE, TYPED)}, "Starts at", "240px")
         button = ui.button("Run").props("unelevated no-caps dense").mark("simulate")

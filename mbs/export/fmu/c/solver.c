@@ -226,4 +226,7 @@ int core_init_solver(core *c) {
 
 void core_prepare_solver(core *c) {
     c->solver.rtol = c->solver.atol = c->m.tolerance;
+#ifdef MODEL_MAX_STEP
+    c->solver.h_max = MODEL_MAX_STEP;
+#endif
 }

@@ -18,6 +18,7 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 # Conditions in a graph of scalar operations.
 
@@ -275,6 +276,8 @@ _VARIATION = 0.45
 is on the axis of a symmetric pulse."""
 _SHORTER = 4.0
 """Ratio of two intervals from which error control might step over the shorter one."""
+_NEAR_ZERO = 1e-3
+"""Part of the interval by which the rounding of times near zero is measured."""
 _SAME = 1e3 * float(np.finfo(float).eps)
 """Part of the time by which jumps differ that fall together: the integrator's own measure."""
 
@@ -301,7 +304,7 @@ class TimeLaws:
     rates: Function
     p: int
 
-    def stops(self, begin: float, end: float, p: Array) -> tuple[Array, Array]:
+    def stops(self, begin: float, end: float, p: Array) -> tuple[Array, Flags]:
         """Times in an interval at which steps end.
 
         Args:
@@ -372,14 +375,14 @@ def _is_arithmetic(value: SX) -> bool:
     )
 
 
-def _near(values: Array, others: Array, distance: float) -> NDArray[np.bool_]:
+def _near(values: Array, others: Array, distance: float) -> Flags:
     """Whether each value is near one of the others, which are in increasing order."""
     if not len(others):
         return np.zeros(len(values), bool)
     place = np.searchsorted(others, values)
     above = others[np.minimum(place, len(others) - 1)]
     below = others[np.maximum(place - 1, 0)]
-    near: NDArray[np.bool_] = np.minimum(abs(above - values), abs(values - below)) <= distance
+    near: Flags = np.minimum(abs(above - values), abs(values - below)) <= distance
     return near
 
 
@@ -400,7 +403,8 @@ class _Search:
         """(k, m) values at times."""
         if not function.numel_out(0) or not len(times):
             return np.empty((function.numel_out(0), len(times)))
-        found = np.array(function(times.reshape(1, -1), np.repeat(self.p[:, None], len(times), 1)))
+        every = np.repeat(self.p[:, None], len(times), 1)
+        found: Array = np.array(function(times.reshape(1, -1), every))
         return found.reshape(function.numel_out(0), len(times))
 
     def _grid(self, more: Array) -> Array:
@@ -446,8 +450,9 @@ class _Search:
             left, right = grid[passed], grid[passed + 1]
             low = values[row, passed]
 
-            def is_past(times: Array, row: int = row, low: Array = low) -> NDArray[np.bool_]:
-                return np.floor(self._values(self.laws.wholes, times)[row]) != low
+            def is_past(times: Array, row: int = row, low: Array = low) -> Flags:
+                past: Flags = np.floor(self._values(self.laws.wholes, times)[row]) != low
+                return past
 
             yield _bisect(is_past, left, right)
 
@@ -464,7 +469,8 @@ class _Search:
         """Times at which sign * value becomes or stops being positive."""
 
         def value(times: Array) -> Array:
-            return sign * self._values(function, times)[row]
+            found: Array = sign * self._values(function, times)[row]
+            return found
 
         v = sign * values
         up = v > 0
@@ -508,7 +514,8 @@ class _Search:
             if len(peaks):
 
                 def value(times: Array, row: int = row) -> Array:
-                    return self._values(self.laws.hints, times)[row]
+                    found: Array = self._values(self.laws.hints, times)[row]
+                    return found
 
                 yield _maximum(value, grid[peaks - 1], grid[peaks + 1])
 
@@ -553,9 +560,9 @@ class _Search:
         return borders[kept]
 
 
-def slope_is_there(lines: Array) -> NDArray[np.bool_]:
+def slope_is_there(lines: Array) -> Flags:
     """Which of some lines, constant and slope, have zeros."""
-    there: NDArray[np.bool_] = (lines[:, 1] != 0) & np.isfinite(lines).all(axis=1)
+    there: Flags = (lines[:, 1] != 0) & np.isfinite(lines).all(axis=1)
     return there
 
 
@@ -567,23 +574,23 @@ def _span(values: Array) -> float:
 
 def _distinct(times: Array, begin: float, end: float) -> Array:
     """Times inside an interval in increasing order, each once."""
-    inside = np.sort(times[(times > begin) & (times < end)])
-    if not len(inside):
-        return inside
-    apart = np.diff(inside) > _SAME * np.maximum(np.abs(inside[1:]), 1e-3 * (end - begin))
-    return inside[np.concatenate([[True], apart])]
+    inside: Array = np.sort(times[(times > begin) & (times < end)])
+    # times near zero differ by parts of the interval
+    apart = np.diff(inside) > _SAME * np.maximum(np.abs(inside[1:]), _NEAR_ZERO * (end - begin))
+    return inside[np.concatenate([np.ones(min(len(inside), 1), bool), apart])]
 
 
-def _flip(value: Curve, left: Array, right: Array, up: NDArray[np.bool_]) -> Array:
+def _flip(value: Curve, left: Array, right: Array, up: Flags) -> Array:
     """Times between left and right at which values become positive, or stop being so."""
 
-    def is_past(times: Array) -> NDArray[np.bool_]:
-        return (value(times) > 0) != up
+    def is_past(times: Array) -> Flags:
+        past: Flags = (value(times) > 0) != up
+        return past
 
     return _bisect(is_past, left, right)
 
 
-def _bisect(is_past: Callable[[Array], NDArray[np.bool_]], left: Array, right: Array) -> Array:
+def _bisect(is_past: Callable[[Array], Flags], left: Array, right: Array) -> Array:
     """The first numbers, to rounding, at which something has happened."""
     left, right = left.copy(), right.copy()
     if not len(left):

@@ -577,7 +577,8 @@ def _distinct(times: Array, begin: float, end: float) -> Array:
     inside: Array = np.sort(times[(times > begin) & (times < end)])
     # times near zero differ by parts of the interval
     apart = np.diff(inside) > _SAME * np.maximum(np.abs(inside[1:]), _NEAR_ZERO * (end - begin))
-    return inside[np.concatenate([np.ones(min(len(inside), 1), bool), apart])]
+    found: Array = inside[np.concatenate([np.ones(min(len(inside), 1), bool), apart])]
+    return found
 
 
 def _flip(value: Curve, left: Array, right: Array, up: Flags) -> Array:

@@ -28,6 +28,7 @@ _TIME, _POSITION, _OTHER = 1, 2, 4
 
 _DIFFERENCE = {casadi.OP_LT, casadi.OP_LE, casadi.OP_FMIN, casadi.OP_FMAX}
 _SELF = {casadi.OP_SIGN, casadi.OP_FABS}
+_BENDS = {casadi.OP_FMIN, casadi.OP_FMAX, casadi.OP_FABS}
 _STEEP = {casadi.OP_TANH, casadi.OP_ERF, casadi.OP_ATAN}
 _WAVES = {casadi.OP_SIN, casadi.OP_COS, casadi.OP_TAN}
 _LINEAR = {casadi.OP_ADD, casadi.OP_SUB, casadi.OP_NEG, casadi.OP_TWICE}
@@ -110,7 +111,7 @@ def operands_of(node: SX) -> list[SX]:
 
 
 def conditions_of(
-    laws: SX, time: SX, positions: SX, constants: SX, *, short: bool = True
+    laws: SX, time: SX, positions: SX, constants: SX, *, jumps_alone: bool = False
 ) -> Conditions:
     """Conditions in the expressions of laws.
 
@@ -119,7 +120,7 @@ def conditions_of(
         time: symbol of the time; empty for laws without time.
         positions: symbols of positions.
         constants: symbols that are constant during a motion, such as parameters.
-        short: whether short smooth laws of positions are looked for too.
+        jumps_alone: whether bends and short smooth laws are left out.
     """
     found = Conditions()
     known = {
@@ -134,7 +135,7 @@ def conditions_of(
     for key, node in walk.nodes.items():
         depends = walk.depends[key]
         if depends and not node.is_symbolic():
-            _collect(node, depends, walk, found, short)
+            _collect(node, depends, found, jumps_alone=jumps_alone)
     if any(value & _TIME for value in walk.depends.values()):
         found.terms += _terms(walk, roots)
     return found
@@ -145,9 +146,9 @@ def _elements(symbols: SX) -> Iterator[SX]:
     return (dense[k] for k in range(dense.numel()))
 
 
-def _collect(node: SX, depends: int, walk: _Walk, found: Conditions, short: bool) -> None:
+def _collect(node: SX, depends: int, found: Conditions, *, jumps_alone: bool) -> None:
     """Add the condition of one node."""
-    if node.is_call() or node.is_output():
+    if node.is_call() or node.is_output() or (jumps_alone and node.op() in _BENDS):
         return  # an interpolant is continuous
     alone = depends == _TIME
     for kind, value in _condition(node.op(), operands_of(node)):
@@ -159,7 +160,12 @@ def _collect(node: SX, depends: int, walk: _Walk, found: Conditions, short: bool
             found.phases.append(value)
         elif alone and kind in ("steep", "negligible"):
             found.hints.append(value)
-        elif kind == "negligible" and short and depends & _POSITION and not depends & _OTHER:
+        elif (
+            kind == "negligible"
+            and not jumps_alone
+            and depends & _POSITION
+            and not depends & _OTHER
+        ):
             found.crossings.append(value)
 
 

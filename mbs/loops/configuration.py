@@ -28,8 +28,11 @@ from mbs.solvers.least_squares import smallest_solution
 from mbs.solvers.rank import RELATIVE_GAP, null_space
 from mbs.text import quoted
 
-Values = Mapping[str, float] | Sequence[float] | State | None
-"""Positions or velocities at a start: by name, all of them in their order, or of a state."""
+Values = Mapping[str, float] | Sequence[float] | None
+"""Positions or velocities: by name, or all of them in their order."""
+
+Start = Values | State
+"""Where something starts: positions, or a whole state."""
 
 _RESTARTS = 60
 _SEED = 20260101
@@ -41,7 +44,7 @@ _NEAR = 0.3
 
 def solve(
     system: System,
-    q_active: Values = None,
+    q_active: Start = None,
     *,
     guess: Mapping[str, float] | State | None = None,
     branch: str | Sequence[str] | None = None,
@@ -237,7 +240,7 @@ _REFINEMENTS = 3
 
 def start(
     system: System,
-    q0: Values,
+    q0: Start,
     v0: Values,
     parameters: Mapping[str, float] | None,
     guess: Mapping[str, float] | State | None = None,
@@ -268,7 +271,7 @@ def start(
 
 def start_position(
     system: System,
-    q0: Values,
+    q0: Start,
     parameters: Mapping[str, float] | None,
     guess: Mapping[str, float] | State | None = None,
 ) -> Vector:
@@ -301,7 +304,6 @@ def start_velocity(
     Raises:
         ModelError: no motion of the loops has these velocities.
     """
-    v0 = v0.v if isinstance(v0, State) else v0
     if not system.is_closed:
         return np.array(system.velocity(v0))
     p = [system.parameter_values(parameters)] if system.parameters else []
@@ -326,7 +328,6 @@ def smallest_velocity(system: System, J: Vector, v0: Values) -> tuple[Vector, st
     Returns:
         v (nv,); the velocities of v0 as text where no v has them, else an empty one.
     """
-    v0 = v0.v if isinstance(v0, State) else v0
     target = np.array(system.velocity(v0))
     names = [speed.name for speed in system.speeds]
     named = v0 is None or isinstance(v0, Mapping)

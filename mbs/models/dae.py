@@ -19,7 +19,7 @@ from mbs.assembly.tree import norm_rows, position_rate, quaternion_slices
 from mbs.assembly.validity import plain_rows
 from mbs.errors import ModelError, NoClosedForm, Unclosable
 from mbs.loops.closure import independent_closure, row_groups
-from mbs.loops.configuration import Values, start
+from mbs.loops.configuration import Start, Values, start
 from mbs.loops.function import function
 from mbs.loops.plan import branches_at, plan
 from mbs.loops.reduction import reduction_matrix
@@ -413,7 +413,7 @@ def dae(
     system: System,
     form: str = "reduced",
     *,
-    q0: Values = None,
+    q0: Start = None,
     v0: Values = None,
     tau0: Values = None,
     states: Mapping[str, float] | None = None,

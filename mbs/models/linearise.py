@@ -25,7 +25,7 @@ from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.assembly.tree import position_rate
 from mbs.errors import ModelError
 from mbs.loops.closure import closure_rows, independent_closure
-from mbs.loops.configuration import Values, start
+from mbs.loops.configuration import Start, Values, start
 from mbs.loops.velocity import velocity_rows
 from mbs.models.contacts import (
     KINDS,
@@ -109,7 +109,7 @@ class Linearisation:
 
     def at(
         self,
-        q0: Values = None,
+        q0: Start = None,
         v0: Values = None,
         tau0: Values = None,
         states: Mapping[str, float] | None = None,

@@ -29,7 +29,7 @@ from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.files import read_sealed, write_sealed
 from mbs.loops.analysis import rows_at
 from mbs.loops.closure import least_upright, rolling_discs
-from mbs.loops.configuration import Values, start, start_position, start_velocity
+from mbs.loops.configuration import Start, Values, start, start_position, start_velocity
 from mbs.loops.examine import row_independence
 from mbs.loops.velocity import constraint_jacobian, scales
 from mbs.models.contacts import (
@@ -888,12 +888,12 @@ def prescribed_motions(system: System, motion: Motion) -> list[Prescribed]:
 def start_positions(
     system: System,
     motions: list[Prescribed],
-    q0: Values,
+    q0: Start,
     v0: Values,
     z0: Sequence[float],
     p: Sequence[float],
     begin: float,
-) -> tuple[Values, Values]:
+) -> tuple[Start, Values]:
     """The start of a motion, with what is prescribed of it at its first time.
 
     Args:
@@ -911,13 +911,9 @@ def start_positions(
     if not motions:
         return q0, v0
     if isinstance(q0, State):
-        q0, v0 = q0.q, q0.v if v0 is None else v0
-    for what, given in (("q0", q0), ("v0", v0)):
-        if not isinstance(given, Mapping | None):
-            raise ModelError(
-                f"{system.name}: {what} is given as a sequence, beside motion; give a dict of names"
-            )
-    positions, velocities = dict(q0 or {}), dict(v0 or {})
+        v0 = q0.v if v0 is None else v0
+        q0 = q0.q
+    positions, velocities = (_by_name(system, *given) for given in (("q0", q0), ("v0", v0)))
     for one in motions:
         position, speed, _ = (float(value) for value in one.laws.call([DM(begin), DM(z0), DM(p)]))
         if one.position is not None:
@@ -925,6 +921,14 @@ def start_positions(
         if one.holds_speed:
             _put(system, velocities, one.name, speed, "v0")
     return positions, velocities
+
+
+def _by_name(system: System, what: str, given: Values) -> dict[str, float]:
+    if not isinstance(given, Mapping | None):
+        raise ModelError(
+            f"{system.name}: {what} is given as a sequence, beside motion; give a dict of names"
+        )
+    return dict(given or {})
 
 
 def _put(system: System, values: dict[str, float], name: str, value: float, what: str) -> None:
@@ -1276,7 +1280,7 @@ class Simulator:
         self,
         duration: float,
         *,
-        q0: Values = None,
+        q0: Start = None,
         v0: Values = None,
         z0: Mapping[str, float] | Sequence[float] | None = None,
         guess: Mapping[str, float] | State | None = None,
@@ -1435,7 +1439,7 @@ def _simulator_of(*state: Any) -> Simulator:
 
 
 def _started(
-    system: System, q0: Values, v0: Values, p: Array, guess: Mapping[str, float] | State | None
+    system: System, q0: Start, v0: Values, p: Array, guess: Mapping[str, float] | State | None
 ) -> tuple[Array, Array]:
     """The start of a motion; the last few are kept, for the next motion from the same one.
 
@@ -1470,7 +1474,7 @@ def run(
     system: System,
     duration: float,
     *,
-    q0: Values = None,
+    q0: Start = None,
     v0: Values = None,
     tau: Effort = None,
     motion: Motion = None,

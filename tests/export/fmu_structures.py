@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from mbs.export.fmu.description import FmuModel, FmuVariable, Jumps, FmuState
+from mbs.export.fmu.description import FmuModel, FmuState, FmuVariable, Jumps
 
 
 def ball(jumps=True):

@@ -17,7 +17,7 @@ from fmu_models import MODELS, crank_reference, pendulum, slider_crank
 
 from mbs.errors import CompilerError, ExportError
 from mbs.export.fmu import fmi2_xml
-from mbs.export.fmu.description import FmuVariable, FmuState
+from mbs.export.fmu.description import FmuState, FmuVariable
 from mbs.export.fmu.pack import FACES, write_fmu
 from mbs.native import find_compiler
 

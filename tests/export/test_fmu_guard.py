@@ -6,7 +6,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from fmu_instances import Fmu
 
-from mbs.export.fmu.description import FmuModel, FmuVariable, FmuState
+from mbs.export.fmu.description import FmuModel, FmuState, FmuVariable
 from mbs.export.fmu.pack import write_fmu
 
 

@@ -11,7 +11,7 @@ from fmu_models import pendulum, slider_crank
 
 from mbs.errors import ExportError
 from mbs.export.fmu import fmi2_xml, fmi3_xml
-from mbs.export.fmu.description import FmuModel, FmuVariable, FmuState
+from mbs.export.fmu.description import FmuModel, FmuState, FmuVariable
 from mbs.export.fmu.pack import write_fmu
 
 MODELS = {"pendulum": pendulum, "slider_crank": slider_crank}

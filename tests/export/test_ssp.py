@@ -12,7 +12,7 @@ from lxml import etree
 
 import mbs
 from mbs.errors import ExportError
-from mbs.export.fmu.description import FmuModel, FmuVariable, FmuState
+from mbs.export.fmu.description import FmuModel, FmuState, FmuVariable
 from mbs.export.fmu.pack import write_fmu
 
 SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"

@@ -23,9 +23,16 @@ from mbs.loops.closing import (
 )
 from mbs.loops.function import configuration_on, fixed_positions, independent_names
 from mbs.loops.velocity import closure_jacobian
+from mbs.result import State
 from mbs.solvers.least_squares import smallest_solution
 from mbs.solvers.rank import RELATIVE_GAP, null_space
 from mbs.text import quoted
+
+Values = Mapping[str, float] | Sequence[float] | None
+"""Positions or velocities: by name, or all of them in their order."""
+
+Start = Values | State
+"""Where something starts: positions, or a whole state."""
 
 _RESTARTS = 60
 _SEED = 20260101
@@ -37,22 +44,25 @@ _NEAR = 0.3
 
 def solve(
     system: System,
-    q_active: Mapping[str, float] | Sequence[float] | None = None,
+    q_active: Start = None,
     *,
-    guess: Mapping[str, float] | None = None,
+    guess: Mapping[str, float] | State | None = None,
     branch: str | Sequence[str] | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Vector:
     """A configuration with the given positions that closes the loops.
 
-    Without a guess the assembled configuration is moved along a straight line to the given
-    positions, in steps small enough to keep its branch. With a guess the configuration next to it
-    is looked for. With a branch the loops are closed by closed forms (`mbs.loops.function`).
+    A complete configuration that closes the loops is taken as it is. Otherwise, without a guess,
+    the assembled configuration is moved along a straight line to the given positions, in steps
+    small enough to keep its branch. With a guess the configuration next to it is looked for. With a
+    branch the loops are closed by closed forms (`mbs.loops.function`).
 
     Args:
         system: the assembled mechanism.
         q_active: positions of the independent joints in the order of `system.free`, those left
-            out staying as in the assembled configuration; or positions of any joints by name.
+            out staying as in the assembled configuration; or positions of any joints by name; or a
+            `State`. Beside all independent joints, positions of others choose the branch and are
+            checked.
         guess: approximate positions of other joints, which choose the branch.
         branch: labels of `mbs.loops.modes` instead, such as "j3:+"; a loop that no label names
             stays as it was assembled. Positions are then those of independent joints.
@@ -68,6 +78,10 @@ def solve(
         ModelError: a name is unknown, or a value is not finite; or guess and branch are given.
     """
     require_system(system)
+    if isinstance(q_active, State):
+        q_active = q_active.q
+    if isinstance(guess, State):
+        guess = guess.q
     if not isinstance(guess, Mapping | None):
         raise ModelError(
             f"{system.name}: guess is {quoted(guess)}; give a dict of coordinate names to values"
@@ -76,19 +90,54 @@ def solve(
         if guess:
             raise ModelError(f"{system.name}: guess and branch both choose the branch; give one")
         return configuration_on(system, q_active, branch, parameters)
+    return _closed(system, fixed_positions(system, q_active), guess or {}, parameters)
+
+
+def _closed(
+    system: System,
+    fixed: Mapping[str, float],
+    guess: Mapping[str, float],
+    parameters: Mapping[str, float] | None,
+) -> Vector:
+    """The configuration of `solve` with fixed positions and a guess of others, by name."""
     names = independent_names(system)
-    fixed = fixed_positions(system, q_active)
     p = closure_parameters(system, parameters)
-    target = np.array(system.position({**(guess or {}), **fixed}))
+    target = np.array(system.position({**guess, **fixed}))
+    if not system.is_closed:
+        return target
     if all(name in names for name in fixed):
         fixed = {**dict.fromkeys(names, 0.0), **fixed}
     locked = tuple(k for k, c in enumerate(system.coordinates) if c.name in fixed)
-    if not system.is_closed:
-        return target
+    if len(locked) == system.nq:
+        require_closed(system, target, parameters)
+        return Closing(system, p).nearest(target).q
+    others = [k for k in locked if system.coordinates[k].name not in names]
+    if others and not guess and all(name in fixed for name in names):
+        free = Closing(system, p, tuple(k for k in locked if k not in others))
+        return _checked(free, _guessed_configuration(free, target, others), target, others)
     if guess:
         named = [k for k, c in enumerate(system.coordinates) if c.name in guess]
         return _guessed_configuration(Closing(system, p, locked), target, named)
     return follow_configuration(system, target, locked, p)
+
+
+def _checked(closing: Closing, q: Vector, target: Vector, others: list[int]) -> Vector:
+    """The configuration q, whose positions of others are those of the target.
+
+    Raises:
+        Unclosable: they are not.
+    """
+    far = np.abs(difference(closing.system, q, target))[others]
+    wrong = [k for k, x in zip(others, far, strict=True) if x > _FITS * max(1.0, abs(target[k]))]
+    if wrong:
+        names = [c.name for c in closing.system.coordinates]
+        given = ", ".join(f"{names[k]} = {target[k]:g}" for k in wrong)
+        found = ", ".join(f"{names[k]} = {q[k]:g}" for k in wrong)
+        raise Unclosable(
+            f"{closing.system.name}: with {closing.locked_positions(q)} the loops do not close with"
+            f" {given}, the nearest is {found}; leave positions out, or give them as guess"
+        )
+    return q
 
 
 def _guessed_configuration(closing: Closing, start: Vector, named: list[int]) -> Vector:
@@ -188,21 +237,25 @@ what does not fit differs by about its own size, what fits by rounding."""
 _REFINEMENTS = 3
 """Solutions added up: the second takes the error of the first away, the third shows no change."""
 
-Values = Mapping[str, float] | Sequence[float] | None
-
 
 def start(
-    system: System, q0: Values, v0: Values, parameters: Mapping[str, float] | None
+    system: System,
+    q0: Start,
+    v0: Values,
+    parameters: Mapping[str, float] | None,
+    guess: Mapping[str, float] | State | None = None,
 ) -> tuple[Vector, Vector]:
     """Positions (nq,) that close the loops and velocities (nv,) that fit them.
 
     Args:
         system: open or closed.
         q0: positions by coordinate name [rad or m], the others as in the assembled configuration;
-            in a closed system the loops are closed with the independent ones as given.
+            in a closed system the loops are closed with the independent ones as given; or a
+            `State`.
         v0: velocities by name [rad/s or m/s], the others zero; in a closed system they may be of
-            any joints, and the others follow.
+            any joints, and the others follow; those of the state if left out.
         parameters: values of symbols, the others at their defaults.
+        guess: approximate positions of other joints, which choose the branch.
 
     Raises:
         Unclosable: the loops cannot be closed at these positions.
@@ -210,17 +263,32 @@ def start(
         ModelError: a name is unknown, a quaternion is not of unit length, or the loops allow no
             motion with these velocities.
     """
-    q = start_position(system, q0, parameters)
+    if isinstance(q0, State) and v0 is None:
+        v0 = q0.v
+    q = start_position(system, q0, parameters, guess)
     return q, start_velocity(system, q, v0, parameters)
 
 
-def start_position(system: System, q0: Values, parameters: Mapping[str, float] | None) -> Vector:
+def start_position(
+    system: System,
+    q0: Start,
+    parameters: Mapping[str, float] | None,
+    guess: Mapping[str, float] | State | None = None,
+) -> Vector:
     """(nq,) the positions of `start`."""
+    q0 = q0.q if isinstance(q0, State) else q0
+    if guess is not None and not isinstance(q0, Mapping | None):
+        raise ModelError(
+            f"{system.name}: a guess is given beside all positions; leave it out, or give q0 by"
+            " name"
+        )
     q = np.array(system.position(q0))
     if fault := plain_fault(system, q, None):
         raise ModelError(f"{system.name}: {fault}")
     if system.is_closed and (isinstance(q0, Mapping) or q0 is None):
-        return solve(system, dict(q0 or {}), parameters=parameters)
+        complete = len(q0 or {}) == system.nq
+        if not complete:
+            return solve(system, dict(q0 or {}), guess=guess, parameters=parameters)
     if system.is_closed:
         require_closed(system, q, parameters)
     return q

@@ -29,7 +29,7 @@ from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.files import read_sealed, write_sealed
 from mbs.loops.analysis import rows_at
 from mbs.loops.closure import least_upright, rolling_discs
-from mbs.loops.configuration import Values, start, start_position, start_velocity
+from mbs.loops.configuration import Start, Values, start, start_position, start_velocity
 from mbs.loops.examine import row_independence
 from mbs.loops.velocity import constraint_jacobian, scales
 from mbs.models.contacts import (
@@ -61,7 +61,7 @@ from mbs.native.compiler import cache_dir
 from mbs.numbers import OnArrays, on_arrays
 from mbs.progress import progress
 from mbs.recursions.parts import part_event_names
-from mbs.result import Result
+from mbs.result import RecordedStates, Result, State
 from mbs.simulate.arguments import count_steps, positive
 from mbs.solvers import EventMotion, Events, integrate_events
 from mbs.solvers.integrate import is_compilable
@@ -392,6 +392,7 @@ def integrate_legs(
     x0: Array,
     times: Array,
     p: Array,
+    modes: Array | None = None,
     **options: Any,
 ) -> tuple[list[Leg], Stop]:
     """The motion at given times, in one leg for most systems, and why it ends before the last.
@@ -402,6 +403,8 @@ def integrate_legs(
         x0: (nx,) state at the first time.
         times: (m,) s, increasing.
         p: (np,) parameters, then the inputs that are given for this motion.
+        modes: (k,) modes of rigid stops and Coulomb friction at the start; found by the positions
+            and velocities if left out.
         options: of `integrate`.
 
     Returns:
@@ -409,7 +412,7 @@ def integrate_legs(
         they do not: the message says when and in which configuration, and at a singular one the
         joint that the loops do not hold.
     """
-    legs, stop = _integrate(system, equations, x0, times, p, **options)
+    legs, stop = _integrate(system, equations, x0, times, p, modes, **options)
     if isinstance(stop, SolverError) and stop.state:
         q = np.array(stop.state[: system.nq])
         where = ", ".join(f"{c.name} = {x:.6g}" for c, x in zip(system.coordinates, q, strict=True))
@@ -459,6 +462,7 @@ def _integrate(
     x0: Array,
     times: Array,
     p: Array,
+    modes: Array | None,
     **options: Any,
 ) -> tuple[list[Leg], Stop]:
     state = equations(system)
@@ -469,7 +473,7 @@ def _integrate(
         if float(row_independence(system)(q, parameters)) < _SINGULAR:
             state = equations(rows_at(system, q, parameters))  # the start may be regular for others
     if len(contacts_of(system)):
-        return _with_contacts(system, state, x0, times, p, options)
+        return _with_contacts(system, state, x0, times, p, modes, options)
     discs = [disc.name for _, disc in rolling_discs(system)]
     if discs:
         upright = Limit(least_upright(system), _FLAT)
@@ -706,10 +710,11 @@ def _with_contacts(
     x0: Array,
     times: Array,
     p: Array,
+    modes: Array | None,
     options: dict[str, Any],
 ) -> tuple[list[Leg], Stop]:
     assert state.events is not None
-    first = first_modes(system, x0, _own(system, p))
+    first = first_modes(system, x0, _own(system, p)) if modes is None else modes
     motion = _motion(state, x0, times, Events(*state.events, first), p, options)
     contact = ContactMotion(first, motion.modes, motion.events)
     reached = times[: len(motion.x)]
@@ -820,12 +825,13 @@ def prescribed_motions(system: System, motion: Motion) -> list[Prescribed]:
 def start_positions(
     system: System,
     motions: list[Prescribed],
-    q0: Values,
+    q0: Start,
     v0: Values,
     z0: Sequence[float],
     p: Sequence[float],
-) -> tuple[Values, Values]:
-    """The start of a motion, with what is prescribed of it at the time zero.
+    begin: float,
+) -> tuple[Start, Values]:
+    """The start of a motion, with what is prescribed of it at its first time.
 
     Args:
         system: open or closed.
@@ -834,25 +840,32 @@ def start_positions(
         v0: velocities by name.
         z0: (nz,) states of components at the start.
         p: (np,) parameters.
+        begin: the first time [s].
 
     Raises:
         ModelError: a start is given for what is prescribed, or not by name.
     """
     if not motions:
         return q0, v0
-    for what, given in (("q0", q0), ("v0", v0)):
-        if not isinstance(given, Mapping | None):
-            raise ModelError(
-                f"{system.name}: {what} is given as a sequence, beside motion; give a dict of names"
-            )
-    positions, velocities = dict(q0 or {}), dict(v0 or {})  # type: ignore[arg-type]
+    if isinstance(q0, State):
+        v0 = q0.v if v0 is None else v0
+        q0 = q0.q
+    positions, velocities = (_by_name(system, *given) for given in (("q0", q0), ("v0", v0)))
     for one in motions:
-        position, speed, _ = (float(value) for value in one.laws.call([DM(0), DM(z0), DM(p)]))
+        position, speed, _ = (float(value) for value in one.laws.call([DM(begin), DM(z0), DM(p)]))
         if one.position is not None:
             _put(system, positions, one.name, position, "q0")
         if one.holds_speed:
             _put(system, velocities, one.name, speed, "v0")
     return positions, velocities
+
+
+def _by_name(system: System, what: str, given: Values) -> dict[str, float]:
+    if not isinstance(given, Mapping | None):
+        raise ModelError(
+            f"{system.name}: {what} is given as a sequence, beside motion; give a dict of names"
+        )
+    return dict(given or {})
 
 
 def _put(system: System, values: dict[str, float], name: str, value: float, what: str) -> None:
@@ -1054,6 +1067,37 @@ def _chosen(system: System, every: Sequence[_Column], outputs: Sequence[str]) ->
     return [known[name] for name in outputs]
 
 
+def _state_names(system: System) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Names of positions, velocities and states of components."""
+    return (
+        tuple(row.name for row in system.coordinates),
+        tuple(row.name for row in system.speeds),
+        tuple(name for name, _ in system.states),
+    )
+
+
+def modes_of(legs: Sequence[Leg]) -> Array:
+    """(n, k) modes of rigid stops and Coulomb friction at the rows of a motion."""
+    contact = legs[0].contact  # a motion with contacts has one leg
+    return np.empty((sum(len(leg.times) for leg in legs), 0)) if contact is None else contact.modes
+
+
+def require_state_of(system: System, state: State) -> None:
+    """Refuse a state of another mechanism.
+
+    Raises:
+        ModelError: its names are not those of the system; the message says which.
+    """
+    wanted, given = _state_names(system), (tuple(state.q), tuple(state.v), tuple(state.z))
+    for what, own, other in zip(("positions", "velocities", "states"), wanted, given, strict=True):
+        if set(own) != set(other):
+            raise ModelError(
+                f"{system.name}: the state is of {state.name or 'another mechanism'} and has the"
+                f" {what} {', '.join(other) or '(none)'}; give one that has"
+                f" {', '.join(own) or '(none)'}"
+            )
+
+
 def _result(system: System, legs: Sequence[Leg], p: Array, stop: Stop, columns: _Columns) -> Result:
     times, x = np.concatenate([leg.times for leg in legs]), np.vstack([leg.x for leg in legs])
     nq, n, np_own = system.nq, system.nq + system.nv, len(system.parameters)
@@ -1083,6 +1127,7 @@ def _result(system: System, legs: Sequence[Leg], p: Array, stop: Stop, columns: 
         events=events,
         system=system,
         stopped=stopped,
+        states=RecordedStates(_state_names(system), x, modes_of(legs)),
     )
 
 
@@ -1172,9 +1217,10 @@ class Simulator:
         self,
         duration: float,
         *,
-        q0: Values = None,
+        q0: Start = None,
         v0: Values = None,
         z0: Mapping[str, float] | Sequence[float] | None = None,
+        guess: Mapping[str, float] | State | None = None,
         inputs: Mapping[str, float] | None = None,
         parameters: Mapping[str, float] | None = None,
         step: float = 0.01,
@@ -1189,6 +1235,7 @@ class Simulator:
             q0: as of `run`, likewise the others.
             v0: likewise.
             z0: likewise.
+            guess: likewise.
             inputs: values of those that the simulator has, the others zero or as described.
             parameters: as of `run`, likewise the others.
             step: likewise.
@@ -1208,10 +1255,15 @@ class Simulator:
         steps = count_steps(duration, positive(step, "step [s]", system.name), system.name)
         own = system.parameter_values(parameters)
         p = np.array([*own, *self._values(inputs)])
+        begin, modes = 0.0, None
+        if isinstance(q0, State):
+            require_state_of(system, q0)
+            begin, modes = q0.time, np.array(q0.modes)
+            z0 = dict(q0.z) if z0 is None else z0
         z = device_states(system, z0)
-        placed = start_positions(system, motions, q0, v0, z, own)
-        x0 = np.concatenate([*_started(system, *placed, p), z])
-        times = np.linspace(0.0, duration, steps + 1)
+        placed = start_positions(system, motions, q0, v0, z, own, begin)
+        x0 = np.concatenate([*_started(system, *placed, p, guess), z])
+        times = np.linspace(begin, begin + duration, steps + 1)
         rtol, atol = step_tolerances(tolerance)
         with progress(f"simulating {system.name}", 0.0, duration, quiet=quiet) as reached:
             legs, stop = integrate_legs(
@@ -1220,6 +1272,7 @@ class Simulator:
                 x0,
                 times,
                 p,
+                modes,
                 method=self._method,
                 rtol=rtol,
                 atol=atol,
@@ -1322,13 +1375,17 @@ def _simulator_of(*state: Any) -> Simulator:
     return made
 
 
-def _started(system: System, q0: Values, v0: Values, p: Array) -> tuple[Array, Array]:
+def _started(
+    system: System, q0: Start, v0: Values, p: Array, guess: Mapping[str, float] | State | None
+) -> tuple[Array, Array]:
     """The start of a motion; the last few are kept, for the next motion from the same one.
 
     So are positions alone: motions that differ in their velocities close the loops once.
     """
     own = _own(system, p)
     named = dict(zip((one.name for one in system.parameters), own, strict=True))
+    if guess is not None or isinstance(q0, State):
+        return start(system, q0, v0, named, guess)
     try:
         positions, velocities = (
             tuple(sorted(dict(given).items())) if isinstance(given, Mapping) else given
@@ -1354,12 +1411,13 @@ def run(
     system: System,
     duration: float,
     *,
-    q0: Values = None,
+    q0: Start = None,
     v0: Values = None,
     tau: Effort = None,
     motion: Motion = None,
     u: Effort = None,
     z0: Mapping[str, float] | Sequence[float] | None = None,
+    guess: Mapping[str, float] | State | None = None,
     parameters: Mapping[str, float] | None = None,
     step: float = 0.01,
     tolerance: float = 1e-8,
@@ -1381,7 +1439,9 @@ def run(
         duration: [s].
         q0: positions at the start by coordinate name [rad or m], the others as in the assembled
             configuration; in a closed system the loops are closed with the independent ones as
-            given.
+            given, and a complete configuration is taken as it is. Or a `State`, as
+            `Result.state` gives it: the motion goes on from there, at its time, with its
+            velocities, its states of components and its modes.
         v0: velocities at the start by name [rad/s or m/s], the others zero; in a closed system
             they may be of any joints, and the others follow.
         tau: joint efforts [N m or N]: constants of motors by name, or a function of (t, q, v) made
@@ -1396,6 +1456,8 @@ def run(
             device, or a function of (t, q, v) as for tau; zero when left out. What the devices
             deliver is added to tau.
         z0: states of devices at the start by name, such as `motor.i`, the others zero.
+        guess: approximate positions of other joints at the start, which choose the branch on which
+            the loops are closed.
         parameters: values of symbols, the others at their defaults.
         step: time between the rows of the result [s]; it does not change the accuracy.
         tolerance: what the error of the motion should stay near [rad, m, rad/s or m/s]. A step
@@ -1428,6 +1490,7 @@ def run(
         q0=q0,
         v0=v0,
         z0=z0,
+        guess=guess,
         parameters=parameters,
         step=step,
         tolerance=tolerance,

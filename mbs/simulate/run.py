@@ -569,11 +569,8 @@ def with_crossings(
     plain, sides, counts = np.split(start, [len(start) - few, len(start) - state.counts])
     places = [*np.where(plain > 0, 1.0, -1.0), *np.sign(sides), *np.floor(counts)]
     if few:  # awake, not in a row, since the start
-        places += [
-            *np.zeros(2 * few),
-            *np.full(few, float(math.floor(ticks_of(t0, end - t0)))),
-            end - t0,
-        ]
+        begin = float(math.floor(ticks_of(t0, duration)))
+        places += [*np.zeros(2 * few), *np.full(few, begin), duration]
     return Events(indicators, jump, [*modes, *places], _FIRST_STEP), functions
 
 

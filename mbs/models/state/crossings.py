@@ -42,8 +42,8 @@ def ticks_of(t: Any, duration: Any) -> Any:
 def guard(t: SX, values: SX, counts: int, modes: SX, fired: SX, duration: Any) -> tuple[SX, SX]:
     """Indicators and next modes of crossings that may stay at zero or pass it without end.
 
-    The modes are, for all crossings, the places; whether they are asleep; numbers of crossings in a
-    row; times of the last changes in ticks. A place is the side, 1 or -1, or 0 where the value is
+    The modes are four columns: places, whether crossings are asleep, numbers of crossings in a row,
+    and times of the last changes in ticks. A place is the side, 1 or -1, or 0 where the value is
     exactly zero, until it is not; of a count it is the whole number. A crossing that was passed
     many times in a row sleeps for a pause, in which error control alone follows the law.
 

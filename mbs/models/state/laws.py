@@ -1,4 +1,4 @@
-"""Where laws jump, bend or are short: conditions in the expressions of efforts, inputs and loads.
+"""Conditions at which the laws of efforts, inputs and loads jump, bend or are short.
 
 Conditions on the time, constants and parameters alone give times at which a step of an integration
 ends. Conditions on states give expressions that pass through zero, which are watched.
@@ -67,8 +67,8 @@ class _Walk:
     """One walk through the graph of expressions.
 
     Attributes:
-        known: what symbols depend on, by their hash; others are states.
-        depends: what nodes depend on, by their hash, in the order of the walk.
+        known: dependence of each symbol, by its hash; symbols that are not in it are states.
+        depends: dependence of each node, by its hash, in the order of the walk.
         nodes: the nodes themselves.
     """
 
@@ -99,12 +99,12 @@ class _Walk:
                 self.depends[key] = found
 
     def of(self, node: SX) -> int:
-        """What a node depends on."""
+        """Dependence of a node."""
         return self.depends[node.element_hash()]
 
 
 def operands_of(node: SX) -> list[SX]:
-    """Operands of a scalar expression; none of a symbol or a constant."""
+    """Operands of a scalar expression; symbols and constants have no operands."""
     if node.is_symbolic() or node.is_constant():
         return []
     return [node.dep(k) for k in range(node.n_dep())]
@@ -147,7 +147,7 @@ def _elements(symbols: SX) -> Iterator[SX]:
 
 
 def _collect(node: SX, depends: int, found: Conditions, *, jumps_alone: bool) -> None:
-    """Add the condition of one node."""
+    """Add the condition of a node."""
     if node.is_call() or node.is_output() or (jumps_alone and node.op() in _BENDS):
         return  # an interpolant is continuous
     alone = depends == _TIME
@@ -290,10 +290,10 @@ _SAME = 1e3 * float(np.finfo(float).eps)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeLaws:
-    """What laws say of the time alone, as functions of (t, p) with a column of values each.
+    """Parts of laws that depend on time alone: functions of (t, p), each with a column of values.
 
     Attributes:
-        lines: (a, 2) constants and slopes of what is linear in time, a function of p.
+        lines: (a, 2) constants and slopes of the zeros that are linear in time, a function of p.
         zeros: a law jumps or bends at their zeros.
         wholes: a law jumps at their whole numbers.
         terms: smooth parts of laws.
@@ -314,8 +314,8 @@ class TimeLaws:
         """Times in an interval at which steps end.
 
         Args:
-            begin: of the interval [s].
-            end: likewise.
+            begin: begin of the interval [s].
+            end: end of the interval [s].
             p: values of the parameters.
 
         Returns:
@@ -334,7 +334,7 @@ class TimeLaws:
 
 
 def time_laws(found: Conditions, time: SX, p: SX) -> TimeLaws | None:
-    """The functions of what laws say of the time; None where they say nothing.
+    """The parts of laws that depend on time alone; None if there are none.
 
     Args:
         found: conditions of all laws.
@@ -398,7 +398,7 @@ Curve = Callable[[Array], Array]
 
 @dataclass(slots=True)
 class _Search:
-    """A search for the times of one interval."""
+    """A search for times in an interval."""
 
     laws: TimeLaws
     begin: float
@@ -512,7 +512,7 @@ class _Search:
         return np.unique(np.concatenate(found))
 
     def _tops(self, grid: Array) -> Iterator[Array]:
-        """Times at which hints are largest: the middle of what is short."""
+        """Times at which hints are largest: the middle of a short change."""
         values = self._values(self.laws.hints, grid)
         for row in range(len(values)):
             v = values[row]
@@ -526,7 +526,7 @@ class _Search:
                 yield _maximum(value, grid[peaks - 1], grid[peaks + 1])
 
     def _sampled(self, row: int, grid: Array) -> tuple[Array, Array]:
-        """Times and values of a term, closer together where it is not straight."""
+        """Times and values of a term, closer together near bends."""
         terms, times = self.laws.terms, grid
         values = self._values(terms, times)[row]
         active = np.arange(len(times) - 1)
@@ -567,7 +567,7 @@ class _Search:
 
 
 def slope_is_there(lines: Array) -> Flags:
-    """Which of some lines, constant and slope, have zeros."""
+    """Whether each line, a constant and a slope, has a zero."""
     there: Flags = (lines[:, 1] != 0) & np.isfinite(lines).all(axis=1)
     return there
 

@@ -165,7 +165,7 @@ def function_of(graph: Graph, defaults: Sequence[float] = ()) -> Function:
     values = [SX(0)] * len(graph.nodes)
     for number, node in enumerate(graph.nodes):
         if alive[number]:
-            values[number] = _value(node, values, elements)
+            values[number] = value_of(node, values, elements)
     outputs = [
         SX(port.sparsity, casadi.vertcat(*(values[number] for number in result)))
         if result
@@ -177,7 +177,14 @@ def function_of(graph: Graph, defaults: Sequence[float] = ()) -> Function:
     return Function(graph.name, symbols, outputs, *names, options)
 
 
-def _value(node: Node, values: Sequence[SX], elements: list[list[SX]]) -> SX:
+def value_of(node: Node, values: Sequence[SX], elements: Sequence[Sequence[SX]]) -> SX:
+    """Expression of a node.
+
+    Args:
+        node: node of a graph.
+        values: expressions of the nodes before it.
+        elements: for each input the expressions of its non-zero elements.
+    """
     if node.op == casadi.OP_INPUT:
         return elements[node.args[0]][node.args[1]]
     if node.op == casadi.OP_CONST:

@@ -43,7 +43,7 @@ from mbs.models.contacts import (
 from mbs.models.direct_dynamics import hybrid_dynamics
 from mbs.models.inverse_dynamics import bias
 from mbs.models.measurements import measurements
-from mbs.models.state.crossings import GUARD_MODES, guard, ticks_of
+from mbs.models.state.crossings import GUARD_MODES, guard, hold_sides, ticks_of
 from mbs.models.state.signals import (
     Effort,
     LawArgument,
@@ -620,16 +620,21 @@ def _watch_crossings(
         Function("indicators", [t, x, pm], [casadi.vertcat(*indicators)]),
         Function("jump", [t, x, pm, fired], [state_after, casadi.vertcat(*after)]),
     )
+
+    def held(function: Function) -> Function:
+        modes = own_modes[0]
+        return hold_sides(function, at, few_values, modes, state.counts, [t, x, pm])
+
     passage = state.passage
     if passage is not None:
         passage = replace(
             passage,
             rows=wide(passage.rows),
-            forces=wide(passage.forces),
+            forces=held(passage.forces),
             regularity=wide(passage.regularity),
         )
     project = None if state.project is None else wide(state.project)
-    return watched, (wide(state.rhs), project, passage)
+    return watched, (held(state.rhs), project, passage)
 
 
 def _without_crossings(motion: EventMotion, events: Events | None, modes: int) -> EventMotion:

@@ -10,6 +10,7 @@ from mbs.components import (
     Custom,
     DCMotor,
     Revolute,
+    RigidClutch,
     ShaftInertia,
     TorqueSource,
     custom,
@@ -323,3 +324,22 @@ def test_counts_of_states_are_crossed_one_by_one():
         quiet=True,
     )
     np.testing.assert_allclose(result["i.q"], finer["i.q"], atol=1e-7)
+
+
+def test_a_clutch_is_engaged_by_a_short_pulse():
+    """A rigid clutch slips for half a second, and brakes one shaft by its torque."""
+    m = mbs.Mechanism("clutch")
+    a, b = ShaftInertia("a", 1.0), ShaftInertia("b", 2.0)
+    clutch = RigidClutch("c", 6.0)
+    m.connect(a.flange_b, clutch.flange_a)
+    m.connect(clutch.flange_b, b.flange_a)
+    system = m.assemble()
+    for begin, end, expected in ((10.003, 10.503, 7.0), (3.0, 3.2, 8.8)):
+        result = mbs.simulate.run(
+            system,
+            20.0,
+            v0={"a": 10.0},
+            u=lambda t, q, v: between(t, begin, end),  # noqa: B023
+            quiet=True,
+        )
+        assert result["a.v"][-1] == pytest.approx(expected, abs=1e-7)

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import casadi
+import numpy as np
 from casadi import SX, Function
 
 from mbs.assembly import System
+from mbs.errors import ModelError
 from mbs.models.state.drive import DriveInputs
 from mbs.models.state.events import MinimalEvents
 from mbs.models.state.laws import Conditions, conditions_of, distinct
 from mbs.models.symbols import dense_function
+from mbs.operations.graph import Graph, Node, Port, function_of, graph_of, value_of
 from mbs.recursions.parts import PartsAt
 
 # Crossings that may stay at zero or pass it without end.
@@ -54,7 +58,7 @@ def guard(t: SX, values: SX, counts: int, modes: SX, fired: SX, duration: Any) -
         modes: (4 k, 1).
         fired: (k + counts, 1) 1 for each indicator that is not positive: of the sides, of counts
             that fall, of counts that rise.
-        duration: of the motion [s].
+        duration: duration of the motion [s].
 
     Returns:
         indicators (k + counts, 1) and modes.
@@ -67,7 +71,7 @@ def guard(t: SX, values: SX, counts: int, modes: SX, fired: SX, duration: Any) -
     side, count = casadi.vertsplit(places, [0, n, k])
     on_side, counted = casadi.vertsplit(values, [0, n, k])
     passed, falls, rises = casadi.vertsplit(fired, [0, n, k, k + counts])
-    # what is watched
+    # indicators
     elapsed = casadi.fmod(ticks_of(t, duration) - last, _WRAP)
     pause = casadi.fmin(_SHORTEST_PAUSE * 2**row, _LONGEST_PAUSE) / _CROWDED
     stays = casadi.if_else(on_side == 0, 1, -1)
@@ -79,7 +83,7 @@ def guard(t: SX, values: SX, counts: int, modes: SX, fired: SX, duration: Any) -
         for one in (asleep, pause - elapsed)
     ]
     indicators = casadi.if_else(both[0], both[1], awake)
-    # what follows
+    # next modes
     happened = casadi.vertcat(passed, casadi.fmax(falls, rises))
     here = casadi.vertcat(casadi.sign(on_side), casadi.floor(counted))
     beyond = casadi.vertcat(
@@ -98,6 +102,109 @@ def guard(t: SX, values: SX, counts: int, modes: SX, fired: SX, duration: Any) -
     return indicators, then
 
 
+# Laws that keep the side of their conditions during a step.
+#
+# The conditions of the laws are found again in the graph of a state equation by their values at
+# random points. There the modes of the crossings take their place: a step that goes beyond an event
+# then follows the law of its begin, smoothly.
+
+
+_POINTS, _SEED = 4, 20261124
+"""Random points at which conditions are compared; a fixed seed, so that every run has the same."""
+_EQUAL = 1e-9
+"""Difference of equal conditions: far above rounding, far below that of different ones."""
+_COMPARISONS = {casadi.OP_LT, casadi.OP_LE}
+_ROUNDED = {casadi.OP_FLOOR: 1.0, casadi.OP_CEIL: -1.0}
+"""Operations with counts, and the sign of their operand in the count."""
+
+
+def hold_sides(
+    function: Function, at: Sequence[SX], values: SX, modes: SX, counts: int, inputs: Sequence[SX]
+) -> Function:
+    """A function whose conditions have the places of crossings.
+
+    Args:
+        function: state equation.
+        at: its inputs as symbols.
+        values: (k, 1) of the crossings at these symbols, the counts last.
+        modes: modes of the crossings, as `guard` has them.
+        counts: number of counts.
+        inputs: inputs of the result, symbols with those of `at` and the modes among them.
+
+    Returns:
+        the function of these inputs. Conditions that are not found in it stay as they are.
+    """
+    k, rest = values.numel(), modes.numel()
+    try:
+        graph = graph_of(function)
+    except ModelError:  # it calls functions as a whole
+        graph = None
+    watched = {*_COMPARISONS, casadi.OP_SIGN, *_ROUNDED}
+    if graph is None or not any(node.op in watched for node in graph.nodes):
+        return Function(function.name(), list(inputs), function.call(list(at)))
+    elements = [[SX(value.nz[j]) for j in range(value.nnz())] for value in at]
+    places, asleep, _ = casadi.vertsplit(modes, [0, k, 2 * k, rest])
+    found = _found_again(graph, [n.numel() for n in at], Function("c", list(at), [values]), counts)
+    nodes = list[SX]()
+    for number, node in enumerate(graph.nodes):
+        value = value_of(node, nodes, elements)
+        if number in found:
+            j, sign = found[number]
+            free = casadi.logic_or(asleep[j], places[j] == 0) if j < k - counts else asleep[j]
+            held = sign * places[j]
+            if node.op in _COMPARISONS:
+                held = held < 0
+            value = casadi.if_else(free, value, held)
+        nodes.append(value)
+    outputs = [
+        SX(port.sparsity, casadi.vertcat(*(nodes[j] for j in result)))
+        if result
+        else SX(port.sparsity)
+        for port, result in zip(graph.outputs, graph.results, strict=True)
+    ]
+    return Function(function.name(), list(inputs), outputs)
+
+
+def _found_again(
+    graph: Graph, sizes: Sequence[int], crossings: Function, counts: int
+) -> dict[int, tuple[int, float]]:
+    """Crossing and sign of each condition in a graph that is one of the crossings."""
+    nodes, numbers, of_counts = list(graph.nodes), list[int](), list[bool]()
+    places = list[int]()
+    for number, node in enumerate(graph.nodes):
+        if node.op in _COMPARISONS:
+            nodes.append(Node(casadi.OP_SUB, node.args))
+            places.append(len(nodes) - 1)
+        elif node.op == casadi.OP_SIGN or node.op in _ROUNDED:
+            places.append(node.args[0])
+        else:
+            continue
+        numbers.append(number)
+        of_counts.append(node.op in _ROUNDED)
+    column = Port("conditions", casadi.Sparsity.dense(len(places), 1))
+    probe = function_of(
+        replace(graph, outputs=(column,), nodes=tuple(nodes), results=(tuple(places),))
+    )
+    random = np.random.default_rng(_SEED)
+    points = [[random.uniform(0.1, 1.0, size) for size in sizes] for _ in range(_POINTS)]
+    seen, wanted = (
+        np.array([np.array(f(*point)).ravel() for point in points]) for f in (probe, crossings)
+    )
+    sides = wanted.shape[1] - counts
+    found: dict[int, tuple[int, float]] = {}
+    for column_of, number in enumerate(numbers):
+        op = graph.nodes[number].op
+        for j in range(wanted.shape[1]):
+            signs = (_ROUNDED[op],) if op in _ROUNDED else (1.0, -1.0)
+            for sign in signs:
+                off = np.abs(seen[:, column_of] - sign * wanted[:, j])
+                known = np.isfinite(off)
+                same = np.all(off[known] <= _EQUAL * (1 + np.abs(wanted[known, j])))
+                if of_counts[column_of] == (j >= sides) and known.sum() > 1 and same:
+                    found.setdefault(number, (j, sign))
+    return found
+
+
 # Crossings of the state equations of FMUs.
 
 
@@ -114,7 +221,7 @@ def part_crossings(system: System) -> Function | None:
         system: open or closed.
 
     Returns:
-        the Function; None where there is nothing.
+        the Function; None if no law jumps.
     """
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     parts = PartsAt(system, q, v)
@@ -133,11 +240,11 @@ def drive_crossings(system: System, drive: DriveInputs, extra: int) -> Function 
 
     Args:
         system: open or closed.
-        drive: with laws, or none.
+        drive: a drive, with or without laws.
         extra: number of the inputs w of the laws.
 
     Returns:
-        the Function; None where there is nothing, or where laws are external functions.
+        the Function; None if no law jumps, or if laws are external functions.
     """
     laws = [law for law in (drive.effort, drive.device) if law is not None]
     if not laws or not all(law.is_a("SXFunction") for law in laws):
@@ -151,10 +258,9 @@ def drive_crossings(system: System, drive: DriveInputs, extra: int) -> Function 
 
 
 def _jumps(laws: SX, t: SX, q: SX, constants: SX) -> Conditions:
-    """Conditions at which laws jump, and those at which the conditions themselves bend.
+    """Conditions at which laws jump, and bends of these conditions.
 
-    An integrator outside sees signs alone: it meets a gap |x| - a from both sides where it also
-    stops at x = 0.
+    An importer sees signs alone. It meets the zeros of |x| - a on both sides if it stops at x = 0.
     """
     found = conditions_of(laws, t, q, constants, jumps_alone=True)
     decisive = casadi.vertcat(*found.crossings, *found.counts, *found.zeros, *found.wholes)
@@ -183,10 +289,10 @@ def _function(
 def join_crossings(
     events: MinimalEvents | None, values: Sequence[SX], point: Sequence[SX], source: str
 ) -> MinimalEvents:
-    """Events, and behind them those of crossings, which change modes alone.
+    """Events with the events of crossings behind them, which change modes alone.
 
     Args:
-        events: None where there are none.
+        events: other events; None if there are no others.
         values: sides and counts at the point.
         point: t, x, z, u and p, without modes.
         source: name of the crossings.
@@ -240,22 +346,42 @@ def with_part_crossings(
     events: MinimalEvents | None,
     motion: tuple[SX, SX],
     point: Sequence[SX],
-) -> tuple[MinimalEvents | None, int]:
-    """Events with the crossings of components behind them, and the number of their modes.
+    *,
+    wanted: bool,
+) -> tuple[MinimalEvents | None, Sequence[SX]]:
+    """Events with the crossings of components behind them, and their sides and counts.
 
     Args:
         system: open or closed.
-        events: None where there are none.
+        events: other events; None if there are no others.
         motion: positions and velocities of the tree.
         point: t, x, z, u and p, without modes.
+        wanted: whether crossings are wanted at all.
     """
-    found = part_crossings(system)
+    found = part_crossings(system) if wanted else None
     if found is None:
-        return events, 0
-    known = len(events.modes) if events else 0
+        return events, (SX(0, 1), SX(0, 1))
     values = found.call([*motion, system.z, system.u, system.p])
-    joined = join_crossings(events, values, point, "laws")
-    return joined, len(joined.modes) - known
+    return join_crossings(events, values, point, "laws"), values
+
+
+def held_by(function: Function, values: Sequence[SX], point: Sequence[SX]) -> Function:
+    """A function of (t, x, z, u, p) that takes the modes of crossings at the end of p.
+
+    Args:
+        function: state equation; its p may end with other modes.
+        values: sides and counts at the point.
+        point: t, x, z, u and p, without modes.
+    """
+    sides, counts = values
+    k = sides.numel() + counts.numel()
+    if not k:
+        return function
+    *others, p = point
+    before = SX.sym("before", function.numel_in(4) - p.numel())
+    modes = SX.sym("own", GUARD_MODES * k)
+    at, inputs = [*others, casadi.vertcat(p, before)], [*others, casadi.vertcat(p, before, modes)]
+    return hold_sides(function, at, casadi.vertcat(sides, counts), modes, counts.numel(), inputs)
 
 
 def with_more_modes(function: Function, count: int) -> Function:

@@ -30,8 +30,8 @@ from mbs.models.inverse_dynamics import bias
 from mbs.models.joint_wrenches import shown_outputs
 from mbs.models.state.crossings import (
     drive_crossings,
+    held_by,
     join_crossings,
-    with_more_modes,
     with_part_crossings,
 )
 from mbs.models.state.drive import (
@@ -429,13 +429,13 @@ def with_laws(
     )
     rhs, events = _driven(wiring, equations.rhs), _events(wiring, equations.events)
     if crossings is not None:
-        known = len(events.modes) if events else 0
-        t, x, z, inputs, p = _symbols(wiring, equations.motion, SX)
+        point = _symbols(wiring, equations.motion, SX)
+        t, x, z, inputs, p = point
         _, _, others, w = _parts(inputs, wiring.sizes)
         q, v = equations.motion.call([t, x, z, _fill(wiring, SX, others), p])
         values = crossings.call([t, q, v, w, p])
-        events = join_crossings(events, values, [t, x, z, inputs, p], "controller")
-        rhs = with_more_modes(rhs, len(events.modes) - known)
+        events = join_crossings(events, values, point, "controller")
+        rhs = held_by(rhs, values, point)
     return StateEquations(rhs=rhs, motion=equations.motion, events=events, sizes=wiring.sizes[:3])
 
 
@@ -675,12 +675,11 @@ def _equations(
             lambda fired: minimal_jump(system, contact, motion, (s.x, fired), states),
         )
     events = join_part_events(system, events, parts.events(), point)
-    few = 0
-    if crossings:
-        events, few = with_part_crossings(system, events, (motion.q, motion.v), point)
-    point[4], (rate, y) = few_modes(contact, system.p, [rate, y])
+    at = (motion.q, motion.v)
+    events, values = with_part_crossings(system, events, at, point, wanted=crossings)
+    p, (rate, y) = few_modes(contact, system.p, [rate, y])
     return StateEquations(
-        rhs=with_more_modes(dense_function("rhs", point, [rate, y]), few),
+        rhs=held_by(dense_function("rhs", [*point[:4], p], [rate, y]), values, point),
         motion=dense_function("motion", [s.t, s.x, s.z, s.u, system.p], [motion.q, motion.v]),
         events=events,
         sizes=(len(motors), system.u.numel(), s.u.numel() - len(motors) - system.u.numel()),

@@ -33,6 +33,7 @@ from mbs.models.inverse_dynamics import bias
 from mbs.models.joint_wrenches import shown_outputs
 from mbs.models.state.crossings import (
     drive_crossings,
+    held_by,
     with_more_modes,
     with_part_crossings,
 )
@@ -483,16 +484,14 @@ def tree_state(
         )
     events = join_part_events(system, events, parts.events(), point)
     few = _mode_count(events)
-    events, of_parts = (
-        with_part_crossings(system, events, (q, v), point) if crossings else (events, 0)
-    )
-    rhs = with_more_modes(rhs, of_parts)
+    events, values = with_part_crossings(system, events, (q, v), point, wanted=crossings)
+    rhs, forces = (held_by(function, values, point) for function in (rhs, forces))
     if drive.effort is not None or drive.device is not None:
         at = dense_function("motion", point, [q, v])
         sizes = (len(motors), system.u.numel())
         sizes3 = (*sizes, s.u.numel() - sum(sizes))
-        pushed = with_laws(StateEquations(forces, at, None, sizes3), drive, layout.extra)
         of_drive = drive_crossings(system, drive, layout.extra) if crossings else None
+        pushed = with_laws(StateEquations(forces, at, None, sizes3), drive, layout.extra, of_drive)
         moving = with_laws(StateEquations(rhs, at, events, sizes3), drive, layout.extra, of_drive)
         rhs, forces, events = moving.rhs, pushed.rhs, moving.events
     more = _mode_count(events) - few
@@ -513,7 +512,7 @@ def tree_state(
         passage=replace(
             through,
             rows=rows,
-            forces=with_more_modes(forces, more),
+            forces=forces,
             regularity=regularity,
         ),
         passes=passes,

@@ -33,7 +33,7 @@ def arm():
     return m.assemble()
 
 
-def last(path, end, name, kind, start=None, tolerance=1e-8):
+def last(path, end, name, kind, start=None):
     """The last value of a variable in one communication step."""
     found = fmpy.simulate_fmu(
         str(path),
@@ -42,7 +42,7 @@ def last(path, end, name, kind, start=None, tolerance=1e-8):
         start_values=start or {},
         output=[name],
         fmi_type=kind,
-        relative_tolerance=tolerance,
+        relative_tolerance=1e-8,
     )
     return found[name][-1]
 
@@ -81,21 +81,22 @@ class Detent(Custom):
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 @pytest.mark.parametrize(("kind", "solver"), KINDS)
 def test_loads_of_components_jump_between_communication_points(tmp_path, fmi, kind, solver):
-    def reached(part, end, name, start, tolerance=1e-8):
+    def reached(part, end, name, start):
         path = tmp_path / f"{type(part).__name__}.fmu"
         mbs.export.fmu(shaft(part), path, fmi=fmi, solver=solver)
-        return last(path, end, name, kind, start, tolerance)
+        return last(path, end, name, kind, start)
 
     quarter = np.sqrt(2 * 0.5 / 3)
     there = np.mod(10.0, 4 * quarter)
     fall = 4 * quarter - there if there > 2 * quarter else there
     exact = 0.5 - 1.5 * fall**2 if fall < quarter else 1.5 * (2 * quarter - fall) ** 2 - 0.5
-    # errors of some hundred steps with an error of 1e-8 each
-    assert reached(Side("side"), 10.0, "i.q", {"i.q": 0.5}) == pytest.approx(exact, abs=1e-5)
+    # an importer locates events less exactly than the solver inside
+    near = 1e-6 if kind == "ModelExchange" else 1e-10
+    assert reached(Side("side"), 10.0, "i.q", {"i.q": 0.5}) == pytest.approx(exact, abs=near)
     lost = np.sqrt(100 - 2 * 20 * 0.004)
-    assert reached(Gate("gate"), 2.0, "i.v", {"i.v": 10.0}) == pytest.approx(lost, abs=1e-6)
+    assert reached(Gate("gate"), 2.0, "i.v", {"i.v": 10.0}) == pytest.approx(lost, abs=near)
     run = mbs.simulate.run(shaft(Detent("d")), 2.0, v0={"i": 5.0}, tolerance=1e-10, quiet=True)
-    found = reached(Detent("detent"), 2.0, "i.q", {"i.v": 5.0}, 1e-10)
+    found = reached(Detent("detent"), 2.0, "i.q", {"i.v": 5.0})
     assert found == pytest.approx(run["i.q"][-1], abs=1e-6)
 
 

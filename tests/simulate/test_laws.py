@@ -134,7 +134,7 @@ def test_a_custom_load_that_jumps_has_errors_near_the_tolerance(tolerance):
     s = np.mod(result.time, 4 * quarter)
     fall = np.where(s > 2 * quarter, 4 * quarter - s, s)
     exact = np.where(fall < quarter, 0.5 - 1.5 * fall**2, 1.5 * (2 * quarter - fall) ** 2 - 0.5)
-    np.testing.assert_allclose(result["i.q"], exact, atol=20 * tolerance)
+    np.testing.assert_allclose(result["i.q"], exact, atol=0.1 * tolerance)
 
 
 def test_a_well_that_a_condition_bounds_is_met_at_speed():

@@ -129,7 +129,7 @@ def hold_sides(
         values: (k, 1) of the crossings at these symbols, the counts last.
         modes: modes of the crossings, as `guard` has them.
         counts: number of counts.
-        inputs: inputs of the result, symbols with those of `at` and the modes among them.
+        inputs: inputs of the result: symbols that include the symbols of `at` and the modes.
 
     Returns:
         the function of these inputs. Conditions that are not found in it stay as they are.

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from mbs.components import Mechanism
     from mbs.errors import MbsError
     from mbs.expressions import Parameter
-    from mbs.result import Result
+    from mbs.result import Result, State
     from mbs.robots import load
 
 _NAMES = {
@@ -40,6 +40,7 @@ _NAMES = {
     "MbsError": "mbs.errors",
     "Parameter": "mbs.expressions",
     "Result": "mbs.result",
+    "State": "mbs.result",
     "System": "mbs.assembly",
     "load": "mbs.robots",
 }
@@ -64,6 +65,7 @@ __all__ = [
     "Mechanism",
     "Parameter",
     "Result",
+    "State",
     "System",
     "bridges",
     "components",

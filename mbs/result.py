@@ -6,7 +6,7 @@ import io
 import json
 import os
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -43,6 +43,61 @@ _QUANTITIES = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class State:
+    """The state of a mechanism at one instant, from which a motion can go on.
+
+    Attributes:
+        q: positions by coordinate name [rad or m], all of them.
+        v: velocities by name [rad/s or m/s], all of them.
+        z: states of components by name, such as `motor.i`.
+        modes: (k,) modes of rigid stops and of Coulomb friction.
+        time: [s].
+        name: of the mechanism.
+    """
+
+    q: Mapping[str, float]
+    v: Mapping[str, float]
+    z: Mapping[str, float] = field(default_factory=dict)
+    modes: tuple[float, ...] = ()
+    time: float = 0.0
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        for what in ("q", "v", "z"):
+            values = {str(name): float(x) for name, x in getattr(self, what).items()}
+            object.__setattr__(self, what, MappingProxyType(values))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        plain = dict(self.q), dict(self.v), dict(self.z), self.modes, self.time, self.name
+        return type(self), plain
+
+    def __repr__(self) -> str:
+        shown = ", ".join(f"{name} = {x:.6g}" for name, x in self.q.items())
+        return f"<State {self.name} at {self.time:g} s: {shown}>"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedStates:
+    """The states of a motion at the times of its rows.
+
+    Attributes:
+        names: of positions, velocities and states of components.
+        x: (n, nx) values of all of them.
+        modes: (n, k) modes of rigid stops and of Coulomb friction.
+    """
+
+    names: tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
+    x: Array
+    modes: Array
+
+    def at(self, row: int, time: float, name: str) -> State:
+        """The state of a row."""
+        values = iter(self.x[row].tolist())
+        q, v, z = ({one: next(values) for one in names} for names in self.names)
+        return State(q, v, z, tuple(self.modes[row].tolist()), time, name)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Result:
     """Signals over time: `result["j1.q"]` is one of them, (n,).
@@ -57,6 +112,7 @@ class Result:
         system: the mechanism whose motion it is, where that is known; not saved, not pickled.
         stopped: time, s, and sentence of what stopped the motion early, after the last row; None
             where it is complete.
+        states: the states of the rows, from which `state` takes one; not saved.
     """
 
     time: Array
@@ -67,6 +123,7 @@ class Result:
     events: tuple[tuple[float, str, str], ...] = ()
     system: object | None = field(default=None, repr=False)
     stopped: tuple[float, str] | None = None
+    states: RecordedStates | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         time = _freeze(self.time)
@@ -91,7 +148,38 @@ class Result:
 
     def __reduce__(self) -> tuple[Any, ...]:
         plain = dict(self.units), self.name, dict(self.info), self.events, None, self.stopped
-        return type(self), (self.time, self.values, *plain)
+        return type(self), (self.time, self.values, *plain, self.states)
+
+    def state(self, t: float | None = None) -> State:
+        """The state of a row, from which a motion, a linear model or an FMU can start.
+
+        Args:
+            t: time of the row [s], the last one if an event repeats it; the last row if left out.
+
+        Raises:
+            ModelError: there is no row of this time, or the result keeps no states, as one that was
+                read from a file.
+        """
+        if self.states is None or not len(self.time):
+            raise ModelError(
+                f"result {self.name!r}: it keeps no states; take the state from the result that"
+                " mbs.simulate.run returned"
+            )
+        row = len(self.time) - 1
+        if t is not None:
+            row = int(np.searchsorted(self.time, float(t), side="right")) - 1
+            near = min((k for k in (row, row + 1) if 0 <= k < len(self.time)), key=self._far(t))
+            # times are sums of steps, which round
+            if self._far(t)(near) > 1e-9 * max(1.0, abs(float(t))):
+                raise ModelError(
+                    f"result {self.name!r}: there is no row at {float(t)!r} s, the nearest is at"
+                    f" {float(self.time[near])!r} s; take this one, or give run another step"
+                )
+            row = int(np.flatnonzero(self.time == self.time[near])[-1])
+        return self.states.at(row, float(self.time[row]), self.name)
+
+    def _far(self, t: float) -> Callable[[int], float]:
+        return lambda row: abs(float(self.time[row]) - float(t))
 
     @classmethod
     def from_structured(

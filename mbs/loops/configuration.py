@@ -23,9 +23,16 @@ from mbs.loops.closing import (
 )
 from mbs.loops.function import configuration_on, fixed_positions, independent_names
 from mbs.loops.velocity import closure_jacobian
+from mbs.result import State
 from mbs.solvers.least_squares import smallest_solution
 from mbs.solvers.rank import RELATIVE_GAP, null_space
 from mbs.text import quoted
+
+Values = Mapping[str, float] | Sequence[float] | None
+"""Positions or velocities: by name, or all of them in their order."""
+
+Start = Values | State
+"""Where something starts: positions, or a whole state."""
 
 _RESTARTS = 60
 _SEED = 20260101
@@ -37,9 +44,9 @@ _NEAR = 0.3
 
 def solve(
     system: System,
-    q_active: Mapping[str, float] | Sequence[float] | None = None,
+    q_active: Start = None,
     *,
-    guess: Mapping[str, float] | None = None,
+    guess: Mapping[str, float] | State | None = None,
     branch: str | Sequence[str] | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Vector:
@@ -54,7 +61,9 @@ def solve(
     Args:
         system: the assembled mechanism.
         q_active: positions of the independent joints in the order of `system.free`, those left
-            out staying as in the assembled configuration; or positions of any joints by name.
+            out staying as in the assembled configuration; or positions of any joints by name; or a
+            `State`. Beside all independent joints, positions of others choose the branch and are
+            checked.
         guess: approximate positions of other joints, which choose the branch.
         branch: labels of `mbs.loops.modes` instead, such as "j3:+"; a loop that no label names
             stays as it was assembled. Positions are then those of independent joints.
@@ -71,6 +80,10 @@ def solve(
         ModelError: a name is unknown, or a value is not finite; or guess and branch are given.
     """
     require_system(system)
+    if isinstance(q_active, State):
+        q_active = q_active.q
+    if isinstance(guess, State):
+        guess = guess.q
     if not isinstance(guess, Mapping | None):
         raise ModelError(
             f"{system.name}: guess is {quoted(guess)}; give a dict of coordinate names to values"
@@ -139,13 +152,15 @@ def _with_dependent_positions(
     given = _indices(system, surplus)
     missed = np.abs(q - target)[given]
     scales = [closing.size if system.coordinates[k].unit.startswith("m") else 1.0 for k in given]
-    if np.max(missed / scales) > OPEN:
-        worst = given[int(np.argmax(missed / scales))]
-        name = system.coordinates[worst].name
+    wrong = [k for k, x in zip(given, missed / scales, strict=True) if x > OPEN]
+    if wrong:
+        required, found = (
+            ", ".join(f"{system.coordinates[k].name} = {values[k]:.6g}" for k in wrong)
+            for values in (target, q)
+        )
         raise Unclosable(
-            f"{system.name}: the loops give {name} the position {q[worst]:.6g} with"
-            f" {closing.locked_positions(q)}, not {fixed[name]:.6g}; leave {name} out, or give it"
-            " as a guess"
+            f"{system.name}: with {closing.locked_positions(q)} the loops do not close with"
+            f" {required}, the nearest is {found}; leave positions out, or give them as a guess"
         )
     exact = Closing(system, p, tuple(_indices(system, fixed))).nearest(
         _with_positions(q, target, given)
@@ -271,21 +286,25 @@ what does not fit differs by about its own size, what fits by rounding."""
 _REFINEMENTS = 3
 """Solutions added up: the second takes the error of the first away, the third shows no change."""
 
-Values = Mapping[str, float] | Sequence[float] | None
-
 
 def start(
-    system: System, q0: Values, v0: Values, parameters: Mapping[str, float] | None
+    system: System,
+    q0: Start,
+    v0: Values,
+    parameters: Mapping[str, float] | None,
+    guess: Mapping[str, float] | State | None = None,
 ) -> tuple[Vector, Vector]:
     """Positions (nq,) that close the loops and velocities (nv,) that fit them.
 
     Args:
         system: open or closed.
         q0: positions by coordinate name [rad or m], the others as in the assembled configuration;
-            in a closed system the loops are closed with the independent ones as given.
+            in a closed system the loops are closed with the independent ones as given; or a
+            `State`.
         v0: velocities by name [rad/s or m/s], the others zero; in a closed system they may be of
-            any joints, and the others follow.
+            any joints, and the others follow; those of the state if left out.
         parameters: values of symbols, the others at their defaults.
+        guess: approximate positions of other joints, which choose the branch.
 
     Raises:
         Unclosable: the loops cannot be closed at these positions.
@@ -293,17 +312,32 @@ def start(
         ModelError: a name is unknown, a quaternion is not of unit length, or the loops allow no
             motion with these velocities.
     """
-    q = start_position(system, q0, parameters)
+    if isinstance(q0, State) and v0 is None:
+        v0 = q0.v
+    q = start_position(system, q0, parameters, guess)
     return q, start_velocity(system, q, v0, parameters)
 
 
-def start_position(system: System, q0: Values, parameters: Mapping[str, float] | None) -> Vector:
+def start_position(
+    system: System,
+    q0: Start,
+    parameters: Mapping[str, float] | None,
+    guess: Mapping[str, float] | State | None = None,
+) -> Vector:
     """(nq,) the positions of `start`."""
+    q0 = q0.q if isinstance(q0, State) else q0
+    if guess is not None and not isinstance(q0, Mapping | None):
+        raise ModelError(
+            f"{system.name}: a guess is given beside all positions; leave it out, or give q0 by"
+            " name"
+        )
     q = np.array(system.position(q0))
     if fault := plain_fault(system, q, None):
         raise ModelError(f"{system.name}: {fault}")
     if system.is_closed and (isinstance(q0, Mapping) or q0 is None):
-        return solve(system, dict(q0 or {}), parameters=parameters)
+        complete = len(q0 or {}) == system.nq
+        if not complete:
+            return solve(system, dict(q0 or {}), guess=guess, parameters=parameters)
     if system.is_closed:
         require_closed(system, q, parameters)
     return q

@@ -19,7 +19,7 @@ from mbs.assembly.tree import norm_rows, position_rate, quaternion_slices
 from mbs.assembly.validity import plain_rows
 from mbs.errors import ModelError, NoClosedForm, Unclosable
 from mbs.loops.closure import independent_closure, row_groups
-from mbs.loops.configuration import Values, start
+from mbs.loops.configuration import Start, Values, start
 from mbs.loops.function import function
 from mbs.loops.plan import branches_at, plan
 from mbs.loops.reduction import reduction_matrix
@@ -29,6 +29,7 @@ from mbs.models.direct_dynamics import direct_dynamics, independent_dynamics
 from mbs.models.inverse_dynamics import inverse_dynamics, own_efforts
 from mbs.models.state.signals import by_name
 from mbs.models.symbols import ModelSymbols, devices, outputs_of, part_equations, symbols_of
+from mbs.result import State
 from mbs.text import quoted
 
 # What loops ask of a motion, on the levels of positions, velocities and accelerations.
@@ -412,12 +413,13 @@ def dae(
     system: System,
     form: str = "reduced",
     *,
-    q0: Values = None,
+    q0: Start = None,
     v0: Values = None,
     tau0: Values = None,
     states: Mapping[str, float] | None = None,
     inputs: Mapping[str, float] | None = None,
     parameters: Mapping[str, float] | None = None,
+    guess: Mapping[str, float] | State | None = None,
 ) -> Dae:
     """Equations of motion dx/dt = ode, 0 = alg, with everything that acts in `direct_dynamics`.
 
@@ -442,12 +444,14 @@ def dae(
         system: open or closed.
         form: one of the five words.
         q0: positions at the start by name, as in `mbs.simulate.run`: the assembled configuration.
+            Or a `State`, whose velocities and states of components count where none are given.
         v0: velocities at the start by name; at rest when left out.
         tau0: efforts of motors at the start by name, the others zero; they tell u0 and z0.
         states: of components at the start by name, such as `motor.i`, the others as described.
         inputs: of components at the start by name, such as `motor.voltage`, or `motor` where it has
             one alone; likewise.
         parameters: values of symbols at the start, the others at their defaults.
+        guess: approximate positions of other joints at the start, which choose the branch.
 
     Raises:
         ModelError: there is no such form, a name is unknown or has no motor, or a symbol has no
@@ -459,7 +463,9 @@ def dae(
     if form not in FORMS:
         raise ModelError(f"{system.name}: form is {quoted(form)}; use one of {', '.join(FORMS)}")
     p = np.array(system.parameter_values(parameters), dtype=float)
-    q, v = start(system, q0, v0, parameters)
+    q, v = start(system, q0, v0, parameters, guess)
+    if isinstance(q0, State) and states is None:
+        states = q0.z
     tau = start_efforts(system, tau0)
     z = by_name(system, "states", states, system.states, system.z_start)
     u = by_name(system, "inputs", inputs, system.inputs, system.u_default)

@@ -25,7 +25,7 @@ from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.assembly.tree import position_rate
 from mbs.errors import ModelError
 from mbs.loops.closure import closure_rows, independent_closure
-from mbs.loops.configuration import Values, start
+from mbs.loops.configuration import Start, Values, start
 from mbs.loops.velocity import velocity_rows
 from mbs.models.contacts import (
     KINDS,
@@ -48,6 +48,7 @@ from mbs.models.symbols import (
     surroundings,
     symbols_of,
 )
+from mbs.result import State
 from mbs.solvers.linear import solve_square
 from mbs.text import did_you_mean, quoted
 
@@ -108,23 +109,26 @@ class Linearisation:
 
     def at(
         self,
-        q0: Values = None,
+        q0: Start = None,
         v0: Values = None,
         tau0: Values = None,
         states: Mapping[str, float] | None = None,
         inputs: Mapping[str, float] | None = None,
         parameters: Mapping[str, float] | None = None,
+        guess: Mapping[str, float] | State | None = None,
     ) -> LinearModel:
         """The equations about one state.
 
         Args:
-            q0: positions by name, the others as assembled; loops are closed at them.
+            q0: positions by name, the others as assembled; loops are closed at them. Or a `State`,
+                whose velocities and states of components count where none are given.
             v0: velocities by name; at rest when left out.
             tau0: efforts of motors by name, the others zero.
             states: of components by name, such as `motor.i`, the others as described; a component
                 that has one goes by its own name too.
             inputs: likewise, such as `motor.voltage` or `motor`.
             parameters: values of symbols, the others at their defaults.
+            guess: approximate positions of other joints, which choose the branch.
 
         Raises:
             ModelError: a name is unknown, a symbol has no value, or contacts do not do in this
@@ -132,7 +136,9 @@ class Linearisation:
             Unclosable: the loops cannot be closed at q0.
         """
         system = self.system
-        q, v = start(system, q0, v0, parameters)
+        q, v = start(system, q0, v0, parameters, guess)
+        if isinstance(q0, State) and states is None:
+            states = q0.z
         point = {
             "q": q,
             "v": v,

@@ -30,7 +30,6 @@ from mbs.components.custom import (
 )
 from mbs.errors import AssemblyError
 from mbs.expressions import to_sx
-from mbs.expressions.conditions import LawConditions, law_conditions
 from mbs.recursions.poses import link_poses
 from mbs.recursions.readings import Readings, coordinate_readings, frame_readings
 from mbs.recursions.route import BASE, relative_motion
@@ -386,26 +385,28 @@ class PartsAt:
                 found += map(SX, part.element.crossings(self.at(part)).values())
         return casadi.vertcat(*found)
 
-    def conditions(self, x: SX) -> LawConditions:
-        """Conditions in the laws of components of users that declare no crossings of their own.
+    def modes(self) -> SX:
+        """(nm, 1) symbols of the modes of all components."""
+        found = [SX(0, 1)]
+        for part in self.parts:
+            found += [part.states[name] for name in part.element.names_of("mode")]
+        return casadi.vertcat(*found)
 
-        Args:
-            x: symbols of all states.
-        """
-        laws = [SX(0, 1)]
+    def laws(self) -> SX:
+        """Loads and rates of all components that do not give their own crossings, (n, 1)."""
+        found = [SX(0, 1)]
         for part in self.parts:
             element = part.element
-            if type(element).__module__.startswith("mbs.") or element.has("crossings"):
+            if element.has("crossings"):
                 continue
-            for load in self.loads(part).values():
+            for load in self.loads(part).values() if element.acts else ():
                 if isinstance(load, FrameLoad):
-                    laws += [SX(load.force), SX(load.moment)]
+                    found += [load.force, load.moment]
                 else:
-                    laws.append(SX(load))
-            for method in ("rates", "outputs"):
-                if element.has(method):
-                    laws += map(SX, getattr(element, method)(self.at(part)).values())
-        return law_conditions(casadi.vertcat(*map(casadi.vec, laws)), SX(0, 1), x)
+                    found.append(SX(load))
+            if part.states:
+                found += [SX(value) for value in element.rates(self.at(part)).values()]
+        return casadi.vertcat(*found)
 
     def outputs(self, lam: SX | None = None) -> SX:
         """(ny, 1) outputs of all components.

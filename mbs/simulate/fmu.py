@@ -24,7 +24,7 @@ import numpy as np
 from mbs.errors import Interrupted, MbsError, ModelError, SolverError
 from mbs.files import check_archive
 from mbs.progress import progress
-from mbs.result import Result
+from mbs.result import Result, State
 from mbs.simulate.arguments import positive
 from mbs.simulate.fmu_plan import (
     Inputs,
@@ -617,7 +617,7 @@ def fmu(
     *,
     inputs: Inputs | None = None,
     parameters: Mapping[str, float] | None = None,
-    start: Mapping[str, float] | None = None,
+    start: Mapping[str, float] | State | None = None,
     kind: Interface = "CoSimulation",
     step: float | None = None,
     tolerance: float = 1e-8,
@@ -644,7 +644,8 @@ def fmu(
             lines between them and a jump where a time is repeated; or a `Result`, whose columns
             feed the inputs of the same names.
         parameters: parameter to its value.
-        start: state, input or other variable with a start value, to its value at the start.
+        start: state, input or other variable with a start value, to its value at the start. Or the
+            `State` of the mechanism that the FMU was made of.
         kind: the interface that is used; the FMU brings the solver for co-simulation.
         step: communication step and distance of the rows, s; by default the one that the FMU
             proposes, else a 500th of the duration. The last one is shorter where steps do not
@@ -666,7 +667,9 @@ def fmu(
     """
     file = _path(path)
     for what, values in (("parameters", parameters), ("start", start)):
-        if not isinstance(values, Mapping | None):
+        if not isinstance(values, Mapping | None) and not (
+            what == "start" and isinstance(values, State)
+        ):
             raise ModelError(f"{what} is {quoted(values)}; give a dict of names to values")
     if not isinstance(inputs, Mapping | Result | None):
         raise ModelError(f"inputs is {quoted(inputs)}; give a dict of names to values, or a Result")

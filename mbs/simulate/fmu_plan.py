@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbs.errors import ModelError, SolverError
-from mbs.result import Result
+from mbs.result import Result, State
 from mbs.simulate.arguments import count_steps
 from mbs.simulate.fmu_variables import (
     CONTINUOUS,
@@ -35,15 +35,37 @@ _FORMS = "a number, a function of time, or (times, values)"
 
 
 def start_values(
-    description: Any, parameters: Mapping[str, float], start: Mapping[str, float]
+    description: Any, parameters: Mapping[str, float], start: Mapping[str, float] | State
 ) -> dict[str, float]:
     """Values of parameters, states and inputs before the run, their names and numbers checked."""
     known = numbers_of(description)
+    if isinstance(start, State):
+        start = _starts_of(start, {n for n, v in known.items() if _settable(v)})
     every = (*known, *(v.name for v in description.modelVariables))
     fixed = {n for n, v in known.items() if v.causality == "parameter"}
     check_names("parameters", parameters, fixed, every)
     check_names("start", start, {n for n, v in known.items() if _settable(v)} - fixed, every)
     return {name: finite_number(name, value) for name, value in {**start, **parameters}.items()}
+
+
+def _starts_of(state: State, settable: set[str]) -> dict[str, float]:
+    """The start values of an FMU of a mechanism in a state.
+
+    Positions and velocities of independent joints and states of components are set. Positions that
+    loops determine choose the branch.
+
+    Raises:
+        ModelError: the FMU has none of them.
+    """
+    positions = {f"{name}.{end}": x for name, x in state.q.items() for end in ("q", "solved")}
+    velocities = {f"{name}.v": x for name, x in state.v.items()}
+    found = {n: x for n, x in {**positions, **velocities, **state.z}.items() if n in settable}
+    if not found:
+        raise ModelError(
+            f"start: the FMU has none of the states of {state.name or 'the mechanism'}; give"
+            " values by the names of its variables"
+        )
+    return found
 
 
 def _settable(variable: Any) -> bool:
@@ -69,6 +91,13 @@ def check_names(what: str, given: Iterable[str], allowed: set[str], known: Itera
     for name in given:
         if name not in allowed:
             why = "cannot be set" if name in everything else "does not exist"
+            solved = f"{name.removesuffix('.q')}.solved"
+            if name not in everything and name.endswith(".q") and solved in allowed:
+                independent = ", ".join(sorted(n for n in allowed if n.endswith(".q")))
+                raise ModelError(
+                    f"{what}: {name} follows from the loops; give {independent}, and {solved} as a"
+                    " guess that chooses the branch"
+                )
             hint = did_you_mean(name, sorted(allowed))
             raise ModelError(f"{what}: variable {name!r} {why} here; {hint}")
 

@@ -29,7 +29,7 @@ from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.files import read_sealed, write_sealed
 from mbs.loops.analysis import rows_at
 from mbs.loops.closure import least_upright, rolling_discs
-from mbs.loops.configuration import Values, start, start_position, start_velocity
+from mbs.loops.configuration import Start, Values, start, start_position, start_velocity
 from mbs.loops.examine import row_independence
 from mbs.loops.velocity import constraint_jacobian, scales
 from mbs.models.contacts import (
@@ -60,12 +60,11 @@ from mbs.native.compiler import cache_dir
 from mbs.numbers import OnArrays, on_arrays
 from mbs.progress import progress
 from mbs.recursions.parts import part_event_names
-from mbs.result import Result
+from mbs.result import RecordedStates, Result, State
 from mbs.simulate.arguments import count_steps, positive
 from mbs.solvers import EventMotion, Events, integrate_events
 from mbs.solvers.integrate import is_compilable
-from mbs.solvers.limits import step_limits
-from mbs.solvers.problem import NO_LIMITS, IntegrationEvent, Passage, StepLimits, failed
+from mbs.solvers.problem import IntegrationEvent, Passage, failed
 from mbs.text import did_you_mean, quoted
 
 # Rigid stops and Coulomb friction in a simulation: how they start, and what a result says of them.
@@ -392,6 +391,7 @@ def integrate_legs(
     x0: Array,
     times: Array,
     p: Array,
+    modes: Array | None = None,
     **options: Any,
 ) -> tuple[list[Leg], Stop]:
     """The motion at given times, in one leg for most systems, and why it ends before the last.
@@ -402,6 +402,8 @@ def integrate_legs(
         x0: (nx,) state at the first time.
         times: (m,) s, increasing.
         p: (np,) parameters, then the inputs that are given for this motion.
+        modes: (k,) modes of rigid stops and Coulomb friction at the start; found by the positions
+            and velocities if left out.
         options: of `integrate`.
 
     Returns:
@@ -409,7 +411,7 @@ def integrate_legs(
         they do not: the message says when and in which configuration, and at a singular one the
         joint that the loops do not hold.
     """
-    legs, stop = _integrate(system, equations, x0, times, p, **options)
+    legs, stop = _integrate(system, equations, x0, times, p, modes, **options)
     if isinstance(stop, SolverError) and stop.state:
         q = np.array(stop.state[: system.nq])
         where = ", ".join(f"{c.name} = {x:.6g}" for c, x in zip(system.coordinates, q, strict=True))
@@ -459,6 +461,7 @@ def _integrate(
     x0: Array,
     times: Array,
     p: Array,
+    modes: Array | None,
     **options: Any,
 ) -> tuple[list[Leg], Stop]:
     state = equations(system)
@@ -469,7 +472,7 @@ def _integrate(
         if float(row_independence(system)(q, parameters)) < _SINGULAR:
             state = equations(rows_at(system, q, parameters))  # the start may be regular for others
     if len(contacts_of(system)):
-        return _with_contacts(system, state, x0, times, p, options)
+        return _with_contacts(system, state, x0, times, p, modes, options)
     discs = [disc.name for _, disc in rolling_discs(system)]
     if discs:
         upright = Limit(least_upright(system), _FLAT)
@@ -497,21 +500,15 @@ def _motion(
     p: Array,
     options: dict[str, Any],
 ) -> EventMotion:
-    """The motion as far as it comes; its steps end where laws jump or bend.
-
-    A condition that switches without end, as the sign of a velocity at rest, is not watched from
-    there on.
-    """
+    """The motion as far as it comes; its steps end where laws of components have bends."""
     rhs, project, passage = state.rhs, state.project, state.passage
     own, count, prepared = events, 0, state.prepared
-    limits, leave = _limits(state, times, p), None
     if state.crossings is not None:
-        own, wrapped = with_crossings(state, x0, times[0], events, p)
+        span = float(times[0]), float(times[-1])
+        own, wrapped = with_crossings(state, x0, span, events, p)
         rhs, project, passage = wrapped
         prepared = state.prepared.setdefault("runs with crossings", {})
-        count = state.crossings.numel_out(0)
-        first = 0 if events is None else events.indicators.numel_out(0)
-        leave = _Chatter(state, first, float(times[-1] - times[0]))
+        count = np.size(own.modes) - (0 if events is None else np.size(events.modes))
     motion = integrate_events(
         rhs,
         x0,
@@ -522,106 +519,40 @@ def _motion(
         passage=passage,
         partial=True,
         prepared=prepared,
-        limits=limits,
-        leave=leave,
+        stops=_stops(state, float(times[0]), float(times[-1]), p),
         **options,
     )
-    if not count:
-        return motion
-    found = _without_crossings(motion, events, count)
-    if motion.left is None:
-        return found
-    assert leave is not None
-    time, x = motion.left
-    going_on = events
-    if events is not None and found.events:
-        going_on = replace(events, modes=found.events[-1].modes)
-    rest = np.concatenate([[time], times[len(found.x) :]])
-    calm = leave.calm(motion.events)
-    after = _motion(calm, x.copy(), rest, going_on, p, options)
-    return replace(
-        after,
-        x=np.vstack([found.x, after.x[1:]]),
-        modes=np.vstack([found.modes, after.modes[1:]]),
-        events=(*found.events, *after.events),
-        first_slope=found.first_slope,
-    )
+    return _without_crossings(motion, events, count) if count else motion
 
 
-_MANY = 30
-"""Events by which a condition is known to switch without end: a law that holds switches once."""
-_SHORT = 1e-3
-"""Part of a motion in which so many events are switching without end, not a law that is fast."""
-
-
-class _Chatter:
-    """Whether conditions on states switch without end, and the equations that do not watch them."""
-
-    def __init__(self, state: FullState, first: int, duration: float) -> None:
-        assert state.crossings is not None
-        self._state, self._first, self._span = state, first, _SHORT * duration
-        pattern = state.crossings.jac_sparsity(0, 1)
-        rows = set(pattern.row())
-        sides = state.crossings.numel_out(0) - state.counts
-        # indicators of a count: below, then above
-        self._rows = [*range(sides + state.counts), *range(sides, sides + state.counts)]
-        self._of_states = frozenset(first + k for k, row in enumerate(self._rows) if row in rows)
-
-    def __call__(self, events: Sequence[IntegrationEvent]) -> bool:
-        """Whether the last events are switching without end."""
-        if len(events) < _MANY or events[-1].time - events[-_MANY].time > self._span:
-            return False
-        return all(set(event.fired) <= self._of_states for event in events[-_MANY:])
-
-    def calm(self, events: Sequence[IntegrationEvent]) -> FullState:
-        """The equations without the conditions of the last events."""
-        state = self._state
-        assert state.crossings is not None
-        left_out = {self._rows[k - self._first] for e in events[-_MANY:] for k in e.fired}
-        key = "calm", tuple(sorted(left_out))
-        if key not in state.prepared:
-            total = state.crossings.numel_out(0)
-            kept = [k for k in range(total) if k not in left_out]
-            counts = sum(k >= total - state.counts for k in kept)
-            crossings = None
-            if kept:
-                inputs = state.crossings.sx_in()
-                values = state.crossings.call(inputs)[0]
-                crossings = Function("crossings", inputs, [values[kept]])
-            state.prepared[key] = replace(state, crossings=crossings, counts=counts, prepared={})
-        made: FullState = state.prepared[key]
-        return made
-
-
-def _limits(state: FullState, times: Array, p: Array) -> StepLimits:
-    """The longest steps by what laws have of time; those of the last motion of equal length."""
-    if state.time_parts is None or len(times) < 2:
-        return NO_LIMITS
-    own = p[: state.time_parts.numel_in(1)]
-    asked = (float(times[0]), float(times[-1]), own.tobytes())
-    known = state.prepared.get("limits")
-    if known is None or known[0] != asked:
-        part = state.time_parts
-
-        def law(at: Array) -> Array:
-            return np.array(part(at.reshape(1, -1), np.tile(own[:, None], len(at))))
-
-        known = state.prepared["limits"] = asked, step_limits(law, asked[0], asked[1])
-    limits: StepLimits = known[1]
-    return limits
+def _stops(
+    state: FullState, begin: float, end: float, p: Array
+) -> tuple[Array, NDArray[np.bool_]] | None:
+    """Times at which laws of time jump, bend or are short; the last ones found are kept."""
+    if state.timing is None:
+        return None
+    own = p[: state.timing.p]
+    key = begin, end, own.tobytes()
+    known = state.prepared.get("stops")
+    if known is None or known[0] != key:
+        known = state.prepared["stops"] = key, state.timing.stops(begin, end, own)
+    found: tuple[Array, NDArray[np.bool_]] = known[1]
+    return found
 
 
 def with_crossings(
-    state: FullState, x0: Array, t0: float, events: Events | None, p: Array
+    state: FullState, x0: Array, span: tuple[float, float], events: Events | None, p: Array
 ) -> tuple[Events, tuple[Function, Function | None, Passage | None]]:
     """Events with the crossings behind them, and the functions of the state with their modes.
 
-    The mode of a crossing is its side, 1 or -1, or its count. The state does not jump there.
+    On which side of a crossing the motion is, 1 or -1, is its mode; nothing jumps there, so that
+    it does not matter whether a step stops a little before or behind it. The modes of sides and
+    counts are as `_guard` has them.
 
     Args:
         state: with crossings.
         x0: (nx,) at the start.
-        t0: time of it [s].
+        span: times of the start and the end [s].
         events: others; None where there are none.
         p: (np,) parameters, without modes.
     """
@@ -630,10 +561,14 @@ def with_crossings(
     if "crossings" not in state.prepared:
         state.prepared["crossings"] = _watch_crossings(state, events, len(x0), len(p), len(modes))
     (indicators, jump), functions = state.prepared["crossings"]
+    t0, end = span
     start = np.array(state.crossings(t0, x0, [*p, *modes]))[:, 0]
-    count = len(start) - state.counts
-    own = [*np.where(start[:count] > 0, 1.0, -1.0), *np.floor(start[count:])]
-    return Events(indicators, jump, [*modes, *own], _FIRST_STEP), functions
+    few = state.sides + state.counts
+    plain, sides, counts = np.split(start, [len(start) - few, len(start) - state.counts])
+    places = [*np.where(plain > 0, 1.0, -1.0), *np.sign(sides), *np.floor(counts)]
+    if few:  # awake, not in a row, since the start
+        places += [*np.zeros(2 * few), *np.full(few, t0), end - t0]
+    return Events(indicators, jump, [*modes, *places], _FIRST_STEP), functions
 
 
 def _watch_crossings(
@@ -649,37 +584,32 @@ def _watch_crossings(
         modes: number of the modes of the others.
     """
     assert state.crossings is not None
-    count, n_p = state.crossings.numel_out(0), own + modes
+    count, n_p, few = state.crossings.numel_out(0), own + modes, state.sides + state.counts
+    plain, more = count - few, _GUARD_MODES * few + 1 if few else 0
     first = 0 if events is None else events.indicators.numel_out(0)
+    ends = [0, first, first + plain, first + count + state.counts]
     t, x, pm, fired = (
         SX.sym(name, size)
-        for name, size in (
-            ("t", 1),
-            ("x", n),
-            ("p", n_p + count),
-            ("fired", first + count + state.counts),
-        )
+        for name, size in (("t", 1), ("x", n), ("p", n_p + plain + more), ("fired", ends[-1]))
     )
-    at, last = [t, x, pm[:n_p]], n_p + count - state.counts
-    _, sides, counts = casadi.vertsplit(pm, [0, n_p, last, n_p + count])
-    values, counted = casadi.vertsplit(state.crossings.call(at)[0], [0, sides.numel(), count])
+    parameters, sides, guards = casadi.vertsplit(pm, [0, n_p, n_p + plain, n_p + plain + more])
+    fired_first, fired_plain, fired_few = casadi.vertsplit(fired, ends)
+    at = [t, x, parameters]
 
     def wide(function: Function) -> Function:
         return Function(function.name(), [t, x, pm], function.call(at))
 
-    # a count is left where it falls below its integer, or reaches the next one
-    own_indicators = [sides * values, counted - counts, counts + 1 - counted]
-    indicators, state_after, after = [casadi.vertcat(*own_indicators)], x, [SX(0, 1)]
+    values, few_values = casadi.vertsplit(state.crossings.call(at)[0], [0, plain, count])
+    guarded, then = _guard(t, few_values, state.counts, guards, fired_few)
+    indicators = [sides * values, guarded]
+    state_after, after = x, [SX(0, 1)]
     if events is not None:
         indicators.insert(0, events.indicators.call(at)[0])
-        jumps = casadi.mmax(fired[:first])
-        there, *changed = events.jump.call([*at, fired[:first]])  # modes where there are some
+        jumps = casadi.mmax(fired_first)
+        there, *changed = events.jump.call([*at, fired_first])  # modes where there are some
         state_after = casadi.if_else(jumps, there, x)
-        after = [casadi.if_else(jumps, values, pm[own:n_p]) for values in changed]
-    end = first + sides.numel()
-    ends = [0, first, end, end + state.counts, end + 2 * state.counts]
-    _, passed, below, above = casadi.vertsplit(fired, ends)
-    after += [sides * (1 - 2 * passed), counts + above - below]
+        after = [casadi.if_else(jumps, now, pm[own:n_p]) for now in changed]
+    after += [casadi.if_else(fired_plain > 0, -sides, sides), then]
     watched = (
         Function("indicators", [t, x, pm], [casadi.vertcat(*indicators)]),
         Function("jump", [t, x, pm, fired], [state_after, casadi.vertcat(*after)]),
@@ -696,10 +626,88 @@ def _watch_crossings(
     return watched, (wide(state.rhs), project, passage)
 
 
-def _without_crossings(motion: EventMotion, events: Events | None, count: int) -> EventMotion:
-    """The motion with the modes and events of others alone."""
+_GUARD_MODES = 4
+"""Modes of a guarded crossing: its place, whether it is asleep, a number and a time."""
+_OFTEN = 4
+"""Number of crossings in a row after which a crossing is not watched for a while: a body that
+bounces between two sides of a law, or that comes to rest at a friction, passes it without end."""
+_CROWDED = 1e-5
+"""Part of the duration within which crossings follow each other in a row."""
+_SHORTEST_PAUSE, _LONGEST_PAUSE = 1e-6, 0.02
+"""Parts of the duration for which a crossing is not watched. The pauses double, so that 16 of them
+come to the longest one, and 50 of these to the duration."""
+
+
+def _guard(t: SX, values: SX, counts: int, modes: SX, fired: SX) -> tuple[SX, SX]:
+    """Indicators and next modes of crossings that may stay at zero or pass it without end.
+
+    The modes are, for all crossings, the places; whether they are asleep; numbers of crossings in a
+    row; times of the last changes. The last mode is the duration. A place is the side, 1 or -1, or
+    0 where the value is exactly zero, until it is not; of a count it is the whole number. A
+    crossing that was passed many times in a row sleeps for a pause, in which error control alone
+    follows the law.
+
+    Args:
+        t: time [s].
+        values: (k, 1) of the crossings, the counts last.
+        counts: number of counts.
+        modes: (4 k + 1, 1), empty where k is zero.
+        fired: (k + counts, 1) 1 for each indicator that is not positive: of the sides, of counts
+            that fall, of counts that rise.
+
+    Returns:
+        indicators (k + counts, 1) and modes.
+    """
+    k = values.numel()
+    if not k:
+        return SX(0, 1), SX(0, 1)
+    n = k - counts
+    places, asleep, row, last, duration = casadi.vertsplit(
+        modes, [0, k, 2 * k, 3 * k, 4 * k, 4 * k + 1]
+    )
+    side, count = casadi.vertsplit(places, [0, n, k])
+    on_side, counted = casadi.vertsplit(values, [0, n, k])
+    passed, falls, rises = casadi.vertsplit(fired, [0, n, k, k + counts])
+    # what is watched
+    pause = duration * casadi.fmin(_SHORTEST_PAUSE * 2**row, _LONGEST_PAUSE)
+    stays = casadi.if_else(on_side == 0, 1, -1)
+    awake = casadi.vertcat(
+        casadi.if_else(side == 0, stays, side * on_side), counted - count, count + 1 - counted
+    )
+    both = (
+        casadi.vertcat(asleep, casadi.vertsplit(asleep, [0, n, k])[1]),
+        casadi.vertcat(last + pause, casadi.vertsplit(last + pause, [0, n, k])[1]),
+    )
+    indicators = casadi.if_else(both[0], both[1] - t, awake)
+    # what follows
+    happened = casadi.vertcat(passed, casadi.fmax(falls, rises))
+    here = casadi.vertcat(casadi.sign(on_side), casadi.floor(counted))
+    beyond = casadi.vertcat(
+        casadi.if_else(side == 0, casadi.sign(on_side), -side), count + rises - falls
+    )
+    soon = casadi.logic_or(asleep, t - last < _CROWDED * duration)
+    in_row = casadi.if_else(soon, row + 1, 0)
+    tired = casadi.logic_and(casadi.logic_not(asleep), in_row > _OFTEN)
+    then = casadi.vertcat(
+        casadi.if_else(happened, casadi.if_else(asleep, here, beyond), places),
+        casadi.if_else(happened, tired, asleep),
+        casadi.if_else(happened, in_row, row),
+        casadi.if_else(happened, t, last),
+        duration,
+    )
+    return indicators, then
+
+
+def _without_crossings(motion: EventMotion, events: Events | None, modes: int) -> EventMotion:
+    """The motion with the modes and events of others alone.
+
+    Args:
+        motion: with crossings.
+        events: others; None where there are none.
+        modes: number of the modes of crossings.
+    """
     first = 0 if events is None else events.indicators.numel_out(0)
-    kept = motion.modes.shape[1] - count
+    kept = motion.modes.shape[1] - modes
     reported = tuple(
         replace(event, fired=others, modes=event.modes[:kept])
         for event in motion.events
@@ -765,10 +773,11 @@ def _with_contacts(
     x0: Array,
     times: Array,
     p: Array,
+    modes: Array | None,
     options: dict[str, Any],
 ) -> tuple[list[Leg], Stop]:
     assert state.events is not None
-    first = first_modes(system, x0, _own(system, p))
+    first = first_modes(system, x0, _own(system, p)) if modes is None else modes
     motion = _motion(state, x0, times, Events(*state.events, first), p, options)
     contact = ContactMotion(first, motion.modes, motion.events)
     reached = times[: len(motion.x)]
@@ -879,12 +888,13 @@ def prescribed_motions(system: System, motion: Motion) -> list[Prescribed]:
 def start_positions(
     system: System,
     motions: list[Prescribed],
-    q0: Values,
+    q0: Start,
     v0: Values,
     z0: Sequence[float],
     p: Sequence[float],
-) -> tuple[Values, Values]:
-    """The start of a motion, with what is prescribed of it at the time zero.
+    begin: float,
+) -> tuple[Start, Values]:
+    """The start of a motion, with what is prescribed of it at its first time.
 
     Args:
         system: open or closed.
@@ -893,25 +903,32 @@ def start_positions(
         v0: velocities by name.
         z0: (nz,) states of components at the start.
         p: (np,) parameters.
+        begin: the first time [s].
 
     Raises:
         ModelError: a start is given for what is prescribed, or not by name.
     """
     if not motions:
         return q0, v0
-    for what, given in (("q0", q0), ("v0", v0)):
-        if not isinstance(given, Mapping | None):
-            raise ModelError(
-                f"{system.name}: {what} is given as a sequence, beside motion; give a dict of names"
-            )
-    positions, velocities = dict(q0 or {}), dict(v0 or {})  # type: ignore[arg-type]
+    if isinstance(q0, State):
+        v0 = q0.v if v0 is None else v0
+        q0 = q0.q
+    positions, velocities = (_by_name(system, *given) for given in (("q0", q0), ("v0", v0)))
     for one in motions:
-        position, speed, _ = (float(value) for value in one.laws.call([DM(0), DM(z0), DM(p)]))
+        position, speed, _ = (float(value) for value in one.laws.call([DM(begin), DM(z0), DM(p)]))
         if one.position is not None:
             _put(system, positions, one.name, position, "q0")
         if one.holds_speed:
             _put(system, velocities, one.name, speed, "v0")
     return positions, velocities
+
+
+def _by_name(system: System, what: str, given: Values) -> dict[str, float]:
+    if not isinstance(given, Mapping | None):
+        raise ModelError(
+            f"{system.name}: {what} is given as a sequence, beside motion; give a dict of names"
+        )
+    return dict(given or {})
 
 
 def _put(system: System, values: dict[str, float], name: str, value: float, what: str) -> None:
@@ -1113,6 +1130,37 @@ def _chosen(system: System, every: Sequence[_Column], outputs: Sequence[str]) ->
     return [known[name] for name in outputs]
 
 
+def _state_names(system: System) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Names of positions, velocities and states of components."""
+    return (
+        tuple(row.name for row in system.coordinates),
+        tuple(row.name for row in system.speeds),
+        tuple(name for name, _ in system.states),
+    )
+
+
+def modes_of(legs: Sequence[Leg]) -> Array:
+    """(n, k) modes of rigid stops and Coulomb friction at the rows of a motion."""
+    contact = legs[0].contact  # a motion with contacts has one leg
+    return np.empty((sum(len(leg.times) for leg in legs), 0)) if contact is None else contact.modes
+
+
+def require_state_of(system: System, state: State) -> None:
+    """Refuse a state of another mechanism.
+
+    Raises:
+        ModelError: its names are not those of the system; the message says which.
+    """
+    wanted, given = _state_names(system), (tuple(state.q), tuple(state.v), tuple(state.z))
+    for what, own, other in zip(("positions", "velocities", "states"), wanted, given, strict=True):
+        if set(own) != set(other):
+            raise ModelError(
+                f"{system.name}: the state is of {state.name or 'another mechanism'} and has the"
+                f" {what} {', '.join(other) or '(none)'}; give one that has"
+                f" {', '.join(own) or '(none)'}"
+            )
+
+
 def _result(system: System, legs: Sequence[Leg], p: Array, stop: Stop, columns: _Columns) -> Result:
     times, x = np.concatenate([leg.times for leg in legs]), np.vstack([leg.x for leg in legs])
     nq, n, np_own = system.nq, system.nq + system.nv, len(system.parameters)
@@ -1142,6 +1190,7 @@ def _result(system: System, legs: Sequence[Leg], p: Array, stop: Stop, columns: 
         events=events,
         system=system,
         stopped=stopped,
+        states=RecordedStates(_state_names(system), x, modes_of(legs)),
     )
 
 
@@ -1231,9 +1280,10 @@ class Simulator:
         self,
         duration: float,
         *,
-        q0: Values = None,
+        q0: Start = None,
         v0: Values = None,
         z0: Mapping[str, float] | Sequence[float] | None = None,
+        guess: Mapping[str, float] | State | None = None,
         inputs: Mapping[str, float] | None = None,
         parameters: Mapping[str, float] | None = None,
         step: float = 0.01,
@@ -1248,6 +1298,7 @@ class Simulator:
             q0: as of `run`, likewise the others.
             v0: likewise.
             z0: likewise.
+            guess: likewise.
             inputs: values of those that the simulator has, the others zero or as described.
             parameters: as of `run`, likewise the others.
             step: likewise.
@@ -1267,10 +1318,15 @@ class Simulator:
         steps = count_steps(duration, positive(step, "step [s]", system.name), system.name)
         own = system.parameter_values(parameters)
         p = np.array([*own, *self._values(inputs)])
+        begin, modes = 0.0, None
+        if isinstance(q0, State):
+            require_state_of(system, q0)
+            begin, modes = q0.time, np.array(q0.modes)
+            z0 = dict(q0.z) if z0 is None else z0
         z = device_states(system, z0)
-        placed = start_positions(system, motions, q0, v0, z, own)
-        x0 = np.concatenate([*_started(system, *placed, p), z])
-        times = np.linspace(0.0, duration, steps + 1)
+        placed = start_positions(system, motions, q0, v0, z, own, begin)
+        x0 = np.concatenate([*_started(system, *placed, p, guess), z])
+        times = np.linspace(begin, begin + duration, steps + 1)
         rtol, atol = step_tolerances(tolerance)
         with progress(f"simulating {system.name}", 0.0, duration, quiet=quiet) as reached:
             legs, stop = integrate_legs(
@@ -1279,6 +1335,7 @@ class Simulator:
                 x0,
                 times,
                 p,
+                modes,
                 method=self._method,
                 rtol=rtol,
                 atol=atol,
@@ -1381,13 +1438,17 @@ def _simulator_of(*state: Any) -> Simulator:
     return made
 
 
-def _started(system: System, q0: Values, v0: Values, p: Array) -> tuple[Array, Array]:
+def _started(
+    system: System, q0: Start, v0: Values, p: Array, guess: Mapping[str, float] | State | None
+) -> tuple[Array, Array]:
     """The start of a motion; the last few are kept, for the next motion from the same one.
 
     So are positions alone: motions that differ in their velocities close the loops once.
     """
     own = _own(system, p)
     named = dict(zip((one.name for one in system.parameters), own, strict=True))
+    if guess is not None or isinstance(q0, State):
+        return start(system, q0, v0, named, guess)
     try:
         positions, velocities = (
             tuple(sorted(dict(given).items())) if isinstance(given, Mapping) else given
@@ -1413,12 +1474,13 @@ def run(
     system: System,
     duration: float,
     *,
-    q0: Values = None,
+    q0: Start = None,
     v0: Values = None,
     tau: Effort = None,
     motion: Motion = None,
     u: Effort = None,
     z0: Mapping[str, float] | Sequence[float] | None = None,
+    guess: Mapping[str, float] | State | None = None,
     parameters: Mapping[str, float] | None = None,
     step: float = 0.01,
     tolerance: float = 1e-8,
@@ -1440,7 +1502,9 @@ def run(
         duration: [s].
         q0: positions at the start by coordinate name [rad or m], the others as in the assembled
             configuration; in a closed system the loops are closed with the independent ones as
-            given.
+            given, and a complete configuration is taken as it is. Or a `State`, as
+            `Result.state` gives it: the motion goes on from there, at its time, with its
+            velocities, its states of components and its modes.
         v0: velocities at the start by name [rad/s or m/s], the others zero; in a closed system
             they may be of any joints, and the others follow.
         tau: joint efforts [N m or N]: constants of motors by name, or a function of (t, q, v) made
@@ -1455,6 +1519,8 @@ def run(
             device, or a function of (t, q, v) as for tau; zero when left out. What the devices
             deliver is added to tau.
         z0: states of devices at the start by name, such as `motor.i`, the others zero.
+        guess: approximate positions of other joints at the start, which choose the branch on which
+            the loops are closed.
         parameters: values of symbols, the others at their defaults.
         step: time between the rows of the result [s]; it does not change the accuracy.
         tolerance: what the error of the motion should stay near [rad, m, rad/s or m/s]. A step
@@ -1487,6 +1553,7 @@ def run(
         q0=q0,
         v0=v0,
         z0=z0,
+        guess=guess,
         parameters=parameters,
         step=step,
         tolerance=tolerance,

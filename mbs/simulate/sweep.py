@@ -29,7 +29,7 @@ from mbs.errors import ExportError, Interrupted, MbsError, ModelError, SolverErr
 from mbs.files import check_archive, path_of, write_text
 from mbs.numbers import doubles
 from mbs.progress import progress
-from mbs.result import Result, optional_module
+from mbs.result import Result, State, optional_module
 from mbs.simulate.fmu import fmu
 from mbs.simulate.fmu_variables import numbers_of
 from mbs.simulate.run import run, simulator_of
@@ -726,6 +726,15 @@ def _signals(system: System) -> dict[str, list[str]]:
 def _merge(options: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """Options of all cases, with the values of one."""
     merged = dict(options)
+    state = merged.get("q0")
+    if isinstance(state, State) and "q0" in given:
+        raise ModelError(
+            f"sweep: q0 is a state and the grid has {', '.join(given['q0'])}; give q0 as a dict of"
+            " independent joints"
+        )
+    if isinstance(state, State):  # else values of the grid would be the only ones
+        merged["v0"] = dict(state.v) if merged.get("v0") is None else merged["v0"]
+        merged["z0"] = dict(state.z) if merged.get("z0") is None else merged["z0"]
     for argument, values in given.items():
         common = {} if merged.get(argument) is None else merged[argument]
         if not isinstance(common, Mapping):

@@ -21,15 +21,12 @@ from mbs.native.compiler import flags_for
 from mbs.native.plain_source import plain_source
 from mbs.solvers.interpreted_run import run_interpreted
 from mbs.solvers.problem import (
-    NO_LIMITS,
     Equations,
     EventMotion,
     Events,
     IntegrationEvent,
     IntegrationProblem,
-    Leave,
     Passage,
-    StepLimits,
     equations,
     failed,
     fired_of,
@@ -132,10 +129,7 @@ def library_of(equations: Equations) -> ctypes.CDLL | None:
 
 
 def run_compiled(
-    library: ctypes.CDLL,
-    problem: IntegrationProblem,
-    progress: Progress | None,
-    leave: Leave | None = None,
+    library: ctypes.CDLL, problem: IntegrationProblem, progress: Progress | None
 ) -> EventMotion:
     """The motion at the times of a problem, as far as it comes.
 
@@ -145,7 +139,6 @@ def run_compiled(
         library: what `library_of` gave for its equations.
         problem: what to integrate.
         progress: called now and then with the time reached, s.
-        leave: asked after each event.
 
     Raises:
         SolverError: there is no memory for it.
@@ -156,7 +149,6 @@ def run_compiled(
     log: list[IntegrationEvent] = []
     stop: SolverError | Interrupted | None = None
     first: Array | None = None
-    left: tuple[float, Array] | None = None
     with _opened(library, problem) as driver:
         status = library.mbs_begin(driver, _pointer(x))
         if status <= _MORE and problem.equations.passage is not None:
@@ -175,9 +167,6 @@ def run_compiled(
                 )
                 if status == _FIRED:
                     log.append(_event(library, driver, problem))
-                    if leave is not None and leave(log):
-                        left = library.mbs_time(driver), x
-                        break
                 if progress is not None:
                     progress(library.mbs_time(driver))
         except KeyboardInterrupt:
@@ -191,7 +180,7 @@ def run_compiled(
                 blamed,
                 x.tolist(),
             )
-    return replace(problem.motion(table[: done.value], log, stop), first_slope=first, left=left)
+    return replace(problem.motion(table[: done.value], log, stop), first_slope=first)
 
 
 def _event(
@@ -223,7 +212,7 @@ def _load(path: Path, has_events: bool, has_passage: bool) -> ctypes.CDLL:
             ctypes.c_int,
             [handle, pointer, pointer, integer, pointer, ctypes.POINTER(integer), integer],
         ),
-        "mbs_limit": (None, [handle, integer, pointer, pointer]),
+        "mbs_stops": (None, [handle, pointer, pointer, integer]),
         "mbs_time": (real, [handle]),
         "mbs_step": (real, [handle]),
     }
@@ -245,6 +234,7 @@ def _opened(library: ctypes.CDLL, problem: IntegrationProblem) -> Iterator[ctype
     indicators = problem.equations.indicators
     afresh = problem.equations.first_step
     control = np.array([problem.rtol, problem.atol, problem.max_step, afresh])
+    ends, jumps = problem.stops[0], problem.stops[1].astype(float)  # kept while the driver lives
     driver = library.mbs_open(n, len(p), _pointer(p), _pointer(control), start)
     full = not driver
     try:
@@ -253,10 +243,8 @@ def _opened(library: ctypes.CDLL, problem: IntegrationProblem) -> Iterator[ctype
         if driver and not full and (through := problem.equations.passage) is not None:
             sizes = (ctypes.c_int * len(through.size))(*through.size)
             full = library.mbs_pass(driver, sizes, through.typical) != 0
-        if driver:
-            limits = problem.limits
-            begins, lengths = _pointer(limits.begins), _pointer(limits.lengths)
-            library.mbs_limit(driver, len(limits.begins), begins, lengths)
+        if driver and len(ends):
+            library.mbs_stops(driver, _pointer(ends), _pointer(jumps), len(ends))
         if full:
             raise SolverError(f"no memory is left to integrate {n} states; close other programs")
         yield driver
@@ -350,12 +338,11 @@ def integrate_events(
     rtol: float = 1e-8,
     atol: float = 1e-8,
     max_step: float = math.inf,
+    stops: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
     progress: Progress | None = None,
     compiled: bool = True,
     partial: bool = False,
     prepared: Prepared | None = None,
-    limits: StepLimits = NO_LIMITS,
-    leave: Leave | None = None,
 ) -> EventMotion:
     """States and modes at given times of a system whose state or equations jump at events.
 
@@ -380,14 +367,15 @@ def integrate_events(
         rtol: relative tolerance of the error of one step.
         atol: absolute tolerance of the error of one step, in the units of the states.
         max_step: the longest step, s; only the error limits it by default.
+        stops: times at which steps end, s, in increasing order, and for each whether functions may
+            jump there as functions of time. Up to such a time they are asked before it, then
+            behind it, and a step begins anew. None when left out.
         progress: called now and then with the time reached, s.
         compiled: False for the same algorithm in Python.
         partial: True for what was reached, with its `stop`, where the integration cannot go on or
             is interrupted by control-C; nothing is raised for that then.
         prepared: what an earlier call made of the same functions and method, and what this one
             makes is kept in; nothing is kept when left out.
-        limits: the longest steps in parts of the motion; max_step alone limits them by default.
-        leave: asked after each event whether to leave the motion there, which then has `left`.
 
     Returns:
         states, modes and the list of events.
@@ -406,11 +394,16 @@ def integrate_events(
         kept[key] = made, library_of(made) if key[1] else None
     functions, library = kept[key]
     modes = () if events is None else events.modes
-    given = problem(functions, x0, times, p, modes, (rtol, atol), max_step, limits)
-    if library is None:
-        motion = run_interpreted(given, progress, leave)
-    else:
-        motion = run_compiled(library, given, progress, leave)
+    given = problem(functions, x0, times, p, modes, (rtol, atol), max_step, stops)
+    motion = _run(given, library, progress)
     if motion.stop is not None and not partial:
         raise motion.stop
     return motion
+
+
+def _run(
+    given: IntegrationProblem, library: ctypes.CDLL | None, progress: Progress | None
+) -> EventMotion:
+    if library is None:
+        return run_interpreted(given, progress)
+    return run_compiled(library, given, progress)

@@ -1,7 +1,7 @@
 """Integrations run by the Python twins of the compiled driver."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import casadi
 import numpy as np
@@ -14,13 +14,12 @@ from mbs.solvers.problem import (
     Failure,
     IntegrationEvent,
     IntegrationProblem,
-    Leave,
     failed,
     fired_of,
     interrupted,
 )
 from mbs.solvers.rodas import Rodas
-from mbs.solvers.stepper import EPSILON, Array, Projection, RowTable, Stepper
+from mbs.solvers.stepper import EPSILON, Array, Projection, RowTable, Stepper, Stops
 
 # Location of events and jumps in plain Python: the twin of `native/runtime/events.c`.
 #
@@ -165,7 +164,12 @@ class EventStepper:
 
     def _step(self, limit: float) -> int:
         """One step, cut at its first event; returns how many were tried."""
-        solver, start, armed = self.solver, self.solver.t, self.armed.copy()
+        solver, start = self.solver, self.solver.t
+        if solver.pass_stop():
+            self._judge()
+            if self.due.any():
+                return 0
+        armed = self.armed.copy()
         tried = solver.step(limit)
         found, end = self._first_event(start), solver.t
         if found and found[0] < end and found[0] - start > AT_START * (end - start):
@@ -307,22 +311,18 @@ shortened."""
 _CHUNK = 50  # steps between two calls of progress
 
 
-def run_interpreted(
-    problem: IntegrationProblem, progress: Progress | None, leave: Leave | None = None
-) -> EventMotion:
+def run_interpreted(problem: IntegrationProblem, progress: Progress | None) -> EventMotion:
     """The motion at the times of a problem, as far as it comes.
 
     Args:
         problem: what to integrate.
         progress: called now and then with the time reached, s.
-        leave: asked after each event.
     """
     p = problem.p.copy()
     solver = _stepper(problem, p)
     table = RowTable(problem.times, np.empty((len(problem.times), len(problem.x0))))
     log: list[IntegrationEvent] = []
     stop: SolverError | Interrupted | None = None
-    left: tuple[float, Array] | None = None
     try:
         if solver.project is not None:
             solver.x = _begin(solver)
@@ -333,16 +333,13 @@ def run_interpreted(
             elif watched.fill(table, _CHUNK):
                 modes = p[len(p) - problem.modes :].copy()
                 log.append(IntegrationEvent(solver.t, fired_of(watched.fired), modes))
-                if leave is not None and leave(log):
-                    left = solver.t, solver.x
-                    break
             if progress is not None:
                 progress(solver.t)
     except SolverError as error:
         stop = error
     except KeyboardInterrupt:
         stop = interrupted(solver.t)
-    return replace(problem.motion(table.rows[: table.done], log, stop), left=left)
+    return problem.motion(table.rows[: table.done], log, stop)
 
 
 def _vector(value: casadi.DM) -> Array:
@@ -351,20 +348,22 @@ def _vector(value: casadi.DM) -> Array:
 
 def _stepper(problem: IntegrationProblem, p: Array) -> Stepper:
     functions, start, state = problem.equations, float(problem.times[0]), problem.x0
-    project = _projection(problem, p)
-    control = problem.rtol, problem.atol, problem.max_step, functions.first_step, problem.limits
+    stops = Stops(*problem.stops)
+    stops.start(start)
+    project = _projection(problem, p, stops)
+    control = problem.rtol, problem.atol, problem.max_step, functions.first_step
 
     def slope(t: float, x: Array) -> Array:
-        return _vector(functions.rhs(t, x, p))
+        return _vector(functions.rhs(stops.law_time(t), x, p))
 
     def jacobian(t: float, x: Array) -> tuple[Array, Array]:
         assert functions.jacobian is not None
-        J, f_t = functions.jacobian(t, x, p)
+        J, f_t = functions.jacobian(stops.law_time(t), x, p)
         return np.asarray(J.full()), _vector(f_t)
 
     if functions.jacobian is None:
-        return Dopri5(slope, project, start, state, *control)
-    return Rodas(slope, project, start, state, *control, jacobian=jacobian)
+        return Dopri5(slope, project, start, state, *control, stops=stops)
+    return Rodas(slope, project, start, state, *control, stops=stops, jacobian=jacobian)
 
 
 def _begin(solver: Stepper) -> Array:
@@ -376,7 +375,7 @@ def _begin(solver: Stepper) -> Array:
         raise failed(solver.t, 0.0, str(failure), state=solver.x.tolist()) from failure
 
 
-def _projection(problem: IntegrationProblem, p: Array) -> Projection | None:
+def _projection(problem: IntegrationProblem, p: Array, stops: Stops) -> Projection | None:
     """Newton steps until the constraints hold to rounding."""
     step = problem.equations.project
     if step is None:
@@ -385,7 +384,7 @@ def _projection(problem: IntegrationProblem, p: Array) -> Projection | None:
     def onto(t: float, x: Array) -> Array:
         for _ in range(ITERATIONS):
             try:
-                moved, residual = step(t, x, p)
+                moved, residual = step(stops.law_time(t), x, p)
             except RuntimeError as error:
                 raise Failure("projection") from error
             x = _vector(moved)
@@ -400,14 +399,14 @@ def _projection(problem: IntegrationProblem, p: Array) -> Projection | None:
 
 def _watch(problem: IntegrationProblem, p: Array, solver: Stepper) -> EventStepper | None:
     """The integration with its events, which has looked at the first state."""
-    functions, project = problem.equations, solver.project
+    functions, project, at = problem.equations, solver.project, solver.stops.law_time
     indicators, rates, jump = functions.indicators, functions.rates, functions.jump
     if indicators is None or rates is None or jump is None:
         return None
 
     def after(t: float, x: Array, fired: Flags) -> Array:
         try:
-            moved, modes = map(_vector, jump(t, x, p, fired))
+            moved, modes = map(_vector, jump(at(t), x, p, fired))
         except RuntimeError as error:
             raise Failure("jump") from error
         if not (np.isfinite(moved).all() and np.isfinite(modes).all()):
@@ -417,8 +416,8 @@ def _watch(problem: IntegrationProblem, p: Array, solver: Stepper) -> EventStepp
 
     watched = EventStepper(
         solver,
-        lambda t, x: _vector(indicators(t, x, p)),
-        lambda t, x: _vector(rates(t, x, p)),
+        lambda t, x: _vector(indicators(at(t), x, p)),
+        lambda t, x: _vector(rates(at(t), x, p)),
         after,
     )
     watched.start()

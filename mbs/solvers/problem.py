@@ -1,6 +1,6 @@
 """An integration, its functions brought into one form and its arguments checked."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import casadi
@@ -95,7 +95,6 @@ class EventMotion:
         stop: why not all the times were reached; None where they were.
         first_slope: (nx,) rates at the first time where constraints are dependent there, those of
             the branch that the motion leaves on; None elsewhere.
-        left: time and state at which the caller left the motion; None if it went on.
     """
 
     x: Array
@@ -103,7 +102,6 @@ class EventMotion:
     events: tuple[IntegrationEvent, ...]
     stop: SolverError | Interrupted | None = None
     first_slope: Array | None = None
-    left: tuple[float, Array] | None = None
 
 
 def fired_of(flags: npt.ArrayLike) -> tuple[int, ...]:
@@ -123,9 +121,6 @@ def modes_at(times: Array, first: Array, events: tuple[IntegrationEvent, ...]) -
     passed = np.searchsorted([event.time for event in events], times, side="right")
     return values[passed]
 
-
-Leave = Callable[[Sequence[IntegrationEvent]], bool]
-"""Whether to leave a motion, by its events so far."""
 
 METHODS = ("dopri5", "rodas")
 
@@ -173,22 +168,6 @@ class Equations:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StepLimits:
-    """The longest steps in parts of a motion, of which each lasts until the next one begins.
-
-    Attributes:
-        begins: (k,) times at which the parts begin, increasing [s].
-        lengths: (k,) the longest step in each part [s].
-    """
-
-    begins: Array
-    lengths: Array
-
-
-NO_LIMITS = StepLimits(np.empty(0), np.empty(0))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class IntegrationProblem:
     """An integration, its arguments checked.
 
@@ -201,7 +180,8 @@ class IntegrationProblem:
         rtol: relative tolerance of the error of one step.
         atol: absolute tolerance of the error of one step.
         max_step: the longest step, s.
-        limits: the longest steps in parts of the motion.
+        stops: times at which steps end, s, in increasing order; whether laws of time may jump
+            there, so that a step begins anew.
     """
 
     equations: Equations
@@ -212,7 +192,7 @@ class IntegrationProblem:
     rtol: float
     atol: float
     max_step: float
-    limits: StepLimits
+    stops: tuple[Array, npt.NDArray[np.bool_]]
 
     def motion(
         self, x: Array, log: Sequence[IntegrationEvent], stop: SolverError | Interrupted | None
@@ -344,7 +324,7 @@ def problem(
     modes: npt.ArrayLike,
     tolerances: tuple[float, float],
     max_step: float,
-    limits: StepLimits,
+    stops: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
 ) -> IntegrationProblem:
     """The integration of given functions.
 
@@ -356,7 +336,7 @@ def problem(
         modes: (nm,) at the first time.
         tolerances: relative and absolute tolerance of the error of one step.
         max_step: the longest step, s; infinite when only the error limits it.
-        limits: the longest steps in parts of the motion.
+        stops: as in `IntegrationProblem`; none when left out.
 
     Raises:
         ModelError: an argument does not fit the functions.
@@ -380,9 +360,14 @@ def problem(
         raise ModelError(f"integrate: tolerances {rtol!r} and {atol!r} must be positive numbers")
     if not (isinstance(max_step, (int, float)) and max_step > 0):
         raise ModelError(f"integrate: the longest step {max_step!r} must be a positive number, s")
-    return IntegrationProblem(
-        functions, x, t, np.concatenate([own, m]), len(m), rtol, atol, max_step, limits
-    )
+    ends = np.empty(0) if stops is None else numbers(stops[0])
+    jumps = np.ones(len(ends), bool) if stops is None else np.array(stops[1], dtype=bool).ravel()
+    if len(jumps) != len(ends) or not np.isfinite(ends).all() or np.any(np.diff(ends) <= 0):
+        raise ModelError(
+            "integrate: stops must be finite times in increasing order, and as many flags"
+        )
+    every = np.concatenate([own, m])
+    return IntegrationProblem(functions, x, t, every, len(m), rtol, atol, max_step, (ends, jumps))
 
 
 def numbers(values: npt.ArrayLike) -> Array:

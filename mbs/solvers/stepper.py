@@ -8,13 +8,13 @@ change there.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from mbs.solvers.problem import MAX_STEPS, NO_LIMITS, Failure, StepLimits, failed
+from mbs.solvers.problem import MAX_STEPS, Failure, failed
 
 Array = npt.NDArray[np.float64]
 RightHandSide = Callable[[float, Array], Array]
@@ -34,6 +34,59 @@ not by that of times later on."""
 UNMOVED = 0.01
 """Part of the tolerances by which a projection may move the state and leave the slope that the
 method ends with: its error is then a hundredth of the one that is allowed."""
+
+ASIDE = 1e3 * EPSILON
+"""Part of the time that laws are asked beside a jump: a few roundings of arithmetic on times."""
+GAP = 0.25
+"""Part of the time between two jumps that this is at most."""
+
+
+@dataclass(slots=True)
+class Stops:
+    """Times at which steps end.
+
+    Attributes:
+        times: (m,) s, increasing.
+        hard: (m,) whether laws of time may jump there, so that a step begins anew.
+        next: index of the first one that lies ahead.
+        side: laws of time are asked between these times: on one side of their jumps.
+    """
+
+    times: Array
+    hard: npt.NDArray[np.bool_]
+    next: int = 0
+    side: tuple[float, float] = (-math.inf, math.inf)
+
+    def start(self, t: float) -> None:
+        """Begin at a time."""
+        self.next = int(np.searchsorted(self.times, t, side="right"))
+        self._find_side(t)
+
+    def limit(self, limit: float) -> float:
+        """The next stop, or a limit before it."""
+        return min(limit, float(self.times[self.next])) if self.next < len(self.times) else limit
+
+    def pass_at(self, t: float) -> bool:
+        """Go on behind a stop at a time, if there is one; whether laws of time may have jumped."""
+        first = self.next
+        self.next += int(np.searchsorted(self.times[first:], t, side="right"))
+        jumps = bool(self.hard[first : self.next].any())
+        if jumps:
+            self._find_side(t)
+        return jumps
+
+    def law_time(self, t: float) -> float:
+        """A time moved to the side of the jumps of laws on which the present step is."""
+        return min(max(t, self.side[0]), self.side[1])
+
+    def _find_side(self, t: float) -> None:
+        jumps = self.times[self.hard]
+        place = int(np.sum(self.hard[: self.next]))
+        first = float(jumps[place - 1]) if place else -math.inf
+        last = float(jumps[place]) if place < len(jumps) else math.inf
+        end = abs(float(self.times[-1])) if len(self.times) else 0.0
+        aside = min(ASIDE * max(end, abs(t)), GAP * (last - first))
+        self.side = first + aside, last - aside
 
 
 @dataclass(slots=True)
@@ -76,7 +129,7 @@ class Stepper(ABC):
         t: present time.
         x: present state, (n,).
         max_step: the longest step, s.
-        limits: the longest steps in parts of the motion.
+        stops: times at which steps end.
         afresh: length of the first step after a jump, s; estimated where 0.
         h: step that error control wants next; 0 before the first one.
         slope: slope at the present state, or None when it is not known.
@@ -93,7 +146,6 @@ class Stepper(ABC):
     atol: float
     max_step: float = math.inf
     afresh: float = 0.0
-    limits: StepLimits = NO_LIMITS
     h: float = 0.0
     error: float = LEAST_ERROR
     since_output: int = 0
@@ -102,6 +154,7 @@ class Stepper(ABC):
     moved: bool = False
     slope: Array | None = None
     dense: tuple[Array, ...] = ()
+    stops: Stops = field(default_factory=lambda: Stops(np.empty(0), np.empty(0, bool)))
 
     @abstractmethod
     def _open(self, slope: Array) -> None:
@@ -166,6 +219,13 @@ class Stepper(ABC):
         """Go on from another state at the present time, with a new first step."""
         self.x, self.slope, self.h, self.error = x, None, self.afresh, LEAST_ERROR
 
+    def pass_stop(self) -> bool:
+        """Go on behind a stop at the present time; whether laws of time may have jumped there."""
+        jumps = self.stops.pass_at(self.t)
+        if jumps:
+            self.restart(self.x)
+        return jumps
+
     def step(self, limit: float) -> int:
         """Try steps towards limit until one is accepted.
 
@@ -176,6 +236,8 @@ class Stepper(ABC):
             Failure: none can be accepted.
         """
         tried = 0
+        self.pass_stop()
+        limit = self.stops.limit(limit)
         slope = self._opened(limit)
         while True:
             self.since_output += 1
@@ -192,17 +254,8 @@ class Stepper(ABC):
             self._open(self.slope)
         if self.h <= 0.0:
             self.h = self._first_step(self.slope, limit - self.t)
-        self.h = self._longest_step(min(self.h, self.max_step))
+        self.h = min(self.h, self.max_step)
         return self.slope
-
-    def _longest_step(self, h: float) -> float:
-        """The longest step from now. It may enter a later part by no more than a step of that."""
-        begins, lengths = self.limits.begins, self.limits.lengths
-        for k in range(max(int(np.searchsorted(begins, self.t, "right")) - 1, 0), len(begins)):
-            if begins[k] >= self.t + h:
-                break
-            h = min(h, max(begins[k] - self.t, lengths[k]))
-        return h
 
     def _try_step(self, slope: Array, limit: float) -> bool:
         # a rest of a hundredth of a step is taken along, as in DOPRI5

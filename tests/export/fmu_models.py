@@ -6,7 +6,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from mbs.export.fmu.description import FmuModel, FmuVariable, Jumps, State
+from mbs.export.fmu.description import FmuModel, FmuState, FmuVariable, Jumps
 from mbs.solvers import integrate
 
 
@@ -26,9 +26,9 @@ def point_of(states: int, inputs: int, parameters: int) -> Point:
     return Point(*(ca.SX.sym(name, n) for name, n in zip("txzup", sizes, strict=True)))
 
 
-def moving(name: str, unit: str, rate: str, description: str, **options: float) -> State:
+def moving(name: str, unit: str, rate: str, description: str, **options: float) -> FmuState:
     """A state that is an output too."""
-    return State(
+    return FmuState(
         name=name,
         unit=unit,
         derivative_unit=rate,
@@ -52,7 +52,7 @@ def pendulum() -> FmuModel:
         name="damped pendulum",
         description="A pendulum with damping & torque",
         states=(
-            State(
+            FmuState(
                 name="j1.q",
                 unit="rad",
                 derivative_unit="rad/s",
@@ -60,7 +60,7 @@ def pendulum() -> FmuModel:
                 description="angle",
                 output=True,
             ),
-            State(
+            FmuState(
                 name="j1.v",
                 unit="rad/s",
                 derivative_unit="rad/s2",
@@ -107,7 +107,7 @@ def slider_crank() -> FmuModel:
         name="slider_crank",
         description="A slider driven by a crank",
         states=(
-            State(
+            FmuState(
                 name="crank.q",
                 description="angle of the crank",
                 unit="rad",
@@ -115,7 +115,7 @@ def slider_crank() -> FmuModel:
                 start=0.3,
                 output=True,
             ),
-            State(
+            FmuState(
                 name="crank.v",
                 description="angular velocity of the crank",
                 unit="rad/s",
@@ -343,7 +343,7 @@ def logarithm() -> FmuModel:
     }
     return FmuModel(
         name="logarithm",
-        states=(State(name="x", start=1.0, output=True),),
+        states=(FmuState(name="x", start=1.0, output=True),),
         rhs=ca.Function("rhs", symbols, [ca.SX(-1), ca.SX(0, 1)]),
         jumps=Jumps(modes=(FmuVariable(name="x.mode"),), names=("x",), **made),
     )

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from mbs.export.fmu.description import FmuModel, FmuVariable, Jumps, State
+from mbs.export.fmu.description import FmuModel, FmuState, FmuVariable, Jumps
 
 
 def ball(jumps=True):
@@ -15,8 +15,8 @@ def ball(jumps=True):
     return FmuModel(
         name="ball",
         states=(
-            State(name="h", unit="m", start=1.0, output=True),
-            State(name="v", unit="m/s", start=0.0),
+            FmuState(name="h", unit="m", start=1.0, output=True),
+            FmuState(name="v", unit="m/s", start=0.0),
         ),
         inputs=(FmuVariable(name="push", unit="m/s2"),),
         outputs=(
@@ -60,7 +60,7 @@ def two_cranks(coupled):
     t, u = ca.SX.sym("t"), ca.SX.sym("u", 0)
     return FmuModel(
         name="cranks",
-        states=(State(name="a", unit="rad"), State(name="b", unit="rad")),
+        states=(FmuState(name="a", unit="rad"), FmuState(name="b", unit="rad")),
         outputs=(FmuVariable(name="s1", unit="m"), FmuVariable(name="s2", unit="m")),
         parameters=(FmuVariable(name="l1", start=3.0), FmuVariable(name="l2", start=3.0)),
         dependents=tuple(

@@ -17,7 +17,7 @@ from fmu_models import MODELS, crank_reference, pendulum, slider_crank
 
 from mbs.errors import CompilerError, ExportError
 from mbs.export.fmu import fmi2_xml
-from mbs.export.fmu.description import FmuVariable, State
+from mbs.export.fmu.description import FmuState, FmuVariable
 from mbs.export.fmu.pack import FACES, write_fmu
 from mbs.native import find_compiler
 
@@ -132,7 +132,7 @@ def test_a_failing_compiler_leaves_the_old_file(tmp_path, monkeypatch):
         ({"inputs": (FmuVariable(name="time"),)}, "'time' is the name of time itself; use another"),
         ({"inputs": (FmuVariable(name="u", unit="lb"),)}, "unit 'lb'; use one of"),
         ({"inputs": (FmuVariable(name="u", start=float("nan")),)}, "u starts at nan"),
-        ({"states": (State(name="a", nominal=0.0), State(name="b"))}, "nominal 0.0"),
+        ({"states": (FmuState(name="a", nominal=0.0), FmuState(name="b"))}, "nominal 0.0"),
         ({"dependents": (FmuVariable(name="z"),)}, "rhs has inputs"),
         ({"closure": slider_crank().closure}, "0 dependent coordinates need no closure"),
         ({"tolerance": 0.0}, "tolerance 0.0 must be positive"),

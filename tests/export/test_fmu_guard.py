@@ -6,7 +6,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from fmu_instances import Fmu
 
-from mbs.export.fmu.description import FmuModel, FmuVariable, State
+from mbs.export.fmu.description import FmuModel, FmuState, FmuVariable
 from mbs.export.fmu.pack import write_fmu
 
 
@@ -19,7 +19,7 @@ def bent(change, rows=None):
     rows = ca.Function("slopes", [x, z, p], [ca.SX(1.0) if rows is None else rows(x)])
     return FmuModel(
         name="bent",
-        states=(State(name="x", output=True),),
+        states=(FmuState(name="x", output=True),),
         outputs=(FmuVariable(name="v"), FmuVariable(name="a")),
         dependents=(FmuVariable(name="z"),),
         rhs=ca.Function("rhs", [t, x, z, u, p], [ca.SX(1.0), ca.vertcat(v, 0.0)]),

@@ -20,7 +20,7 @@ from fmu_structures import ball
 
 import mbs
 from mbs.errors import ExportError
-from mbs.export.fmu.description import About, FmuModel, FmuVariable, State
+from mbs.export.fmu.description import About, FmuModel, FmuState, FmuVariable
 from mbs.export.fmu.documentation import MBS
 from mbs.export.fmu.pack import write_fmu
 from mbs.export.fmu.reference import FOLDER, reference_files
@@ -58,7 +58,7 @@ def oscillator(**changes):
     t, x, z, u, p = (ca.SX.sym(n, k) for n, k in zip("txzup", (1, 2, 0, 1, 1), strict=True))
     values = {
         "name": "oscillator",
-        "states": (State(name="x", start=1.0, output=True), State(name="v")),
+        "states": (FmuState(name="x", start=1.0, output=True), FmuState(name="v")),
         "inputs": (FmuVariable(name="u", start=2.0),),
         "outputs": (FmuVariable(name="shifted"),),
         "parameters": (FmuVariable(name="k", start=4.0),),
@@ -126,7 +126,7 @@ def test_a_motion_that_ends_early_has_no_reference():
     t, x, z, u, p = (ca.SX.sym(n, k) for n, k in zip("txzup", (1, 1, 0, 0, 0), strict=True))
     burst = FmuModel(
         name="burst",
-        states=(State(name="x", start=1.0, output=True),),
+        states=(FmuState(name="x", start=1.0, output=True),),
         rhs=ca.Function("rhs", [t, x, z, u, p], [x**2, ca.SX(0, 1)]),
         stop_time=3.0,
     )
@@ -135,7 +135,7 @@ def test_a_motion_that_ends_early_has_no_reference():
 
 
 def test_a_start_beyond_a_stop_has_no_reference():
-    states = (State(name="h", unit="m", start=-1.0, output=True), ball().states[1])
+    states = (FmuState(name="h", unit="m", start=-1.0, output=True), ball().states[1])
     with pytest.raises(ExportError, match="start values are beyond floor"):
         reference_files(dataclasses.replace(ball(), states=states))
 
@@ -296,7 +296,7 @@ def test_a_full_disk_leaves_what_was_there(code, tmp_path, monkeypatch):
 
 
 def test_nothing_is_written_where_the_reference_fails(tmp_path):
-    states = (State(name="h", unit="m", start=-1.0, output=True), ball().states[1])
+    states = (FmuState(name="h", unit="m", start=-1.0, output=True), ball().states[1])
     with pytest.raises(ExportError, match="beyond floor"):
         write_fmu(dataclasses.replace(ball(), states=states), tmp_path / "x.fmu", reference=True)
     assert not list(tmp_path.iterdir())

@@ -11,7 +11,7 @@ from fmu_models import pendulum, slider_crank
 
 from mbs.errors import ExportError
 from mbs.export.fmu import fmi2_xml, fmi3_xml
-from mbs.export.fmu.description import FmuModel, FmuVariable, State
+from mbs.export.fmu.description import FmuModel, FmuState, FmuVariable
 from mbs.export.fmu.pack import write_fmu
 
 MODELS = {"pendulum": pendulum, "slider_crank": slider_crank}
@@ -23,7 +23,7 @@ def stiff():
     xdot = -p * (x - ca.cos(t)) - ca.sin(t)
     return FmuModel(
         name="stiff",
-        states=(State(name="x", start=1.0, output=True, description="state"),),
+        states=(FmuState(name="x", start=1.0, output=True, description="state"),),
         parameters=(FmuVariable(name="rate", unit="1/s", start=1e6, description="how fast"),),
         rhs=ca.Function("rhs", [t, x, z, u, p], [xdot, ca.SX(0, 1)]),
     )

@@ -12,7 +12,7 @@ from lxml import etree
 
 import mbs
 from mbs.errors import ExportError
-from mbs.export.fmu.description import FmuModel, FmuVariable, State
+from mbs.export.fmu.description import FmuModel, FmuState, FmuVariable
 from mbs.export.fmu.pack import write_fmu
 
 SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
@@ -263,7 +263,7 @@ def test_a_unit_of_another_size_is_another_unit(parts, tmp_path):
     model = FmuModel(
         name="lag",
         rhs=ca.Function("lag", inputs, [inputs[3] - x, x]),
-        states=(State(name="x"),),
+        states=(FmuState(name="x"),),
         inputs=(FmuVariable(name="u", unit="m"),),
         outputs=(FmuVariable(name="y", unit="m"),),
     )

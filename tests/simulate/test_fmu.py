@@ -10,7 +10,7 @@ import pytest
 
 import mbs
 from mbs.errors import ModelError, SolverError
-from mbs.export.fmu.description import FmuModel, FmuVariable, Jumps, State
+from mbs.export.fmu.description import FmuModel, FmuState, FmuVariable, Jumps
 from mbs.export.fmu.pack import write_fmu
 from mbs.result import Result
 from mbs.simulate.fmu import fmu
@@ -27,8 +27,8 @@ def spring():
     return FmuModel(
         name="spring",
         states=(
-            State(name="s", unit="m", derivative_unit="m/s", start=1.0, output=True),
-            State(name="v", unit="m/s", derivative_unit="m/s2"),
+            FmuState(name="s", unit="m", derivative_unit="m/s", start=1.0, output=True),
+            FmuState(name="v", unit="m/s", derivative_unit="m/s2"),
         ),
         inputs=(FmuVariable(name="push", unit="N"),),
         outputs=(FmuVariable(name="force", unit="N"),),
@@ -72,8 +72,8 @@ def ball():
     return FmuModel(
         name="ball",
         states=(
-            State(name="h", unit="m", start=1.0, derivative_unit="m/s", output=True),
-            State(name="v", unit="m/s", derivative_unit="m/s2", output=True),
+            FmuState(name="h", unit="m", start=1.0, derivative_unit="m/s", output=True),
+            FmuState(name="v", unit="m/s", derivative_unit="m/s2", output=True),
         ),
         parameters=(FmuVariable(name="restitution", start=0.5, min=0.0, max=1.0),),
         rhs=ca.Function(

@@ -15,9 +15,9 @@ from mbs.components import (
     custom,
 )
 from mbs.errors import ModelError
+from mbs.models.state.laws import conditions_of, time_laws
+from mbs.native.compiler import compiler_found
 from mbs.solvers import integrate, integrate_events
-from mbs.solvers.limits import step_limits
-from mbs.solvers.problem import StepLimits
 
 PULSES = [(round(begin, 3), 0.5) for begin in np.linspace(0.503, 19.103, 20)]
 
@@ -200,26 +200,126 @@ def test_a_law_that_switches_without_end_does_not_stop_what_the_steps_can_follow
     assert result["i.q"][-1] == pytest.approx(1.0, abs=1e-6)
 
 
-def test_smooth_laws_have_no_limits_and_short_ones_fine_steps_near_the_pulse_alone():
-    def of(law):
-        return step_limits(law, 0.0, 20.0)
+def stops_of(law, end=20.0):
+    """Times at which steps end for a law of time, and whether it may jump there."""
+    t, nothing = casadi.SX.sym("t"), casadi.SX(0, 1)
+    found = time_laws(conditions_of(casadi.SX(law(t)), t, nothing, nothing), t, nothing)
+    return (np.empty(0), np.empty(0, bool)) if found is None else found.stops(0.0, end, [])
 
-    assert len(of(lambda t: 3 - 2 * t).begins) == 0
-    assert len(of(lambda t: np.sin(0.1 * t)).begins) == 0
-    short = of(lambda t: np.exp(-(((t - 9.7) / 0.02) ** 2)))
-    near = np.abs(short.begins - 9.7) < 0.1
-    assert short.lengths[near].max() < 0.1
-    assert short.lengths[~near].max() > 4
-    assert len(short.begins) < 30
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        lambda t: 3 - 2 * t,
+        lambda t: casadi.sin(0.1 * t),
+        lambda t: casadi.sin(7 * t) + t**2,
+        lambda t: 5.0 + 0 * t,
+    ],
+)
+def test_laws_without_short_changes_end_no_steps(law):
+    assert len(stops_of(law)[0]) == 0
+
+
+def test_a_short_law_ends_a_step_before_the_pulse_alone():
+    times, jumps = stops_of(lambda t: casadi.exp(-(((t - 9.7) / 0.02) ** 2)))
+    assert not jumps.any()
+    assert len(times) < 5
+    assert np.abs(times - 9.7).max() < 0.04
+
+
+def test_jumps_are_found_exactly():
+    times, jumps = stops_of(lambda t: casadi.if_else(casadi.fmod(t, 1) < 0.001, 1, 0), 3.0)
+    assert jumps.all()
+    np.testing.assert_allclose(times, [0.001, 1, 1.001, 2, 2.001], rtol=1e-14)
+    times, _ = stops_of(lambda t: casadi.if_else(t < 5.3, 1, casadi.sign(7.1 - t)))
+    assert times.tolist() == [5.3, 7.1]
+    narrow, _ = stops_of(lambda t: casadi.if_else(casadi.sin(t) > 1 - 1e-12, 1, 0), 3.0)
+    half = np.arccos(1 - 1e-12)
+    np.testing.assert_allclose(narrow[[0, -1]], [np.pi / 2 - half, np.pi / 2 + half], atol=1e-9)
+    fast, _ = stops_of(lambda t: casadi.if_else(casadi.sin(2 * np.pi * 500 * t) > 0.9, 1, 0), 4.0)
+    assert len(fast) == 4000
 
 
 @pytest.mark.parametrize("method", ["dopri5", "rodas"])
 @pytest.mark.parametrize("compiled", [True, False])
-def test_limits_hold_in_their_parts(method, compiled):
+def test_steps_end_at_stops(method, compiled):
     t, x = casadi.SX.sym("t"), casadi.SX.sym("x")
-    rhs = casadi.Function("rhs", [t, x], [casadi.exp(-(((t - 2.2) / 1e-3) ** 2))])
     whole = {"method": method, "compiled": compiled}
-    assert integrate(rhs, [0.0], [0.0, 10.0], **whole)[-1, 0] == pytest.approx(0.0, abs=1e-12)
-    limits = StepLimits(np.array([0.0, 2.19, 2.21]), np.array([9.0, 1e-3, 9.0]))
-    motion = integrate_events(rhs, [0.0], [0.0, 10.0], None, limits=limits, **whole)
+    pulse = casadi.Function("rhs", [t, x], [casadi.exp(-(((t - 2.2) / 1e-3) ** 2))])
+    assert integrate(pulse, [0.0], [0.0, 10.0], **whole)[-1, 0] == pytest.approx(0.0, abs=1e-12)
+    motion = integrate_events(pulse, [0.0], [0.0, 10.0], None, stops=([2.199], [False]), **whole)
     assert motion.x[-1, 0] == pytest.approx(1e-3 * np.sqrt(np.pi), rel=1e-6)
+    jump = casadi.Function("rhs", [t, x], [casadi.if_else(t > 0.1 * 3, -(x**2), 1)])
+    motion = integrate_events(jump, [0.0], [0.0, 0.3, 1.0], None, stops=([0.3], [True]), **whole)
+    np.testing.assert_allclose(motion.x[:, 0], [0, 0.3, 0.3 / (1 + 0.3 * 0.7)], atol=1e-8)
+
+
+@pytest.mark.parametrize("stops", [([1.0, 0.5], [1, 1]), ([1.0], []), ([np.nan], [True])])
+def test_stops_are_increasing_times(stops):
+    t, x = casadi.SX.sym("t"), casadi.SX.sym("x")
+    rhs = casadi.Function("rhs", [t, x], [-x])
+    with pytest.raises(ModelError, match="stops must be finite times in increasing order"):
+        integrate_events(rhs, [0.0], [0.0, 10.0], None, stops=stops)
+
+
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-8])
+@pytest.mark.parametrize("speed", [1.0, 10.0, 100.0])
+@pytest.mark.parametrize("width", [0.1, 0.01, 0.001])
+def test_a_smooth_potential_well_is_met_at_speed(width, speed, tolerance):
+    class Well(Custom):
+        flange = custom.flange()
+
+        def energy(self, at):
+            """Energy that is low near an angle."""
+            return -30 * casadi.exp(-(((at.flange.angle - 5.003) / width) ** 2))
+
+    duration = 10 / speed
+    result = mbs.simulate.run(
+        shaft(Well("well")), duration, v0={"i": speed}, tolerance=tolerance, quiet=True
+    )
+    x = np.linspace(5.003 - 8 * width, 5.003 + 8 * width, 100_001)
+    inside = np.sqrt(speed**2 + 60 * np.exp(-(((x - 5.003) / width) ** 2)))
+    ahead = speed * np.trapezoid(1 / speed - 1 / inside, x)
+    assert result["i.q"][-1] - 10 == pytest.approx(ahead, abs=10 * tolerance)
+    assert result["i.v"][-1] == pytest.approx(speed, abs=10 * tolerance)
+
+
+def test_pulses_of_many_widths_in_sums_have_their_whole_effect():
+    for width in (0.1, 1e-3, 1e-6):
+        speed = last_speed(
+            lambda t, q, v: 50 * casadi.sin(0.1 * t) + casadi.exp(-(((t - 5) / width) ** 2)),  # noqa: B023
+            10.0,
+        )
+        exact = 500 * (1 - np.cos(1.0)) + width * np.sqrt(np.pi)
+        assert speed == pytest.approx(exact, abs=1e-7)
+
+
+@pytest.mark.parametrize("method", ["dopri5", "rodas"])
+@pytest.mark.parametrize("compiler", [True, False])
+def test_jumps_in_time_cost_no_accuracy(method, compiler, monkeypatch):
+    monkeypatch.setitem(
+        integrate_events.__globals__, "compiler_found", lambda: compiler and compiler_found()
+    )
+    speed = last_speed(
+        lambda t, q, v: casadi.if_else(casadi.sin(2 * np.pi * t) > 0, 1.0, -0.9),
+        5.0,
+        method=method,
+        tolerance=1e-5,
+    )
+    assert speed == pytest.approx(0.25, abs=1e-12)
+
+
+def test_counts_of_states_are_crossed_one_by_one():
+    """A detent torque with a jump at each tenth of a radian."""
+    result = mbs.simulate.run(
+        shaft(), 3.0, v0={"i": 5.0}, u=lambda t, q, v: -casadi.floor(10 * q[0]) / 10, quiet=True
+    )
+    finer = mbs.simulate.run(
+        shaft(),
+        3.0,
+        v0={"i": 5.0},
+        u=lambda t, q, v: -casadi.floor(10 * q[0]) / 10,
+        tolerance=1e-11,
+        quiet=True,
+    )
+    np.testing.assert_allclose(result["i.q"], finer["i.q"], atol=1e-7)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from mbs.export.fmu.description import Array, FmuEntry, FmuModel, FmuVariable, Kind, State
+from mbs.export.fmu.description import Array, FmuEntry, FmuModel, FmuState, FmuVariable, Kind
 from mbs.export.fmu.xml import KINDS, DependencyKind, Known
 
 
@@ -89,7 +89,7 @@ def in_arrays(model: FmuModel, groups: Iterable[Group]) -> FmuModel:
     names = {variable.name for variables in changed.values() for variable in variables}
     return replace(
         model,
-        states=tuple(v for v in changed["state"] if isinstance(v, State)),
+        states=tuple(v for v in changed["state"] if isinstance(v, FmuState)),
         inputs=tuple(changed["input"]),
         outputs=tuple(changed["output"]),
         dependents=tuple(changed["dependent"]),

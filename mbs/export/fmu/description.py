@@ -302,7 +302,7 @@ class FmuVariable:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class State(FmuVariable):
+class FmuState(FmuVariable):
     """A continuous state and its derivative.
 
     Attributes:
@@ -486,7 +486,7 @@ class FmuModel:
     rhs: casadi.Function
     description: str = ""
     origin: Origin = Origin()
-    states: tuple[State, ...] = ()
+    states: tuple[FmuState, ...] = ()
     inputs: tuple[FmuVariable, ...] = ()
     outputs: tuple[FmuVariable, ...] = ()
     parameters: tuple[FmuVariable, ...] = ()
@@ -519,7 +519,7 @@ class FmuModel:
         return self.tree is not None and self.tree.passes and self.jumps is None
 
     @property
-    def slots(self) -> tuple[State, ...]:
+    def slots(self) -> tuple[FmuState, ...]:
         """The states where the integrator is outside and loops are closed.
 
         They are the states of the independent joints but near singular configurations, so joints
@@ -529,7 +529,7 @@ class FmuModel:
             return ()
         text = "{}, or near singular configurations a coordinate along the motion"
         return tuple(
-            State(
+            FmuState(
                 name=f"state[{k}]",
                 start=state.start,
                 nominal=state.nominal,
@@ -592,7 +592,7 @@ class FmuModel:
         return place
 
 
-def derivative_of(state: State) -> FmuVariable:
+def derivative_of(state: FmuState) -> FmuVariable:
     """The derivative of a state, as a variable.
 
     Args:

@@ -16,7 +16,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import ExportError
-from mbs.export.fmu.description import FmuModel, FmuVariable, State
+from mbs.export.fmu.description import FmuModel, FmuState, FmuVariable
 from mbs.export.fmu.documentation import about
 from mbs.export.fmu.pack import require_version, require_writable, write_fmu
 from mbs.export.fmu.variables import parameters
@@ -109,7 +109,7 @@ def _model(chain: FrameChain, every: StepSequence | Function, start: np.ndarray)
     entries = [("xyz"[k], T[k, 3], "m") for k in range(3)]
     entries += [(f"R{r + 1}{c + 1}", T[r, c], "1") for r in range(3) for c in range(3)]
     states = [
-        State(
+        FmuState(
             name=f"{coordinate.name}.last",
             unit=coordinate.unit,
             start=float(start[index]),

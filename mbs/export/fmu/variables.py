@@ -10,7 +10,7 @@ from mbs.assembly import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, RATE_UNIT, Coordinate
 from mbs.components.custom import Friction, OneWay
 from mbs.errors import ModelError
-from mbs.export.fmu.description import FmuVariable, Jumps, State, once
+from mbs.export.fmu.description import FmuState, FmuVariable, Jumps, once
 from mbs.models.contacts import contacts_of
 from mbs.models.geometry import terminal_frame
 from mbs.models.state.drive import InputMotion
@@ -26,11 +26,11 @@ WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 """Elements of a wrench."""
 
 
-def states(system: System, state: MinimalState, start: Sequence[float]) -> tuple[State, ...]:
+def states(system: System, state: MinimalState, start: Sequence[float]) -> tuple[FmuState, ...]:
     """Positions and velocities of the independent joints, and states of devices."""
     rates = {speed.name: speed.unit for speed in system.speeds}
     positions = [
-        State(
+        FmuState(
             name=f"{coordinate.name}.q",
             unit=coordinate.unit,
             start=value,
@@ -45,7 +45,7 @@ def states(system: System, state: MinimalState, start: Sequence[float]) -> tuple
     ]
     sizes = {coordinate.name: _size(coordinate) for coordinate in system.coordinates}
     velocities = [
-        State(
+        FmuState(
             name=f"{speed.name}.v",
             unit=speed.unit,
             nominal=sizes.get(speed.name, 1.0),
@@ -56,7 +56,7 @@ def states(system: System, state: MinimalState, start: Sequence[float]) -> tuple
         for speed in (system.speeds[k] for k in state.velocities)
     ]
     own = [
-        State(
+        FmuState(
             name=name,
             unit=unit,
             description=f"state of {name.rpartition('.')[0]}",

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import casadi
 
-from mbs.export.fmu.description import WITH_START, FmuEntry, FmuModel, Kind, State, is_structured
+from mbs.export.fmu.description import WITH_START, FmuEntry, FmuModel, FmuState, Kind, is_structured
 from mbs.units import UNITS
 from mbs.version import __version__
 
@@ -432,7 +432,7 @@ def variable_attributes(reference: int, entry: FmuEntry) -> dict[str, str]:
     }
     if v.description:
         attributes["description"] = v.description
-    if isinstance(v, State) and v.output:
+    if isinstance(v, FmuState) and v.output:
         attributes["causality"] = "output"
     if entry.kind in _INITIAL:
         attributes["initial"] = "approx" if v.guess else _INITIAL[entry.kind]

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.tree import norm_rows, normalised, position_rate, quaternion_slices
-from mbs.expressions.conditions import law_conditions, time_parts
 from mbs.loops.closing import constraint_sizes, relative_rows
 from mbs.loops.closure import closure_rows, independent_closure
 from mbs.loops.velocity import (
@@ -45,6 +44,7 @@ from mbs.models.state.independent import (
     point_of,
     with_laws,
 )
+from mbs.models.state.laws import TimeLaws, conditions_of, distinct, time_laws
 from mbs.models.state.signals import GivenInput, Prescribed
 from mbs.models.symbols import dense_function, outputs_of, part_equations, state_count
 from mbs.recursions.parts import PartsAt, after_events
@@ -527,10 +527,13 @@ class FullState:
         events: `indicators(t, x, p) -> g` and `jump(t, x, p, fired) -> (x, modes)` of rigid stops
             and Coulomb friction, whose modes are then the last of p; None where there are none.
         passage: for steps through singular configurations of the loops; None where there are none.
-        crossings: `crossings(t, x, p)`, values by which laws change: at a sign of the first ones,
-            at an integer of the last ones; None if no law changes.
-        counts: how many values of crossings have integers.
-        time_parts: `time_parts(t, p)`, what laws have of time alone; None if they have none.
+        crossings: `crossings(t, x, p)`, what passes through zero where laws jump or bend; None
+            where there is nothing. First those that components give, then sides, then counts.
+        sides: number of the crossings that may stay at zero or pass it without end, such as the
+            velocity in a law of dry friction.
+        counts: number of the last crossings, at whose whole numbers laws jump.
+        timing: what efforts, inputs and prescribed motions say of the time alone; None where they
+            say nothing.
         prepared: what integrations keep between runs.
     """
 
@@ -540,8 +543,9 @@ class FullState:
     events: tuple[Function, Function] | None = None
     passage: Passage | None = None
     crossings: Function | None = None
+    sides: int = 0
     counts: int = 0
-    time_parts: Function | None = None
+    timing: TimeLaws | None = None
     prepared: dict[Any, Any] = field(default_factory=dict)
 
 
@@ -567,7 +571,6 @@ def full_state(
     t, x = SX.sym("t"), casadi.vertcat(SX.sym("x", n), system.z)
     q, v, z, p = x[:nq], x[nq:n], x[n:], system.p
     tau = SX.zeros(system.nv) if effort is None else casadi.densify(effort(t, q, v, p))
-    tau_of_law = SX(tau)
     u = SX(DM(system.u_default)) if inputs is None else casadi.densify(SX(inputs(t, q, v, p)))
     for one in given:
         symbol = SX.sym(one.name)
@@ -591,14 +594,11 @@ def full_state(
     observed = [a, tau, u, y, contact_efforts, E, U, openness]
     keeps = system.is_closed or motions or touch or quaternion_slices(system.tree)
     corrected = [casadi.vertcat(*kept, z), residual]
-    given_p, p = p, casadi.vertcat(p, contact.values) if contact else p
-    prescribed = [one.law(t, system.z, system.p)[one.order] for one in motions]
-    laws = casadi.vertcat(tau_of_law, u, *prescribed)
-    found = law_conditions(laws, t, x) + parts.conditions(x)
-    timed = time_parts(laws, t, casadi.vertcat(x, system.u))
-    of_time = dense_function("time_parts", [t, given_p], [timed]) if timed.numel() else None
-    crossed = casadi.vertcat(parts.crossings(), found.sides, found.counts)
-    rate, crossed, *observed = with_inputs(system, [rate, crossed, *observed], u)
+    p = casadi.vertcat(p, contact.values) if contact else p
+    signals = effort, inputs
+    timing, sides, counts = _law_conditions(system, (t, q, v), u, signals, motions, parts)
+    crossed = casadi.vertcat(parts.crossings(), sides, counts)
+    rate, *observed = with_inputs(system, [rate, *observed], u)
     return FullState(
         rhs=dense_function("rhs", [t, x, p], [rate]),
         project=dense_function("project", [t, x, p], corrected) if keeps else None,
@@ -606,9 +606,53 @@ def full_state(
         events=_events(system, contact, parts, [t, x, p], u),
         passage=through,
         crossings=dense_function("crossings", [t, x, p], [crossed]) if crossed.numel() else None,
-        counts=found.counts.numel(),
-        time_parts=of_time,
+        sides=sides.numel(),
+        counts=counts.numel(),
+        timing=timing,
     )
+
+
+def _law_conditions(
+    system: System,
+    point: tuple[SX, SX, SX],
+    u: SX,
+    signals: Sequence[Function | None],
+    motions: Sequence[Prescribed],
+    parts: PartsAt,
+) -> tuple[TimeLaws | None, SX, SX]:
+    """What laws say of the time alone, and sides and counts at which they jump or bend.
+
+    Args:
+        system: open or closed.
+        point: t, q and v.
+        u: (nu, 1) values of the inputs of components.
+        signals: functions of (t, q, v, p).
+        motions: coordinates that drives move along laws.
+        parts: all components.
+    """
+    t, q, v = point
+    values = [signal(t, q, v, system.p) for signal in signals if signal is not None]
+    values += [law for one in motions for law in one.law(t, system.z, system.p)]
+    constants = casadi.vertcat(system.p, parts.modes())
+    found = conditions_of(casadi.vertcat(SX(0, 1), *values), t, q, constants)
+    own = conditions_of(parts.laws(), SX(0, 1), q, constants)
+    crossings, counts = with_inputs(system, own.crossings, u), with_inputs(system, own.counts, u)
+    given = parts.crossings()
+    known = casadi.vertsplit(given) if given.numel() else []
+    states = casadi.vertcat(q, v, system.z)
+    results = []
+    for every, others, of_time in (
+        ([*found.crossings, *crossings], known, found.zeros),
+        ([*found.counts, *counts], [], found.wholes),
+    ):
+        kept = list[SX]()
+        for value in distinct(every, others):
+            if casadi.depends_on(value, states):
+                kept.append(value)
+            elif casadi.depends_on(value, t):
+                of_time.append(value)
+        results.append(casadi.vertcat(SX(0, 1), *kept))
+    return time_laws(found, t, system.p), results[0], results[1]
 
 
 def _events(

@@ -78,6 +78,7 @@ typedef int (*work_of)(integer *, integer *, integer *, integer *);
 typedef int (*value_of)(const double **, double **, integer *, double *, int);
 
 static int call(driver *d, value_of f, double t, const double *x, double *first, double *second) {
+    t = stepper_law_time(&d->solver, t);
     d->arg[0] = &t;
     d->arg[1] = x;
     d->arg[2] = d->p;
@@ -144,6 +145,7 @@ static int jump(void *user, double t, double *x, const double *fired) {
 static int rows(void *user, double t, const double *x, const passage_rows *r) {
     driver *d = user;
     double *const to[] = {r->position, r->slope, r->J, r->b, r->c, r->N, r->bend, r->rank};
+    t = stepper_law_time(&d->solver, t);
     d->arg[0] = &t;
     d->arg[1] = x;
     d->arg[2] = d->p;
@@ -274,13 +276,6 @@ EXPORT driver *mbs_open(int n, int n_p, const double *p, const double *control, 
     return d;
 }
 
-/* Before mbs_begin; the arrays stay with the caller. */
-EXPORT void mbs_limit(driver *d, integer count, const double *begins, const double *lengths) {
-    d->solver.limits = (long)count;
-    d->solver.limit_begins = begins;
-    d->solver.limit_lengths = lengths;
-}
-
 EXPORT int mbs_begin(driver *d, double *x) {
     double t = stepper_time(&d->solver);
     if (d->solver.project && d->solver.project(d, t, x)) return STEPPER_PROJECTION_FAILED;
@@ -303,6 +298,12 @@ EXPORT int mbs_table(driver *d, double *x, const double *times, long long count,
 #endif
     *done = filled;
     return status;
+}
+
+/* Before mbs_begin: steps end at these times; hard: 1 where laws of time may jump. The arrays stay
+ * with the caller. */
+EXPORT void mbs_stops(driver *d, const double *stops, const double *hard, long long count) {
+    stepper_stop_at(&d->solver, stops, hard, (long)count);
 }
 
 EXPORT double mbs_time(const driver *d) { return stepper_time(&d->solver); }

@@ -259,7 +259,9 @@ static int stop_at_event(events *e, double *x, double event) {
 int events_step(events *e, double *x, double limit) {
     stepper *s = e->solver;
     double start = stepper_time(s), event = HUGE_VAL;
-    int status = events_look(e, x);
+    int status;
+    if (stepper_pass_stop(s)) events_restart(e);
+    status = events_look(e, x);
     if (status || events_pending(e)) return status;
     copy(e, at_start(e), armed(e));
     status = stepper_step(s, x, limit);

@@ -10,6 +10,10 @@ enum { TIME, STEP, ERROR, SLOPE_VALID, LAST_STEP, LAST_END, SLOPE };
 static const double SAFETY = 0.9, SHRINK = 0.2, GROW = 10.0, BETA = 0.04;
 static const double NEAR_ZERO = 1e-10; /* part of the limit below which time counts as zero */
 
+/* Part of the time that laws are asked beside a jump: a few roundings of arithmetic on times. */
+static const double ASIDE = 1e3 * DBL_EPSILON;
+static const double GAP = 0.25; /* part of the time between two jumps that this is at most */
+
 static const double UNMOVED = 0.01; /* part of the tolerances that a move is not worth a slope */
 
 void stepper_init(stepper *s, int n, const stepper_method *method, stepper_rhs rhs, void *user,
@@ -44,6 +48,43 @@ void stepper_fix(stepper *s, double h) { s->h_max = s->fixed = h; }
 void stepper_restart_afresh(stepper *s) {
     stepper_restart(s);
     s->memory[STEP] = s->fixed > 0.0 ? s->fixed : s->afresh;
+}
+
+/* Between which times laws are asked until the next stop at which they may jump. */
+static void find_side(stepper *s) {
+    long before = s->next - 1, after = s->next;
+    double first, last, aside, end = s->n_stops ? fabs(s->stops[s->n_stops - 1]) : 0.0;
+    while (before >= 0 && s->hard[before] == 0.0) before--;
+    while (after < s->n_stops && s->hard[after] == 0.0) after++;
+    first = before >= 0 ? s->stops[before] : -HUGE_VAL;
+    last = after < s->n_stops ? s->stops[after] : HUGE_VAL;
+    aside = fmin(ASIDE * fmax(end, fabs(s->memory[TIME])), GAP * (last - first));
+    s->from = first + aside;
+    s->to = last - aside;
+}
+
+void stepper_stop_at(stepper *s, const double *stops, const double *hard, long count) {
+    s->stops = stops;
+    s->hard = hard;
+    s->n_stops = count;
+    for (s->next = 0; s->next < count && stops[s->next] <= s->memory[TIME]; s->next++) continue;
+    find_side(s);
+}
+
+int stepper_pass_stop(stepper *s) {
+    int jumps = 0;
+    if (s->next >= s->n_stops || s->memory[TIME] < s->stops[s->next]) return 0;
+    for (; s->next < s->n_stops && s->stops[s->next] <= s->memory[TIME]; s->next++)
+        jumps |= s->hard[s->next] > 0.0;
+    if (jumps) {
+        find_side(s);
+        stepper_restart_afresh(s);
+    }
+    return jumps;
+}
+
+double stepper_law_time(const stepper *s, double t) {
+    return s->n_stops ? fmin(fmax(t, s->from), s->to) : t;
 }
 
 double stepper_time(const stepper *s) { return s->memory[TIME]; }
@@ -127,21 +168,6 @@ static int accept(stepper *s, double *x, double t_new, double h) {
     return STEPPER_OK;
 }
 
-/* The longest step from a time. It may enter a later part by no more than a step of that part. */
-static double longest_step(const stepper *s, double t, double h) {
-    long k = 0, end = s->limits;
-    while (end - k > 1) { /* the part of the time t */
-        long middle = k + (end - k) / 2;
-        if (s->limit_begins[middle] <= t)
-            k = middle;
-        else
-            end = middle;
-    }
-    for (; k < s->limits && s->limit_begins[k] < t + h; k++)
-        h = fmin(h, fmax(s->limit_begins[k] - t, s->limit_lengths[k]));
-    return h;
-}
-
 static int open_step(stepper *s, const double *x, double limit) {
     double *m = s->memory;
     if (m[SLOPE_VALID] == 0.0) {
@@ -152,7 +178,7 @@ static int open_step(stepper *s, const double *x, double limit) {
         m[SLOPE_VALID] = 1.0;
     }
     if (m[STEP] <= 0.0) m[STEP] = first_step(s, x, limit - m[TIME]);
-    m[STEP] = longest_step(s, m[TIME], fmin(m[STEP], s->h_max));
+    m[STEP] = fmin(m[STEP], s->h_max);
     return STEPPER_OK;
 }
 
@@ -193,7 +219,10 @@ static int try_step(stepper *s, double *x, double limit) {
 }
 
 int stepper_step(stepper *s, double *x, double limit) {
-    int status = open_step(s, x, limit);
+    int status;
+    stepper_pass_stop(s);
+    if (s->next < s->n_stops) limit = fmin(limit, s->stops[s->next]);
+    status = open_step(s, x, limit);
     while (!status) {
         if (s->since_output++ >= s->max_steps) return STEPPER_TOO_MANY_STEPS;
         status = try_step(s, x, limit);

@@ -61,8 +61,6 @@ struct stepper {
     double fixed;  /* length of all steps; 0: error control finds it */
     double afresh; /* length of the first step after a jump; 0: it is estimated */
     const double *nominal; /* typical size of each state, which scales atol; NULL: 1 */
-    long limits; /* the longest steps in parts of the motion, which begin at these times */
-    const double *limit_begins, *limit_lengths;
     long max_steps;
     double *memory, *work;
     long steps, rejected, since_output;
@@ -71,6 +69,10 @@ struct stepper {
     int cut;         /* the present attempt ends at a limit */
     int kept_closed; /* the candidate is on the constraints: nothing projects it */
     int corrected;   /* whether the last projection changed the candidate beyond tolerances */
+    const double *stops; /* (n_stops) increasing times at which steps end; or NULL */
+    const double *hard;  /* 1 where laws of time may jump, so that a step begins anew; 0 elsewhere */
+    long n_stops, next;  /* the next one is the first that lies ahead */
+    double from, to;     /* laws of time are asked between these: on one side of their jumps */
 };
 
 /* What the init of a method calls. max_steps and h_max are then 100000 and infinite. */
@@ -87,6 +89,15 @@ void stepper_fix(stepper *s, double h);
 
 /* The state jumped: the step size is found anew too, where it is neither fixed nor given. */
 void stepper_restart_afresh(stepper *s);
+
+/* After stepper_start: steps end at these times. The arrays stay with the caller. */
+void stepper_stop_at(stepper *s, const double *stops, const double *hard, long count);
+
+/* Go on behind a stop at the present time, if there is one. 1: laws of time may have jumped there. */
+int stepper_pass_stop(stepper *s);
+
+/* A time moved to the side of the jumps of laws on which the present step is. */
+double stepper_law_time(const stepper *s, double t);
 
 double stepper_time(const stepper *s);
 double stepper_wanted_step(const stepper *s);

@@ -503,6 +503,7 @@ def follow_configuration(
         raise Unclosable(_ended(line, q, 0.0, "meets others"))
     side, s, step = line.side(q, 0.0), 0.0, min(_LARGEST_STEP, line.length)
     while s < line.length:
+        # a remaining part below 1 % of a step belongs to this step
         to = line.length if s + 1.01 * step >= line.length else s + step
         reached = _step(line, (q, slope, side), s, to)
         if reached is not None:
@@ -560,9 +561,9 @@ def _line(
         )
     length = float(np.max(change / scales, initial=0.0))
     if not np.array_equal(*parameters):
-        relative = np.abs(parameters[1] - parameters[0])
-        relative = relative / np.maximum(np.abs(parameters[0]), np.abs(parameters[1])).clip(1e-300)
-        length = max(length, float(np.nanmax(relative, initial=0.0)))
+        size = np.maximum(np.abs(parameters[0]), np.abs(parameters[1]))
+        moved = np.abs(parameters[1] - parameters[0])[size > 0] / size[size > 0]
+        length = max(length, float(np.nanmax(moved, initial=0.0)))
     return _Line(system, locked, (first, ends[1]), parameters, length, scales)
 
 

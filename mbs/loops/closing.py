@@ -561,8 +561,8 @@ def _line(
         )
     length = float(np.max(change / scales, initial=0.0))
     if not np.array_equal(*parameters):
-        size = np.maximum(np.abs(parameters[0]), np.abs(parameters[1]))
-        moved = np.abs(parameters[1] - parameters[0])[size > 0] / size[size > 0]
+        largest = np.maximum(np.abs(parameters[0]), np.abs(parameters[1]))
+        moved = np.abs(parameters[1] - parameters[0])[largest > 0] / largest[largest > 0]
         length = max(length, float(np.nanmax(moved, initial=0.0)))
     return _Line(system, locked, (first, ends[1]), parameters, length, scales)
 

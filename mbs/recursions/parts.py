@@ -377,11 +377,17 @@ class PartsAt:
             first += len(part.states)
         return found
 
-    def crossings(self) -> SX:
-        """(nc, 1) what passes through zero where the laws of components have bends."""
+    def crossings(self, *, of_contacts: bool = True) -> SX:
+        """(nc, 1) what passes through zero where the laws of components have bends.
+
+        Args:
+            of_contacts: whether those of contacts and curves of this package count too.
+        """
         found = [SX(0, 1)]
         for part in self.parts:
-            if part.element.has("crossings"):
+            own = type(part.element).__module__
+            is_contact = own.startswith("mbs.") and own != "mbs.components.sources"
+            if part.element.has("crossings") and (of_contacts or not is_contact):
                 found += map(SX, part.element.crossings(self.at(part)).values())
         return casadi.vertcat(*found)
 

@@ -43,6 +43,7 @@ from mbs.models.contacts import (
 from mbs.models.direct_dynamics import hybrid_dynamics
 from mbs.models.inverse_dynamics import bias
 from mbs.models.measurements import measurements
+from mbs.models.state.crossings import GUARD_MODES, guard, ticks_of
 from mbs.models.state.signals import (
     Effort,
     LawArgument,
@@ -547,7 +548,7 @@ def with_crossings(
 
     On which side of a crossing the motion is, 1 or -1, is its mode; nothing jumps there, so that
     it does not matter whether a step stops a little before or behind it. The modes of sides and
-    counts are as `_guard` has them.
+    counts are as `guard` has them; the last mode is the duration.
 
     Args:
         state: with crossings.
@@ -562,12 +563,14 @@ def with_crossings(
         state.prepared["crossings"] = _watch_crossings(state, events, len(x0), len(p), len(modes))
     (indicators, jump), functions = state.prepared["crossings"]
     t0, end = span
+    duration = end - t0 or 1.0  # a motion of one time has no events
     start = np.array(state.crossings(t0, x0, [*p, *modes]))[:, 0]
     few = state.sides + state.counts
     plain, sides, counts = np.split(start, [len(start) - few, len(start) - state.counts])
     places = [*np.where(plain > 0, 1.0, -1.0), *np.sign(sides), *np.floor(counts)]
     if few:  # awake, not in a row, since the start
-        places += [*np.zeros(2 * few), *np.full(few, t0), end - t0]
+        begin = float(math.floor(ticks_of(t0, duration)))
+        places += [*np.zeros(2 * few), *np.full(few, begin), duration]
     return Events(indicators, jump, [*modes, *places], _FIRST_STEP), functions
 
 
@@ -585,7 +588,7 @@ def _watch_crossings(
     """
     assert state.crossings is not None
     count, n_p, few = state.crossings.numel_out(0), own + modes, state.sides + state.counts
-    plain, more = count - few, _GUARD_MODES * few + 1 if few else 0
+    plain, more = count - few, GUARD_MODES * few + 1 if few else 0
     first = 0 if events is None else events.indicators.numel_out(0)
     ends = [0, first, first + plain, first + count + state.counts]
     t, x, pm, fired = (
@@ -600,7 +603,10 @@ def _watch_crossings(
         return Function(function.name(), [t, x, pm], function.call(at))
 
     values, few_values = casadi.vertsplit(state.crossings.call(at)[0], [0, plain, count])
-    guarded, then = _guard(t, few_values, state.counts, guards, fired_few)
+    *own_modes, duration = (
+        casadi.vertsplit(guards, [0, GUARD_MODES * few, more]) if few else [guards, guards]
+    )
+    guarded, then = guard(t, few_values, state.counts, own_modes[0], fired_few, duration)
     indicators = [sides * values, guarded]
     state_after, after = x, [SX(0, 1)]
     if events is not None:
@@ -609,7 +615,7 @@ def _watch_crossings(
         there, *changed = events.jump.call([*at, fired_first])  # modes where there are some
         state_after = casadi.if_else(jumps, there, x)
         after = [casadi.if_else(jumps, now, pm[own:n_p]) for now in changed]
-    after += [casadi.if_else(fired_plain > 0, -sides, sides), then]
+    after += [casadi.if_else(fired_plain > 0, -sides, sides), then, duration]
     watched = (
         Function("indicators", [t, x, pm], [casadi.vertcat(*indicators)]),
         Function("jump", [t, x, pm, fired], [state_after, casadi.vertcat(*after)]),
@@ -624,78 +630,6 @@ def _watch_crossings(
         )
     project = None if state.project is None else wide(state.project)
     return watched, (wide(state.rhs), project, passage)
-
-
-_GUARD_MODES = 4
-"""Modes of a guarded crossing: its place, whether it is asleep, a number and a time."""
-_OFTEN = 4
-"""Number of crossings in a row after which a crossing is not watched for a while: a body that
-bounces between two sides of a law, or that comes to rest at a friction, passes it without end."""
-_CROWDED = 1e-5
-"""Part of the duration within which crossings follow each other in a row."""
-_SHORTEST_PAUSE, _LONGEST_PAUSE = 1e-6, 0.02
-"""Parts of the duration for which a crossing is not watched. The pauses double, so that 16 of them
-come to the longest one, and 50 of these to the duration."""
-
-
-def _guard(t: SX, values: SX, counts: int, modes: SX, fired: SX) -> tuple[SX, SX]:
-    """Indicators and next modes of crossings that may stay at zero or pass it without end.
-
-    The modes are, for all crossings, the places; whether they are asleep; numbers of crossings in a
-    row; times of the last changes. The last mode is the duration. A place is the side, 1 or -1, or
-    0 where the value is exactly zero, until it is not; of a count it is the whole number. A
-    crossing that was passed many times in a row sleeps for a pause, in which error control alone
-    follows the law.
-
-    Args:
-        t: time [s].
-        values: (k, 1) of the crossings, the counts last.
-        counts: number of counts.
-        modes: (4 k + 1, 1), empty where k is zero.
-        fired: (k + counts, 1) 1 for each indicator that is not positive: of the sides, of counts
-            that fall, of counts that rise.
-
-    Returns:
-        indicators (k + counts, 1) and modes.
-    """
-    k = values.numel()
-    if not k:
-        return SX(0, 1), SX(0, 1)
-    n = k - counts
-    places, asleep, row, last, duration = casadi.vertsplit(
-        modes, [0, k, 2 * k, 3 * k, 4 * k, 4 * k + 1]
-    )
-    side, count = casadi.vertsplit(places, [0, n, k])
-    on_side, counted = casadi.vertsplit(values, [0, n, k])
-    passed, falls, rises = casadi.vertsplit(fired, [0, n, k, k + counts])
-    # what is watched
-    pause = duration * casadi.fmin(_SHORTEST_PAUSE * 2**row, _LONGEST_PAUSE)
-    stays = casadi.if_else(on_side == 0, 1, -1)
-    awake = casadi.vertcat(
-        casadi.if_else(side == 0, stays, side * on_side), counted - count, count + 1 - counted
-    )
-    both = (
-        casadi.vertcat(asleep, casadi.vertsplit(asleep, [0, n, k])[1]),
-        casadi.vertcat(last + pause, casadi.vertsplit(last + pause, [0, n, k])[1]),
-    )
-    indicators = casadi.if_else(both[0], both[1] - t, awake)
-    # what follows
-    happened = casadi.vertcat(passed, casadi.fmax(falls, rises))
-    here = casadi.vertcat(casadi.sign(on_side), casadi.floor(counted))
-    beyond = casadi.vertcat(
-        casadi.if_else(side == 0, casadi.sign(on_side), -side), count + rises - falls
-    )
-    soon = casadi.logic_or(asleep, t - last < _CROWDED * duration)
-    in_row = casadi.if_else(soon, row + 1, 0)
-    tired = casadi.logic_and(casadi.logic_not(asleep), in_row > _OFTEN)
-    then = casadi.vertcat(
-        casadi.if_else(happened, casadi.if_else(asleep, here, beyond), places),
-        casadi.if_else(happened, tired, asleep),
-        casadi.if_else(happened, in_row, row),
-        casadi.if_else(happened, t, last),
-        duration,
-    )
-    return indicators, then
 
 
 def _without_crossings(motion: EventMotion, events: Events | None, modes: int) -> EventMotion:

@@ -202,10 +202,13 @@ def fmu_model(
     interface = interface_of(system, wished.inputs, wished.flanges)
     request = make_request(system, wished.outputs, interface.flanges)
     controller = controller_of(system, wished.controller, read_sources(wished.sources))
+    # a solver with fixed steps meets no events
+    crossings = settings.solver != "rk4" and settings.target != "bare"
     state = minimal_state(
         system,
         lambda seen: observed_values(system, request, seen),
         interface.drive(system, controller),
+        crossings=crossings,
     )
     tree = None
     followed = state.events is None or settings.solver != "rk4"
@@ -214,6 +217,7 @@ def fmu_model(
             system,
             lambda seen: observed_values(system, request, seen),
             interface.drive(system, controller),
+            crossings=crossings,
         )
     x, z = consistent_start(system, state)
     x_variables = states(system, state, x)

@@ -233,6 +233,15 @@ def _effort(speed: Coordinate, text: str) -> FmuVariable:
 # Events of a mechanism's FMU: its rigid stops and Coulomb friction.
 
 
+_CROSSING = {
+    "place": "side, -1 or 1, or 0 at zero; or whole number",
+    "asleep": "1 while it is not watched, since it has changed many times in a row",
+    "row": "number of changes in a row",
+    "time": "time of the last change in units of 10 us",
+}
+"""What the modes of crossings are."""
+
+
 def jumps(system: System, state: MinimalState) -> Jumps | None:
     """Modes, indicators and jumps of a state equation; None where nothing jumps.
 
@@ -254,6 +263,9 @@ def jumps(system: System, state: MinimalState) -> Jumps | None:
             text = "direction of sliding, -1 or 1, and 0 where it sticks"
         described = f"of {name}, {text}"
         modes.append(FmuVariable(name=f"{name}.mode", min=-1, max=1, description=described))
+    for name in events.modes[len(modes) :]:
+        text = f"of a law that jumps: {_CROSSING[name.rpartition('.')[2]]}"
+        modes.append(FmuVariable(name=name, description=text))
     return Jumps(
         modes=tuple(modes),
         first=events.first,

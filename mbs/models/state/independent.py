@@ -28,6 +28,12 @@ from mbs.models.direct_dynamics import hybrid_dynamics, independent_dynamics, in
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_dynamics import bias
 from mbs.models.joint_wrenches import shown_outputs
+from mbs.models.state.crossings import (
+    drive_crossings,
+    join_crossings,
+    with_more_modes,
+    with_part_crossings,
+)
 from mbs.models.state.drive import (
     DriveInputs,
     InputMotion,
@@ -403,7 +409,9 @@ class StateEquations:
     sizes: tuple[int, int, int]
 
 
-def with_laws(equations: StateEquations, drive: DriveInputs, extra: int) -> StateEquations:
+def with_laws(
+    equations: StateEquations, drive: DriveInputs, extra: int, crossings: Function | None = None
+) -> StateEquations:
     """The same with inputs that the laws of a drive compute.
 
     The functions are of scalars where the laws are. Else they hold calls of the laws, which may be
@@ -413,17 +421,22 @@ def with_laws(equations: StateEquations, drive: DriveInputs, extra: int) -> Stat
         equations: where u begins with what the laws give.
         drive: with a law.
         extra: number of the inputs w of the laws, which end u.
+        crossings: as `drive_crossings` has them; None for none.
     """
     tau, u, rest = equations.sizes
     wiring = _Wiring(
         equations, drive, (0 if drive.effort else tau, 0 if drive.device else u, rest, extra)
     )
-    return StateEquations(
-        rhs=_driven(wiring, equations.rhs),
-        motion=equations.motion,
-        events=_events(wiring, equations.events),
-        sizes=wiring.sizes[:3],
-    )
+    rhs, events = _driven(wiring, equations.rhs), _events(wiring, equations.events)
+    if crossings is not None:
+        known = len(events.modes) if events else 0
+        t, x, z, inputs, p = _symbols(wiring, equations.motion, SX)
+        _, _, others, w = _parts(inputs, wiring.sizes)
+        q, v = equations.motion.call([t, x, z, _fill(wiring, SX, others), p])
+        values = crossings.call([t, q, v, w, p])
+        events = join_crossings(events, values, [t, x, z, inputs, p], "controller")
+        rhs = with_more_modes(rhs, len(events.modes) - known)
+    return StateEquations(rhs=rhs, motion=equations.motion, events=events, sizes=wiring.sizes[:3])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -551,7 +564,11 @@ class MinimalState(MinimalLayout):
 
 
 def minimal_state(
-    system: System, observe: Observe | None = None, drive: DriveInputs | None = None
+    system: System,
+    observe: Observe | None = None,
+    drive: DriveInputs | None = None,
+    *,
+    crossings: bool = False,
 ) -> MinimalState:
     """The state equation of the independent joints.
 
@@ -560,6 +577,7 @@ def minimal_state(
         observe: what else the outputs end with.
         drive: what drives it beside, or in place of, the efforts of motors and the inputs of
             devices.
+        crossings: whether events end steps where laws jump.
 
     Raises:
         ModelError: a drive does not fit the system, or the independent rows of the loops change
@@ -568,9 +586,10 @@ def minimal_state(
     require_lasting_rows(system, contacts_of(system))
     drive = DriveInputs() if drive is None else drive
     layout = minimal_layout(system, drive)
-    equations = _equations(system, observe, layout, drive)
+    equations = _equations(system, observe, layout, drive, crossings=crossings)
     if drive.effort is not None or drive.device is not None:
-        equations = with_laws(equations, drive, layout.extra)
+        found = drive_crossings(system, drive, layout.extra) if crossings else None
+        equations = with_laws(equations, drive, layout.extra, found)
     closure, slopes = _closure_step(system, layout) if layout.dependents else (None, None)
     return MinimalState(
         **{field.name: getattr(layout, field.name) for field in fields(layout)},
@@ -620,7 +639,12 @@ def _split(values: SX, sizes: Sequence[int]) -> list[SX]:
 
 
 def _equations(
-    system: System, observe: Observe | None, layout: MinimalLayout, drive: DriveInputs
+    system: System,
+    observe: Observe | None,
+    layout: MinimalLayout,
+    drive: DriveInputs,
+    *,
+    crossings: bool,
 ) -> StateEquations:
     """The functions, where u has no w, and all efforts and inputs of devices that laws give."""
     motors = layout.inputs if drive.effort is None else tuple(range(system.nv))
@@ -651,9 +675,12 @@ def _equations(
             lambda fired: minimal_jump(system, contact, motion, (s.x, fired), states),
         )
     events = join_part_events(system, events, parts.events(), point)
+    few = 0
+    if crossings:
+        events, few = with_part_crossings(system, events, (motion.q, motion.v), point)
     point[4], (rate, y) = few_modes(contact, system.p, [rate, y])
     return StateEquations(
-        rhs=dense_function("rhs", point, [rate, y]),
+        rhs=with_more_modes(dense_function("rhs", point, [rate, y]), few),
         motion=dense_function("motion", [s.t, s.x, s.z, s.u, system.p], [motion.q, motion.v]),
         events=events,
         sizes=(len(motors), system.u.numel(), s.u.numel() - len(motors) - system.u.numel()),

@@ -1,4 +1,4 @@
-"""Where laws jump, bend or are short: conditions in the expressions of efforts, inputs and loads.
+"""Conditions at which the laws of efforts, inputs and loads jump, bend or are short.
 
 Conditions on the time, constants and parameters alone give times at which a step of an integration
 ends. Conditions on states give expressions that pass through zero, which are watched.
@@ -28,6 +28,7 @@ _TIME, _POSITION, _OTHER = 1, 2, 4
 
 _DIFFERENCE = {casadi.OP_LT, casadi.OP_LE, casadi.OP_FMIN, casadi.OP_FMAX}
 _SELF = {casadi.OP_SIGN, casadi.OP_FABS}
+_BENDS = {casadi.OP_FMIN, casadi.OP_FMAX, casadi.OP_FABS}
 _STEEP = {casadi.OP_TANH, casadi.OP_ERF, casadi.OP_ATAN}
 _WAVES = {casadi.OP_SIN, casadi.OP_COS, casadi.OP_TAN}
 _LINEAR = {casadi.OP_ADD, casadi.OP_SUB, casadi.OP_NEG, casadi.OP_TWICE}
@@ -66,8 +67,8 @@ class _Walk:
     """One walk through the graph of expressions.
 
     Attributes:
-        known: what symbols depend on, by their hash; others are states.
-        depends: what nodes depend on, by their hash, in the order of the walk.
+        known: dependence of each symbol, by its hash; symbols that are not in it are states.
+        depends: dependence of each node, by its hash, in the order of the walk.
         nodes: the nodes themselves.
     """
 
@@ -98,19 +99,19 @@ class _Walk:
                 self.depends[key] = found
 
     def of(self, node: SX) -> int:
-        """What a node depends on."""
+        """Dependence of a node."""
         return self.depends[node.element_hash()]
 
 
 def operands_of(node: SX) -> list[SX]:
-    """Operands of a scalar expression; none of a symbol or a constant."""
+    """Operands of a scalar expression; symbols and constants have no operands."""
     if node.is_symbolic() or node.is_constant():
         return []
     return [node.dep(k) for k in range(node.n_dep())]
 
 
 def conditions_of(
-    laws: SX, time: SX, positions: SX, constants: SX, *, short: bool = True
+    laws: SX, time: SX, positions: SX, constants: SX, *, jumps_alone: bool = False
 ) -> Conditions:
     """Conditions in the expressions of laws.
 
@@ -119,7 +120,7 @@ def conditions_of(
         time: symbol of the time; empty for laws without time.
         positions: symbols of positions.
         constants: symbols that are constant during a motion, such as parameters.
-        short: whether short smooth laws of positions are looked for too.
+        jumps_alone: whether bends and short smooth laws are left out.
     """
     found = Conditions()
     known = {
@@ -134,7 +135,7 @@ def conditions_of(
     for key, node in walk.nodes.items():
         depends = walk.depends[key]
         if depends and not node.is_symbolic():
-            _collect(node, depends, walk, found, short)
+            _collect(node, depends, found, jumps_alone=jumps_alone)
     if any(value & _TIME for value in walk.depends.values()):
         found.terms += _terms(walk, roots)
     return found
@@ -145,9 +146,9 @@ def _elements(symbols: SX) -> Iterator[SX]:
     return (dense[k] for k in range(dense.numel()))
 
 
-def _collect(node: SX, depends: int, walk: _Walk, found: Conditions, short: bool) -> None:
-    """Add the condition of one node."""
-    if node.is_call() or node.is_output():
+def _collect(node: SX, depends: int, found: Conditions, *, jumps_alone: bool) -> None:
+    """Add the condition of a node."""
+    if node.is_call() or node.is_output() or (jumps_alone and node.op() in _BENDS):
         return  # an interpolant is continuous
     alone = depends == _TIME
     for kind, value in _condition(node.op(), operands_of(node)):
@@ -159,7 +160,12 @@ def _collect(node: SX, depends: int, walk: _Walk, found: Conditions, short: bool
             found.phases.append(value)
         elif alone and kind in ("steep", "negligible"):
             found.hints.append(value)
-        elif kind == "negligible" and short and depends & _POSITION and not depends & _OTHER:
+        elif (
+            kind == "negligible"
+            and not jumps_alone
+            and depends & _POSITION
+            and not depends & _OTHER
+        ):
             found.crossings.append(value)
 
 
@@ -284,10 +290,10 @@ _SAME = 1e3 * float(np.finfo(float).eps)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeLaws:
-    """What laws say of the time alone, as functions of (t, p) with a column of values each.
+    """Parts of laws that depend on time alone: functions of (t, p), each with a column of values.
 
     Attributes:
-        lines: (a, 2) constants and slopes of what is linear in time, a function of p.
+        lines: (a, 2) constants and slopes of the zeros that are linear in time, a function of p.
         zeros: a law jumps or bends at their zeros.
         wholes: a law jumps at their whole numbers.
         terms: smooth parts of laws.
@@ -308,8 +314,8 @@ class TimeLaws:
         """Times in an interval at which steps end.
 
         Args:
-            begin: of the interval [s].
-            end: likewise.
+            begin: begin of the interval [s].
+            end: end of the interval [s].
             p: values of the parameters.
 
         Returns:
@@ -328,7 +334,7 @@ class TimeLaws:
 
 
 def time_laws(found: Conditions, time: SX, p: SX) -> TimeLaws | None:
-    """The functions of what laws say of the time; None where they say nothing.
+    """The parts of laws that depend on time alone; None if there are none.
 
     Args:
         found: conditions of all laws.
@@ -392,7 +398,7 @@ Curve = Callable[[Array], Array]
 
 @dataclass(slots=True)
 class _Search:
-    """A search for the times of one interval."""
+    """A search for times in an interval."""
 
     laws: TimeLaws
     begin: float
@@ -506,7 +512,7 @@ class _Search:
         return np.unique(np.concatenate(found))
 
     def _tops(self, grid: Array) -> Iterator[Array]:
-        """Times at which hints are largest: the middle of what is short."""
+        """Times at which hints are largest: the middle of a short change."""
         values = self._values(self.laws.hints, grid)
         for row in range(len(values)):
             v = values[row]
@@ -520,7 +526,7 @@ class _Search:
                 yield _maximum(value, grid[peaks - 1], grid[peaks + 1])
 
     def _sampled(self, row: int, grid: Array) -> tuple[Array, Array]:
-        """Times and values of a term, closer together where it is not straight."""
+        """Times and values of a term, closer together near bends."""
         terms, times = self.laws.terms, grid
         values = self._values(terms, times)[row]
         active = np.arange(len(times) - 1)
@@ -561,7 +567,7 @@ class _Search:
 
 
 def slope_is_there(lines: Array) -> Flags:
-    """Which of some lines, constant and slope, have zeros."""
+    """Whether each line, a constant and a slope, has a zero."""
     there: Flags = (lines[:, 1] != 0) & np.isfinite(lines).all(axis=1)
     return there
 

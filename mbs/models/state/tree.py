@@ -31,6 +31,11 @@ from mbs.models.direct_dynamics import direct_dynamics, hybrid_dynamics, inertia
 from mbs.models.energy import energy
 from mbs.models.inverse_dynamics import bias
 from mbs.models.joint_wrenches import shown_outputs
+from mbs.models.state.crossings import (
+    drive_crossings,
+    with_more_modes,
+    with_part_crossings,
+)
 from mbs.models.state.drive import DriveInputs, TreeMotion, load_of, wrenches_of
 from mbs.models.state.events import MinimalEvents, few_modes, join_part_events, minimal_events
 from mbs.models.state.independent import (
@@ -408,7 +413,11 @@ class TreeState:
 
 
 def tree_state(
-    system: System, observe: Observe | None = None, drive: DriveInputs | None = None
+    system: System,
+    observe: Observe | None = None,
+    drive: DriveInputs | None = None,
+    *,
+    crossings: bool = False,
 ) -> TreeState | None:
     """The state equation of the tree; None where it has no advantage, or is not known.
 
@@ -416,6 +425,7 @@ def tree_state(
         system: open or closed.
         observe: as of `minimal_state`, likewise the next one.
         drive: motions that are inputs are left to the independent state equation.
+        crossings: as of `minimal_state`.
     """
     drive = DriveInputs() if drive is None else drive
     layout = minimal_layout(system, drive)
@@ -472,26 +482,40 @@ def tree_state(
             contact, motion, point, lambda fired: tree_jump(system, contact, X, fired)
         )
     events = join_part_events(system, events, parts.events(), point)
+    few = _mode_count(events)
+    events, of_parts = (
+        with_part_crossings(system, events, (q, v), point) if crossings else (events, 0)
+    )
+    rhs = with_more_modes(rhs, of_parts)
     if drive.effort is not None or drive.device is not None:
         at = dense_function("motion", point, [q, v])
         sizes = (len(motors), system.u.numel())
         sizes3 = (*sizes, s.u.numel() - sum(sizes))
         pushed = with_laws(StateEquations(forces, at, None, sizes3), drive, layout.extra)
-        moving = with_laws(StateEquations(rhs, at, events, sizes3), drive, layout.extra)
+        of_drive = drive_crossings(system, drive, layout.extra) if crossings else None
+        moving = with_laws(StateEquations(rhs, at, events, sizes3), drive, layout.extra, of_drive)
         rhs, forces, events = moving.rhs, pushed.rhs, moving.events
+    more = _mode_count(events) - few
     inputs = SX.sym("u", rhs.numel_in(3))
     free = [s.t, X, none, inputs]
     first = motion_of(system, layout, s, [])
     start = casadi.vertcat(first.q, first.v, s.states)
     rows, regularity = (
-        written(function.name(), free, function.call(whole))
+        with_more_modes(written(function.name(), free, function.call(whole)), more)
         for function in (through.rows, through.regularity)
     )
+    project = written("tree_project", free, [casadi.vertcat(*kept, X[n:]), residual])
+    begin = written("tree_start", [s.t, s.x, s.z, inputs], [start])
     return TreeState(
         rhs=rhs,
-        project=written("tree_project", free, [casadi.vertcat(*kept, X[n:]), residual]),
-        start=written("tree_start", [s.t, s.x, s.z, inputs], [start]),
-        passage=replace(through, rows=rows, forces=forces, regularity=regularity),
+        project=with_more_modes(project, more),
+        start=with_more_modes(begin, more),
+        passage=replace(
+            through,
+            rows=rows,
+            forces=with_more_modes(forces, more),
+            regularity=regularity,
+        ),
         passes=passes,
         events=events,
         states=(
@@ -505,6 +529,10 @@ def tree_state(
         independent=layout.velocities,
         units=tuple(scales(system).columns([speed.unit for speed in system.speeds])),
     )
+
+
+def _mode_count(events: MinimalEvents | None) -> int:
+    return 0 if events is None else len(events.modes)
 
 
 # The state equation of the whole tree, with a projection that keeps its loops closed.

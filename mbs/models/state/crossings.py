@@ -1,0 +1,268 @@
+"""Crossings of laws as events: sides and counts with modes, for simulations and FMUs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import casadi
+from casadi import SX, Function
+
+from mbs.assembly import System
+from mbs.models.state.drive import DriveInputs
+from mbs.models.state.events import MinimalEvents
+from mbs.models.state.laws import Conditions, conditions_of, distinct
+from mbs.models.symbols import dense_function
+from mbs.recursions.parts import PartsAt
+
+# Crossings that may stay at zero or pass it without end.
+
+
+GUARD_MODES = 4
+"""Modes of a guarded crossing: its place, whether it is asleep, a number and a time."""
+_OFTEN = 4
+"""Number of crossings in a row after which a crossing is not watched for a while: a body that
+bounces between two sides of a law, or that comes to rest at a friction, passes it without end."""
+_CROWDED = 1e-5
+"""Part of the duration that is a tick; crossings within one or two ticks are in a row."""
+_IN_A_ROW = 2.0
+"""Ticks since the last crossing, whose fraction is not kept."""
+_WRAP = 1e9
+"""Ticks after which their number begins again, so that it is an integer of 32 bits."""
+_SHORTEST_PAUSE, _LONGEST_PAUSE = 1e-6, 0.02
+"""Parts of the duration for which a crossing is not watched. The pauses double, so that 16 of them
+come to the longest one, and 50 of these to the duration."""
+
+
+def ticks_of(t: Any, duration: Any) -> Any:
+    """A time in ticks."""
+    return t / (_CROWDED * duration)
+
+
+def guard(t: SX, values: SX, counts: int, modes: SX, fired: SX, duration: Any) -> tuple[SX, SX]:
+    """Indicators and next modes of crossings that may stay at zero or pass it without end.
+
+    The modes are four columns: places, whether crossings are asleep, numbers of crossings in a row,
+    and times of the last changes in ticks. A place is the side, 1 or -1, or 0 where the value is
+    exactly zero, until it is not; of a count it is the whole number. A crossing that was passed
+    many times in a row sleeps for a pause, in which error control alone follows the law.
+
+    Args:
+        t: time [s].
+        values: (k, 1) of the crossings, the counts last.
+        counts: number of counts.
+        modes: (4 k, 1).
+        fired: (k + counts, 1) 1 for each indicator that is not positive: of the sides, of counts
+            that fall, of counts that rise.
+        duration: of the motion [s].
+
+    Returns:
+        indicators (k + counts, 1) and modes.
+    """
+    k = values.numel()
+    if not k:
+        return SX(0, 1), SX(0, 1)
+    n = k - counts
+    places, asleep, row, last = casadi.vertsplit(modes, [0, k, 2 * k, 3 * k, 4 * k])
+    side, count = casadi.vertsplit(places, [0, n, k])
+    on_side, counted = casadi.vertsplit(values, [0, n, k])
+    passed, falls, rises = casadi.vertsplit(fired, [0, n, k, k + counts])
+    # what is watched
+    elapsed = casadi.fmod(ticks_of(t, duration) - last, _WRAP)
+    pause = casadi.fmin(_SHORTEST_PAUSE * 2**row, _LONGEST_PAUSE) / _CROWDED
+    stays = casadi.if_else(on_side == 0, 1, -1)
+    awake = casadi.vertcat(
+        casadi.if_else(side == 0, stays, side * on_side), counted - count, count + 1 - counted
+    )
+    both = [
+        casadi.vertcat(one, casadi.vertsplit(one, [0, n, k])[1])
+        for one in (asleep, pause - elapsed)
+    ]
+    indicators = casadi.if_else(both[0], both[1], awake)
+    # what follows
+    happened = casadi.vertcat(passed, casadi.fmax(falls, rises))
+    here = casadi.vertcat(casadi.sign(on_side), casadi.floor(counted))
+    beyond = casadi.vertcat(
+        casadi.if_else(side == 0, casadi.sign(on_side), -side), count + rises - falls
+    )
+    soon = casadi.logic_or(asleep, elapsed < _IN_A_ROW)
+    in_row = casadi.if_else(soon, row + 1, 0)
+    tired = casadi.logic_and(casadi.logic_not(asleep), in_row > _OFTEN)
+    now = casadi.fmod(casadi.floor(ticks_of(t, duration)), _WRAP)
+    then = casadi.vertcat(
+        casadi.if_else(happened, casadi.if_else(asleep, here, beyond), places),
+        casadi.if_else(happened, tired, asleep),
+        casadi.if_else(happened, in_row, row),
+        casadi.if_else(happened, now, last),
+    )
+    return indicators, then
+
+
+# Crossings of the state equations of FMUs.
+
+
+_SPAN = 1.0
+"""Duration by which crossings in a row are known in an FMU [s], which does not know its own."""
+
+
+def part_crossings(system: System) -> Function | None:
+    """`f(q, v, z, u, p) -> sides, counts` at which laws of components jump.
+
+    Bends, and built-in contacts and curves, are left to error control.
+
+    Args:
+        system: open or closed.
+
+    Returns:
+        the Function; None where there is nothing.
+    """
+    q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
+    parts = PartsAt(system, q, v)
+    constants = casadi.vertcat(system.p, parts.modes())
+    found = _jumps(parts.laws(), SX(0, 1), q, constants)
+    states = casadi.vertcat(q, v, system.z)
+    given = parts.crossings(of_contacts=False)
+    sides = casadi.vertsplit(given) if given.numel() else []
+    return _function(
+        [q, v, system.z, system.u, system.p], [*sides, *found.crossings], found.counts, states
+    )
+
+
+def drive_crossings(system: System, drive: DriveInputs, extra: int) -> Function | None:
+    """`f(t, q, v, w, p) -> sides, counts` at which the laws of a drive jump.
+
+    Args:
+        system: open or closed.
+        drive: with laws, or none.
+        extra: number of the inputs w of the laws.
+
+    Returns:
+        the Function; None where there is nothing, or where laws are external functions.
+    """
+    laws = [law for law in (drive.effort, drive.device) if law is not None]
+    if not laws or not all(law.is_a("SXFunction") for law in laws):
+        return None
+    t, q, v = SX.sym("t"), SX.sym("q", system.nq), SX.sym("v", system.nv)
+    point = [t, q, v, SX.sym("w", extra), system.p]
+    values = [casadi.vec(law.call(point)[0]) for law in laws]
+    found = _jumps(casadi.vertcat(*values), t, q, system.p)
+    sides = [*found.crossings, *found.zeros]
+    return _function(point, sides, [*found.counts, *found.wholes], casadi.vertcat(t, q, v))
+
+
+def _jumps(laws: SX, t: SX, q: SX, constants: SX) -> Conditions:
+    """Conditions at which laws jump, and those at which the conditions themselves bend.
+
+    An integrator outside sees signs alone: it meets a gap |x| - a from both sides where it also
+    stops at x = 0.
+    """
+    found = conditions_of(laws, t, q, constants, jumps_alone=True)
+    decisive = casadi.vertcat(*found.crossings, *found.counts, *found.zeros, *found.wholes)
+    inner = conditions_of(SX(decisive), t, q, constants)
+    return Conditions(
+        zeros=[*found.zeros, *inner.zeros],
+        wholes=[*found.wholes, *inner.wholes],
+        crossings=[*found.crossings, *inner.crossings],
+        counts=[*found.counts, *inner.counts],
+    )
+
+
+def _function(
+    point: Sequence[SX], sides: Sequence[SX], counts: Sequence[SX], of: SX
+) -> Function | None:
+    """The Function of those expressions that depend on some symbols."""
+    kept = [
+        [value for value in distinct(values, []) if casadi.depends_on(value, of)]
+        for values in (sides, counts)
+    ]
+    if not any(kept):
+        return None
+    return dense_function("crossings", list(point), [casadi.vertcat(SX(0, 1), *v) for v in kept])
+
+
+def join_crossings(
+    events: MinimalEvents | None, values: Sequence[SX], point: Sequence[SX], source: str
+) -> MinimalEvents:
+    """Events, and behind them those of crossings, which change modes alone.
+
+    Args:
+        events: None where there are none.
+        values: sides and counts at the point.
+        point: t, x, z, u and p, without modes.
+        source: name of the crossings.
+    """
+    sides, counts = values
+    k, n, m = sides.numel() + counts.numel(), sides.numel(), counts.numel()
+    *others, p = point
+    t, x = point[:2]
+    names = [f"{source}.side{j + 1}" for j in range(n)]
+    names += [f"{source}.count{j + 1}" for j in range(m)]
+    before = SX.sym("modes", len(events.modes) if events else 0)
+    own, known = SX.sym("own", GUARD_MODES * k), len(events.names) if events else 0
+    every = [*others, casadi.vertcat(p, before, own)]
+    fired = SX.sym("fired", known + k + m)
+    first_fired, own_fired = casadi.vertsplit(fired, [0, known, known + k + m])
+    starts = casadi.vertcat(casadi.sign(sides), casadi.floor(counts), SX.zeros(2 * k))
+    since = casadi.fmod(casadi.floor(ticks_of(t, _SPAN)), _WRAP)
+    starts = casadi.vertcat(starts, casadi.repmat(since, k, 1))
+    watched, then = guard(t, casadi.vertcat(sides, counts), m, own, own_fired, _SPAN)
+    first, beyond, indicators, after, now = SX(0, 1), SX(0, 1), SX(0, 1), x, before
+    if events:
+        at = [*others, casadi.vertcat(p, before)]
+        first, beyond = events.first.call(at)
+        (indicators,) = events.indicators.call(at)
+        there, changed = events.jump.call([*at, first_fired])
+        jumps = casadi.mmax(first_fired)
+        after, now = casadi.if_else(jumps, there, x), casadi.if_else(jumps, changed, before)
+    kinds = ("place", "asleep", "row", "time")
+    return MinimalEvents(
+        modes=(
+            *(events.modes if events else ()),
+            *(f"{name}.{kind}" for kind in kinds for name in names),
+        ),
+        names=(
+            *(events.names if events else ()),
+            *names[:n],
+            *(f"{name} {what}" for what in ("falls", "rises") for name in names[n:]),
+        ),
+        first=dense_function(
+            "first",
+            every,
+            [casadi.vertcat(first, starts), casadi.vertcat(beyond, -SX.ones(k + m))],
+        ),
+        indicators=dense_function("indicators", every, [casadi.vertcat(indicators, watched)]),
+        jump=dense_function("jump", [*every, fired], [after, casadi.vertcat(now, then)]),
+    )
+
+
+def with_part_crossings(
+    system: System,
+    events: MinimalEvents | None,
+    motion: tuple[SX, SX],
+    point: Sequence[SX],
+) -> tuple[MinimalEvents | None, int]:
+    """Events with the crossings of components behind them, and the number of their modes.
+
+    Args:
+        system: open or closed.
+        events: None where there are none.
+        motion: positions and velocities of the tree.
+        point: t, x, z, u and p, without modes.
+    """
+    found = part_crossings(system)
+    if found is None:
+        return events, 0
+    known = len(events.modes) if events else 0
+    values = found.call([*motion, system.z, system.u, system.p])
+    joined = join_crossings(events, values, point, "laws")
+    return joined, len(joined.modes) - known
+
+
+def with_more_modes(function: Function, count: int) -> Function:
+    """A function of (t, x, z, u, p) that takes more modes at the end of p."""
+    if not count:
+        return function
+    symbols = [SX.sym(f"i{k}", function.numel_in(k)) for k in range(function.n_in())]
+    more = casadi.vertcat(symbols[4], SX.sym("more", count))
+    wide = [*symbols[:4], more, *symbols[5:]]
+    return Function(function.name(), wide, function.call(symbols))

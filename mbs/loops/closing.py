@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -230,6 +231,13 @@ class Closing:
             if closed.is_closed:
                 yield closed.q
 
+    @property
+    def acting(self) -> NDArray[np.bool_]:
+        """(nq,) whether a closure row depends on each position."""
+        acting = np.zeros(self.system.nq, dtype=bool)
+        acting[self._functions().places[1]] = True
+        return acting
+
     def faces(self, q: Vector) -> bool:
         """Whether no axis of a closing joint is opposed at q (nq,)."""
         return bool(np.all(self._functions().facing(q, self.p)[0] > 0))
@@ -342,65 +350,300 @@ def within_half_turn(system: System, q: Vector) -> Vector:
     return turned
 
 
-# Moving a closed configuration along a line in small steps, so that it stays on its branch.
+# Continuation of a closed configuration on the constraint manifold.
 
 
-_LARGEST_STEP = 0.2
-"""Of a locked position in one step [rad or m]."""
+_LARGEST_STEP = 0.5
+"""Largest change of a locked position in one step [rad, or sizes of the mechanism]."""
 LARGEST_MOVE = 0.3
-"""Of any other position from where its slope led; more may be another branch [rad or m]."""
+"""Largest distance of a free position from its prediction [rad, or sizes of the mechanism]: more
+may be another branch."""
+_CURVED = 0.002
+"""Largest difference between a step and the mean of the slopes at its two ends, as a part of the
+largest change in the step: smooth branches give 1e-4 to 1e-3, a change of branch gives about 1."""
+_CROSSING = 1e-3
+"""Longest step through a configuration at which the determinant of the loops changes its sign
+[rad or sizes]: a branch that goes on is smooth at this length, a branch that turns is not."""
+_OFFSET = 1e-7
+"""Change of locked positions for a slope [rad or sizes]: closed configurations are accurate to
+1e-12, so that a slope is accurate to 1e-5."""
+_STEEP = 1e4
+"""Slope beyond which the free positions do not follow from the locked ones: the branch turns."""
 _LONGEST_LINE = 400.0
-"""Of a locked position, in all [rad or m]."""
-_SMALLEST_PART = 1e-4
-"""Of the whole line, below which it is said to end."""
+"""Largest change of a locked position in all [rad or m]: some sixty revolutions."""
+_SMALLEST_STEP = 1e-6
+"""Shortest step [rad or sizes], ten times the offset of slopes."""
+_SINGULAR = 1e-7
+"""Smallest singular value, as a part of the largest, below which a start has no slope: rounding
+leaves 1e-8 of a value that vanishes with the square root, regular mechanisms have 1e-4 or more."""
+_CANDIDATES, _TRIES = 6, 60
+"""Most configurations in an error message, and starts of the search for them."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Line:
+    """Locked positions and parameters on a straight line, a function of the distance s.
+
+    Attributes:
+        system: with loops.
+        locked: indices in q.
+        ends: (nq,) configurations at the start and at the end, of which locked positions count.
+        parameters: (np,) values at the start and at the end.
+        length: of the line [rad or sizes of the mechanism].
+        scales: (nq,) unit of each position: 1 rad, or the size of the mechanism [m].
+    """
+
+    system: System
+    locked: tuple[int, ...]
+    ends: tuple[Vector, Vector]
+    parameters: tuple[Vector, Vector]
+    length: float
+    scales: Vector
+
+    def closing(self, s: float) -> Closing:
+        """Closure rows with the parameters at s."""
+        first, last = self.parameters
+        p = last if s == self.length else first + s / self.length * (last - first)
+        return Closing(self.system, p, self.locked)
+
+    def placed(self, q: Vector, s: float) -> Vector:
+        """The configuration q with the locked positions at s."""
+        (first, last), indices, part = self.ends, list(self.locked), s / self.length
+        at = last if s == self.length else first + part * (last - first)
+        if s < self.length:
+            for turn in quaternion_slices(self.system.tree):
+                if turn.start in self.locked:
+                    at[turn] /= np.linalg.norm(at[turn])
+        return _replace(q, indices, at[indices])
+
+    def slope(self, q: Vector, s: float) -> Vector | None:
+        """(nq,) dq/ds of the branch through the closed q; None if the branch turns there."""
+        ahead = s + _OFFSET if s + _OFFSET <= self.length else s - _OFFSET
+        near = self.closing(ahead).nearest(self.placed(q, ahead))
+        if not near.is_closed:
+            return None
+        slope: Vector = (near.q - q) / (ahead - s)
+        return slope if np.max(np.abs(slope / self.scales), initial=0.0) < _STEEP else None
+
+    def side(self, q: Vector, s: float) -> float:
+        """Sign of the determinant of the loops by the free positions; 0 if it is not defined."""
+        closure, closing = self.system.closure, self.closing(s)
+        free = closing.free
+        if closure is None or closure.varies or not 0 < len(free) < MANY:
+            return 0.0
+        J = closing.rows(q)[1]
+        kept = [*closure.rows, *self._free_norms(len(J))]
+        return float(np.linalg.slogdet(J[kept])[0]) if len(kept) == len(free) else 0.0
+
+    def _free_norms(self, count: int) -> list[int]:
+        """Indices, among all rows, of norms of quaternions that are not locked as a whole."""
+        parts = [range(turn.start, turn.stop) for turn in quaternion_slices(self.system.tree)]
+        first, locked = count - len(parts), set(self.locked)
+        return [first + k for k, part in enumerate(parts) if not locked >= set(part)]
+
+    def is_singular(self, q: Vector, s: float) -> bool:
+        """Whether the loops leave the free positions undetermined at q to first order."""
+        closing = self.closing(s)
+        if not 0 < len(closing.free) < MANY:
+            return False
+        J = closing.rows(q)[1] / closing.sizes[:, None] * self.scales[closing.free]
+        values = np.linalg.svd(J, compute_uv=False)
+        closure, rank = self.system.closure, len(values)
+        if closure is not None:
+            rank = min(len(closure.rows) + len(self._free_norms(len(J))), rank)
+        return bool(rank and values[rank - 1] < _SINGULAR * values[0])
 
 
 def follow_configuration(
-    system: System, target: Vector, locked: tuple[int, ...], p: Vector
+    system: System,
+    target: Vector,
+    locked: tuple[int, ...],
+    p: Vector,
+    origin: tuple[Vector, Vector] | None = None,
 ) -> Vector:
-    """The configuration reached from the assembled one while locked positions, and p, move.
+    """Return the configuration that is reached while locked positions, and p, move to a target.
+
+    Locked positions move on a straight line. The free ones follow on the constraint manifold, in
+    steps that are accepted if the step agrees with the slopes at both its ends: a jump to another
+    branch does not. The branch continues straight through a configuration in which it crosses
+    another one.
+
+    Source: Allgower and Georg 1990, chapters 2 and 8, for prediction, correction and crossings.
 
     Args:
-        system: with loops; its configuration is where the line starts.
-        target: (nq,) of which the locked positions count.
+        system: with loops.
+        target: (nq,) configuration, of which the locked positions count.
         locked: indices in q.
         p: (np,) values of the parameters at the end of the line.
+        origin: closed configuration at which the line starts, and the parameters there; the
+            assembled configuration and default parameters if left out.
 
     Returns:
         q (nq,), its locked positions equal to the target's.
 
     Raises:
-        Unclosable: the line leaves what this branch can reach; the message says where.
+        Unclosable: the branch turns or the start is singular; the message lists the configurations
+            with the required positions.
     """
-    start, p_start = np.array(system.configuration), closure_parameters(system)
-    indices, free = list(locked), [k for k in range(system.nq) if k not in locked]
-    change = target[indices] - start[indices]
-    length = float(np.max(np.abs(change), initial=0.0))
-    if length > _LONGEST_LINE:
-        raise Unclosable(
-            f"{system.name}: a position is {length:.3g} rad or m away from the assembled"
-            " configuration;"
-            f" give one less than {_LONGEST_LINE:g} away"
-        )
-    largest = _LARGEST_STEP / length if length > _LARGEST_STEP else 1.0
-    q, slope, done, part = start, np.zeros(len(free)), 0.0, largest
-    while done < 1.0:
-        to = min(1.0, done + part)
-        trial = q.copy()
-        trial[indices] = target[indices] if to == 1.0 else start[indices] + to * change
-        trial[free] += (to - done) * slope
-        closing = Closing(system, p if to == 1.0 else p_start + to * (p - p_start), locked)
-        found = closing.nearest(trial)
-        if found.is_closed and np.max(np.abs(found.q - trial), initial=0.0) < LARGEST_MOVE:
-            slope = (found.q[free] - q[free]) / (to - done)
-            q, done, part = found.q, to, min(2 * part, largest)
-        else:
-            part, slope = part / 2, slope if part > 8 * _SMALLEST_PART else np.zeros(len(free))
-            if part < _SMALLEST_PART:
-                raise Unclosable(
-                    f"{system.name}: {closing.locked_positions(target) or 'the configuration'}"
-                    " cannot be reached from the assembled configuration, whose branch ends near"
-                    f" {closing.locked_positions(q) or 'it'}; give a guess of other joints to"
-                    " choose another branch, or other positions"
-                )
+    start, p_start = origin or (np.array(system.configuration), closure_parameters(system))
+    start, whole = _with_whole_quaternions(system, start, target, locked)
+    if whole != locked:
+        with suppress(Unclosable):
+            return follow_configuration(system, target, whole, p, (start, p_start))
+    line = _line(system, (start, target), locked, (p_start, p))
+    if line.length <= _SMALLEST_STEP:
+        found = Closing(system, p, locked).nearest(_replace(start, locked, target[list(locked)]))
+        moves = (np.abs(found.q - start) / line.scales)[line.closing(0.0).free]
+        if found.is_closed and np.max(moves, initial=0.0) < LARGEST_MOVE:
+            return found.q
+        raise Unclosable(_ended(line, start, line.length, "ends"))
+    q = line.placed(start, 0.0)
+    slope = None if line.is_singular(q, 0.0) else line.slope(q, 0.0)
+    if slope is None:
+        raise Unclosable(_ended(line, q, 0.0, "meets others"))
+    side, s, step = line.side(q, 0.0), 0.0, min(_LARGEST_STEP, line.length)
+    while s < line.length:
+        # a remaining part below 1 % of a step belongs to this step
+        to = line.length if s + 1.01 * step >= line.length else s + step
+        reached = _step(line, (q, slope, side), s, to)
+        if reached is not None:
+            (q, slope, side), s, step = reached, to, min(2 * (to - s), _LARGEST_STEP)
+            continue
+        step = (to - s) / 2
+        if step < _SMALLEST_STEP:
+            raise Unclosable(_ended(line, q, s, "ends"))
     return q
+
+
+def _with_whole_quaternions(
+    system: System, start: Vector, target: Vector, locked: tuple[int, ...]
+) -> tuple[Vector, tuple[int, ...]]:
+    """The start with quaternions on the side of the target, and the locked positions.
+
+    A quaternion is locked as a whole if some of its elements are locked and the target has unit
+    length: the norm changes along a line of single elements.
+    """
+    first, whole = start.copy(), set(locked)
+    for turn in quaternion_slices(system.tree):
+        indices = set(range(turn.start, turn.stop))
+        if indices & whole and abs(np.linalg.norm(target[turn]) - 1) < OPEN:
+            whole |= indices
+            first[turn] *= 1.0 if start[turn] @ target[turn] >= 0 else -1.0
+    return first, tuple(sorted(whole))
+
+
+def _line(
+    system: System,
+    ends: tuple[Vector, Vector],
+    locked: tuple[int, ...],
+    parameters: tuple[Vector, Vector],
+) -> _Line:
+    """The line of locked positions, and of parameters, from a start to a target.
+
+    Positions that no loop depends on are at the target from the start.
+
+    Raises:
+        Unclosable: the line is too long.
+    """
+    closing = Closing(system, parameters[1])
+    size = closing.size
+    lengths = np.array([c.unit.startswith("m") for c in system.coordinates])
+    scales = np.where(lengths, size, 1.0)
+    acting = closing.acting
+    first = np.where(acting, ends[0], ends[1])
+    change = np.zeros(system.nq)
+    change[list(locked)] = np.abs(ends[1] - first)[list(locked)]
+    longest = float(np.max(np.minimum(change, change / scales), initial=0.0))
+    if longest > _LONGEST_LINE:
+        raise Unclosable(
+            f"{system.name}: a position is {longest:.3g} rad or m away from the assembled"
+            f" configuration; give one less than {_LONGEST_LINE:g} away"
+        )
+    length = float(np.max(change / scales, initial=0.0))
+    if not np.array_equal(*parameters):
+        largest = np.maximum(np.abs(parameters[0]), np.abs(parameters[1]))
+        moved = np.abs(parameters[1] - parameters[0])[largest > 0] / largest[largest > 0]
+        length = max(length, float(np.nanmax(moved, initial=0.0)))
+    return _Line(system, locked, (first, ends[1]), parameters, length, scales)
+
+
+_Point = tuple[Vector, Vector, float]
+"""Configuration, its slope, and the sign of the determinant of the loops."""
+
+
+def _step(line: _Line, point: _Point, s: float, to: float) -> _Point | None:
+    """One step on a branch from s; None if it may have left the branch."""
+    (q, slope, side), h = point, to - s
+    predicted = line.placed(q + h * slope, to)
+    found = line.closing(to).nearest(predicted)
+    if not found.is_closed:
+        return None
+    if np.max(np.abs(found.q - predicted) / line.scales, initial=0.0) >= LARGEST_MOVE:
+        return None
+    after = line.slope(found.q, to)
+    is_last = to == line.length
+    if after is None:
+        # the target may be a configuration at which the branch turns or crosses
+        near = np.max(np.abs(found.q - predicted) / line.scales, initial=0.0)
+        return (found.q, slope, side) if is_last and near < _CURVED * h else None
+    missed = np.abs(found.q - q - h / 2 * (slope + after)) / line.scales
+    change = np.max(np.abs(found.q - q) / line.scales)
+    if np.max(missed[line.closing(to).free], initial=0.0) > _CURVED * max(h, change):
+        return None
+    now = line.side(found.q, to)
+    if now * side < 0 and h > _CROSSING:
+        return None
+    return found.q, after, now
+
+
+def _ended(line: _Line, q: Vector, s: float, what: str) -> str:
+    """Message of a branch that ends or meets others, with the configurations at the target."""
+    system, closing, target = line.system, line.closing(line.length), line.ends[1]
+    where = closing.locked_positions(q) or "it"
+    text = (
+        f"{system.name}: {closing.locked_positions(target) or 'the configuration'} cannot be"
+        f" reached from the assembled configuration, whose branch {what} near {where}"
+    )
+    found = candidates(closing, line.placed(q, line.length))
+    remedy = "give a guess of other joints to choose another branch, or other positions"
+    if not found:
+        return f"{text}; {remedy}"
+    names = [c.name for c in system.coordinates]
+    listed = (
+        "(" + ", ".join(f"{names[k]} = {one[k]:.4g}" for k in closing.free) + ")" for one in found
+    )
+    return (
+        f"{text}; configurations with these positions: {' or '.join(listed)}; choose one by a guess"
+        " of its joints, or give other positions"
+    )
+
+
+def candidates(closing: Closing, start: Vector) -> list[Vector]:
+    """Closed configurations with the locked positions of the start, nearest first, a few at most.
+
+    Args:
+        closing: closure rows and the locked positions.
+        start: (nq,) configuration around which the search starts.
+    """
+    rng, free = np.random.default_rng(_SEED), closing.free
+    lengths = [closing.system.coordinates[k].unit.startswith("m") for k in free]
+    reach = np.where(lengths, closing.size, np.pi)
+    found: list[Vector] = []
+    for number in range(_TRIES):
+        trial = start.copy()
+        trial[free] += (number > 0) * reach * rng.uniform(-1, 1, len(free))
+        closed = closing.nearest(trial)
+        if not closed.is_closed:
+            continue
+        q = start + difference(closing.system, closed.q, start)
+        q = q if closing.openness(q) < CLOSED else closed.q
+        if all(np.max(np.abs(difference(closing.system, q, one))) > _OTHER for one in found):
+            found.append(q)
+        if len(found) == _CANDIDATES:
+            break
+    found.sort(key=lambda q: float(np.max(np.abs(difference(closing.system, q, start)))))
+    return found
+
+
+_OTHER = 1e-4
+"""Smallest difference of two listed configurations [rad or m]; iterations leave 1e-10."""

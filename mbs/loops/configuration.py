@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -52,10 +52,11 @@ def solve(
 ) -> Vector:
     """A configuration with the given positions that closes the loops.
 
-    A complete configuration that closes the loops is taken as it is. Otherwise, without a guess,
-    the assembled configuration is moved along a straight line to the given positions, in steps
-    small enough to keep its branch. With a guess the configuration next to it is looked for. With a
-    branch the loops are closed by closed forms (`mbs.loops.function`).
+    All positions by name are accepted as they are if they close the loops. Without a guess the
+    given positions move on a straight line from the assembled configuration, and the others follow
+    on the constraint manifold, in steps that keep the branch. With a guess the nearest
+    configuration is returned; a guess of all positions that closes the loops is the start of the
+    branch. With a branch the loops are closed by closed forms (`mbs.loops.function`).
 
     Args:
         system: the assembled mechanism.
@@ -72,8 +73,9 @@ def solve(
         q (nq,) [rad or m].
 
     Raises:
-        Unclosable: no configuration was found; the message says by how much the loops stay open, or
-            what can be reached on the branch.
+        Unclosable: no configuration was found, or the branch ends before the given positions; the
+            message lists the configurations that have these positions.
+        LoopError: all positions are given and leave the loops open.
         NoClosedForm: a branch was named, but a loop is solved by iteration only.
         ModelError: a name is unknown, or a value is not finite; or guess and branch are given.
     """
@@ -95,70 +97,106 @@ def solve(
 
 def _closed(
     system: System,
-    fixed: Mapping[str, float],
+    fixed: dict[str, float],
     guess: Mapping[str, float],
     parameters: Mapping[str, float] | None,
 ) -> Vector:
-    """The configuration of `solve` with fixed positions and a guess of others, by name."""
-    names = independent_names(system)
+    """The configuration (nq,) of `solve` with positions by name."""
     p = closure_parameters(system, parameters)
     target = np.array(system.position({**guess, **fixed}))
     if not system.is_closed:
         return target
+    if len(fixed) == system.nq:
+        _require_joined(Closing(system, p), target)
+        return target
+    names = independent_names(system)
     if all(name in names for name in fixed):
         fixed = {**dict.fromkeys(names, 0.0), **fixed}
-    locked = tuple(k for k, c in enumerate(system.coordinates) if c.name in fixed)
-    if len(locked) == system.nq:
-        require_closed(system, target, parameters)
-        return Closing(system, p).nearest(target).q
-    others = [k for k in locked if system.coordinates[k].name not in names]
-    if others and not guess and all(name in fixed for name in names):
-        free = Closing(system, p, tuple(k for k in locked if k not in others))
-        return _checked(free, _guessed_configuration(free, target, others), target, others)
-    if guess:
-        named = [k for k, c in enumerate(system.coordinates) if c.name in guess]
-        return _guessed_configuration(Closing(system, p, locked), target, named)
-    return follow_configuration(system, target, locked, p)
+    elif set(names) <= set(fixed):
+        return _with_dependent_positions(system, target, fixed, guess, p)
+    locked = tuple(_indices(system, fixed))
+    if not guess:
+        return follow_configuration(system, target, locked, p)
+    if set(_coordinate_names(system)) <= set(guess):
+        origin = np.array(system.position(guess))
+        if Closing(system, p).openness(origin) <= OPEN:
+            return follow_configuration(system, target, locked, p, (origin, p))
+    return _guessed_configuration(Closing(system, p, locked), target, _indices(system, guess))
 
 
-def _checked(closing: Closing, q: Vector, target: Vector, others: list[int]) -> Vector:
-    """The configuration q, whose positions of others are those of the target.
+def _coordinate_names(system: System) -> list[str]:
+    return [coordinate.name for coordinate in system.coordinates]
+
+
+def _indices(system: System, names: Collection[str]) -> list[int]:
+    """Indices in q of named coordinates."""
+    return [k for k, c in enumerate(system.coordinates) if c.name in names]
+
+
+def _with_dependent_positions(
+    system: System,
+    target: Vector,
+    fixed: Mapping[str, float],
+    guess: Mapping[str, float],
+    p: Vector,
+) -> Vector:
+    """Return the configuration (nq,) with all independent positions and some dependent ones.
 
     Raises:
-        Unclosable: they are not.
+        Unclosable: the loops give the dependent joints other positions.
     """
-    far = np.abs(difference(closing.system, q, target))[others]
-    wrong = [k for k, x in zip(others, far, strict=True) if x > _FITS * max(1.0, abs(target[k]))]
+    names = independent_names(system)
+    independent, surplus = _indices(system, names), [name for name in fixed if name not in names]
+    closing = Closing(system, p, tuple(independent))
+    q = _guessed_configuration(closing, target, _indices(system, {*surplus, *guess}))
+    given = _indices(system, surplus)
+    missed = np.abs(q - target)[given]
+    scales = [closing.size if system.coordinates[k].unit.startswith("m") else 1.0 for k in given]
+    wrong = [k for k, x in zip(given, missed / scales, strict=True) if x > OPEN]
     if wrong:
-        names = [c.name for c in closing.system.coordinates]
-        given = ", ".join(f"{names[k]} = {target[k]:g}" for k in wrong)
-        found = ", ".join(f"{names[k]} = {q[k]:g}" for k in wrong)
-        raise Unclosable(
-            f"{closing.system.name}: with {closing.locked_positions(q)} the loops do not close with"
-            f" {given}, the nearest is {found}; leave positions out, or give them as guess"
+        required, found = (
+            ", ".join(f"{system.coordinates[k].name} = {values[k]:.6g}" for k in wrong)
+            for values in (target, q)
         )
-    return q
+        raise Unclosable(
+            f"{system.name}: with {closing.locked_positions(q)} the loops do not close with"
+            f" {required}, the nearest is {found}; leave positions out, or give them as a guess"
+        )
+    exact = Closing(system, p, tuple(_indices(system, fixed))).nearest(
+        _with_positions(q, target, given)
+    )
+    return exact.q if exact.is_closed else q
+
+
+def _with_positions(q: Vector, target: Vector, indices: Sequence[int]) -> Vector:
+    """The configuration q with some positions of the target."""
+    result = q.copy()
+    result[list(indices)] = target[list(indices)]
+    return result
 
 
 def _guessed_configuration(closing: Closing, start: Vector, named: list[int]) -> Vector:
     """The configuration whose named positions are nearest to those of `start`, (nq,).
 
-    Newton's method may land far from its start: unless it stays near, starts that differ in the
-    positions that nobody named are tried as well, and the nearest answer is taken.
+    Newton's method may end far from its start: then starts that differ in the positions without a
+    guess are tried as well, and the nearest configuration is taken.
     """
     rng = np.random.default_rng(_SEED)
     others = [k for k in closing.free if k not in named]
+    lengths = np.array([c.unit.startswith("m") for c in closing.system.coordinates])
+    scales = np.where(lengths, max(closing.size, 1.0), 1.0)
     found: list[tuple[float, Vector]] = []
     for _ in range(_GUESSES):
         trial = start.copy()
         if found:
-            trial[others] += rng.uniform(-_LARGEST_ANGLE, _LARGEST_ANGLE, len(others))
+            reach = _LARGEST_ANGLE * scales[others]
+            trial[others] += rng.uniform(-reach, reach, len(others))
         closed = closing.nearest(trial)
         if not closed.is_closed and found:
             continue
         q = _unwound(closing, closed.q, start) if closed.is_closed else None
         q = closed_configuration(closing, start) if q is None else q
-        far = float(np.max(np.abs(q[named] - start[named]), initial=0.0))
+        far = float(np.max(np.abs(q[named] - start[named]) / scales[named], initial=0.0))
         found.append((far, q))
         if far < _NEAR:
             break
@@ -219,12 +257,23 @@ def require_closed(
     Raises:
         LoopError: says how far it is open.
     """
-    closing = Closing(system, closure_parameters(system, parameters))
+    _require_joined(Closing(system, closure_parameters(system, parameters)), q)
+
+
+def _require_joined(closing: Closing, q: Vector) -> None:
+    """Raise LoopError if the configuration q (nq,) leaves the loops open."""
+    name = closing.system.name
     if closing.openness(q) > OPEN:
         worst = float(np.max(np.abs(closing.rows(q)[0]), initial=0.0))
         raise LoopError(
-            f"{system.name}: the configuration leaves the loops open by {worst:.3g};"
-            " use mbs.loops.solve to get one that closes them"
+            f"{name}: the configuration leaves the loops open by {worst:.3g};"
+            " use mbs.loops.solve to get one that closes them, or give the independent positions"
+            " alone"
+        )
+    if not closing.faces(q):
+        raise LoopError(
+            f"{name}: an axis of a closing joint points the opposite way in this configuration;"
+            " use mbs.loops.solve to get one that closes the loops"
         )
 
 

@@ -13,7 +13,14 @@ from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction, Named, model_function
 from mbs.closed_forms.ring import extent, independent_indices
 from mbs.errors import ModelError, NoClosedForm, Unclosable
-from mbs.loops.closing import LARGEST_MOVE, Vector, closure_parameters, relative_rows, row_sizes
+from mbs.loops.closing import (
+    LARGEST_MOVE,
+    Vector,
+    closure_parameters,
+    mechanism_size,
+    relative_rows,
+    row_sizes,
+)
 from mbs.loops.closure import facing, square_closure
 from mbs.loops.plan import Stage, plan
 from mbs.text import did_you_mean, quoted
@@ -383,7 +390,10 @@ def _stage(system: System, active: list[int], passive: list[int]) -> Function:
     p = MX.sym("p", system.p.numel())
     z = _newton(system, active, passive)(led, q_a, p)
     q = _merge(system, active, passive)(z, q_a)
-    near = casadi.norm_inf(z - led) < LARGEST_MOVE
+    size = mechanism_size(system)
+    scales = [size if system.coordinates[k].unit.startswith("m") else SX(1) for k in passive]
+    measures = Function("measures", [system.p], [casadi.vertcat(SX(0, 1), *scales)])
+    near = casadi.norm_inf((z - led) / measures(p)) < LARGEST_MOVE
     good = casadi.logic_and(_closed(system)(q, p), near)
     return Function("stage", [led, q_a, p], [z, good])
 

@@ -186,6 +186,7 @@ def _found_again(
         replace(graph, outputs=(column,), nodes=tuple(nodes), results=(tuple(places),))
     )
     random = np.random.default_rng(_SEED)
+    # away from zero, where conditions are often equal
     points = [[random.uniform(0.1, 1.0, size) for size in sizes] for _ in range(_POINTS)]
     seen, wanted = (
         np.array([np.array(f(*point)).ravel() for point in points]) for f in (probe, crossings)

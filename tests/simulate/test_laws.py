@@ -343,3 +343,26 @@ def test_a_clutch_is_engaged_by_a_short_pulse():
             quiet=True,
         )
         assert result["a.v"][-1] == pytest.approx(expected, abs=1e-7)
+
+
+def test_conditions_that_are_equal_for_positive_angles_are_told_apart():
+    """Torques of |q| < 0.5, of q < 0.5 and of fmin(q, 5) < 0.5 beside formulas."""
+
+    class Both(Custom):
+        flange = custom.flange()
+
+        def loads(self, at):
+            """Loads of three conditions."""
+            q = at.flange.angle
+            near = casadi.if_else(casadi.fabs(q) < 0.5, 1.0, 0.0)
+            below = casadi.if_else(q < 0.5, 2.0, 0.0)
+            return {"flange": near + below + casadi.if_else(casadi.fmin(q, 5) < 0.5, 4.0, 0.0)}
+
+    result = mbs.simulate.run(shaft(Both("both")), 2.0, q0={"i": -1.0}, quiet=True)
+    # 6 N m from -1 to -0.5, 7 N m from there to 0.5, then none
+    first = np.sqrt(2 * 0.5 / 6)
+    middle = 6 * first
+    last = np.sqrt(middle**2 + 2 * 7)
+    after = 2.0 - first - (last - middle) / 7
+    assert result["i.v"][-1] == pytest.approx(last, abs=1e-10)
+    assert result["i.q"][-1] == pytest.approx(0.5 + last * after, abs=1e-10)

@@ -9,6 +9,7 @@ from typing import Any
 import casadi
 import numpy as np
 from casadi import SX, Function
+from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.errors import ModelError
@@ -109,8 +110,11 @@ def guard(t: SX, values: SX, counts: int, modes: SX, fired: SX, duration: Any) -
 # then follows the law of its begin, smoothly.
 
 
-_POINTS, _SEED = 4, 20261124
-"""Random points at which conditions are compared; a fixed seed, so that every run has the same."""
+_POINTS, _KNOWN, _SEED = 24, 12, 20261124
+"""Random points at which conditions are compared, and how many of them must have values: |x| and x
+are equal at half of them. A fixed seed, so that every run has the same."""
+_SIZES = -2.0, 3.0
+"""Powers of ten of the coordinates of these points: fmin(x, 5) and x are equal below 5."""
 _EQUAL = 1e-9
 """Difference of equal conditions: far above rounding, far below that of different ones."""
 _COMPARISONS = {casadi.OP_LT, casadi.OP_LE}
@@ -186,8 +190,9 @@ def _found_again(
         replace(graph, outputs=(column,), nodes=tuple(nodes), results=(tuple(places),))
     )
     random = np.random.default_rng(_SEED)
-    # away from zero, where conditions are often equal
-    points = [[random.uniform(0.1, 1.0, size) for size in sizes] for _ in range(_POINTS)]
+    points = [[_anywhere(random, size) for size in sizes] for _ in range(_POINTS)]
+    for point in points[:_KNOWN]:  # roots of parameters, such as masses, have values
+        point[-1] = np.abs(point[-1])
     seen, wanted = (
         np.array([np.array(f(*point)).ravel() for point in points]) for f in (probe, crossings)
     )
@@ -201,9 +206,14 @@ def _found_again(
                 off = np.abs(seen[:, column_of] - sign * wanted[:, j])
                 known = np.isfinite(off)
                 same = np.all(off[known] <= _EQUAL * (1 + np.abs(wanted[known, j])))
-                if of_counts[column_of] == (j >= sides) and known.sum() > 1 and same:
+                if of_counts[column_of] == (j >= sides) and known.sum() >= _KNOWN and same:
                     found.setdefault(number, (j, sign))
     return found
+
+
+def _anywhere(random: np.random.Generator, size: int) -> NDArray[np.float64]:
+    """Numbers of many sizes and both signs."""
+    return random.choice([-1.0, 1.0], size) * 10 ** random.uniform(*_SIZES, size)
 
 
 # Crossings of the state equations of FMUs.

@@ -399,20 +399,24 @@ class PartsAt:
         return casadi.vertcat(*found)
 
     def laws(self) -> SX:
-        """Loads and rates of all components that do not give their own crossings, (n, 1)."""
+        """Loads, rates and outputs of components of users without crossings of their own, (n, 1).
+
+        The laws of the components of this package are continuous, or give their crossings.
+        """
         found = [SX(0, 1)]
         for part in self.parts:
             element = part.element
-            if element.has("crossings"):
+            if type(element).__module__.startswith("mbs.") or element.has("crossings"):
                 continue
             for load in self.loads(part).values() if element.acts else ():
                 if isinstance(load, FrameLoad):
                     found += [load.force, load.moment]
                 else:
                     found.append(SX(load))
-            if part.states:
-                found += [SX(value) for value in element.rates(self.at(part)).values()]
-        return casadi.vertcat(*found)
+            for method in ("rates", "outputs"):
+                if element.has(method):
+                    found += map(SX, getattr(element, method)(self.at(part)).values())
+        return casadi.vertcat(*map(casadi.vec, found))
 
     def outputs(self, lam: SX | None = None) -> SX:
         """(ny, 1) outputs of all components.

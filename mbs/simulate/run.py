@@ -571,7 +571,8 @@ def with_crossings(
     if few:  # awake, not in a row, since the start
         begin = float(math.floor(ticks_of(t0, duration)))
         places += [*np.zeros(2 * few), *np.full(few, begin), duration]
-    return Events(indicators, jump, [*modes, *places], _FIRST_STEP), functions
+    first_step = _FIRST_STEP if state.short else 0.0
+    return Events(indicators, jump, [*modes, *places], first_step), functions
 
 
 def _watch_crossings(

@@ -51,6 +51,7 @@ class Conditions:
         crossings: expressions that also depend on states; a law jumps, bends or is short near their
             zeros.
         counts: expressions that also depend on states; a law jumps at their whole numbers.
+        short: those of `crossings` near whose zeros a smooth law is short.
     """
 
     zeros: list[SX] = field(default_factory=list)
@@ -60,6 +61,7 @@ class Conditions:
     phases: list[SX] = field(default_factory=list)
     crossings: list[SX] = field(default_factory=list)
     counts: list[SX] = field(default_factory=list)
+    short: list[SX] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -167,6 +169,7 @@ def _collect(node: SX, depends: int, found: Conditions, *, jumps_alone: bool) ->
             and not depends & _OTHER
         ):
             found.crossings.append(value)
+            found.short.append(value)
 
 
 def _condition(op: int, operands: Sequence[SX]) -> Iterator[tuple[str, SX]]:

@@ -559,6 +559,7 @@ class FullState:
         sides: number of the crossings that may stay at zero or pass it without end, such as the
             velocity in a law of dry friction.
         counts: number of the last crossings, at whose whole numbers laws jump.
+        short: whether a smooth law may be short behind a crossing.
         timing: what efforts, inputs and prescribed motions say of the time alone; None where they
             say nothing.
         prepared: what integrations keep between runs.
@@ -572,6 +573,7 @@ class FullState:
     crossings: Function | None = None
     sides: int = 0
     counts: int = 0
+    short: bool = False
     timing: TimeLaws | None = None
     prepared: dict[Any, Any] = field(default_factory=dict)
 
@@ -623,7 +625,7 @@ def full_state(
     corrected = [casadi.vertcat(*kept, z), residual]
     p = casadi.vertcat(p, contact.values) if contact else p
     signals = effort, inputs
-    timing, sides, counts = _law_conditions(system, (t, q, v), u, signals, motions, parts)
+    timing, sides, counts, short = _law_conditions(system, (t, q, v), u, signals, motions, parts)
     crossed = casadi.vertcat(parts.crossings(), sides, counts)
     rate, *observed = with_inputs(system, [rate, *observed], u)
     return FullState(
@@ -635,6 +637,7 @@ def full_state(
         crossings=dense_function("crossings", [t, x, p], [crossed]) if crossed.numel() else None,
         sides=sides.numel(),
         counts=counts.numel(),
+        short=short or parts.crossings().numel() > 0,
         timing=timing,
     )
 
@@ -646,8 +649,10 @@ def _law_conditions(
     signals: Sequence[Function | None],
     motions: Sequence[Prescribed],
     parts: PartsAt,
-) -> tuple[TimeLaws | None, SX, SX]:
-    """What laws say of the time alone, and sides and counts at which they jump or bend.
+) -> tuple[TimeLaws | None, SX, SX, bool]:
+    """Parts of laws that depend on time alone, and sides and counts at which laws jump or bend.
+
+    The last value is whether a smooth law may be short behind one of the sides.
 
     Args:
         system: open or closed.
@@ -679,7 +684,8 @@ def _law_conditions(
             elif casadi.depends_on(value, t):
                 of_time.append(value)
         results.append(casadi.vertcat(SX(0, 1), *kept))
-    return time_laws(found, t, system.p), results[0], results[1]
+    short = bool(found.short or own.short)
+    return time_laws(found, t, system.p), results[0], results[1], short
 
 
 def _events(

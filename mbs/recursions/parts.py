@@ -399,7 +399,7 @@ class PartsAt:
         return casadi.vertcat(*found)
 
     def laws(self) -> SX:
-        """Loads and rates of components of users without crossings of their own, and signals, (n, 1).
+        """(n, 1) loads, rates and signals of components of users without crossings of their own.
 
         The laws of the components of this package are continuous, or give their crossings. The
         outputs of components of users act on the motion only through wires.

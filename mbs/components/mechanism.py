@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
+from mbs.arguments import names_given
 from mbs.components.bodies import Mount, RigidBody, World
 from mbs.components.component import Component, Point
 from mbs.components.couplings import Coupling
@@ -20,6 +21,7 @@ from mbs.components.sensors import Sensor
 from mbs.components.shapes import Shape
 from mbs.errors import AssemblyError, DescriptionError
 from mbs.expressions import Parameter, Scalar, parameters_of
+from mbs.result import Result, State, positions_of
 from mbs.text import did_you_mean, quoted
 
 if TYPE_CHECKING:
@@ -359,7 +361,7 @@ class Mechanism:
         lock(self, positions)
 
     def assemble(
-        self, guess: Mapping[str, float] | None = None, active: Sequence[str] = ()
+        self, guess: Mapping[str, float] | State | Result | None = None, active: Sequence[str] = ()
     ) -> System:
         """The frozen `System` of this mechanism: tree, cut joints, equations.
 
@@ -377,15 +379,13 @@ class Mechanism:
         """
         from mbs.loops.assemble import assemble  # the one call upwards, see docs/decisions.md
 
+        guess = positions_of(guess)
         if not isinstance(guess, Mapping | None):
             raise DescriptionError(
                 f"{self.name}: guess is {quoted(guess)}; give a dict of names to positions"
             )
-        if isinstance(active, str):
-            raise DescriptionError(
-                f"{self.name}: active is the text {active!r}; give a list of names, [{active!r}]"
-            )
-        return assemble(self, {**self.guess, **(guess or {})}, active)
+        names = names_given(f"{self.name}: active", active, "j1", DescriptionError)
+        return assemble(self, {**self.guess, **(guess or {})}, names)
 
     def _require_use(self, component: Component) -> None:
         """Refuse a component that no equation would know."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from mbs.arguments import values_given
 from mbs.components import Mechanism
 from mbs.components.locking import Base, fix_root, free_root
 from mbs.errors import DescriptionError
@@ -83,7 +84,8 @@ def load(
     if lock:
         mechanism.lock(_joint_names(mechanism, lock))
     known = {parameter.name: parameter for parameter in mechanism.parameters()}
-    for name, value in (parameters or {}).items():
+    given = values_given(f"{mechanism.name}: parameters", parameters, '"L1": 0.3', DescriptionError)
+    for name, value in given.items():
         if name not in known:
             raise DescriptionError(
                 f"{mechanism.name}: parameter {name!r} is not used; {did_you_mean(name, known)}"

@@ -385,7 +385,7 @@ class Result:
         return figure
 
     def _index(self, name: str) -> int:
-        if name not in self.units:
+        if not isinstance(name, str) or name not in self.units:
             raise ModelError(
                 f"result {self.name!r} has no signal {name!r}; it has {', '.join(self.names)}"
             )

@@ -74,7 +74,7 @@ from mbs.result import (
 from mbs.simulate.arguments import count_steps, positive
 from mbs.solvers import EventMotion, Events, integrate_events
 from mbs.solvers.integrate import is_compilable
-from mbs.solvers.problem import IntegrationEvent, Passage, failed
+from mbs.solvers.problem import METHODS, IntegrationEvent, Passage, failed
 from mbs.text import did_you_mean, quoted
 
 # Rigid stops and Coulomb friction in a simulation: how they start, and what a result says of them.
@@ -1193,6 +1193,10 @@ class Simulator:
         require_contacts_possible(system, self._motions)
         self._effort, self._inputs = effort_function(system, tau), input_function(system, u)
         self._given = given_inputs(system, inputs)
+        if not isinstance(method, str) or method not in METHODS:
+            raise ModelError(
+                f"{system.name}: method is {quoted(method)}; use {' or '.join(map(repr, METHODS))}"
+            )
         self._method = method
         self._outputs = None
         if outputs is not None:
@@ -1526,7 +1530,7 @@ def simulator_of(system: System, inputs: Sequence[str] = (), **laws: Any) -> Sim
         return Simulator(system, inputs, **laws)
 
     require_system(system)
-    key = list(inputs)
+    key = list(names_given(f"{system.name}: inputs", inputs, "j1.tau"))
     for name, law in laws.items():
         if law is None or type(law) is str:
             key.append(f"{name} {law}")

@@ -388,8 +388,8 @@ def by_fmu(fmi, kind):
         if "motion" in content:
             exported["inputs"], inputs["j1.a"] = ["j1.a"], 0.5
         if content.get("tau") is jumping:
-            before = np.nextafter(DURATION / 2, 0)
-            inputs["j1.tau"] = [0.0, before, DURATION / 2, DURATION], [0.3, 0.3, -0.4, -0.4]
+            half = DURATION / 2  # twice: a jump
+            inputs["j1.tau"] = [0.0, half, half, DURATION], [0.3, 0.3, -0.4, -0.4]
         elif "tau" in content:
             inputs |= {f"{joint}.tau": value for joint, value in content["tau"].items()}
         inputs |= content.get("u", {})

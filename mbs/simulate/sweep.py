@@ -62,7 +62,7 @@ def cases_of(grid: Grid) -> tuple[Case, ...]:
             f'sweep: the grid is {quoted(grid)}; give a dict such as {{"m": [1.0, 2.0]}}, or a'
             ' list of one dict for each case, such as [{"m": 1.0}, {"m": 2.0}]'
         )
-    if not listed:
+    if not grid or not listed:
         raise ModelError("sweep: the grid has no case; give at least one value for every name")
     return tuple({str(name): _number(name, x) for name, x in case.items()} for case in listed)
 

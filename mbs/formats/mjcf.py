@@ -474,7 +474,7 @@ class Joints:
             moved = body
             if j != joints[-1]:
                 name = unused_name(mechanism, mjcf, f"{mjcf.bodies[k]}_{mjcf.joints[j]}")
-                moved = mechanism.add(Body(name))
+                moved = mechanism.add(Body(name, mass=0))
             self._connect(j, parent, point, moved)
             point = moved.frame
 

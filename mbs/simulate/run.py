@@ -1195,7 +1195,7 @@ class Simulator:
         self._given = given_inputs(system, inputs)
         if not isinstance(method, str) or method not in METHODS:
             raise ModelError(
-                f"{system.name}: method is {quoted(method)}; use {' or '.join(map(repr, METHODS))}"
+                f"{system.name}: method is {quoted(method)}; use {', or '.join(map(repr, METHODS))}"
             )
         self._method = method
         self._outputs = None

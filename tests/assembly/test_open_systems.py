@@ -222,7 +222,7 @@ def test_numbering_depth_first_or_as_given():
 
 def test_massless_bodies_between_joints():
     m = mbs.Mechanism("m")
-    frame, end = m.add(Body("frame")), m.add(solid("end"))
+    frame, end = m.add(Body("frame", mass=0)), m.add(solid("end"))
     m.connect(m.world, Revolute("j1"), frame)
     m.connect(frame, Revolute("j2", axis="x"), end)
     other = mbs.Mechanism("m")

@@ -32,8 +32,8 @@ def shapes_left_out(system: System) -> str:
     if not system.shapes:
         return ""
     names = {-1: "the base", **{j: link.name for j, link in enumerate(system.tree.links)}}
-    owners = dict.fromkeys(names[row.link] for row in system.shapes)
-    return f"The {len(system.shapes)} shapes on {', '.join(owners)} are not in this file."
+    owners = ", ".join(dict.fromkeys(names[row.link] for row in system.shapes))
+    return f"Shapes that are not in this file: {len(system.shapes)}, on {owners}."
 
 
 def write_xml(root: Element, path: str | os.PathLike[str], note: str = "") -> None:

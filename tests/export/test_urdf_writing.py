@@ -118,7 +118,7 @@ def test_shapes_that_are_left_out_are_noted_once(writer, tmp_path):
         m.add_shape(body.at(x), Shape("sphere", (0.05,)))
     path = tmp_path / f"m.{'xml' if writer == 'mjcf' else writer}"
     getattr(mbs.export, writer)(m, path)
-    assert path.read_text().count("The 2 shapes on j are not in this file.") == 1
+    assert path.read_text().count("Shapes that are not in this file: 2, on j.") == 1
 
 
 def test_all_symbols_without_value_are_named(tmp_path):

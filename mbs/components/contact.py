@@ -18,7 +18,7 @@ from casadi import SX, Function
 
 from mbs.components import custom
 from mbs.components.bodies import three
-from mbs.components.custom import Load, RelativeMotion
+from mbs.components.custom import Approach, Load, RelativeMotion
 from mbs.components.forces import ForceElement
 from mbs.components.shapes import Shape
 from mbs.errors import DescriptionError
@@ -41,6 +41,9 @@ a plane is inside, whatever rounding does."""
 _THIN = 0.03
 """Half the width of a wheel without a round rim in pictures, part of its radius: a disc that is
 seen from its edge, too."""
+_SPACING = 0.01
+"""Width of the narrowest bump [m] that a point is sure to meet where no width is given: that of the
+ground of feet and wheels."""
 _INSIDE = 1e-9
 """Distance [m] of a centre from a box from which on its direction tells the normal; nearer, and
 inside, the nearest face does."""
@@ -268,13 +271,27 @@ class Contact(ForceElement):
             found |= {name + label: value for name, value in zip(_OUTPUTS, values, strict=True)}
         return found
 
-    def crossings(self, at: Any) -> Mapping[str, SX]:
+    def crossings(self, at: Any) -> Mapping[str, SX | Approach]:
         """The depths: a spot begins and ends to touch where one is zero."""
-        spots = self.spots(self._motion(at), at)
+        motion = self._motion(at)
         return {
-            f"depth{label}": spot.depth + _TOUCHING
-            for label, spot in zip(self.labels, spots, strict=True)
+            f"depth{label}": Approach(spot.depth + _TOUCHING, *self.approach(motion, spot, at))
+            for label, spot in zip(self.labels, self.spots(motion, at), strict=True)
         }
+
+    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+        """Speed [m/s] and pace [1/s] of the depth of a spot, as `custom.Approach` has them.
+
+        The speed is that of the whole body, and the size of what it meets is that of the body.
+
+        Args:
+            motion: of the frame of the body, seen from that of the ground.
+            spot: one of its spots.
+            at: the parameters.
+        """
+        reach = custom.regular_length(spot.lever)
+        speed = custom.regular_length(motion.V) + reach * custom.regular_length(motion.w)
+        return speed, speed / (reach + _TOUCHING)
 
     # How it is computed.
 
@@ -397,6 +414,12 @@ class PlaneContact(Contact):
     def reach(self, at: Any) -> SX:
         """Radius of the spheres [m]."""
         return SX(0)
+
+    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+        """The whole speed; a plane has no size, so that only a turn shortens an approach."""
+        reach = custom.regular_length(spot.lever)
+        turn = custom.regular_length(motion.w)
+        return custom.regular_length(motion.V) + reach * turn, turn
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
         """The lowest point of every sphere."""
@@ -569,6 +592,11 @@ class SphereSphereContact(Contact):
         depth = at.radius_a + at.radius_b - motion.length
         return [Spot(depth, motion.along, -(at.radius_b - depth / 2) * motion.along)]
 
+    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+        """The relative speed of the centres; the size is the sum of the radii."""
+        speed = custom.regular_length(at.b.v - at.a.v)
+        return speed, speed / (at.radius_a + at.radius_b)
+
     def figures(self, at: Any) -> Mapping[str, Shape]:
         """Both spheres."""
         return {**_ball("a", at.radius_a), **_ball("b", at.radius_b)}
@@ -613,6 +641,11 @@ class SphereBoxContact(Contact):
         depth = at.radius - casadi.if_else(is_outside, distance, nearest)
         return [Spot(depth, normal, -(at.radius - depth / 2) * normal)]
 
+    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+        """The speed of the centre, seen from the box; the size is that of its shortest side."""
+        speed = custom.regular_length(motion.V)
+        return speed, speed / (at.radius + casadi.mmin(_half_size(self, at)))
+
     def figures(self, at: Any) -> Mapping[str, Shape]:
         """The sphere and the box."""
         return {**_ball("sphere", at.radius), **_cuboid("box", self.size, at)}
@@ -630,15 +663,21 @@ class HeightFieldContact(Contact):
         ground: frame of x, y and z.
         height: h, a function of (x, y) made of CasADi operations, or a casadi.Function [m].
         radius: [m].
+        spacing: width of the narrowest bump [m], which no step passes over; the radius when left
+            out, 1 cm for a point.
     """
 
     body = custom.frame()
     ground = custom.frame()
     height: Any = field(kw_only=True)
     radius = custom.parameter("m", 0.0, min=0)
+    spacing: Scalar | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         Contact.__post_init__(self)
+        if self.spacing is not None:
+            self._normalise("spacing")
+            self._require_positive("spacing")
         x, y = SX.sym("x"), SX.sym("y")
         try:
             value = SX(self.height(x, y))
@@ -668,6 +707,13 @@ class HeightFieldContact(Contact):
                 f"{self.name}: height holds the symbols {', '.join(strange)}; make it of x, y and"
                 " numbers"
             )
+
+    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+        """The speed over the ground has no bound for the depth, which a bump may change at once."""
+        size = casadi.if_else(at.radius > 0, at.radius, _SPACING)
+        if self.spacing is not None:
+            size = to_sx(self.spacing, at.symbols)
+        return None, custom.regular_length(motion.V) / size
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
         """The sphere; the ground is not drawn."""

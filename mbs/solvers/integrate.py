@@ -120,6 +120,8 @@ def library_of(equations: Equations) -> ctypes.CDLL | None:
     if equations.indicators is not None:
         names.append("events")
         flags.append("-DMBS_EVENTS")
+    if equations.approaches is not None:
+        flags.append("-DMBS_APPROACHES")
     if equations.passage is not None:
         names.extend(("dense", "passage"))
         flags.append("-DMBS_PASSAGE")

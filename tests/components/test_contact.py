@@ -412,19 +412,41 @@ def test_sizes_of_boxes_are_checked():
     )
 
 
-def test_a_crossing_of_velocities_is_refused():
-    class Stick(Custom):
+def test_a_crossing_of_inputs_is_refused():
+    class Push(Custom):
         point = custom.frame()
+        force = custom.input("N")
 
         def loads(self, at):
-            return {"point": custom.force(-at.point.v)}
+            return {"point": custom.force(casadi.vertcat(at.force, 0, 0))}
 
         def crossings(self, at):
-            return {"stop": at.point.v[0]}
+            return {"push": at.force - 1}
 
     m = mbs.Mechanism("m")
     body = m.add(Body("b", mass=1))
     m.connect(m.world, Prismatic("x", axis="x"), body)
-    m.add(Stick("s", body))
-    sentence = "s (Stick): the crossing 'stop' depends on velocities or inputs"
-    refused(AssemblyError, sentence, by=m.assemble)
+    m.add(Push("s", body))
+    refused(AssemblyError, "s (Push): the crossing 'push' depends on inputs", by=m.assemble)
+
+
+def test_a_crossing_may_follow_from_velocities():
+    class Gas(Custom):
+        """Resists with 2 N while the body moves forwards, not while it returns."""
+
+        point = custom.frame()
+
+        def loads(self, at):
+            force = casadi.if_else(at.point.v[0] > 0, -2.0, 0.0)
+            return {"point": custom.force(casadi.vertcat(force, 0, 0))}
+
+        def crossings(self, at):
+            return {"turn": at.point.v[0]}
+
+    m = mbs.Mechanism("m", gravity=(-1.0, 0, 0))
+    body = m.add(Body("b", mass=1))
+    m.connect(m.world, Prismatic("x", axis="x"), body)
+    m.add(Gas("s", body))
+    result = mbs.simulate.run(m.assemble(), 3.0, v0={"x": 3.0}, step=3.0, quiet=True)
+    # it stops after 1 s at 1.5 m and falls for 2 s
+    assert result["x.q"][-1] == pytest.approx(1.5 - 2.0, abs=1e-9)

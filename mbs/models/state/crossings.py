@@ -239,8 +239,7 @@ def part_crossings(system: System) -> Function | None:
     constants = casadi.vertcat(system.p, parts.modes())
     found = _jumps(parts.laws(), SX(0, 1), q, constants)
     states = casadi.vertcat(q, v, system.z)
-    given = parts.crossings(of_contacts=False)
-    sides = casadi.vertsplit(given) if given.numel() else []
+    sides = [one.value for one in parts.crossings(of_bends=False)]
     return _function(
         [q, v, system.z, system.u, system.p], [*sides, *found.crossings], found.counts, states
     )

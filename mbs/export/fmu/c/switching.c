@@ -177,7 +177,7 @@ static int jump(void *user, double t, double *x, const double *fired) {
 }
 
 void core_init_events(core *c) {
-    static const events_model model = {indicators, rates, jump};
+    static const events_model model = {indicators, rates, jump, NULL};
     events_init(&c->events, &c->solver, NK, &model, c->m.events, c->event_work);
 }
 

@@ -141,6 +141,7 @@ from mbs.components.translational import (
     SlidingMass,
     SlidingSpring,
 )
+from mbs.components.wheels import WheelSet
 
 __all__ = [
     "PI",
@@ -270,6 +271,7 @@ __all__ = [
     "Trapezoid",
     "Universal",
     "WheelPlaneContact",
+    "WheelSet",
     "World",
     "WrenchSensor",
 ]

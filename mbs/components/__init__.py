@@ -25,10 +25,12 @@ from mbs.components.constraints import (
 )
 from mbs.components.contact import (
     BoxPlaneContact,
+    CapsuleCapsuleContact,
     CapsulePlaneContact,
     Contact,
     HeightFieldContact,
     SphereBoxContact,
+    SphereCapsuleContact,
     SpherePlaneContact,
     SphereSphereContact,
     WheelPlaneContact,
@@ -155,6 +157,7 @@ __all__ = [
     "Brake",
     "Bushing",
     "Cam",
+    "CapsuleCapsuleContact",
     "CapsulePlaneContact",
     "Cartesian",
     "Clutch",
@@ -257,6 +260,7 @@ __all__ = [
     "SlidingMass",
     "SlidingSpring",
     "SphereBoxContact",
+    "SphereCapsuleContact",
     "SpherePlaneContact",
     "SphereSphereContact",
     "Spherical",

@@ -41,6 +41,10 @@ a plane is inside, whatever rounding does."""
 _THIN = 0.03
 """Half the width of a wheel without a round rim in pictures, part of its radius: a disc that is
 seen from its edge, too."""
+_PARALLEL = 1e-6
+"""Weight of the distances from the middles of capsules in the square of their distance. It adds
+1e-5 of a radius to the distance at the ends of capsules of ten radii, a tenth of usual depths. Its
+square root is the angle over which a capsule comes to rest on another one."""
 _SPACING = 0.01
 """Width of the narrowest bump [m] that a point is sure to meet where no width is given: that of the
 ground of feet and wheels."""
@@ -565,6 +569,11 @@ def _cuboid(port: str, size: Any, at: Any) -> Mapping[str, Shape]:
     return {port: Shape("box", known)} if len(known) == len(sides) else {}
 
 
+def _within(value: SX, half: SX) -> SX:
+    """A distance from the middle of a segment, at most half its length."""
+    return casadi.fmin(casadi.fmax(value, -half), half)
+
+
 def _half_size(box: Any, at: Any) -> SX:
     return vector(to_sx(side, at.symbols) for side in box.size) / 2
 
@@ -600,6 +609,99 @@ class SphereSphereContact(Contact):
     def figures(self, at: Any) -> Mapping[str, Shape]:
         """Both spheres."""
         return {**_ball("a", at.radius_a), **_ball("b", at.radius_b)}
+
+
+class SphereCapsuleContact(Contact):
+    """A sphere and a capsule, at the point of its axis that is nearest.
+
+    Attributes:
+        sphere: frame at its centre.
+        capsule: frame in the middle of the capsule, whose z is its axis.
+        radius: of the sphere [m].
+        capsule_radius: of the capsule [m].
+        length: between the centres of its end spheres [m].
+    """
+
+    ports = ("sphere", "capsule")
+
+    sphere = custom.frame()
+    capsule = custom.frame()
+    radius = custom.parameter("m", min=0)
+    capsule_radius = custom.parameter("m", positive=True)
+    length = custom.parameter("m", positive=True)
+
+    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+        """From the nearest point of the axis to the centre."""
+        along = _within(motion.p[2], at.length / 2)
+        off = motion.p - vector([SX(0), SX(0), along])
+        distance = custom.regular_length(off)
+        depth = at.radius + at.capsule_radius - distance
+        return [Spot(depth, off / distance, -(at.radius - depth / 2) * off / distance)]
+
+    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+        """The speed of the centre, seen from the capsule; the size is the sum of the radii."""
+        speed = custom.regular_length(motion.V)
+        return speed, speed / (at.radius + at.capsule_radius)
+
+    def figures(self, at: Any) -> Mapping[str, Shape]:
+        """The sphere and the capsule."""
+        capsule = Shape("capsule", (at.capsule_radius, at.length))
+        return {**_ball("sphere", at.radius), "capsule": capsule}
+
+
+class CapsuleCapsuleContact(Contact):
+    """Two capsules, at the points of their axes that are nearest.
+
+    Of axes that are parallel no points are nearest. The square of the distance therefore has the
+    term e (s^2 + t^2) of the distances s and t of the points from the middles, e = 1e-6: the points
+    move smoothly from one end to the other while the angle of the axes changes by some 1e-3 rad.
+
+    Source: Ericson 2005, section 5.1.9, for the nearest points of two segments.
+
+    Attributes:
+        a, b: frames in the middle of the capsules, whose z is the axis.
+        radius_a, radius_b: [m].
+        length_a, length_b: between the centres of the end spheres [m].
+    """
+
+    ports = ("b", "a")
+
+    a = custom.frame()
+    b = custom.frame()
+    radius_a = custom.parameter("m", positive=True)
+    length_a = custom.parameter("m", positive=True)
+    radius_b = custom.parameter("m", positive=True)
+    length_b = custom.parameter("m", positive=True)
+
+    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+        """Between the nearest points, in the middle of the overlap."""
+        axis = motion.R[:, 2]
+        cosine, weight = axis[2], 1 + _PARALLEL
+        own, other = motion.p[2], casadi.dot(motion.p, axis)
+        half_a, half_b = at.length_a / 2, at.length_b / 2
+        # the minimum of a convex function of s and t within the lengths
+        s = _within((weight * own - cosine * other) / (weight**2 - cosine**2), half_a)
+        t = _within((cosine * s - other) / weight, half_b)
+        s = _within((own + cosine * t) / weight, half_a)
+        off = motion.p + t * axis - vector([SX(0), SX(0), s])
+        length = custom.regular_length(off)
+        distance = casadi.sqrt(length**2 + _PARALLEL * (s**2 + t**2))
+        depth, normal = at.radius_a + at.radius_b - distance, off / length
+        lever = t * axis - (at.radius_b - depth / 2) * normal
+        return [Spot(depth, normal, lever, length / distance)]
+
+    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+        """The speed of the ends of b, seen from a; the size is the sum of the radii."""
+        turn = at.length_b / 2 * custom.regular_length(motion.w)
+        speed = custom.regular_length(motion.V) + turn
+        return speed, speed / (at.radius_a + at.radius_b)
+
+    def figures(self, at: Any) -> Mapping[str, Shape]:
+        """Both capsules."""
+        return {
+            "a": Shape("capsule", (at.radius_a, at.length_a)),
+            "b": Shape("capsule", (at.radius_b, at.length_b)),
+        }
 
 
 class SphereBoxContact(Contact):

@@ -18,6 +18,7 @@ from mbs.assembly import System
 from mbs.assembly.parts import AttachedPart, WireSource
 from mbs.assembly.tables import AttachedSensor
 from mbs.assembly.tree import Frame, position_rate
+from mbs.components.contact import Contact
 from mbs.components.custom import (
     Approach,
     At,
@@ -396,6 +397,7 @@ class PartsAt:
         for part in self.parts:
             own = type(part.element).__module__
             is_bend = own.startswith("mbs.") and own not in _ENDING
+            is_bend = is_bend and not isinstance(part.element, Contact)
             if part.element.has("crossings") and (of_bends or not is_bend):
                 for given in part.element.crossings(self.at(part)).values():
                     plain = not isinstance(given, Approach)

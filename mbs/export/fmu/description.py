@@ -110,6 +110,8 @@ def _check_functions(model: FmuModel) -> None:
         _check_shape(model, "first", model.jumps.first, point, (n_m, k))
         _check_shape(model, "indicators", model.jumps.indicators, point, (k,))
         _check_shape(model, "jump", model.jumps.jump, (*point, k), (nx, n_m))
+        if model.jumps.approaches is not None:
+            _check_shape(model, "approaches", model.jumps.approaches, point, (3 * k,))
 
 
 def _check_target(model: FmuModel) -> None:
@@ -333,6 +335,8 @@ class Jumps:
         jump: `jump(t, x, z, u, p, fired) -> (x, modes)` after an event; fired (k, 1) is 1 for each
             indicator that is not positive.
         names: (k) what each indicator watches, for messages.
+        approaches: `approaches(t, x, z, u, p) -> a`, (k, 3) as `mbs.solvers.Events` has them, for
+            steps of Co-Simulation; None where two looks a step are enough.
     """
 
     modes: tuple[FmuVariable, ...]
@@ -340,6 +344,7 @@ class Jumps:
     indicators: casadi.Function
     jump: casadi.Function
     names: tuple[str, ...]
+    approaches: casadi.Function | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -272,4 +272,5 @@ def jumps(system: System, state: MinimalState) -> Jumps | None:
         indicators=events.indicators,
         jump=events.jump,
         names=events.names,
+        approaches=events.approaches,
     )

@@ -120,6 +120,7 @@ core_status core_step(core *c, double limit) {
     if (!status && !ON_TREE(c) && !c->m.watched.on) status = guard_restart(c);
     if (status) return status;
 #if NK > 0
+    c->events.near_at = NAN; /* the state may be another one */
     stopped = events_step(&c->events, x, limit);
 #else
     stopped = stepper_step(&c->solver, x, limit);
@@ -163,6 +164,19 @@ static int rates(void *user, double t, const double *x, double *rise) {
     return CALL(ON_TREE(c), rates);
 }
 
+#ifdef MODEL_APPROACHES
+/* Only systems without loops have them, whose states are those of the tree. */
+static int approaches(void *user, double t, const double *x, double *near) {
+    core *c = user;
+    if (place(c, &t, x)) return 1;
+    c->res[0] = near;
+    return mbs_approaches(c->arg, c->res, c->iw, c->w, 0);
+}
+#define APPROACHES approaches
+#else
+#define APPROACHES NULL
+#endif
+
 static int jump(void *user, double t, double *x, const double *fired) {
     core *c = user;
     double next[MOST(NX, NT) + 1], modes[NM + 1];
@@ -177,7 +191,7 @@ static int jump(void *user, double t, double *x, const double *fired) {
 }
 
 void core_init_events(core *c) {
-    static const events_model model = {indicators, rates, jump, NULL};
+    static const events_model model = {indicators, rates, jump, APPROACHES};
     events_init(&c->events, &c->solver, NK, &model, c->m.events, c->event_work);
 }
 

@@ -46,8 +46,8 @@ _PARALLEL = 1e-6
 1e-5 of a radius to the distance at the ends of capsules of ten radii, a tenth of usual depths. Its
 square root is the angle over which a capsule comes to rest on another one."""
 _SPACING = 0.01
-"""Width of the narrowest bump [m] that a point is sure to meet where no width is given: that of the
-ground of feet and wheels."""
+"""Size [m] of the narrowest bump or body that a point is sure to meet where no size is given: that
+of the ground of feet and wheels."""
 _INSIDE = 1e-9
 """Distance [m] of a centre from a box from which on its direction tells the normal; nearer, and
 inside, the nearest face does."""
@@ -286,7 +286,8 @@ class Contact(ForceElement):
     def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
         """Speed [m/s] and pace [1/s] of the depth of a spot, as `custom.Approach` has them.
 
-        The speed is that of the whole body, and the size of what it meets is that of the body.
+        The speed is that of the whole body, and the size is the distance of the spot from its
+        frame, at least 1 cm.
 
         Args:
             motion: of the frame of the body, seen from that of the ground.
@@ -295,7 +296,7 @@ class Contact(ForceElement):
         """
         reach = custom.regular_length(spot.lever)
         speed = custom.regular_length(motion.V) + reach * custom.regular_length(motion.w)
-        return speed, speed / (reach + _TOUCHING)
+        return speed, speed / casadi.fmax(reach, _SPACING)
 
     # How it is computed.
 

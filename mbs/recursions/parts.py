@@ -400,8 +400,9 @@ class PartsAt:
             is_bend = is_bend and not isinstance(part.element, Contact)
             if part.element.has("crossings") and (of_bends or not is_bend):
                 for given in part.element.crossings(self.at(part)).values():
-                    plain = not isinstance(given, Approach)
-                    found.append(Approach(SX(given), SX(0), SX(0)) if plain else given)
+                    if not isinstance(given, Approach):
+                        given = Approach(SX(given), SX(0), SX(0))
+                    found.append(given)
         return found
 
     def approaches(self, found: Sequence[Approach]) -> SX:

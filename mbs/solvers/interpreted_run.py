@@ -253,9 +253,12 @@ class EventStepper:
         """(k, 3) approaches at a time within the last step."""
         assert self.approaches is not None
         try:
-            return self.approaches(t, self.solver.state(t))
+            near = self.approaches(t, self.solver.state(t))
         except RuntimeError as error:
             raise Failure("indicators") from error
+        if not np.isfinite(near).all():
+            raise Failure("indicators")
+        return near
 
     def _come_near(self, a: float, b: float, left: Array, right: Look) -> tuple[float, Look, Array]:
         """A time before b so near a that no indicator can have been at zero in between."""

@@ -168,6 +168,21 @@ def test_a_rotor_meets_what_is_on_its_circle(obstacle, method):
         assert result["j.v"][-1] == pytest.approx(-speed, rel=1e-6)
 
 
+def test_all_is_the_same_without_a_compiler(monkeypatch):
+    monkeypatch.setitem(integrate_events.__globals__, "compiler_found", lambda: False)
+    assert fly("edge", "dopri5", 4, 3) == fly("capsule", "rodas", 2, 4) == 0
+    for obstacle in ("sphere", "paddle"):
+        result = mbs.simulate.run(
+            rotor(obstacle),
+            3.5 / 30,
+            v0={"j": 30.0},
+            parameters={"k": 2e2 * 30**2 / 0.005**2.5},
+            step=3.5 / 30,
+            quiet=True,
+        )
+        assert result["j.v"][-1] == pytest.approx(-30, rel=1e-6)
+
+
 def test_the_python_twin_meets_it_too():
     """A point on a circle, whose first steps in Python pass over the obstacle without looks."""
     t, x, p = (casadi.SX.sym(name, n) for name, n in (("t", 1), ("x", 2), ("p", 1)))

@@ -130,7 +130,7 @@ def hold_sides(
     counts: int,
     inputs: Sequence[SX],
     *,
-    free: int = 0,
+    loose: int = 0,
 ) -> Function:
     """A function whose conditions have the places of crossings.
 
@@ -141,7 +141,7 @@ def hold_sides(
         modes: modes of the crossings, as `guard` has them.
         counts: number of counts.
         inputs: inputs of the result: symbols that include the symbols of `at` and the modes.
-        free: number of the first crossings, whose conditions stay as they are.
+        loose: number of the first crossings, whose conditions stay as they are.
 
     Returns:
         the function of these inputs. Conditions that are not found in it stay as they are.
@@ -157,7 +157,7 @@ def hold_sides(
     elements = [[SX(value.nz[j]) for j in range(value.nnz())] for value in at]
     places, asleep, _ = casadi.vertsplit(modes, [0, k, 2 * k, rest])
     crossed = Function("c", list(at), [values])
-    found = _found_again(graph, [n.numel() for n in at], crossed, counts, free)
+    found = _found_again(graph, [n.numel() for n in at], crossed, counts, loose)
     nodes = list[SX]()
     for number, node in enumerate(graph.nodes):
         value = value_of(node, nodes, elements)
@@ -179,7 +179,7 @@ def hold_sides(
 
 
 def _found_again(
-    graph: Graph, sizes: Sequence[int], crossings: Function, counts: int, free: int
+    graph: Graph, sizes: Sequence[int], crossings: Function, counts: int, loose: int
 ) -> dict[int, tuple[int, float]]:
     """Crossing and sign of each condition in a graph that is one of the crossings."""
     nodes, numbers, of_counts = list(graph.nodes), list[int](), list[bool]()
@@ -209,7 +209,7 @@ def _found_again(
     found: dict[int, tuple[int, float]] = {}
     for column_of, number in enumerate(numbers):
         op = graph.nodes[number].op
-        for j in range(free, wanted.shape[1]):
+        for j in range(loose, wanted.shape[1]):
             signs = (_ROUNDED[op],) if op in _ROUNDED else (1.0, -1.0)
             for sign in signs:
                 off = np.abs(seen[:, column_of] - sign * wanted[:, j])
@@ -432,8 +432,8 @@ def held_by(function: Function, values: WatchedCrossings, point: Sequence[SX]) -
     before = SX.sym("before", function.numel_in(4) - p.numel())
     modes = SX.sym("own", GUARD_MODES * k)
     at, inputs = [*others, casadi.vertcat(p, before)], [*others, casadi.vertcat(p, before, modes)]
-    every, free = casadi.vertcat(sides, counts), values.approaches.shape[0]
-    return hold_sides(function, at, every, modes, counts.numel(), inputs, free=free)
+    every, loose = casadi.vertcat(sides, counts), values.approaches.shape[0]
+    return hold_sides(function, at, every, modes, counts.numel(), inputs, loose=loose)
 
 
 def with_more_modes(function: Function, count: int) -> Function:

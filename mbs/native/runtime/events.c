@@ -244,8 +244,8 @@ static int may_repeat(const stepper *s, double start, double event) {
 
 /* Approaches at the place of the last look. */
 static int look_near(const events *e, double t, double *near) {
-    return e->model->approaches(e->solver->user, t, e->work, near) ? EVENTS_INDICATORS_FAILED
-                                                                   : STEPPER_OK;
+    if (e->model->approaches(e->solver->user, t, e->work, near)) return EVENTS_INDICATORS_FAILED;
+    return stepper_all_finite(near, 3 * e->count) ? STEPPER_OK : EVENTS_INDICATORS_FAILED;
 }
 
 static double pace(const events *e, int k) {

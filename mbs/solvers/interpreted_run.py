@@ -51,6 +51,10 @@ NEAR = 0.5
 turn."""
 FASTER = 1.25
 """Speed between two looks over that at the looks, which changes little in so short a time."""
+FALL = 0.85
+"""Part of the time to zero until the next look; 2 / (1 + FASTER) would just be near enough."""
+FULL = 0.98
+"""Part of the time of NEAR until the next look, since the pace may grow a little."""
 OFF = 0.1
 """Part of an indicator by which it may leave the curve of the step: forces follow it and are then
 wrong by as much."""
@@ -212,7 +216,7 @@ class EventStepper:
         None instead of the indicators where the step has missed a part of a law, with the time at
         which a shorter one ends.
         """
-        here, end, part, longest = start, self.solver.t, 1, math.inf
+        here, end, part = start, self.solver.t, 1
         left, ends = np.empty(0), None
         if self.approaches is not None:
             left, last = self._approaches(start), self._approaches(end)
@@ -220,14 +224,14 @@ class EventStepper:
                 ends = self._look(start), self._look(end)
         while here < end:
             planned = start + part * (end - start) / LOOKS if part < LOOKS else end
-            aim = min(planned, here + longest)
+            aim = planned if ends is None else min(planned, here + self._time_to_next(left))
+            aim = planned if aim <= here else aim  # a time below its rounding
             if here > start:
                 to, right = aim, self._look(aim)
             else:
                 to, right = self._first_look(start, aim)
             if ends is not None:
                 to, right, there = self._come_near(here, to, left, right)
-                longest = 2 * (to - here)
                 paces = np.maximum(left[:, 1], there[:, 1])
                 if to < end and not _follows(
                     ends,
@@ -259,6 +263,13 @@ class EventStepper:
         if not np.isfinite(near).all():
             raise Failure("indicators")
         return near
+
+    def _time_to_next(self, near: Array) -> float:
+        """Time to the next look that is likely to be near enough, from the left one [s]."""
+        speed, pace, _ = near[near[:, 1] > 0].T
+        value = self.left[0][near[:, 1] > 0]
+        falls = np.where((value > 0) & (speed > 0), FALL * value / speed, 0.0)
+        return float(np.min(np.maximum(falls, FULL * NEAR / pace), initial=math.inf))
 
     def _come_near(self, a: float, b: float, left: Array, right: Look) -> tuple[float, Look, Array]:
         """A time before b so near a that no indicator can have been at zero in between."""

@@ -14,6 +14,9 @@ static const double AT_START = 1e-3;
 static const double NEAR = 0.5;    /* product of pace and time between two looks, at most: half an
                                     * obstacle, or half a radian of a turn */
 static const double FASTER = 1.25; /* the speed between two looks, over that at the looks */
+static const double FALL = 0.85;   /* part of the time to zero until the next look: 2 / (1 + FASTER)
+                                    * would just be near enough */
+static const double FULL = 0.98;   /* part of the time of NEAR, likewise: the pace may grow a little */
 static const double OFF = 0.1;     /* part of an indicator by which it may leave the curve of the
                                     * step, and multiple of the tolerance */
 static const double SHORTER = 0.75; /* part of a step that missed a law, at most, of the next try */
@@ -289,6 +292,19 @@ static int are_near(const events *e, double a, double b) {
     return 1;
 }
 
+/* Time to the next look that is likely to be near enough, from the left one. */
+static double time_to_next(const events *e) {
+    double least_time = HUGE_VAL;
+    int k;
+    for (k = 0; k < e->count; k++) {
+        double rate = left_near(e)[e->count + k], speed = left_near(e)[k], time = 0.0;
+        if (rate == 0.0) continue;
+        if (left(e)[k] > 0.0 && speed > 0.0) time = FALL * left(e)[k] / speed;
+        least_time = fmin(least_time, fmax(time, FULL * NEAR / rate));
+    }
+    return least_time;
+}
+
 /* Move the right look at *b towards a until both are near. */
 static int come_near(const events *e, const double *x, double a, double *b) {
     int status = look_near(e, *b, right_near(e));
@@ -321,18 +337,18 @@ static int follows(const events *e, double start, double t) {
 /* The first event in the step from start, with the indicators there at the right; HUGE_VAL: none.
  * again: where a shorter step ends, if this one has missed a part of a law; HUGE_VAL: it has not. */
 static int first_event(events *e, const double *x, double start, double *event, double *again) {
-    double from = start, end = stepper_time(e->solver), longest = HUGE_VAL;
+    double from = start, end = stepper_time(e->solver);
     int number = 1, near = 0, status = STEPPER_OK;
     if (e->model->approaches) status = look_at_ends(e, x, start, &near);
     *event = *again = HUGE_VAL;
     while (!status && from < end) {
         double next = number < LOOKS ? start + number * (end - start) / LOOKS : end;
-        double to = fmin(next, from + longest);
+        double to = near ? fmin(next, from + time_to_next(e)) : next;
+        if (to <= from) to = next; /* a time below its rounding */
         status = from > start ? look(e, x, to, right(e), right_rate(e))
                               : first_look(e, x, start, &to);
         if (near && !status) {
             status = come_near(e, x, from, &to);
-            longest = 2.0 * (to - from);
             if (!status && !follows(e, start, to)) {
                 *again = fmin(to, start + SHORTER * (end - start));
                 return STEPPER_OK;

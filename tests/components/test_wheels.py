@@ -89,7 +89,7 @@ def example(kind):
     m = mbs.Mechanism("example", gravity=(0, 0, -9.81))
     before, last = m.world.at(0, 0, RADIUS), Revolute("phi", axis="z", actuated=False)
     for joint in (Prismatic("x", axis="x", actuated=False), Prismatic("y", axis="y"), last):
-        after = m.add(Body(f"after_{joint.name}"))
+        after = m.add(Body(f"after_{joint.name}", mass=0))
         m.connect(before, joint, after)
         before = after
     m.connect(before, m.add(Body("body", mass=LOAD, com=(AHEAD, 0, 0), inertia=(1, 1, TURN))))

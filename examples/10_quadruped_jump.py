@@ -30,7 +30,7 @@ under = m.world
 slides = [Prismatic(axis, axis=axis, actuated=False) for axis in "xyz"]
 turns = [Revolute(name, axis=axis, actuated=False) for name, axis in (("yaw", "z"), ("pitch", "y"))]
 for number, joint in enumerate([*slides, *turns]):
-    carriage = m.add(Body(f"carriage{number}"))
+    carriage = m.add(Body(f"carriage{number}", mass=0))
     m.connect(under, joint, carriage)
     under = carriage
 trunk = m.add(Body("trunk", mass=6, inertia=(0.03, 0.1, 0.11)))

@@ -34,7 +34,7 @@ def doubles(value: Any) -> NDArray[np.float64] | str:
         return "has a mask, which would be passed over; give array.filled(value)"
     try:
         array = np.asarray(value)
-    except ValueError:
+    except (ValueError, TypeError, NotImplementedError):  # the last two for symbols of CasADi
         return f"is {quoted(value)}; give numbers"
     if array.dtype.kind not in "biuf":
         what = f"an array of {array.dtype}" if isinstance(value, np.ndarray) else quoted(value)

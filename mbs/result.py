@@ -4,10 +4,12 @@ import csv
 import importlib
 import io
 import json
+import math
 import os
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Real
 from types import MappingProxyType
 from typing import Any
 
@@ -16,7 +18,7 @@ import numpy.typing as npt
 
 from mbs.errors import ExportError, ModelError
 from mbs.files import whole_file
-from mbs.text import install_command
+from mbs.text import install_command, quoted
 
 Array = npt.NDArray[np.float64]
 
@@ -98,6 +100,29 @@ class RecordedStates:
         return State(q, v, z, tuple(self.modes[row].tolist()), time, name)
 
 
+def state_of(given: Any) -> Any:
+    """Return the last state of a `Result`; any other value as it is."""
+    return given.state() if isinstance(given, Result) else given
+
+
+def positions_of(given: Any) -> Any:
+    """Return the positions by name of a `State`, or of the last one of a `Result`."""
+    given = state_of(given)
+    return given.q if isinstance(given, State) else given
+
+
+def velocities_of(given: Any) -> Any:
+    """Return the velocities by name of a `State`, or of the last one of a `Result`."""
+    given = state_of(given)
+    return given.v if isinstance(given, State) else given
+
+
+def device_states_of(given: Any) -> Any:
+    """Return the states of components by name of a `State`, or of the last one of a `Result`."""
+    given = state_of(given)
+    return given.z if isinstance(given, State) else given
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Result:
     """Signals over time: `result["j1.q"]` is one of them, (n,).
@@ -166,6 +191,8 @@ class Result:
                 " mbs.simulate.run returned"
             )
         row = len(self.time) - 1
+        if t is not None and not (isinstance(t, Real) and math.isfinite(t)):
+            raise ModelError(f"result {self.name!r}: t [s] is {quoted(t)}; give the time of a row")
         if t is not None:
             row = int(np.searchsorted(self.time, float(t), side="right")) - 1
             near = min((k for k in (row, row + 1) if 0 <= k < len(self.time)), key=self._far(t))
@@ -358,7 +385,7 @@ class Result:
         return figure
 
     def _index(self, name: str) -> int:
-        if name not in self.units:
+        if not isinstance(name, str) or name not in self.units:
             raise ModelError(
                 f"result {self.name!r} has no signal {name!r}; it has {', '.join(self.names)}"
             )

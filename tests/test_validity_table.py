@@ -505,7 +505,7 @@ def table() -> tuple[list[str], dict[str, list[str]]]:
     """Columns, and rows with their words, of the first table of the page."""
     rows = [
         [cell.strip() for cell in line.strip("|").split("|")]
-        for line in PAGE.read_text(encoding="utf-8").splitlines()
+        for line in PAGE.read_text(encoding="utf-8").split("## Arguments")[0].splitlines()
         if line.startswith("|") and line.count("|") == len(COLUMNS) + 2
     ]
     return rows[0][1:], {row[0]: row[1:] for row in rows[2:]}

@@ -375,14 +375,17 @@ class ModelFunction(Function):
         plain = all(isinstance(x, DM) for x in point) and [x.shape for x in point] == sizes
         if plain and _is_one(one, point):
             return
-        # which sentence to say, of which column, is looked for where one of them fails
         columns = {name: _columns(inputs[name], one.size1_in(name)) for name in names}
         known = {name: values for name, values in columns.items() if values is not None}
-        for k in range(max((values.shape[1] for values in known.values()), default=0)):
-            column = {name: values[:, k % values.shape[1]] for name, values in known.items()}
-            whole = len(known) == len(names)
-            if whole and _is_one(one, [_dm(column[name]) for name in names]):
-                continue
+        whole = len(known) == len(names)
+        count = max((values.shape[1] for values in known.values()), default=0)
+        places = {name: np.arange(count) % values.shape[1] for name, values in known.items()}
+        suspects = np.arange(count)
+        if whole and count:
+            every = [_dm(known[name][:, places[name]]) for name in names]
+            suspects = np.flatnonzero(one.map(count).call(every)[0].full().ravel() != 1)
+        for k in suspects:
+            column = {name: values[:, places[name][k]] for name, values in known.items()}
             if fault := plain_fault(system, column.get("q"), column.get("p")):
                 raise ModelError(f"{self._title}: {fault}")
             if whole:

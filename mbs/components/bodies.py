@@ -36,6 +36,16 @@ def check_mass(name: str, mass: Scalar) -> None:
         raise DescriptionError(f"{name}: mass is {value:g} kg; give zero or more")
 
 
+def _require_mass(name: str, kind: str, given: Scalar | None, other: str = "") -> Scalar:
+    """Return the mass or density of a body; raise DescriptionError if there is none."""
+    if given is None:
+        ways = f"mass= [kg] or {other} [kg/m^3]" if other else "mass= [kg]"
+        raise DescriptionError(
+            f"{name}: this {kind} has no mass; give {ways}, or mass=0 for a frame without mass"
+        )
+    return given
+
+
 def check_tensor(name: str, six: Iterable[Scalar], scale: float = 0.0) -> None:
     """Refuse moments of inertia about the centre of mass that no distribution of mass has.
 
@@ -169,7 +179,7 @@ class Body(RigidBody):
     """A body of given mass, centre of mass and inertia.
 
     Attributes:
-        mass: [kg], zero for a frame without mass.
+        mass: [kg]; `mass=0` for a frame without mass.
         com: centre of mass in the reference frame [m].
         inertia: about the centre of mass, in the axes of the reference frame [kg m^2]: three
             principal values, or Ixx Ixy Ixz Iyy Iyz Izz, or a (3, 3) symmetric matrix.
@@ -178,21 +188,22 @@ class Body(RigidBody):
             on such a body, and note it; nothing else should.
 
     Raises:
-        DescriptionError: negative mass, or moments of inertia that no body has.
+        DescriptionError: no mass is given, it is negative, or no body has these moments of inertia.
     """
 
-    mass: Scalar = 0.0
+    mass: Scalar | None = None
     com: tuple[Scalar, ...] = (0.0, 0.0, 0.0)
     inertia: Any = (0.0, 0.0, 0.0)
     checked: bool = True
 
     def __post_init__(self) -> None:
         Component.__post_init__(self)
+        mass = _require_mass(self.name, type(self).__name__, self.mass)
         self._normalise("mass")
         object.__setattr__(self, "com", three(self.com, f"{self.name}, com"))
         object.__setattr__(self, "inertia", six_of(self.inertia, f"{self.name}, inertia"))
         if self.checked:
-            check_mass(self.name, self.mass)
+            check_mass(self.name, mass)
             check_tensor(self.name, self.inertia)
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
@@ -201,7 +212,7 @@ class Body(RigidBody):
         tensor = Inertia.from_parameters(
             vector([*(to_sx(value, symbols) for value in self.inertia), 0, 0, 0, 0])
         ).J
-        return Inertia.about_com(to_sx(self.mass, symbols), com, tensor)
+        return Inertia.about_com(to_sx(self.mass or 0, symbols), com, tensor)
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,17 +282,18 @@ class PointMass(RigidBody):
         mass: [kg].
     """
 
-    mass: Scalar = 0.0
+    mass: Scalar | None = None
 
     def __post_init__(self) -> None:
         Component.__post_init__(self)
+        mass = _require_mass(self.name, type(self).__name__, self.mass)
         self._normalise("mass")
-        check_mass(self.name, self.mass)
+        check_mass(self.name, mass)
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
         """Inertia about the reference frame: only a mass."""
         zero = Inertia.zero()
-        return Inertia(zero.J, zero.ms, to_sx(self.mass, symbols))
+        return Inertia(zero.J, zero.ms, to_sx(self.mass or 0, symbols))
 
 
 # Homogeneous solids along x: their inertia follows from dimensions and density.
@@ -291,7 +303,7 @@ class PointMass(RigidBody):
 class _Bar(RigidBody):
     """A solid that runs along x from its left to its right end; the reference frame is at the left.
 
-    Either a density or a mass is given; with neither the solid has no mass.
+    Either a density or a mass is given; `mass=0` makes a solid without mass.
     """
 
     length: Scalar = 1.0
@@ -326,7 +338,8 @@ class _Bar(RigidBody):
             )
         if mass is not None:
             return expression(mass)
-        return expression(density) * volume if density is not None else Number(0.0)
+        given = _require_mass(self.name, type(self).__name__, density, "density=")
+        return expression(given) * volume
 
     def _solid_inertia(
         self, symbols: SymbolTable, mass: Expression, radii: list[Expression]

@@ -19,8 +19,10 @@ from mbs.expressions import (
     Number,
     Scalar,
     expression,
+    operation,
     parameters_of,
     renamed,
+    to_float,
     to_sx,
     with_values,
     without_defaults,
@@ -158,6 +160,45 @@ def displacement(
     if rotation is not None:
         steps.extend(_rotation_steps(where, rotation))
     return tuple(steps)
+
+
+def in_rotated_axes(
+    vector: Sequence[Expression], rotation: Rotation, where: str
+) -> tuple[Expression, ...]:
+    """Return the components of a vector (3,) in axes that are rotated.
+
+    Args:
+        vector: components in the axes before the rotation.
+        rotation: of the new axes relative to the old ones.
+        where: names the rotation in messages.
+
+    Raises:
+        DescriptionError: the rotation is none.
+    """
+    for step in _rotation_steps(where, rotation):
+        if isinstance(step, FixedRotation):
+            columns = zip(*step.rows, strict=True)
+            vector = [_sum(zip(column, vector, strict=True)) for column in columns]
+        elif isinstance(step, ElementaryRotation):
+            k = "xyz".index(step.axis)
+            i, j = (k + 1) % 3, (k + 2) % 3
+            c, s = operation("cos", step.angle), operation("sin", step.angle)
+            rotated = list(vector)
+            rotated[i] = _sum(((c, vector[i]), (s, vector[j])))
+            rotated[j] = _sum(((c, vector[j]), (-s, vector[i])))
+            vector = rotated
+    return tuple(vector)
+
+
+def _sum(products: Iterable[tuple[Scalar, Expression]]) -> Expression:
+    """Sum of products, without the products with zero."""
+    total: Expression = Number(0.0)
+    for factor, value in products:
+        if 0 in (to_float(factor), to_float(value)):
+            continue
+        product = value if to_float(factor) == 1 else factor * value
+        total = product if to_float(total) == 0 else total + product
+    return total
 
 
 def _rotation_steps(where: str, rotation: Any) -> Iterable[Step]:

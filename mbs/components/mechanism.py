@@ -7,11 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
-from mbs.components.bodies import Mount, RigidBody, World
-from mbs.components.component import Component, Point
+from mbs.arguments import names_given
+from mbs.components.bodies import Mount, RigidBody, World, three
+from mbs.components.component import Component, Point, Rotation, in_rotated_axes
 from mbs.components.couplings import Coupling
 from mbs.components.custom import Custom, Flange, Signal
 from mbs.components.drives import flange_pair
+from mbs.components.forces import Force
 from mbs.components.joints import Joint
 from mbs.components.locking import lock
 from mbs.components.motion_joint import MotionJoint
@@ -19,7 +21,8 @@ from mbs.components.notes import Note
 from mbs.components.sensors import Sensor
 from mbs.components.shapes import Shape
 from mbs.errors import AssemblyError, DescriptionError
-from mbs.expressions import Parameter, Scalar, parameters_of
+from mbs.expressions import Parameter, Scalar, expression, parameters_of
+from mbs.result import Result, State, positions_of
 from mbs.text import did_you_mean, quoted
 
 if TYPE_CHECKING:
@@ -125,12 +128,26 @@ def on_placed(point: Point, placed: Mapping[str, Component], scope: str) -> Poin
 C = TypeVar("C", bound=Component)
 
 
+_ATTRIBUTES = frozenset(
+    (
+        *("name", "source", "keep_order", "cuts", "guess", "notes", "numbered", "world"),
+        *("components", "connections", "shafts", "wires", "frames", "shapes", "values"),
+        *("_ports", "_counted"),
+    )
+)
+"""Attributes of a mechanism."""
+_COMPENSATIONS = "_gravcomp", "_gravity"
+"""Ends of the names of forces that readers of files make against the weight of bodies."""
+
+
 class Mechanism:
     """Bodies and joints connected in any order; loops are found, never declared.
 
     Args:
         name: of the mechanism.
         gravity: gravity acceleration in the world frame [m/s^2].
+        mount: rotation of the base relative to the axes in which gravity is given, such as
+            ("x", "pi") for a robot that hangs from the ceiling. Poses stay relative to the base.
         parameters: values of the symbols that the components use.
         source: where the data come from, for catalogue entries and files.
         keep_order: number the links in the order in which the joints were added, as a table of
@@ -151,6 +168,7 @@ class Mechanism:
         source: str = "",
         keep_order: bool = False,
         guess: Mapping[str, float] | None = None,
+        mount: Rotation | None = None,
     ) -> None:
         self.name = Component(name).name
         self.source = source
@@ -171,6 +189,56 @@ class Mechanism:
         self.values: dict[str, Parameter] = {}
         for symbol, value in (parameters or {}).items():
             self.values[symbol] = Parameter(symbol, value)
+        if mount is not None:
+            self.change_gravity(mount=mount)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set an attribute.
+
+        Raises:
+            DescriptionError: a mechanism has no attribute of this name.
+        """
+        if name not in _ATTRIBUTES and not hasattr(type(self), name):
+            raise DescriptionError(
+                f"{self.__dict__.get('name', 'mechanism')}: a mechanism has no attribute {name!r};"
+                f" {did_you_mean(name, sorted(one for one in _ATTRIBUTES if one[0] != '_'))}"
+            )
+        if name == "gravity":
+            raise DescriptionError(
+                f"{self.name}: gravity cannot be set; give gravity= to Mechanism or mbs.load, or"
+                " call change_gravity"
+            )
+        super().__setattr__(name, value)
+
+    @property
+    def gravity(self) -> tuple[Scalar, ...]:
+        """Gravity acceleration in the axes of the base [m/s^2]."""
+        return self.world.gravity
+
+    def change_gravity(
+        self, gravity: Sequence[Scalar] | None = None, mount: Rotation | None = None
+    ) -> None:
+        """Change the gravity acceleration, or rotate the base in it.
+
+        Args:
+            gravity: in the axes of the world [m/s^2]; unchanged if left out.
+            mount: rotation of the base relative to the axes of the world; none if left out.
+
+        Raises:
+            DescriptionError: these are no vector and no rotation, or forces of the file compensate
+                its own gravity.
+        """
+        where = f"{self.name}, gravity"
+        for component in self.components.values():
+            if isinstance(component, Force) and component.name.endswith(_COMPENSATIONS):
+                raise DescriptionError(
+                    f"{where}: the force {component.name!r} compensates the gravity of the file;"
+                    " change the gravity in the file"
+                )
+        vector = self.world.gravity if gravity is None else three(gravity, where)
+        if mount is not None:
+            vector = in_rotated_axes(tuple(map(expression, vector)), mount, f"{self.name}, mount")
+        object.__setattr__(self.world, "gravity", tuple(vector))
 
     @overload
     def add(self, component: C) -> C: ...
@@ -359,7 +427,7 @@ class Mechanism:
         lock(self, positions)
 
     def assemble(
-        self, guess: Mapping[str, float] | None = None, active: Sequence[str] = ()
+        self, guess: Mapping[str, float] | State | Result | None = None, active: Sequence[str] = ()
     ) -> System:
         """The frozen `System` of this mechanism: tree, cut joints, equations.
 
@@ -377,15 +445,13 @@ class Mechanism:
         """
         from mbs.loops.assemble import assemble  # the one call upwards, see docs/decisions.md
 
+        guess = positions_of(guess)
         if not isinstance(guess, Mapping | None):
             raise DescriptionError(
                 f"{self.name}: guess is {quoted(guess)}; give a dict of names to positions"
             )
-        if isinstance(active, str):
-            raise DescriptionError(
-                f"{self.name}: active is the text {active!r}; give a list of names, [{active!r}]"
-            )
-        return assemble(self, {**self.guess, **(guess or {})}, active)
+        names = names_given(f"{self.name}: active", active, "j1", DescriptionError)
+        return assemble(self, {**self.guess, **(guess or {})}, names)
 
     def _require_use(self, component: Component) -> None:
         """Refuse a component that no equation would know."""

@@ -26,6 +26,7 @@ from mbs.expressions.expression import (
     Parameter,
     Scalar,
     expression,
+    operation,
     out_of_bounds,
 )
 from mbs.expressions.numbers import number, plain_numbers, whole_number
@@ -39,6 +40,7 @@ __all__ = [
     "Scalar",
     "expression",
     "number",
+    "operation",
     "out_of_bounds",
     "parameters_of",
     "plain_numbers",

@@ -196,6 +196,8 @@ class MjcfModel:
         given = [model.body(k).name for k in range(1, model.nbody)]
         bodies = ("world", *distinct("body", given, plain[1:]))
         flags = Flags.of(mujoco, model)
+        # since MuJoCo 4 an actuator may have several controls, which nu counts
+        count = len(model.actuator_group)
         mjcf = MjcfModel(
             mujoco,
             model,
@@ -205,7 +207,7 @@ class MjcfModel:
             of_kind("site", model.nsite, model.site),
             of_kind("equality", model.neq, model.eq),
             of_kind("tendon", model.ntendon, model.tendon),
-            tuple(k for k in range(model.nu) if flags.drives(int(model.actuator_group[k]))),
+            tuple(k for k in range(count) if flags.drives(int(model.actuator_group[k]))),
             flags,
             {},
         )
@@ -474,7 +476,7 @@ class Joints:
             moved = body
             if j != joints[-1]:
                 name = unused_name(mechanism, mjcf, f"{mjcf.bodies[k]}_{mjcf.joints[j]}")
-                moved = mechanism.add(Body(name))
+                moved = mechanism.add(Body(name, mass=0))
             self._connect(j, parent, point, moved)
             point = moved.frame
 

@@ -664,7 +664,7 @@ class _SdfBuilding:
             if closes and (kind == "fixed" or self.file.cuts(joint)):
                 self.mechanism.cut(made)
         elif kind == "screw":
-            between = self.mechanism.add(Body(self._unused(f"{name}_nut")))
+            between = self.mechanism.add(Body(self._unused(f"{name}_nut"), mass=0))
             turn = self._one_axis(joint, reader, name, "revolute")
             slide = Prismatic(self._unused(f"{name}_slide"), axis=turn.axis, actuated=False)
             connect(a, turn, between)
@@ -711,7 +711,7 @@ class _SdfBuilding:
             self.mechanism.connect(a, cross, b)
             names, last = (f"{name}.phi_a", f"{name}.phi_b"), cross
         else:
-            between = self.mechanism.add(Body(self._unused(f"{name}_between")))
+            between = self.mechanism.add(Body(self._unused(f"{name}_between"), mass=0))
             first, second = (replace(one, name=self._unused(one.name)) for one in (first, second))
             self.mechanism.connect(a, first, between)
             self.mechanism.connect(between, second, b)

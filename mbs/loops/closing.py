@@ -376,6 +376,13 @@ _SMALLEST_STEP = 1e-6
 _SINGULAR = 1e-7
 """Smallest singular value, as a part of the largest, below which a start has no slope: rounding
 leaves 1e-8 of a value that vanishes with the square root, regular mechanisms have 1e-4 or more."""
+_BEFORE_END = 1e-3
+"""Distance between the configurations from which a singular end is extrapolated [rad or sizes]:
+rounding is 1e-13 there, and the fifth power of the distance is below it."""
+_EXTRAPOLATION = np.array([5.0, -10.0, 10.0, -5.0, 1.0])
+"""Weights of five equidistant configurations that give the next one to the fourth order."""
+_ROOT_OF_ROUNDING = 1e-6
+"""Largest correction of a singular end [rad or sizes]: closing rows give it to 1e-9 to 1e-7."""
 _CANDIDATES, _TRIES = 6, 60
 """Most configurations in an error message, and starts of the search for them."""
 
@@ -408,9 +415,11 @@ class _Line:
 
     def placed(self, q: Vector, s: float) -> Vector:
         """The configuration q with the locked positions at s."""
-        (first, last), indices, part = self.ends, list(self.locked), s / self.length
-        at = last if s == self.length else first + part * (last - first)
-        if s < self.length:
+        (first, last), indices = self.ends, list(self.locked)
+        if s == self.length:
+            at = last
+        else:
+            at = first + s / self.length * (last - first)
             for turn in quaternion_slices(self.system.tree):
                 if turn.start in self.locked:
                     at[turn] /= np.linalg.norm(at[turn])
@@ -466,7 +475,8 @@ def follow_configuration(
     Locked positions move on a straight line. The free ones follow on the constraint manifold, in
     steps that are accepted if the step agrees with the slopes at both its ends: a jump to another
     branch does not. The branch continues straight through a configuration in which it crosses
-    another one.
+    another one. If the branch does not lead to the target, but the loops are closed there with the
+    free positions of the start, these positions stay.
 
     Source: Allgower and Georg 1990, chapters 2 and 8, for prediction, correction and crossings.
 
@@ -491,8 +501,23 @@ def follow_configuration(
         with suppress(Unclosable):
             return follow_configuration(system, target, whole, p, (start, p_start))
     line = _line(system, (start, target), locked, (p_start, p))
+    try:
+        return _end_of_branch(line, start)
+    except Unclosable:
+        unchanged, closing = line.placed(start, line.length), line.closing(line.length)
+        if closing.openness(unchanged) <= OPEN and closing.faces(unchanged):
+            return unchanged
+        raise
+
+
+def _end_of_branch(line: _Line, start: Vector) -> Vector:
+    """The configuration (nq,) at the end of a line, on the branch of a start.
+
+    Raises:
+        Unclosable: the branch turns or the start is singular.
+    """
     if line.length <= _SMALLEST_STEP:
-        found = Closing(system, p, locked).nearest(_replace(start, locked, target[list(locked)]))
+        found = line.closing(line.length).nearest(line.placed(start, line.length))
         moves = (np.abs(found.q - start) / line.scales)[line.closing(0.0).free]
         if found.is_closed and np.max(moves, initial=0.0) < LARGEST_MOVE:
             return found.q
@@ -512,7 +537,25 @@ def follow_configuration(
         step = (to - s) / 2
         if step < _SMALLEST_STEP:
             raise Unclosable(_ended(line, q, s, "ends"))
-    return q
+    return _singular_end(line, q) if line.is_singular(q, line.length) else q
+
+
+def _singular_end(line: _Line, q: Vector) -> Vector:
+    """The configuration (nq,) at a singular end, extrapolated from configurations on the branch.
+
+    The closing rows determine a singular configuration to the square root of rounding only.
+    """
+    points = list[Vector]()
+    for s in line.length - _BEFORE_END * np.arange(1, len(_EXTRAPOLATION) + 1):
+        if s <= 0:
+            return q
+        near = line.closing(float(s)).nearest(line.placed(q, float(s)))
+        if not near.is_closed:
+            return q
+        points.append(near.q)
+    end = line.placed(q + _EXTRAPOLATION @ (np.array(points) - q), line.length)
+    is_near = np.max(np.abs(end - q) / line.scales) < _ROOT_OF_ROUNDING
+    return end if is_near and line.closing(line.length).openness(end) <= CLOSED else q
 
 
 def _with_whole_quaternions(

@@ -23,16 +23,19 @@ from mbs.loops.closing import (
 )
 from mbs.loops.function import configuration_on, fixed_positions, independent_names
 from mbs.loops.velocity import closure_jacobian
-from mbs.result import State
+from mbs.result import Result, State, positions_of, state_of, velocities_of
 from mbs.solvers.least_squares import smallest_solution
 from mbs.solvers.rank import RELATIVE_GAP, null_space
 from mbs.text import quoted
 
 Values = Mapping[str, float] | Sequence[float] | None
-"""Positions or velocities: by name, or all of them in their order."""
+"""Positions or velocities by name, or all of them in their order."""
 
-Start = Values | State
-"""Where something starts: positions, or a whole state."""
+Start = Values | State | Result
+"""Positions or velocities, or those of a state; the state of a `Result` is its last one."""
+
+Guess = Mapping[str, float] | State | Result | None
+"""Approximate positions by name, or those of a state."""
 
 _RESTARTS = 60
 _SEED = 20260101
@@ -46,7 +49,7 @@ def solve(
     system: System,
     q_active: Start = None,
     *,
-    guess: Mapping[str, float] | State | None = None,
+    guess: Guess = None,
     branch: str | Sequence[str] | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Vector:
@@ -80,10 +83,8 @@ def solve(
         ModelError: a name is unknown, or a value is not finite; or guess and branch are given.
     """
     require_system(system)
-    if isinstance(q_active, State):
-        q_active = q_active.q
-    if isinstance(guess, State):
-        guess = guess.q
+    given: Values = positions_of(q_active)
+    guess = positions_of(guess)
     if not isinstance(guess, Mapping | None):
         raise ModelError(
             f"{system.name}: guess is {quoted(guess)}; give a dict of coordinate names to values"
@@ -91,8 +92,8 @@ def solve(
     if branch is not None:
         if guess:
             raise ModelError(f"{system.name}: guess and branch both choose the branch; give one")
-        return configuration_on(system, q_active, branch, parameters)
-    return _closed(system, fixed_positions(system, q_active), guess or {}, parameters)
+        return configuration_on(system, given, branch, parameters)
+    return _closed(system, fixed_positions(system, given), guess or {}, parameters)
 
 
 def _closed(
@@ -290,9 +291,9 @@ _REFINEMENTS = 3
 def start(
     system: System,
     q0: Start,
-    v0: Values,
+    v0: Start,
     parameters: Mapping[str, float] | None,
-    guess: Mapping[str, float] | State | None = None,
+    guess: Guess = None,
 ) -> tuple[Vector, Vector]:
     """Positions (nq,) that close the loops and velocities (nv,) that fit them.
 
@@ -312,32 +313,33 @@ def start(
         ModelError: a name is unknown, a quaternion is not of unit length, or the loops allow no
             motion with these velocities.
     """
-    if isinstance(q0, State) and v0 is None:
-        v0 = q0.v
-    q = start_position(system, q0, parameters, guess)
-    return q, start_velocity(system, q, v0, parameters)
+    at, velocities = state_of(q0), velocities_of(v0)
+    if isinstance(at, State) and v0 is None:
+        velocities = at.v
+    q = start_position(system, at, parameters, guess)
+    return q, start_velocity(system, q, velocities, parameters)
 
 
 def start_position(
     system: System,
     q0: Start,
     parameters: Mapping[str, float] | None,
-    guess: Mapping[str, float] | State | None = None,
+    guess: Guess = None,
 ) -> Vector:
     """(nq,) the positions of `start`."""
-    q0 = q0.q if isinstance(q0, State) else q0
-    if guess is not None and not isinstance(q0, Mapping | None):
+    given: Values = positions_of(q0)
+    if guess is not None and not isinstance(given, Mapping | None):
         raise ModelError(
             f"{system.name}: a guess is given beside all positions; leave it out, or give q0 by"
             " name"
         )
-    q = np.array(system.position(q0))
+    q = np.array(system.position(given))
     if fault := plain_fault(system, q, None):
         raise ModelError(f"{system.name}: {fault}")
-    if system.is_closed and (isinstance(q0, Mapping) or q0 is None):
-        complete = len(q0 or {}) == system.nq
+    if system.is_closed and (isinstance(given, Mapping) or given is None):
+        complete = len(given or {}) == system.nq
         if not complete:
-            return solve(system, dict(q0 or {}), guess=guess, parameters=parameters)
+            return solve(system, dict(given or {}), guess=guess, parameters=parameters)
     if system.is_closed:
         require_closed(system, q, parameters)
     return q

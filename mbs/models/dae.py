@@ -19,7 +19,7 @@ from mbs.assembly.tree import norm_rows, position_rate, quaternion_slices
 from mbs.assembly.validity import plain_rows
 from mbs.errors import ModelError, NoClosedForm, Unclosable
 from mbs.loops.closure import independent_closure, row_groups
-from mbs.loops.configuration import Start, Values, start
+from mbs.loops.configuration import Guess, Start, Values, start
 from mbs.loops.function import function
 from mbs.loops.plan import branches_at, plan
 from mbs.loops.reduction import reduction_matrix
@@ -29,7 +29,7 @@ from mbs.models.direct_dynamics import direct_dynamics, independent_dynamics
 from mbs.models.inverse_dynamics import inverse_dynamics, own_efforts
 from mbs.models.state.signals import by_name
 from mbs.models.symbols import ModelSymbols, devices, outputs_of, part_equations, symbols_of
-from mbs.result import State
+from mbs.result import Result, State, device_states_of, state_of
 from mbs.text import quoted
 
 # What loops ask of a motion, on the levels of positions, velocities and accelerations.
@@ -414,12 +414,12 @@ def dae(
     form: str = "reduced",
     *,
     q0: Start = None,
-    v0: Values = None,
+    v0: Start = None,
     tau0: Values = None,
-    states: Mapping[str, float] | None = None,
+    states: Mapping[str, float] | State | Result | None = None,
     inputs: Mapping[str, float] | None = None,
     parameters: Mapping[str, float] | None = None,
-    guess: Mapping[str, float] | State | None = None,
+    guess: Guess = None,
 ) -> Dae:
     """Equations of motion dx/dt = ode, 0 = alg, with everything that acts in `direct_dynamics`.
 
@@ -463,11 +463,12 @@ def dae(
     if form not in FORMS:
         raise ModelError(f"{system.name}: form is {quoted(form)}; use one of {', '.join(FORMS)}")
     p = np.array(system.parameter_values(parameters), dtype=float)
+    q0, own = state_of(q0), device_states_of(states)
     q, v = start(system, q0, v0, parameters, guess)
-    if isinstance(q0, State) and states is None:
-        states = q0.z
+    if isinstance(q0, State) and own is None:
+        own = q0.z
     tau = start_efforts(system, tau0)
-    z = by_name(system, "states", states, system.states, system.z_start)
+    z = by_name(system, "states", own, system.states, system.z_start)
     u = by_name(system, "inputs", inputs, system.inputs, system.u_default)
     kind = _kind(system, form, q, p)
     equations, elements = _built(system, kind)

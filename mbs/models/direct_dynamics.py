@@ -9,6 +9,7 @@ import numpy as np
 from casadi import SX, Function
 from numpy.typing import NDArray
 
+from mbs.arguments import names_given
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tree import normalised
@@ -300,10 +301,9 @@ def hybrid_dynamics(system: System, prescribed: Sequence[str]) -> Function:
 
 def _numbers(system: System, prescribed: Sequence[str]) -> tuple[int, ...]:
     names = [speed.name for speed in system.speeds]
-    if isinstance(prescribed, str) or not prescribed:
-        raise ModelError(
-            f"{system.name}: prescribed is {quoted(prescribed)}; give a list of names of velocities"
-        )
+    prescribed = names_given(f"{system.name}: prescribed", prescribed, names[0])
+    if not prescribed:
+        raise ModelError(f"{system.name}: prescribed is empty; give names of velocities")
     for name in prescribed:
         if name not in names:
             raise ModelError(

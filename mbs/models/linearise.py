@@ -18,6 +18,7 @@ import numpy as np
 from casadi import DM, SX, Function
 from numpy.typing import NDArray
 
+from mbs.arguments import names_given, values_given
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.parts import Quantity
@@ -25,7 +26,7 @@ from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.assembly.tree import position_rate
 from mbs.errors import ModelError
 from mbs.loops.closure import closure_rows, independent_closure
-from mbs.loops.configuration import Start, Values, start
+from mbs.loops.configuration import Guess, Start, Values, start
 from mbs.loops.velocity import velocity_rows
 from mbs.models.contacts import (
     KINDS,
@@ -48,7 +49,7 @@ from mbs.models.symbols import (
     surroundings,
     symbols_of,
 )
-from mbs.result import State
+from mbs.result import Result, State, device_states_of, state_of
 from mbs.solvers.linear import solve_square
 from mbs.text import did_you_mean, quoted
 
@@ -110,12 +111,12 @@ class Linearisation:
     def at(
         self,
         q0: Start = None,
-        v0: Values = None,
+        v0: Start = None,
         tau0: Values = None,
-        states: Mapping[str, float] | None = None,
+        states: Mapping[str, float] | State | Result | None = None,
         inputs: Mapping[str, float] | None = None,
         parameters: Mapping[str, float] | None = None,
-        guess: Mapping[str, float] | State | None = None,
+        guess: Guess = None,
     ) -> LinearModel:
         """The equations about one state.
 
@@ -136,15 +137,16 @@ class Linearisation:
             Unclosable: the loops cannot be closed at q0.
         """
         system = self.system
+        q0, own = state_of(q0), device_states_of(states)
         q, v = start(system, q0, v0, parameters, guess)
-        if isinstance(q0, State) and states is None:
-            states = q0.z
+        if isinstance(q0, State) and own is None:
+            own = q0.z
         point = {
             "q": q,
             "v": v,
             "v_a": v[list(system.active)],
             "tau": start_efforts(system, tau0),
-            "z": by_name(system, "states", states, system.states, system.z_start),
+            "z": by_name(system, "states", own, system.states, system.z_start),
             "u": by_name(system, "inputs", inputs, system.inputs, system.u_default),
             "p": system.parameter_values(parameters),
         }
@@ -203,9 +205,11 @@ def linearise(
     require_system(system)
     if mode is None:
         require_no_contacts(system, "linearise without mode=")
-    modes = _modes(system, mode or {})
+    modes = _modes(system, values_given(f"{system.name}: mode", mode, '"clutch": 0'))
     known = _output_units(system)
-    names = list(known)[: system.nq + system.nv] if outputs is None else list(outputs)
+    names = list(known)[: system.nq + system.nv]
+    if outputs is not None:
+        names = list(names_given(f"{system.name}: outputs", outputs, names[0]))
     for name in names:
         if name not in known:
             raise ModelError(

@@ -436,23 +436,29 @@ class PartsAt:
         return casadi.vertcat(*found)
 
     def laws(self) -> SX:
-        """Loads, rates and outputs of components of users without crossings of their own, (n, 1).
+        """(n, 1) loads, rates and signals of components of users without crossings of their own.
 
-        The laws of the components of this package are continuous, or give their crossings.
+        The laws of the components of this package are continuous, or give their crossings. The
+        outputs of components of users act on the motion only through wires.
         """
-        found = [SX(0, 1)]
+        found, by_user = [SX(0, 1)], dict[str, bool]()
         for part in self.parts:
             element = part.element
-            if type(element).__module__.startswith("mbs.") or element.has("crossings"):
+            own = type(element).__module__.startswith("mbs.") or element.has("crossings")
+            by_user[part.name] = not own
+            if own:
                 continue
             for load in self.loads(part).values() if element.acts else ():
                 if isinstance(load, FrameLoad):
                     found += [load.force, load.moment]
                 else:
                     found.append(SX(load))
-            for method in ("rates", "outputs"):
-                if element.has(method):
-                    found += map(SX, getattr(element, method)(self.at(part)).values())
+            if element.has("rates"):
+                found += map(SX, element.rates(self.at(part)).values())
+        for part in self.parts:
+            for source in part.inputs.values():
+                if isinstance(source, WireSource) and by_user.get(source.owner, False):
+                    found.append(self.signal(source))
         return casadi.vertcat(*map(casadi.vec, found))
 
     def outputs(self, lam: SX | None = None) -> SX:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from mbs.arguments import values_given
 from mbs.components import Mechanism
+from mbs.components.component import Rotation
 from mbs.components.locking import Base, fix_root, free_root
 from mbs.errors import DescriptionError
-from mbs.expressions import Parameter
+from mbs.expressions import Parameter, Scalar
 from mbs.formats import from_dict, read_mjcf, read_par, read_sdf, read_toml, read_urdf, to_mechanism
 from mbs.formats.files import component_name
 from mbs.text import did_you_mean, quoted
@@ -43,6 +45,8 @@ def load(
     strict: bool = False,
     xacro: Mapping[str, object] | None = None,
     packages: Mapping[str, str | Path] | None = None,
+    gravity: Sequence[Scalar] | None = None,
+    mount: Rotation | None = None,
 ) -> Mechanism:
     """A mechanism from the catalogue, a dict of the TOML schema, or a file.
 
@@ -63,6 +67,10 @@ def load(
         strict: refuse a file where a note would be taken.
         xacro: values of the arguments of a xacro file, by name.
         packages: folders of the packages that a xacro file or `package://` names.
+        gravity: gravity acceleration in the world frame [m/s^2] in place of that of the file.
+        mount: rotation of the base in the world, such as ("x", "pi") for a robot that hangs from
+            the ceiling. Gravity is rotated into the axes of the base; poses stay relative to the
+            base.
 
     Raises:
         DescriptionError: the name or the suffix is unknown, the description is impossible, a
@@ -80,10 +88,13 @@ def load(
         free_root(mechanism)
     elif base == "fixed":
         fix_root(mechanism)
+    if gravity is not None or mount is not None:
+        mechanism.change_gravity(gravity, mount)
     if lock:
         mechanism.lock(_joint_names(mechanism, lock))
     known = {parameter.name: parameter for parameter in mechanism.parameters()}
-    for name, value in (parameters or {}).items():
+    given = values_given(f"{mechanism.name}: parameters", parameters, '"L1": 0.3', DescriptionError)
+    for name, value in given.items():
         if name not in known:
             raise DescriptionError(
                 f"{mechanism.name}: parameter {name!r} is not used; {did_you_mean(name, known)}"

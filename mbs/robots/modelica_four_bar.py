@@ -36,7 +36,7 @@ def modelica_four_bar() -> Mechanism:
     )
     m.connect(m.world, j1, b1)
     m.connect(m.world.at(1.2), Prismatic("j2", axis="x"), b2)
-    hub, cross, spider = (m.add(Body(name)) for name in ("hub", "cross", "spider"))
+    hub, cross, spider = (m.add(Body(name, mass=0)) for name in ("hub", "cross", "spider"))
     m.connect(b2.at(*ROCKER), rev, hub)
     m.connect(hub, rev1, b3)
     m.connect(b1.at(*CRANK), j3, cross)

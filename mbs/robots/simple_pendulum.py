@@ -17,7 +17,7 @@ def simple_pendulum() -> Mechanism:
     Source: Gonzalez et al. 2006, problem A01.
     """
     m = Mechanism("simple_pendulum", gravity=(0, -9.81, 0), source=_SOURCE, guess={"theta": pi})
-    rod, mass = m.add(Body("rod")), m.add(PointMass("mass", mass=1))
+    rod, mass = m.add(Body("rod", mass=0)), m.add(PointMass("mass", mass=1))
     m.connect(m.world, Revolute("theta", axis="z", actuated=False), rod)
     m.connect(rod.at(1), mass)
     return m

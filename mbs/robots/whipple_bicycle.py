@@ -30,7 +30,9 @@ def whipple_bicycle() -> Mechanism:
     front_wheel = m.add(_wheel("front_wheel", 3.0, 0.1405, 0.28))
     before: RigidBody = m.world
     for joint in _base_joints():
-        after = rear_frame if joint.name == "pitch" else m.add(Body(f"{joint.name}_carrier"))
+        after = (
+            rear_frame if joint.name == "pitch" else m.add(Body(f"{joint.name}_carrier", mass=0))
+        )
         m.connect(before, joint, after)
         before = after
     axis = (math.sin(_TILT), 0.0, math.cos(_TILT))

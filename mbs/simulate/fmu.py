@@ -24,7 +24,7 @@ import numpy as np
 from mbs.errors import Interrupted, MbsError, ModelError, SolverError
 from mbs.files import check_archive
 from mbs.progress import progress
-from mbs.result import Result, State
+from mbs.result import Result, State, state_of
 from mbs.simulate.arguments import positive
 from mbs.simulate.fmu_plan import (
     Inputs,
@@ -666,6 +666,7 @@ def fmu(
         Interrupted: control-C was pressed; a KeyboardInterrupt whose `result` has what was reached.
     """
     file = _path(path)
+    start = state_of(start)
     for what, values in (("parameters", parameters), ("start", start)):
         if not isinstance(values, Mapping | None) and not (
             what == "start" and isinstance(values, State)

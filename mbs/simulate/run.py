@@ -19,6 +19,7 @@ import numpy as np
 from casadi import DM, SX, Function
 from numpy.typing import NDArray
 
+from mbs.arguments import names_given, values_given
 from mbs.assembly import System
 from mbs.assembly.model_function import require_motion, require_system
 from mbs.assembly.parts import WireSource
@@ -29,7 +30,7 @@ from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.files import read_sealed, write_sealed
 from mbs.loops.analysis import rows_at
 from mbs.loops.closure import least_upright, rolling_discs
-from mbs.loops.configuration import Start, Values, start, start_position, start_velocity
+from mbs.loops.configuration import Guess, Start, Values, start, start_position, start_velocity
 from mbs.loops.examine import row_independence
 from mbs.loops.velocity import constraint_jacobian, scales
 from mbs.models.contacts import (
@@ -58,14 +59,22 @@ from mbs.models.state.tree import FullState, full_state
 from mbs.models.symbols import part_equations
 from mbs.native import compiled
 from mbs.native.compiler import cache_dir
-from mbs.numbers import OnArrays, on_arrays
+from mbs.numbers import OnArrays, doubles, on_arrays
 from mbs.progress import progress
 from mbs.recursions.parts import part_event_names
-from mbs.result import RecordedStates, Result, State
+from mbs.result import (
+    RecordedStates,
+    Result,
+    State,
+    device_states_of,
+    positions_of,
+    state_of,
+    velocities_of,
+)
 from mbs.simulate.arguments import count_steps, positive
 from mbs.solvers import EventMotion, Events, integrate_events
 from mbs.solvers.integrate import is_compilable
-from mbs.solvers.problem import IntegrationEvent, Passage, failed
+from mbs.solvers.problem import METHODS, IntegrationEvent, Passage, failed
 from mbs.text import did_you_mean, quoted
 
 # Rigid stops and Coulomb friction in a simulation: how they start, and what a result says of them.
@@ -275,13 +284,10 @@ def device_states(system: System, z0: Mapping[str, float] | Sequence[float] | No
 
 
 def _numbers(system: System, what: str, values: Any) -> list[float]:
-    try:
-        numbers = [float(value) for value in values]
-    except (TypeError, ValueError):
-        numbers = [math.nan]
-    if not all(map(math.isfinite, numbers)):
+    array = doubles(values)
+    if isinstance(array, str) or not np.isfinite(array).all() or array.ndim == 0:
         raise ModelError(f"{system.name}: {what} is {quoted(values)}; give finite numbers")
-    return numbers
+    return [float(value) for value in array.ravel()]
 
 
 # Integration in one leg, or in several: over-constrained loops whose independent rows change.
@@ -862,10 +868,10 @@ def start_positions(
     """
     if not motions:
         return q0, v0
-    if isinstance(q0, State):
-        v0 = q0.v if v0 is None else v0
-        q0 = q0.q
-    positions, velocities = (_by_name(system, *given) for given in (("q0", q0), ("v0", v0)))
+    if isinstance(q0, State) and v0 is None:
+        v0 = q0.v
+    positions = _by_name(system, "q0", positions_of(q0))
+    velocities = _by_name(system, "v0", v0)
     for one in motions:
         position, speed, _ = (float(value) for value in one.laws.call([DM(begin), DM(z0), DM(p)]))
         if one.position is not None:
@@ -1199,13 +1205,14 @@ class Simulator:
         require_contacts_possible(system, self._motions)
         self._effort, self._inputs = effort_function(system, tau), input_function(system, u)
         self._given = given_inputs(system, inputs)
-        self._method = method
-        if isinstance(outputs, str):
+        if not isinstance(method, str) or method not in METHODS:
             raise ModelError(
-                f"{system.name}: outputs is {quoted(outputs)}; give a list of names, such as"
-                f" [{quoted(outputs)}]"
+                f"{system.name}: method is {quoted(method)}; use {', or '.join(map(repr, METHODS))}"
             )
-        self._outputs = None if outputs is None else tuple(outputs)
+        self._method = method
+        self._outputs = None
+        if outputs is not None:
+            self._outputs = names_given(f"{system.name}: outputs", outputs, "j1.q")
         columns = partial(_columns_of, system, self._outputs)
         self._columns: _Columns = system.recent("columns", self._outputs, columns, _KEPT)
 
@@ -1233,9 +1240,9 @@ class Simulator:
         duration: float,
         *,
         q0: Start = None,
-        v0: Values = None,
-        z0: Mapping[str, float] | Sequence[float] | None = None,
-        guess: Mapping[str, float] | State | None = None,
+        v0: Start = None,
+        z0: Start = None,
+        guess: Guess = None,
         inputs: Mapping[str, float] | None = None,
         parameters: Mapping[str, float] | None = None,
         step: float = 0.01,
@@ -1271,12 +1278,14 @@ class Simulator:
         own = system.parameter_values(parameters)
         p = np.array([*own, *self._values(inputs)])
         begin, modes = 0.0, None
+        q0, guess = state_of(q0), state_of(guess)
+        speeds, devices = velocities_of(v0), device_states_of(z0)
         if isinstance(q0, State):
             require_state_of(system, q0)
             begin, modes = q0.time, np.array(q0.modes)
-            z0 = dict(q0.z) if z0 is None else z0
-        z = device_states(system, z0)
-        placed = start_positions(system, motions, q0, v0, z, own, begin)
+            devices = dict(q0.z) if devices is None else devices
+        z = device_states(system, devices)
+        placed = start_positions(system, motions, q0, speeds, z, own, begin)
         x0 = np.concatenate([*_started(system, *placed, p, guess), z])
         times = np.linspace(begin, begin + duration, steps + 1)
         rtol, atol = step_tolerances(tolerance)
@@ -1305,6 +1314,7 @@ class Simulator:
 
     def _values(self, inputs: Mapping[str, float] | None) -> list[float]:
         """Numbers of the inputs that the simulator has."""
+        inputs = values_given(f"{self.system.name}: inputs", inputs, '"j1.tau": 2.0')
         if not inputs:
             return [one.default for one in self._given]
         quantities = [(one.name, "") for one in self._given]
@@ -1391,7 +1401,11 @@ def _simulator_of(*state: Any) -> Simulator:
 
 
 def _started(
-    system: System, q0: Start, v0: Values, p: Array, guess: Mapping[str, float] | State | None
+    system: System,
+    q0: Start,
+    v0: Values,
+    p: Array,
+    guess: Guess,
 ) -> tuple[Array, Array]:
     """The start of a motion; the last few are kept, for the next motion from the same one.
 
@@ -1407,7 +1421,7 @@ def _started(
             for given in (q0, v0)
         )
         hash((positions, velocities))
-    except TypeError:  # lists, arrays, and what is refused
+    except (TypeError, NotImplementedError):  # lists, arrays, DM, and values without meaning
         return start(system, q0, v0, named)
 
     def position() -> Array:
@@ -1427,12 +1441,12 @@ def run(
     duration: float,
     *,
     q0: Start = None,
-    v0: Values = None,
+    v0: Start = None,
     tau: Effort = None,
     motion: Motion = None,
     u: Effort = None,
-    z0: Mapping[str, float] | Sequence[float] | None = None,
-    guess: Mapping[str, float] | State | None = None,
+    z0: Start = None,
+    guess: Guess = None,
     parameters: Mapping[str, float] | None = None,
     step: float = 0.01,
     tolerance: float = 1e-8,
@@ -1456,9 +1470,9 @@ def run(
             configuration; in a closed system the loops are closed with the independent ones as
             given, and a complete configuration is taken as it is. Or a `State`, as
             `Result.state` gives it: the motion goes on from there, at its time, with its
-            velocities, its states of components and its modes.
+            velocities, its states of components and its modes. A `Result` is its last state.
         v0: velocities at the start by name [rad/s or m/s], the others zero; in a closed system
-            they may be of any joints, and the others follow.
+            they may be of any joints, and the others follow. Or those of a `State` or `Result`.
         tau: joint efforts [N m or N]: constants of motors by name, or a function of (t, q, v) made
             of CasADi operations, or a casadi.Function, that returns (nv, 1) efforts, zero where
             there is no motor; or a dict that names joints, also such as have no motor.
@@ -1470,7 +1484,8 @@ def run(
         u: inputs of the devices of drive lines, such as voltages: constants by the name of the
             device, or a function of (t, q, v) as for tau; zero when left out. What the devices
             deliver is added to tau.
-        z0: states of devices at the start by name, such as `motor.i`, the others zero.
+        z0: states of devices at the start by name, such as `motor.i`, the others zero. Or those of
+            a `State` or `Result`.
         guess: approximate positions of other joints at the start, which choose the branch on which
             the loops are closed.
         parameters: values of symbols, the others at their defaults.
@@ -1527,7 +1542,7 @@ def simulator_of(system: System, inputs: Sequence[str] = (), **laws: Any) -> Sim
         return Simulator(system, inputs, **laws)
 
     require_system(system)
-    key = list(inputs)
+    key = list(names_given(f"{system.name}: inputs", inputs, "j1.tau"))
     for name, law in laws.items():
         if law is None or type(law) is str:
             key.append(f"{name} {law}")

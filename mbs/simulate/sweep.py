@@ -29,7 +29,7 @@ from mbs.errors import ExportError, Interrupted, MbsError, ModelError, SolverErr
 from mbs.files import check_archive, path_of, write_text
 from mbs.numbers import doubles
 from mbs.progress import progress
-from mbs.result import Result, State, optional_module
+from mbs.result import Result, State, optional_module, state_of
 from mbs.simulate.fmu import fmu
 from mbs.simulate.fmu_variables import numbers_of
 from mbs.simulate.run import run, simulator_of
@@ -53,7 +53,15 @@ def cases_of(grid: Grid) -> tuple[Case, ...]:
     Raises:
         ModelError: there is no case, or a value is no number.
     """
-    listed = list(_combinations(grid)) if isinstance(grid, Mapping) else [dict(c) for c in grid]
+    if isinstance(grid, Mapping):
+        listed = list(_combinations(grid))
+    elif isinstance(grid, Sequence) and all(isinstance(case, Mapping) for case in grid):
+        listed = [dict(case) for case in grid]
+    else:
+        raise ModelError(
+            f'sweep: the grid is {quoted(grid)}; give a dict such as {{"m": [1.0, 2.0]}}, or a'
+            ' list of one dict for each case, such as [{"m": 1.0}, {"m": 2.0}]'
+        )
     if not grid or not listed:
         raise ModelError("sweep: the grid has no case; give at least one value for every name")
     return tuple({str(name): _number(name, x) for name, x in case.items()} for case in listed)
@@ -726,7 +734,7 @@ def _signals(system: System) -> dict[str, list[str]]:
 def _merge(options: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """Options of all cases, with the values of one."""
     merged = dict(options)
-    state = merged.get("q0")
+    state = state_of(merged.get("q0"))
     if isinstance(state, State) and "q0" in given:
         raise ModelError(
             f"sweep: q0 is a state and the grid has {', '.join(given['q0'])}; give q0 as a dict of"

@@ -227,9 +227,9 @@ def test_a_quarter_turn_that_a_file_wrote_in_digits(written, read):
     value = angle_expression(written, "here")
     assert isinstance(value, Number)
     assert value.value == read
-    point = Body("b").at(rotation=("x", written))
+    point = Body("b", mass=0).at(rotation=("x", written))
     (step,) = point.placement.steps
     assert isinstance(step, ElementaryRotation)
     assert step.angle.value == read
-    placed = Body("b").at_khalil(alpha=written, d=written).placement.steps[0]
+    placed = Body("b", mass=0).at_khalil(alpha=written, d=written).placement.steps[0]
     assert (placed.alpha.value, placed.d.value) == (read, written)

@@ -15,7 +15,7 @@ from mbs.errors import ModelError
 @pytest.fixture(scope="module")
 def pendulum():
     m = Mechanism("pendulum", gravity=(0, -9.81, 0), parameters={"L": 0.5, "m": 2.0})
-    rod = m.add(Body("rod"))
+    rod = m.add(Body("rod", mass=0))
     m.connect(m.world, Revolute("j"), rod)
     m.connect(rod.at("L"), m.add(PointMass("bob", mass="m")))
     return m.assemble()

@@ -79,7 +79,7 @@ def test_mass_and_density_describe_the_same_solid():
         np.testing.assert_allclose(
             ten(shape(density=100)), ten(shape(mass=100 * volume)), rtol=1e-14
         )
-    np.testing.assert_array_equal(ten(Box("b")), np.zeros(10))
+    np.testing.assert_array_equal(ten(Box("b", mass=0)), np.zeros(10))
 
 
 def test_symbolic_dimensions():
@@ -93,7 +93,7 @@ def test_symbolic_dimensions():
 
 
 def test_ends_of_a_bar():
-    bar = Box("b", length="L")
+    bar = Box("b", length="L", mass=0)
     assert bar.left.placement.steps == ()
     symbols = {"L": SX(0.6)}
     assert DM(bar.right.placement.pose(symbols).p).full().ravel().tolist() == [0.6, 0, 0]
@@ -143,7 +143,7 @@ def test_grouped_bodies_are_not_checked():
         (lambda: Body("arm", Parameter("m", -2.0)), ["arm: mass is -2 kg", "give zero or more"]),
         (lambda: PointMass("p", -0.5), ["p: mass is -0.5 kg", "give"]),
         (lambda: KhalilBody("k", M=-1), ["k: mass is -1 kg", "give"]),
-        (lambda: Body("arm", None), ["arm, mass: None is not a finite number", "give a number"]),
+        (lambda: Body("arm", None), ["arm: this Body has no mass", "give mass= [kg], or mass=0"]),
         (lambda: Body("arm", math.nan), ["arm, mass: nan is not a finite number", "give"]),
         (lambda: Body("arm", True), ["arm, mass: True is not a finite number", "give"]),
         (
@@ -197,28 +197,37 @@ def test_grouped_bodies_are_not_checked():
             lambda: KhalilBody("k", XX=1, YY=1, ZZ=1, MX=5, M=1),
             ["k: ", "negative principal moment", "give"],
         ),
-        (lambda: Box("b", length=-1), ["b: length is -1", "above zero"]),
-        (lambda: Box("b", width=0), ["b: width is 0", "above zero"]),
-        (lambda: Box("b", height=Parameter("h", -0.1)), ["b: height is -0.1", "above zero"]),
+        (lambda: Box("b", length=-1, mass=0), ["b: length is -1", "above zero"]),
+        (lambda: Box("b", width=0, mass=0), ["b: width is 0", "above zero"]),
+        (
+            lambda: Box("b", height=Parameter("h", -0.1), mass=0),
+            ["b: height is -0.1", "above zero"],
+        ),
         (
             lambda: Box("b", mass=1, density=1),
             ["b: both mass and density are given", "give only one"],
         ),
         (lambda: Box("b", density=-1000), ["b: mass is -10 kg", "give zero or more"]),
-        (lambda: Cylinder("c", radius=0), ["c: radius is 0", "above zero"]),
+        (lambda: Cylinder("c", radius=0, mass=0), ["c: radius is 0", "above zero"]),
         (
-            lambda: Cylinder("c", radius=0.1, inner_radius=0.1),
+            lambda: Cylinder("c", radius=0.1, inner_radius=0.1, mass=0),
             ["c: inner_radius is 0.1", "give 0 <="],
         ),
-        (lambda: Cylinder("c", inner_radius=-0.1), ["c: inner_radius is -0.1", "give 0 <="]),
+        (
+            lambda: Cylinder("c", inner_radius=-0.1, mass=0),
+            ["c: inner_radius is -0.1", "give 0 <="],
+        ),
         (
             lambda: World(gravity=(0, 9.81)),
             ["world, gravity: (0, 9.81) has not three values", "give"],
         ),
-        (lambda: Body("upper arm"), ["Body 'upper arm': ", "no blanks", "choose another name"]),
-        (lambda: Body(""), ["Body '': ", "choose another name"]),
-        (lambda: Body("a."), ["Body 'a.': ", "empty parts", "choose another name"]),
-        (lambda: Box(7), ["Box 7: ", "choose another name"]),
+        (
+            lambda: Body("upper arm", mass=0),
+            ["Body 'upper arm': ", "no blanks", "choose another name"],
+        ),
+        (lambda: Body("", mass=0), ["Body '': ", "choose another name"]),
+        (lambda: Body("a.", mass=0), ["Body 'a.': ", "empty parts", "choose another name"]),
+        (lambda: Box(7, mass=0), ["Box 7: ", "choose another name"]),
     ],
 )
 def test_impossible_bodies(make, parts):

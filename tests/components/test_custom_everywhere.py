@@ -121,7 +121,7 @@ def quaternions(add):
 def massless(add):
     """A cross without mass between two revolute joints, to which the spring is fastened."""
     m = mbs.Mechanism("massless", gravity=(0, 0, -9.81))
-    cross, bar = m.add(Body("cross")), m.add(Box("bar", length=0.5, width=0.1, mass=1.0))
+    cross, bar = m.add(Body("cross", mass=0)), m.add(Box("bar", length=0.5, width=0.1, mass=1.0))
     m.connect(m.world, Revolute("j1", axis="x"), cross.at())
     m.connect(cross.at(), Revolute("j2", axis="y"), bar.left)
     add(m, m.world.at(0.2, 0.3, -0.6), cross.at(0.1, 0.4, 0.2))

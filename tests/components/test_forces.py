@@ -262,11 +262,11 @@ def test_descriptions_refused(call, parts):
             ["f: what it acts on, world, does not move, so that the Force does nothing"],
         ),
         (
-            lambda m, b: Spring("s", Body("b"), m.world, stiffness=1),
+            lambda m, b: Spring("s", Body("b", mass=0), m.world, stiffness=1),
             ["s: it acts on 'b', which is not part of m"],
         ),
         (
-            lambda m, b: Spring("s", Body("other"), m.world, stiffness=1),
+            lambda m, b: Spring("s", Body("other", mass=0), m.world, stiffness=1),
             ["s: it acts on 'other', which is not part of m"],
         ),
         (

@@ -6,7 +6,7 @@ from support.messages import refused
 
 import mbs
 import mbs.models
-from mbs.components import Body, Coupling, Fixed, PointMass, Revolute
+from mbs.components import Body, Box, Coupling, Fixed, PointMass, Revolute
 from mbs.errors import AssemblyError, DescriptionError
 from mbs.expressions import Parameter
 
@@ -27,7 +27,7 @@ def body(m):
     ("call", "parts"),
     [
         (
-            lambda m: m.add(Body("b")),
+            lambda m: m.add(Body("b", mass=0)),
             ["m: two components are named 'b' (Body and Body)", "rename one"],
         ),
         (
@@ -70,11 +70,11 @@ def body(m):
             ["m: Body 'b' stands where a joint belongs", "write connect"],
         ),
         (
-            lambda m: m.connect(m.world, Revolute("k"), Body("c")),
+            lambda m: m.connect(m.world, Revolute("k"), Body("c", mass=0)),
             ["m: 'c' is connected but is not part", "call add(c) first"],
         ),
         (
-            lambda m: m.connect(m.world, Revolute("k"), Body("b")),
+            lambda m: m.connect(m.world, Revolute("k"), Body("b", mass=0)),
             ["m: 'b' is connected but is not part", "call add(b) first"],
         ),
         (
@@ -90,7 +90,7 @@ def body(m):
             ["'my tool': ", "no blanks", "choose another name"],
         ),
         (
-            lambda m: m.add_frame("tool", Body("c")),
+            lambda m: m.add_frame("tool", Body("c", mass=0)),
             ["m: 'c' is connected but is not part", "call add(c) first"],
         ),
         (lambda m: m.cut(Revolute("k")), ["m: joint 'k' is not connected", "connect it before"]),
@@ -112,7 +112,7 @@ def test_a_frame_name_is_taken_for_frames_and_components(m):
         DescriptionError,
         "m: 'tool' is the name of a frame",
         "rename",
-        by=lambda: m.add(Body("tool")),
+        by=lambda: m.add(Body("tool", mass=0)),
     )
 
 
@@ -286,3 +286,77 @@ def test_welds_keep_the_bodies_apart_in_the_description(m):
     assert float(system.tree.links[0].inertia.m) == 6
     assert [j.name for j in m.joints()] == ["j", "glue"]
     assert [b.name for b in m.bodies()] == ["b", "load", "lamp"]
+
+
+# Attributes and gravity.
+
+
+def test_unknown_attributes_are_refused():
+    m = mbs.Mechanism("arm")
+    with pytest.raises(DescriptionError, match=r"arm: gravity cannot be set; give gravity="):
+        m.gravity = (0, 0, 0)
+    with pytest.raises(DescriptionError, match=r"no attribute 'note'; did you mean 'notes'"):
+        m.note = []
+    m.guess = {"j": 0.1}
+    assert m.guess == {"j": 0.1}
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Body("b"),
+        lambda: Body("b", com=(1, 0, 0)),
+        lambda: mbs.components.PointMass("b"),
+        lambda: Box("b", length=1),
+        lambda: mbs.components.Cylinder("b", length=1),
+    ],
+)
+def test_bodies_without_mass_say_so(make):
+    with pytest.raises(DescriptionError, match=r"b: this \w+ has no mass; give mass="):
+        make()
+
+
+def weight_efforts(mechanism, q):
+    system = mechanism.assemble()
+    idm = mbs.models.inverse_dynamics(system)
+    return idm(q, *(np.zeros(idm.size1_in(k)) for k in (1, 2))).full().ravel()
+
+
+@pytest.mark.parametrize("robot", ["puma560", "panda", "five_bar"])
+def test_a_mounted_robot_has_its_gravity_rotated(robot):
+    """A robot on a wall has the weight of a robot in the gravity of its own axes."""
+    q = mbs.load(robot).assemble().configuration
+    rotation = (("x", "pi/2"), ("z", "pi/2"))  # the same as a matrix
+    turned = mbs.load(robot, gravity=(1, 2, -9), mount=rotation)
+    by_matrix = mbs.load(robot, gravity=(1, 2, -9), mount=_matrix(rotation))
+    plain = mbs.load(robot, gravity=_matrix(rotation).T @ (1, 2, -9))
+    expected = weight_efforts(plain, q)
+    assert np.abs(expected).max() > 0.1
+    np.testing.assert_allclose(weight_efforts(turned, q), expected, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(weight_efforts(by_matrix, q), expected, rtol=0, atol=1e-11)
+
+
+def _matrix(rotation):
+    total = np.eye(3)
+    for axis, _ in rotation:
+        k = "xyz".index(axis)
+        quarter = np.zeros((3, 3))
+        i, j = (k + 1) % 3, (k + 2) % 3
+        quarter[k, k], quarter[j, i], quarter[i, j] = 1, 1, -1
+        total = total @ quarter
+    return total
+
+
+def test_a_symbolic_mount():
+    m = mbs.Mechanism("m", gravity=(0, 0, "-G"), mount=("x", "A"))
+    assert [str(g) for g in m.gravity] == ["0", "sin(A)*-G", "cos(A)*-G"]
+
+
+def test_gravity_of_a_file_that_compensates_it_stays(tmp_path):
+    path = tmp_path / "arm.xml"
+    path.write_text(
+        '<mujoco><worldbody><body name="b" gravcomp="1"><joint name="j" axis="0 1 0"/>'
+        '<geom size="0.1" pos="0.2 0 0"/></body></worldbody></mujoco>'
+    )
+    with pytest.raises(DescriptionError, match=r"b_gravcomp.*compensates the gravity of the file"):
+        mbs.load(path, gravity=(0, 0, -1.6))

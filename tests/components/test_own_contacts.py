@@ -111,7 +111,7 @@ def rail(*elements, gravity=(0, 0, 0), masses=(2.0, 3.0)):
 def table(*elements, gravity=(0, 0, 0), at=None):
     """A point mass that moves in the plane of x and y."""
     m = mbs.Mechanism("table", gravity=gravity)
-    cross, ball = m.add(Body("cross")), m.add(PointMass("ball", 0.7))
+    cross, ball = m.add(Body("cross", mass=0)), m.add(PointMass("ball", 0.7))
     m.connect(m.world, Prismatic("x", axis="x"), cross)
     m.connect(cross, Prismatic("y", axis="y"), ball)
     for make in elements:

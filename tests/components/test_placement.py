@@ -10,7 +10,7 @@ from mbs.components import Body
 from mbs.components.component import ElementaryRotation, FixedRotation, KhalilStep, Translation
 from mbs.errors import DescriptionError
 
-B = Body("b")
+B = Body("b", mass=0)
 
 
 def matrix(point, **values):

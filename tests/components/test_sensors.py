@@ -77,7 +77,7 @@ def test_descriptions_refused(make, parts):
     ("make", "parts"),
     [
         (
-            lambda m, b: [AbsoluteSensor("s", Body("x"))],
+            lambda m, b: [AbsoluteSensor("s", Body("x", mass=0))],
             ["s: it is on 'x', which is not part of m"],
         ),
         (lambda m, b: [JointSensor("s", "k")], ["s: there is no coordinate 'k'", "j"]),

@@ -69,8 +69,8 @@ def test_out_of_reach_the_joints_stay(puma, path):
 
 def test_lengths_are_parameters(tmp_path):
     m = mbs.Mechanism("arm", gravity=(0, 0, 0))
-    body = m.add(mbs.components.Body("upper"))
-    hand = m.add(mbs.components.Body("hand"))
+    body = m.add(mbs.components.Body("upper", mass=0))
+    hand = m.add(mbs.components.Body("hand", mass=0))
     m.connect(m.world, mbs.components.Revolute("q1", axis="z"), body)
     length = mbs.Parameter("L", 0.6)
     m.connect(body.at(length, 0, 0), mbs.components.Revolute("q2", axis="z"), hand)

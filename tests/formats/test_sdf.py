@@ -291,7 +291,7 @@ def test_two_revolute_joints_in_one(read):
     for kind, second in (("revolute2", "0 .6 .8"), ("universal", "0 0 1")):
         m = Mechanism("m")
         a, b, _ = bodies_for(m)
-        cross = m.add(Body("k_between"))
+        cross = m.add(Body("k_between", mass=0))
         m.connect(m.world, Revolute("j"), a)
         axis = tuple(map(float, second.split()))
         m.connect(a.at(1), Revolute("k_1", axis="y", stiffness=4, rest=0.2), cross)

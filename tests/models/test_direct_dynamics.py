@@ -186,7 +186,7 @@ def test_external_wrenches(method, name):
 
 def test_symbols_stay_symbols():
     m = Mechanism("pendulum", gravity=(0, -9.81, 0))
-    bob, rod = m.add(PointMass("bob", mass=mbs.Parameter("m", 2.0))), m.add(Body("rod"))
+    bob, rod = m.add(PointMass("bob", mass=mbs.Parameter("m", 2.0))), m.add(Body("rod", mass=0))
     m.connect(m.world, Revolute("j"), rod)
     m.connect(rod.at(mbs.Parameter("L", 0.5)), bob)
     ddm = mbs.models.direct_dynamics(m.assemble(), "articulated")
@@ -255,7 +255,7 @@ def test_articulated_bodies_refuse_loops():
 
 def coaxial(m):
     """Two joints about one axis, with nothing between them."""
-    first, box = m.add(Body("first")), m.add(Box("box", length=1, mass=2))
+    first, box = m.add(Body("first", mass=0)), m.add(Box("box", length=1, mass=2))
     m.connect(m.world, Revolute("a", axis="z"), first)
     m.connect(first, Revolute("b", axis="z"), box.left)
 
@@ -263,7 +263,7 @@ def coaxial(m):
 def rod_about_itself(m):
     """A point mass on the axis of its joint, behind an oblique shoulder."""
     rod, bob = m.add(Body("rod", mass=1, inertia=(1, 1, 1))), m.add(PointMass("bob", mass=2))
-    hand = m.add(Body("hand"))
+    hand = m.add(Body("hand", mass=0))
     m.connect(m.world, Revolute("a", axis=(0.36, 0.48, 0.8)), rod)
     m.connect(rod.at(0.3, 0.1, 0.2), Revolute("b", axis=(0.6, 0, 0.8)), hand)
     m.connect(hand.at(0.6, 0, 0.8), bob)
@@ -271,7 +271,7 @@ def rod_about_itself(m):
 
 def point_on_a_ball(m):
     """A point mass away from the centre of a spherical joint spins freely about its arm."""
-    hand, bob = m.add(Body("hand")), m.add(PointMass("bob", mass=2))
+    hand, bob = m.add(Body("hand", mass=0)), m.add(PointMass("bob", mass=2))
     m.connect(m.world, Spherical("b"), hand)
     m.connect(hand.at(0.1, 0.2, 0.3), bob)
 

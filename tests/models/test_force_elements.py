@@ -309,7 +309,7 @@ def test_elements_of_a_moving_base():
         m = mbs.Mechanism("m")
         foot = m.world
         if moved:
-            foot = m.add(mbs.components.Body("foot"))
+            foot = m.add(mbs.components.Body("foot", mass=0))
             m.connect(m.world, Free("float"), foot)
         arm = m.add(mbs.components.Body("arm", 1.0, (0.2, 0, 0), (0.1, 0.2, 0.3)))
         m.connect(foot, Revolute("j", axis="y", actuated=True), arm)

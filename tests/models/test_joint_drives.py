@@ -165,7 +165,7 @@ def test_rotor_on_a_moving_base():
     on_base = Mechanism("on_base", gravity=(0, 0, -9.81))
     on_base.connect(on_base.world, Revolute("j", rotor=rotor), on_base.add(arm))
     on_body = Mechanism("on_body", gravity=(0, 0, -9.81))
-    carrier = on_body.add(Body("carrier"))
+    carrier = on_body.add(Body("carrier", mass=0))
     on_body.connect(on_body.world, Free("float"), carrier)
     on_body.connect(carrier, Revolute("j", rotor=rotor), on_body.add(arm))
     whole = on_body.assemble()

@@ -165,7 +165,7 @@ def test_gears_put_efforts_on_their_coordinates():
 def test_massless_link_of_a_parallelogram():
     m = mbs.Mechanism("parallelogram", gravity=(0, -9.81, 0))
     a, c = (m.add(Box(n, length=0.5, mass=2.0)) for n in "ac")
-    bar = m.add(Body("bar"))
+    bar = m.add(Body("bar", mass=0))
     m.connect(m.world, Revolute("j1", actuated=True), a.left)
     m.connect(m.world.at(0.8), Revolute("j4"), c.left)
     m.connect(a.right, Revolute("j2"), bar)

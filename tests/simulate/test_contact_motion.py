@@ -301,7 +301,7 @@ def thrown():
     m = mbs.Mechanism("thrown", gravity=(0, 0, -G))
     under = m.world
     for name in "xz":
-        carriage = m.add(Body(f"at_{name}"))
+        carriage = m.add(Body(f"at_{name}", mass=0))
         m.connect(under, Prismatic(name, axis=name, actuated=False), carriage)
         under = carriage
     body = m.add(Body("b", mass=MASS, inertia=(2e-3, 2e-3, 2e-3)))

@@ -21,7 +21,7 @@ def test_mass_on_a_spring_swings_about_where_gravity_is_held():
 def elastic_drive(inertia, ratio, stiffness, arm):
     """A motor with a gear, a spring behind it, and an arm of this inertia."""
     m = Mechanism("elastic", gravity=(0, 0, 0))
-    shaft = m.add(Body("shaft"))
+    shaft = m.add(Body("shaft", mass=0))
     body = m.add(Body("arm", mass=1, inertia=(1, 1, arm)))
     m.connect(m.world, Revolute("motor", rotor=Rotor(inertia=inertia, ratio=ratio)), shaft)
     m.connect(shaft, Revolute("spring", stiffness=stiffness, actuated=False), body)
@@ -55,7 +55,7 @@ def test_satellite_turns_against_its_wheel():
     satellite = m.add(Body("satellite", mass=12, inertia=(2, 3, 4)))
     m.connect(m.world, Free("float"), satellite)
     wheel = Revolute("wheel", axis="z", rotor=Rotor(inertia=0.01, ratio=1.0))
-    m.connect(satellite, wheel, m.add(Body("hub")))
+    m.connect(satellite, wheel, m.add(Body("hub", mass=0)))
     result = mbs.simulate.run(
         m.assemble(), 2.0, tau={"wheel": 0.05}, v0={"float.wx": 0.3}, tolerance=1e-11
     )

@@ -16,7 +16,7 @@ LOOSE = casadi.SX.sym("loose")
 def pendulum(**joint):
     m = Mechanism("pendulum", gravity=(0, -9.81, 0), parameters={"L": 0.7})
     bob = m.add(PointMass("bob", mass=1.3))
-    rod = m.add(Body("rod"))
+    rod = m.add(Body("rod", mass=0))
     m.connect(m.world, Revolute("j", **joint), rod)
     m.connect(rod.at("L"), bob)
     return m.assemble()
@@ -123,7 +123,7 @@ def test_spatial_loop_with_quaternion_joints():
 
 def test_massless_link_in_a_loop_gives_numbers():
     m = Mechanism("massless", gravity=(0, -9.81, 0))
-    a, b = m.add(Box("a", length=0.4, width=0.03, mass=1)), m.add(Body("rod"))
+    a, b = m.add(Box("a", length=0.4, width=0.03, mass=1)), m.add(Body("rod", mass=0))
     s = m.add(Body("slider", mass=1))
     m.connect(m.world, Revolute("j1", actuated=True), a.left)
     m.connect(a.right, Revolute("j2"), b)

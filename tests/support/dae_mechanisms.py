@@ -42,7 +42,9 @@ def slider_crank(rod_mass=1.0, stiffness=0.0):
     """A crank, a rod that may have no mass, a slider along x; a spring turns the rod back."""
     m = Mechanism("slider_crank", gravity=(0, -9.81, 0))
     crank = m.add(Box("crank", length=0.4, width=0.03, mass=1))
-    rod = m.add(Box("rod", length=0.9, width=0.03, mass=rod_mass) if rod_mass else Body("rod"))
+    rod = m.add(
+        Box("rod", length=0.9, width=0.03, mass=rod_mass) if rod_mass else Body("rod", mass=0)
+    )
     slider = m.add(Body("slider", mass=1.5))
     m.connect(m.world, Revolute("j1", actuated=True), crank.left)
     m.connect(crank.right, Revolute("j2", stiffness=stiffness), rod.left if rod_mass else rod)

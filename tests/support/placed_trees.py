@@ -91,7 +91,7 @@ def mechanism(tree, numbers, *, symbols, defaults=None, loops=()):
         body = m.add(Body(f"b{k}", mass=mass, com=com, inertia=moments))
         start = m.world if one.parent < 0 else bodies[one.parent]
         if one.fixed:
-            between = m.add(Body(f"f{k}"))
+            between = m.add(Body(f"f{k}", mass=0))
             m.connect(at(start.at(), one.before[:1], numbers, symbols), between)
             point = at(between.at(), one.before[1:], numbers, symbols)
         else:

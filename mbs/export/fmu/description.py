@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Literal, get_args
 
 import casadi
 
+from mbs.arguments import elements_of
 from mbs.assembly import System
 from mbs.errors import ExportError, ModelError
 from mbs.models.state.tree import TreeState
@@ -208,9 +209,10 @@ def once(system: System, what: str, names: Sequence[str]) -> list[str]:
     Raises:
         ModelError: one is no text or is given twice.
     """
-    if not isinstance(names, Iterable):
+    found = (names,) if isinstance(names, str) else elements_of(() if names is None else names)
+    if found is None:
         raise ModelError(f"{system.name}: {what} is {quoted(names)}; give a list of texts")
-    given = [names] if isinstance(names, str) else list(names)
+    given = list(found)
     for name in given:
         if not isinstance(name, str):
             raise ModelError(f"{system.name}: {what} name {quoted(name)}; give texts")

@@ -196,8 +196,9 @@ def fmu_model(
     """
     require_motion(system)
     wished, settings = wished or Contents(), settings or Settings()
-    if wished.parameters:
-        system = symbolic(system, wished.parameters)
+    given = wished.parameters
+    if given is not None and (not isinstance(given, list | tuple) or given):
+        system = symbolic(system, given)
     system.parameter_values()
     interface = interface_of(system, wished.inputs, wished.flanges)
     request = make_request(system, wished.outputs, interface.flanges)

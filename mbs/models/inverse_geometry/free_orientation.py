@@ -418,12 +418,12 @@ def _with_free_joints(system: System, arm: Arm, free: str) -> System:
     last: Any = mechanism.world
     for k, name in enumerate(arm.names):
         joint = Prismatic if arm.prismatic[k] else Revolute
-        body = mechanism.add(Body(f"link{k + 1}"))
+        body = mechanism.add(Body(f"link{k + 1}", mass=0))
         mechanism.connect(_behind(last, arm.gaps[k]), joint(name, limits=limits[name]), body)
         last = body
     place = _behind(last, arm.gaps[arm.size])
     for axis in _AXES[free]:
-        body = mechanism.add(Body(f"free_{axis}_body"))
+        body = mechanism.add(Body(f"free_{axis}_body", mass=0))
         mechanism.connect(place, Revolute(f"free_{axis}", axis=axis), body)
         last = place = body
     mechanism.add_frame("tool", last.at())

@@ -12,6 +12,7 @@ import numpy as np
 from casadi import DM, SX, Function
 from numpy.typing import NDArray
 
+from mbs.arguments import names_given, values_given
 from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.numbers import doubles
@@ -242,11 +243,7 @@ def given_inputs(system: System, names: Sequence[str]) -> tuple[GivenInput, ...]
     Raises:
         ModelError: a name is unknown, or there twice.
     """
-    if isinstance(names, str):
-        raise ModelError(
-            f"{system.name}: inputs is {quoted(names)}; give a list of names, such as"
-            f" [{quoted(names)}]"
-        )
+    names = names_given(f"{system.name}: inputs", names, "j1.tau")
     efforts = [f"{speed.name}.tau" for speed in system.speeds]
     inputs = [name for name, _ in system.inputs]
     found: dict[str, GivenInput] = {}
@@ -328,7 +325,8 @@ def by_name(
         ModelError: a name is unknown, or a value is no finite number.
     """
     names, result = [name for name, _ in quantities], np.array(otherwise, dtype=float)
-    for given, value in (values or {}).items():
+    example = f'"{names[0]}": 0.5' if names else '"motor.i": 0.5'
+    for given, value in values_given(f"{system.name}: {what}", values, example).items():
         name = full_name(str(given), quantities)
         if name not in names:
             owners = [full.rpartition(".")[0] for full in names]

@@ -132,7 +132,7 @@ def test_refusals(monkeypatch):
     m = mbs.Mechanism("symbolic")
     below = m.world
     for k, axis in enumerate("zxyzxy"):
-        body = m.add(mbs.components.Body(f"b{k}"))
+        body = m.add(mbs.components.Body(f"b{k}", mass=0))
         m.connect(below, mbs.components.Revolute(f"q{k + 1}", axis=axis), body)
         below = body.at(mbs.Parameter("L", 0.3) if k == 2 else 0.2, 0.1, 0.1 * k)
     m.add_frame("tool", below)

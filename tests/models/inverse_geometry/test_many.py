@@ -183,8 +183,8 @@ def test_repair_solves_what_is_in_doubt():
 
 def test_parameters():
     m = mbs.Mechanism("slide", gravity=(0, 0, 0))
-    body = m.add(mbs.components.Body("arm"))
-    hand = m.add(mbs.components.Body("hand"))
+    body = m.add(mbs.components.Body("arm", mass=0))
+    hand = m.add(mbs.components.Body("hand", mass=0))
     m.connect(m.world, mbs.components.Revolute("q1", axis="z"), body)
     m.connect(body.at("L", 0, 0), mbs.components.Revolute("q2", axis="z"), hand)
     m.add_frame("tool", hand.at(0.5, 0, 0))

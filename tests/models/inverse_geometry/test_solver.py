@@ -151,7 +151,10 @@ def test_locked_joints_parameters_and_frames():
     third = solver(puma, 3)(T)
     assert np.min(np.max(np.abs(third.q[:, :3] - Q[:3]), axis=1)) < 1e-9
     m = mbs.Mechanism("slide", gravity=(0, 0, 0))
-    body, hand = m.add(mbs.components.Body("arm")), m.add(mbs.components.Body("hand"))
+    body, hand = (
+        m.add(mbs.components.Body("arm", mass=0)),
+        m.add(mbs.components.Body("hand", mass=0)),
+    )
     m.connect(m.world, mbs.components.Revolute("q1", axis="z"), body)
     m.connect(body.at("L", 0, 0), mbs.components.Revolute("q2", axis="z"), hand)
     m.add_frame("tool", hand.at(0.5, 0, 0))

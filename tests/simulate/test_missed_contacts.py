@@ -7,7 +7,9 @@ import pytest
 import mbs
 from mbs.components import (
     Body,
+    CapsuleCapsuleContact,
     Cartesian,
+    Free,
     HeightFieldContact,
     PointMass,
     Revolute,
@@ -126,6 +128,43 @@ def test_fast_flights_are_reflected(obstacle, method):
 @pytest.mark.parametrize("obstacle", OBSTACLES)
 def test_two_thousand_flights_are_reflected(obstacle, method):
     assert fly(obstacle, method, 250, 2) == 0
+
+
+# Capsules that tumble.
+
+
+def capsules():
+    m = mbs.Mechanism("capsules", gravity=(0, 0, -9.81))
+    bodies = [m.add(Body(name, mass=1.0, inertia=(0.02, 0.02, 0.005))) for name in "ab"]
+    for body in bodies:
+        m.connect(m.world, Free(f"f{body.name}"), body)
+    sizes = {"radius_a": 0.01, "length_a": 0.3, "radius_b": 0.005, "length_b": 0.2}
+    m.add(CapsuleCapsuleContact("c", *bodies, stiffness=1e8, **sizes))
+    return m.assemble()
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("method", METHODS)
+def test_tumbling_capsules_meet_as_in_short_steps(method):
+    """Against runs whose steps are far shorter than a contact."""
+    simulator, random = Simulator(capsules(), method=method), np.random.default_rng(7)
+    struck = 0
+    for _ in range(10):
+        speed, turn = 10 ** random.uniform(0, 2), 10 ** random.uniform(0, 2)
+        q0 = {"fb.x": -1.0, "fb.y": random.uniform(-0.08, 0.08)}
+        v0 = {"fb.vx": speed}
+        for name in ("fa", "fb"):
+            q0[f"{name}.qw"], q0[f"{name}.qx"] = np.cos(0.7), np.sin(0.7)
+            v0 |= {f"{name}.w{axis}": turn * random.normal() for axis in "xyz"}
+        given = {"q0": q0, "v0": v0, "step": 0.02 / speed, "tolerance": 1e-9}
+        ends = []
+        for longest in (None, 2e-4 / (speed + 0.2 * turn)):
+            result = simulator(1.2 / speed, max_step=longest, **given)
+            names = [name for name in result.units if name.endswith(".v")]
+            ends.append([result[name][-1] for name in names])
+        struck += result["c.depth"].max() > -1e-3
+        np.testing.assert_allclose(*ends, rtol=0, atol=1e-4 * (speed + turn))
+    assert struck >= 2
 
 
 # An arm that turns without forces: a step is as long as the motion.

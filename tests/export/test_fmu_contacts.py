@@ -5,7 +5,15 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.components import Body, PointMass, Prismatic, Revolute, SphereSphereContact
+from mbs.components import (
+    Body,
+    Box,
+    Cartesian,
+    PointMass,
+    Prismatic,
+    Revolute,
+    SphereSphereContact,
+)
 
 
 def bullet():
@@ -44,6 +52,63 @@ def test_one_long_step_of_co_simulation_meets_the_obstacle(made, solver, tmp_pat
             output=["j.v"],
         )
         assert found["j.v"][-1] == pytest.approx(-speed, rel=1e-5)
+
+
+def four_bar():
+    """A four-bar without gravity whose crank hits a body at rest."""
+    m = mbs.Mechanism("four_bar", gravity=(0, 0, 0))
+    lengths = {"crank": 0.3, "coupler": 1.0, "rocker": 0.8}
+    crank, coupler, rocker = (m.add(Box(n, length=x, mass=1.0)) for n, x in lengths.items())
+    m.connect(m.world, Revolute("j1", actuated=True), crank.left)
+    m.connect(crank.right, Revolute("j2"), coupler.left)
+    m.connect(m.world.at(0.9), Revolute("j4"), rocker.left)
+    m.connect(coupler.right, Revolute("j3"), rocker.right)
+    body = m.add(PointMass("t", mass=0.2))
+    place = m.world.at(0.3 * np.cos(2), 0.3 * np.sin(2), 0)
+    m.connect(place, Cartesian("o"), body)
+    m.add(SphereSphereContact("c", body, crank.right, radius_a=0.01, radius_b=0.01, stiffness=1e8))
+    return m.assemble(guess={"j1": 0.5, "j4": 1.0})
+
+
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_a_closed_mechanism_hits_a_body(kind, tmp_path):
+    system = four_bar()
+    path = mbs.export.fmu(system, tmp_path / "four_bar.fmu")
+    result = mbs.simulate.run(system, 0.2, v0={"j1": 30.0}, step=0.02, quiet=True)
+    assert result["o.x.v"][-1] < -5
+    found = fmpy.simulate_fmu(
+        str(path),
+        fmi_type=kind,
+        stop_time=0.2,
+        output_interval=0.2 if kind == "CoSimulation" else 1e-4,
+        start_values={"j1.v": 30.0},
+        output=["o.x.q", "o.y.q"],
+        relative_tolerance=1e-9,
+    )
+    for name in ("o.x.q", "o.y.q"):
+        assert found[name][-1] == pytest.approx(result[name][-1], abs=1e-5)
+
+
+def test_model_exchange_passes_singular_configurations_beside_contacts(tmp_path):
+    """A parallelogram that lies flat after 0.3 s, and a contact far from it."""
+    m = mbs.robots.n_four_bar()
+    body, bar = m.add(PointMass("t", mass=0.2)), m.components["upright0"]
+    m.connect(m.world.at(30, 0, 0), Cartesian("o"), body)
+    m.add(SphereSphereContact("c", body, bar, radius_a=0.01, radius_b=0.01, stiffness=1e6))
+    system = m.assemble(active=["a0"])
+    result = mbs.simulate.run(system, 1.0, v0={"a0": -3.0}, step=0.1, quiet=True)
+    path = mbs.export.fmu(system, tmp_path / "flat.fmu")
+    found = fmpy.simulate_fmu(
+        str(path),
+        fmi_type="ModelExchange",
+        stop_time=1.0,
+        output_interval=2e-3,
+        start_values={"a0.v": -3.0},
+        output=["a0.q"],
+        relative_tolerance=1e-8,
+    )
+    assert result["a0.q"][-1] < -3
+    assert found["a0.q"][-1] == pytest.approx(result["a0.q"][-1], abs=1e-4)
 
 
 def test_a_saved_state_hits_again(tmp_path):

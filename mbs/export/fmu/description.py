@@ -339,6 +339,8 @@ class Jumps:
         names: (k) what each indicator watches, for messages.
         approaches: `approaches(t, x, z, u, p) -> a`, (k, 3) as `mbs.solvers.Events` has them, for
             steps of Co-Simulation; None where two looks a step are enough.
+        optional: whether the functions of the model do not depend on the modes, as where all events
+            are of contacts: integrators outside need none of them.
     """
 
     modes: tuple[FmuVariable, ...]
@@ -347,6 +349,7 @@ class Jumps:
     jump: casadi.Function
     names: tuple[str, ...]
     approaches: casadi.Function | None = None
+    optional: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -523,7 +526,8 @@ class FmuModel:
     @property
     def charted(self) -> bool:
         """Whether integrators outside pass singular configurations: charts.h."""
-        return self.tree is not None and self.tree.passes and self.jumps is None
+        optional = self.jumps is None or self.jumps.optional
+        return self.tree is not None and self.tree.passes and optional
 
     @property
     def slots(self) -> tuple[FmuState, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from mbs.errors import ExportError, ModelError
 from mbs.export.fmu.description import FmuModel, FmuVariable, Jumps
+from mbs.models.state.events import MinimalEvents
 from mbs.models.state.tree import TreeState
 from mbs.native.compiled import generated, unwritten
 from mbs.native.plain_source import Work, plain_source
@@ -119,6 +120,8 @@ def _tree_events(
         "rates": ([*point, du], _forward(events.indicators, own, along)),
         "jump": ([*point, fired], events.jump.call([*own, fired])),
     }
+    if events.approaches is not None:
+        named["approaches"] = point, events.approaches.call(own)
     return [
         casadi.Function(f"mbs_tree_{name}", taken, _dense(values))
         for name, (taken, values) in named.items()
@@ -160,11 +163,12 @@ def _events(jumps: Jumps, point: list[casadi.MX]) -> list[casadi.Function]:
     ]
 
 
-def _names_of_events(jumps: Jumps | None) -> tuple[str, ...]:
+def _names_of_events(events: Jumps | MinimalEvents | None, prefix: str = "mbs_") -> tuple[str, ...]:
     """The functions of events that an FMU has."""
-    if jumps is None:
+    if events is None:
         return ()
-    return _EVENTS if jumps.approaches is None else (*_EVENTS, "mbs_approaches")
+    names = _EVENTS if prefix == "mbs_" else _TREE_EVENTS
+    return names if events.approaches is None else (*names, f"{prefix}approaches")
 
 
 def _rates(model: FmuModel, point: list[casadi.MX], du: casadi.MX) -> casadi.MX:
@@ -356,7 +360,7 @@ def header(model: FmuModel, guid: str, work: Work, *, adjoint: bool) -> str:
     if model.closure is not None:
         names = (*names, *_LOOPS, *(("mbs_slopes",) if model.slopes is not None else ()))
     if (tree := model.tree) is not None:
-        names = (*names, *_TREE, *(_TREE_EVENTS if tree.events is not None else ()))
+        names = (*names, *_TREE, *_names_of_events(tree.events, "mbs_tree_"))
     names = (*names, *_names_of_events(model.jumps))
     if "mbs_approaches" in names:
         options += "#define MODEL_APPROACHES\n"

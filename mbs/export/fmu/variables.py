@@ -13,6 +13,7 @@ from mbs.errors import ModelError
 from mbs.export.fmu.description import FmuState, FmuVariable, Jumps, once
 from mbs.models.contacts import contacts_of
 from mbs.models.geometry import terminal_frame
+from mbs.models.state.crossings import CONTACTS
 from mbs.models.state.drive import InputMotion
 from mbs.models.state.events import element_names
 from mbs.models.state.independent import MinimalState
@@ -273,4 +274,5 @@ def jumps(system: System, state: MinimalState) -> Jumps | None:
         jump=events.jump,
         names=events.names,
         approaches=events.approaches,
+        optional=all(name.startswith(f"{CONTACTS}.") for name in events.modes),
     )

@@ -23,6 +23,8 @@ from mbs.recursions.parts import PartsAt
 # Crossings that may stay at zero or pass it without end.
 
 
+CONTACTS = "contacts"
+"""Before the names of crossings of contacts in FMUs."""
 GUARD_MODES = 4
 """Modes of a guarded crossing: its place, whether it is asleep, a number and a time."""
 _OFTEN = 4
@@ -250,8 +252,7 @@ class WatchedCrossings:
 def part_crossings(system: System) -> Function | None:
     """`f(q, v, z, u, p) -> sides, counts, approaches` at which the laws of components change.
 
-    Contacts of open systems are watched. Bends, curves, and contacts in loops are left to error
-    control: with events, Model Exchange would not pass singular configurations of loops.
+    Bends and curves are left to error control.
 
     Args:
         system: open or closed.
@@ -265,7 +266,7 @@ def part_crossings(system: System) -> Function | None:
     laws = _jumps(parts.laws(), SX(0, 1), q, constants)
     states, point = casadi.vertcat(q, v, system.z), [q, v, system.z, system.u, system.p]
     given = [one for one in parts.crossings(of_bends=False) if casadi.depends_on(one.value, states)]
-    contacts = [] if system.is_closed else [one for one in given if not one.pace.is_zero()]
+    contacts = [one for one in given if not one.pace.is_zero()]
     others = [one.value for one in given if one.pace.is_zero()]
     found = _function(point, [*others, *laws.crossings], laws.counts, states)
     if not contacts:
@@ -341,7 +342,9 @@ def join_crossings(
     k, n, m = sides.numel() + counts.numel(), sides.numel(), counts.numel()
     *others, p = point
     t, x = point[:2]
-    names = [f"{source}.side{j + 1}" for j in range(n)]
+    c = near.shape[0]
+    names = [f"{CONTACTS}.side{j + 1}" for j in range(c)]
+    names += [f"{source}.side{j + 1}" for j in range(n - c)]
     names += [f"{source}.count{j + 1}" for j in range(m)]
     before = SX.sym("modes", len(events.modes) if events else 0)
     own, known = SX.sym("own", GUARD_MODES * k), len(events.names) if events else 0
@@ -361,7 +364,7 @@ def join_crossings(
         jumps = casadi.mmax(first_fired)
         after, now = casadi.if_else(jumps, there, x), casadi.if_else(jumps, changed, before)
     kinds = ("place", "asleep", "row", "time")
-    approaches, c = None, near.shape[0]
+    approaches = None
     if c or (events and events.approaches is not None):
         place, asleep = own[:c], own[k : k + c]
         awake = casadi.logic_and(casadi.logic_not(asleep), place)

@@ -164,13 +164,19 @@ static int rates(void *user, double t, const double *x, double *rise) {
     return CALL(ON_TREE(c), rates);
 }
 
+/* Integrators outside that have charts need no events of contacts, which stay positive. */
+#if MODEL_TREE_OUTSIDE
+#define MODEL_CHARTS_ALONE 1
+#else
+#define MODEL_CHARTS_ALONE 0
+#endif
+
 #ifdef MODEL_APPROACHES
-/* Only systems without loops have them, whose states are those of the tree. */
 static int approaches(void *user, double t, const double *x, double *near) {
     core *c = user;
     if (place(c, &t, x)) return 1;
     c->res[0] = near;
-    return mbs_approaches(c->arg, c->res, c->iw, c->w, 0);
+    return CALL(ON_TREE(c), approaches);
 }
 #define APPROACHES approaches
 #else
@@ -229,6 +235,7 @@ static void set_offsets(core *c) {
 
 core_status core_start_events(core *c) {
     int status;
+    if (MODEL_CHARTS_ALONE && !c->m.cosimulation) return CORE_OK;
     synchronize(c);
     status = events_start(&c->events, moving(c));
     if (status) return step_failed(c, status);
@@ -272,6 +279,10 @@ core_status core_show_indicators(core *c) {
     core_status status = core_refresh(c);
     int k, tree = ON_TREE(c) && !(c->m.mode & (INSTANTIATED | INITIALIZATION));
     if (status) return status;
+    if (MODEL_CHARTS_ALONE && !c->m.cosimulation) {
+        for (k = 0; k < NK; k++) shown[k] = 1.0;
+        return CORE_OK;
+    }
     core_point(c, &c->m.time, tree ? moving(c) : c->m.values + STATES, c->m.values + DEPENDENTS);
     c->res[0] = shown;
     if (CALL(tree, indicators))

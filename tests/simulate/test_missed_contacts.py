@@ -17,8 +17,9 @@ from mbs.components import (
     SphereCapsuleContact,
     SpherePlaneContact,
     SphereSphereContact,
+    custom,
 )
-from mbs.errors import ModelError
+from mbs.errors import AssemblyError, ModelError
 from mbs.simulate import Simulator
 from mbs.solvers import Events, integrate_events
 
@@ -205,6 +206,52 @@ def test_a_rotor_meets_what_is_on_its_circle(obstacle, method):
             quiet=True,
         )
         assert result["j.v"][-1] == pytest.approx(-speed, rel=1e-6)
+
+
+class Post(custom.Custom):
+    """A wall in a sector of the circle of a point, which pushes along the angle."""
+
+    joint = custom.coordinate()
+
+    def _off(self, at):
+        """Sine of half the angle to the post, less that of its edge."""
+        return casadi.sqrt((1 - casadi.cos(at.joint.q - 3)) / 2 + 1e-12) - 0.005
+
+    def energy(self, at):
+        return 1e8 * casadi.fmax(-self._off(at), 0) ** 2
+
+    def crossings(self, at):
+        speed = casadi.fabs(at.joint.v)
+        return {"post": custom.Approach(self._off(at), speed / 2, speed / 0.01)}
+
+
+class PlainPost(Post):
+    def crossings(self, at):
+        return {"post": self._off(at)}
+
+
+@pytest.mark.parametrize(("kind", "end"), [(Post, -10.0), (PlainPost, 10.0)])
+def test_components_of_users_tell_how_fast_they_are_approached(kind, end):
+    """Without speed and pace a step of half a revolution passes over the post."""
+    m = mbs.Mechanism("post", gravity=(0, 0, 0))
+    arm = m.add(Body("arm", mass=1.0, inertia=(1, 1, 1)))
+    m.connect(m.world, Revolute("j", axis="z"), arm)
+    m.add(kind("p", "j"))
+    result = mbs.simulate.run(m.assemble(), 0.5, v0={"j": 10.0}, step=0.5, quiet=True)
+    assert result["j.v"][-1] == pytest.approx(end, rel=1e-6)
+
+
+def test_a_pace_of_the_wrong_shape_is_refused():
+    class Wrong(Post):
+        def crossings(self, at):
+            return {"post": custom.Approach(at.joint.q, None, casadi.SX(2, 1))}
+
+    m = mbs.Mechanism("post", gravity=(0, 0, 0))
+    arm = m.add(Body("arm", mass=1.0, inertia=(1, 1, 1)))
+    m.connect(m.world, Revolute("j", axis="z"), arm)
+    m.add(Wrong("p", "j"))
+    with pytest.raises(AssemblyError, match="the pace of the crossing 'post'"):
+        m.assemble()
 
 
 def test_all_is_the_same_without_a_compiler(monkeypatch):

@@ -262,7 +262,7 @@ class EventStepper:
         try:
             near = self.approaches(t, self.solver.state(t))
         except RuntimeError as error:
-            raise Failure("indicators") from error
+            raise failure_of(error, "indicators") from error
         if not np.isfinite(near).all():
             raise Failure("indicators")
         return near

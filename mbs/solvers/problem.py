@@ -411,7 +411,7 @@ REASONS = {
     "projection": "the projection onto the constraints does not converge; "
     "look for a singular configuration",
     "singular": "a singular configuration is not passed, the rows of the loops stay dependent "
-    "around it, or rounding there exceeds the tolerance; start elsewhere, or end the run before, or "
+    "around it, or rounding there exceeds the tolerance; start elsewhere, end the run before, or "
     "ask for a looser tolerance, 1e-10 or more",
     "near miss": "branches of motion come near each other and do not meet, by so little that what "
     "turns there cannot be told from what goes on; make the branches meet, or miss by more, or ask "

@@ -35,6 +35,21 @@ def listed(names: Sequence[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
+def without_values(names: Sequence[str]) -> str:
+    """Return the message about parameters that have no value, and how to give values."""
+    values = ", ".join(f"{name!r}: 1.0" for name in names)
+    how = f"such as mbs.load(source, parameters={{{values}}}), or in the call"
+    if len(names) == 1:
+        return (
+            f"parameter {names[0]!r} has no value; give it a default where the mechanism is"
+            f" described, {how}"
+        )
+    return (
+        f"parameters {listed([repr(name) for name in names])} have no value; give them defaults"
+        f" where the mechanism is described, {how}"
+    )
+
+
 def install_command(extra: str) -> str:
     """What installs an extra of this package, from an index and in a clone of its source.
 

@@ -39,7 +39,7 @@ from mbs.expressions import Parameter, out_of_bounds
 from mbs.files import PathLike
 from mbs.numbers import doubles
 from mbs.spatial import Pose
-from mbs.text import did_you_mean, listed, quoted
+from mbs.text import did_you_mean, listed, quoted, without_values
 
 if TYPE_CHECKING:
     from mbs.view.diagram import Diagram
@@ -595,15 +595,18 @@ class System:
                 raise ModelError(
                     f"{self.name}: there is no parameter {name!r}; " + did_you_mean(name, names)
                 )
+        defaults = {parameter.name: parameter.default for parameter in self.parameters}
+        missing = [
+            name
+            for name, default in defaults.items()
+            if given.get(name, default) is None and (needed is None or name in needed)
+        ]
+        if missing:
+            raise ModelError(f"{self.name}: {without_values(missing)}")
         result = []
         for parameter in self.parameters:
             name = parameter.name
             value = given.get(name, parameter.default)
-            if value is None and (needed is None or name in needed):
-                raise ModelError(
-                    f"{self.name}: parameter {name!r} has no value; give it a default"
-                    " where the mechanism is described, or a value in the call"
-                )
             if value is not None and name in given:
                 value = self._number(value, f"parameter {name}")
             result.append(math.nan if value is None else value)

@@ -29,7 +29,7 @@ from mbs.components import (
 )
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
-from mbs.export.robot_files import system_of, write_xml
+from mbs.export.robot_files import shapes_left_out, system_of, write_xml
 from mbs.expressions import to_sx
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose
@@ -81,7 +81,7 @@ def mjcf(
     """
     system = system_of(system)
     root = _Writer(system, parameters).model()
-    write_xml(root, path)
+    write_xml(root, path, shapes_left_out(system))
 
 
 class _Writer:

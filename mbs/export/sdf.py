@@ -20,7 +20,7 @@ from mbs.assembly.tree import Link, zero_position
 from mbs.components import Fixed, Mechanism, Prismatic, Revolute, Spherical, Universal
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
-from mbs.export.robot_files import system_of, write_xml
+from mbs.export.robot_files import shapes_left_out, system_of, write_xml
 from mbs.export.urdf import Numbers, angles, inertia_of, inverse, limits_of, text_of
 from mbs.formats.urdf import UNLIMITED
 from mbs.spatial.rotation import quaternion_rotation
@@ -68,7 +68,7 @@ def sdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
     system = system_of(system)
     _check(system)
     root = _SdfWriting(system, Numbers(system, "SDF")).file()
-    write_xml(root, path)
+    write_xml(root, path, shapes_left_out(system))
 
 
 def _refusal(system: System, what: str) -> ModelError:

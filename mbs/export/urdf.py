@@ -19,9 +19,9 @@ from mbs.assembly.tree import Link
 from mbs.components import Mechanism
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
-from mbs.export.robot_files import system_of, write_xml
+from mbs.export.robot_files import shapes_left_out, system_of, write_xml
 from mbs.formats.urdf import UNLIMITED
-from mbs.text import quoted
+from mbs.text import listed, quoted
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ def urdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
     system = system_of(system)
     _check(system)
     root = _Writing(system, Numbers(system, "URDF")).robot()
-    write_xml(root, path)
+    write_xml(root, path, shapes_left_out(system))
 
 
 class Numbers:
@@ -65,9 +65,10 @@ class Numbers:
     def __init__(self, system: System, file: str) -> None:
         missing = [p.name for p in system.parameters if p.default is None]
         if missing:
+            has = "has no value" if len(missing) == 1 else "have no value"
             raise ModelError(
-                f"{system.name}: {missing[0]} has no value, and {file} files have no symbols; give"
-                " it one"
+                f"{system.name}: {listed(missing)} {has}, and {file} files have no symbols; give"
+                f" values, such as Mechanism(parameters={{{missing[0]!r}: 1.0}})"
             )
         self.p, self.values = system.p, system.p_default
 
@@ -160,6 +161,7 @@ class _Writing:
             damping, coulomb = map(repr, friction)
             SubElement(joint, "dynamics", damping=damping, friction=coulomb)
         if kind == "floating":
+            self._rotor(root, link)
             return
         SubElement(joint, "axis", xyz=text_of(pose[2, :3]))
         low, high = limits or (-UNLIMITED, UNLIMITED)
@@ -168,9 +170,18 @@ class _Writing:
             given |= {"lower": repr(low), "upper": repr(high)}
         SubElement(joint, "limit", given)
         self._mimic(joint, link)
-        Ia = float(self.number(link.Ia).item())
-        if Ia:
-            _rotor(root, link.name, Ia)
+        self._rotor(root, link)
+
+    def _rotor(self, root: Element, link: Link) -> None:
+        """The rotor inertia of a joint, as that of a motor with the ratio 1."""
+        inertia = float(self.number(link.Ia).item())
+        if not inertia:
+            return
+        transmission = SubElement(root, "transmission", name=f"{link.name}_transmission")
+        SubElement(transmission, "joint", name=link.name)
+        actuator = SubElement(transmission, "actuator", name=f"{link.name}_motor")
+        SubElement(actuator, "mechanicalReduction").text = "1"
+        SubElement(actuator, "motorInertia").text = repr(inertia)
 
     def _carrier(
         self, j: int, link: Link, frames_by_name: Mapping[str, tuple[int, Array]]
@@ -301,11 +312,3 @@ def _inertial(link: Element, mass: float, com: Array, tensor: Array) -> None:
         "izz": (2, 2),
     }
     SubElement(inertial, "inertia", {name: repr(float(tensor[at])) for name, at in rows.items()})
-
-
-def _rotor(root: Element, joint: str, inertia: float) -> None:
-    transmission = SubElement(root, "transmission", name=f"{joint}_transmission")
-    SubElement(transmission, "joint", name=joint)
-    actuator = SubElement(transmission, "actuator", name=f"{joint}_motor")
-    SubElement(actuator, "mechanicalReduction").text = "1"
-    SubElement(actuator, "motorInertia").text = repr(inertia)

@@ -666,7 +666,8 @@ def _rotors(root: Element, tree: UrdfTree) -> dict[str, float]:
     equation, since the inputs of the models are efforts at the joints.
     """
     found: dict[str, float] = {}
-    one_axis = {joint.name for joint in tree.joints if joint.kind in _ONE_AXIS}
+    # armatures of free joints have no other place in the format
+    moving = {joint.name for joint in tree.joints if joint.kind in (*_ONE_AXIS, "floating")}
     for element in root.findall("transmission"):
         name = quoted((element.get("name") or "").strip())
         reader = Reader(f"transmission {name}", element, tree.notes)
@@ -676,8 +677,8 @@ def _rotors(root: Element, tree: UrdfTree) -> dict[str, float]:
             if n not in (None, 0.0, 1.0):
                 reader.note("ignored", f"a reduction of {n:g} without the inertia of a rotor")
             continue
-        if len(joints) != 1 or joints[0] not in one_axis or inertia < 0:
-            reader.note("ignored", "its rotor is not that of one joint of one axis")
+        if len(joints) != 1 or joints[0] not in moving or inertia < 0:
+            reader.note("ignored", "its rotor is not that of one joint")
             continue
         found[joints[0]] = found.get(joints[0], 0.0) + (1.0 if n is None else n) ** 2 * inertia
     return found
@@ -770,7 +771,7 @@ class _Building:
         dynamics = joint.element.find("dynamics")
         Fv, Fs = (_friction(reader, dynamics, key) for key in ("damping", "friction"))
         if kind == "floating":
-            return Free(name, actuated=False, Fv=Fv, Fs=Fs)
+            return Free(name, actuated=False, Fv=Fv, Fs=Fs, Ia=self.rotors.get(joint.name, 0.0))
         axis = reader.vector(joint.element.find("axis"), "xyz", (1.0, 0.0, 0.0))
         if not any(axis):
             reader.fail("its axis has zero length; give a direction")

@@ -305,8 +305,8 @@ def test_symbols_in_the_geometry():
     )
     refused(
         ModelError,
-        "m: parameter 'L' has no value",
-        "give it a default",
+        "m: parameters 'L' and 'A' have no value",
+        "give them defaults",
         by=symbolic.parameter_values,
     )
     refused(

@@ -10,7 +10,7 @@ from support.random_trees import random_tree
 from support.written_files import assert_coupling_is_kept, assert_same_tree, names_of, written_arm
 
 import mbs
-from mbs.components import Body, Free, Mechanism, Revolute, Spherical
+from mbs.components import Body, Free, Mechanism, Revolute, Shape, Spherical
 from mbs.errors import ModelError
 from mbs.expressions import to_float
 
@@ -92,3 +92,42 @@ def test_what_urdf_cannot_say_is_refused(tmp_path):
     symbol = Mechanism("m", gravity=(0, 0, 0))
     symbol.connect(symbol.world, Free("f"), symbol.add(Body("b", mass=1, inertia=(1, 1, 1))))
     refused(symbol, "gravity is [0.0, 0.0, 0.0]")
+
+
+def test_the_armature_of_a_free_joint_is_kept(tmp_path):
+    file = tmp_path / "b.xml"
+    file.write_text(
+        '<mujoco><worldbody><body name="b"><joint name="f" type="free" armature="0.1"/>'
+        '<geom size="0.1"/></body></worldbody></mujoco>'
+    )
+    system = mbs.load(file).assemble()
+    mbs.export.urdf(system, tmp_path / "b.urdf")
+    again = mbs.load(tmp_path / "b.urdf").assemble()
+    q = np.array(system.configuration)
+    M, other = (mbs.models.inertia_matrix(one)(q).full() for one in (system, again))
+    assert M[0, 0] == pytest.approx(4 / 3 * np.pi + 0.1, abs=1e-12)
+    np.testing.assert_allclose(np.diag(other), np.diag(M), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("writer", ["urdf", "mjcf", "sdf"])
+def test_shapes_that_are_left_out_are_noted_once(writer, tmp_path):
+    m = mbs.Mechanism("m")
+    body = m.add(Body("arm", 1.0, (0.1, 0, 0), (0.1, 0.1, 0.1)))
+    m.connect(m.world, Revolute("j"), body)
+    for x in (0.1, 0.2):
+        m.add_shape(body.at(x), Shape("sphere", (0.05,)))
+    path = tmp_path / f"m.{'xml' if writer == 'mjcf' else writer}"
+    getattr(mbs.export, writer)(m, path)
+    assert path.read_text().count("Shapes that are not in this file: 2, on j.") == 1
+
+
+def test_all_symbols_without_value_are_named(tmp_path):
+    m = mbs.Mechanism("m")
+    body = m.add(Body("arm", "M", ("L", 0, 0), (0.1, 0.1, 0.1)))
+    m.connect(m.world, Revolute("j"), body)
+    text = r"m: M and L have no value, and URDF files have no symbols"
+    with pytest.raises(ModelError, match=text):
+        mbs.export.urdf(m, tmp_path / "m.urdf")
+    text = r"parameters 'M' and 'L' have no value.*parameters=\{'M': 1.0, 'L': 1.0\}"
+    with pytest.raises(ModelError, match=text):
+        m.assemble().parameter_values()

@@ -17,7 +17,7 @@ from mbs.assembly.validity import field_rows, quaternion_rows
 from mbs.errors import ExportError
 from mbs.export.fmu.arrays import Group, in_arrays
 from mbs.export.fmu.controller import Law, controller_of, read_sources
-from mbs.export.fmu.description import FmuModel, Origin, Rules, Solver, once
+from mbs.export.fmu.description import FmuModel, Origin, Rules, Solver
 from mbs.export.fmu.documentation import about
 from mbs.export.fmu.interface import (
     interface_of,
@@ -196,8 +196,9 @@ def fmu_model(
     """
     require_motion(system)
     wished, settings = wished or Contents(), settings or Settings()
-    if names := once(system, "parameters", wished.parameters):
-        system = symbolic(system, names)
+    given = wished.parameters
+    if given is not None and (not isinstance(given, list | tuple) or given):
+        system = symbolic(system, given)
     system.parameter_values()
     interface = interface_of(system, wished.inputs, wished.flanges)
     request = make_request(system, wished.outputs, interface.flanges)

@@ -372,8 +372,17 @@ class System:
 
     @property
     def active(self) -> tuple[int, ...]:
-        """Numbers of the independent velocities: all of them in an open chain."""
+        """Indices of the independent velocities: all of them in an open chain.
+
+        These are the velocities that models of a closed system take. `actuated` has the velocities
+        with motors.
+        """
         return self.closure.active if self.closure else tuple(range(self.nv))
+
+    @property
+    def actuated(self) -> tuple[int, ...]:
+        """Indices of the velocities whose joints have motors."""
+        return tuple(k for k, speed in enumerate(self.speeds) if speed.actuated)
 
     @property
     def free(self) -> tuple[int, ...]:

@@ -9,11 +9,15 @@ from mbs.loops.pose import solve_pose
 from mbs.loops.reduction import reduction_matrix
 from mbs.loops.velocity import closure_jacobian
 
+assembly_modes = modes
+"""The name of `modes` in the literature on parallel robots."""
+
 __all__ = [
     "ConfigurationState",
     "Mode",
     "ModeList",
     "WorkingMode",
+    "assembly_modes",
     "closure",
     "closure_jacobian",
     "examine",

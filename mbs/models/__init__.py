@@ -1,5 +1,7 @@
 """Model builders: a System in, a casadi.Function with named inputs and outputs out."""
 
+from typing import NoReturn
+
 from mbs.models import catalogue, inverse_geometry
 from mbs.models.actuation import actuation_matrix, actuation_null_space
 from mbs.models.contact_phases import ContactPhases, contact_phases
@@ -12,9 +14,26 @@ from mbs.models.derivatives import (
 )
 from mbs.models.direct_dynamics import direct_dynamics, hybrid_dynamics, inertia_matrix
 from mbs.models.energy import energy
+from mbs.models.field_names import (
+    aba,
+    crba,
+    forward_dynamics,
+    forward_kinematics,
+    generalised_gravity,
+    geometric_jacobian,
+    inverse_kinematics,
+    jacobian_drift,
+    mass_matrix,
+    nonlinear_effects,
+    rnea,
+)
 from mbs.models.geometry import direct_geometry, transform
 from mbs.models.inverse_dynamics import bias, gravity_effort, inverse_dynamics
-from mbs.models.jacobian_inverse import inverse_jacobian, inverse_kinematics, jacobian_determinant
+from mbs.models.jacobian_inverse import (
+    inverse_differential_kinematics,
+    inverse_jacobian,
+    jacobian_determinant,
+)
 from mbs.models.joint_wrenches import joint_wrenches
 from mbs.models.kinematics import (
     jacobian,
@@ -31,6 +50,7 @@ from mbs.models.singularities import singularities
 from mbs.models.symbols import devices
 from mbs.models.tree_core import TreeCore, tree_core
 from mbs.models.validity import validity, validity_rows
+from mbs.text import did_you_mean
 
 __all__ = [
     "ContactPhases",
@@ -40,21 +60,28 @@ __all__ = [
     "LinearModel",
     "Linearisation",
     "TreeCore",
+    "aba",
     "acceleration_closure",
     "actuation_matrix",
     "actuation_null_space",
     "bias",
     "catalogue",
     "contact_phases",
+    "crba",
     "dae",
     "devices",
     "direct_dynamics",
     "direct_dynamics_derivatives",
     "direct_geometry",
     "energy",
+    "forward_dynamics",
+    "forward_kinematics",
+    "generalised_gravity",
+    "geometric_jacobian",
     "gravity_effort",
     "hybrid_dynamics",
     "inertia_matrix",
+    "inverse_differential_kinematics",
     "inverse_dynamics",
     "inverse_dynamics_derivatives",
     "inverse_geometry",
@@ -63,13 +90,17 @@ __all__ = [
     "jacobian",
     "jacobian_determinant",
     "jacobian_dot_velocity",
+    "jacobian_drift",
     "joint_wrenches",
     "lagrange",
     "limits",
     "linearise",
     "link_accelerations",
     "link_velocities",
+    "mass_matrix",
     "measurements",
+    "nonlinear_effects",
+    "rnea",
     "singularities",
     "transform",
     "tree_core",
@@ -78,3 +109,8 @@ __all__ = [
     "velocity_closure",
     "with_implicit_jacobian",
 ]
+
+
+def __getattr__(name: str) -> NoReturn:
+    """Raise AttributeError with the nearest names."""
+    raise AttributeError(f"mbs.models has no {name!r}; {did_you_mean(name, __all__)}")

@@ -198,7 +198,7 @@ def inverse_jacobian(
     return model_function(system, ("inverse_jacobian", chosen), build, chosen.check)
 
 
-def inverse_kinematics(
+def inverse_differential_kinematics(
     system: System,
     frame: str | int,
     rows: Sequence[int | str] | None = None,

@@ -102,7 +102,7 @@ def test_a_symbol_that_is_not_in_the_loop_needs_no_value():
     q = solve(system, {"j1": 0.4})
     idm = mbs.models.inverse_dynamics(system)
     assert np.isfinite(float(idm(q, 1.0, 1.0, [1.0, 0.1, 2.0, 3.0])))
-    with pytest.raises(ModelError, match="parameters 'm_a', .* have no value; give them"):
+    with pytest.raises(ModelError, match=r"parameters 'm_a', .* have no value; give them"):
         idm(q, 1.0, 1.0)
 
 

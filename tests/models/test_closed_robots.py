@@ -118,7 +118,7 @@ def test_determinant_and_inverse_are_those_of_the_square_part(systems, name, see
     inverse = numbers(mbs.models.inverse_jacobian(system, frame, rows), q)
     np.testing.assert_allclose(inverse @ square, np.eye(len(square)), atol=1e-8)
     twist = np.arange(1.0, len(square) + 1)
-    v = numbers(mbs.models.inverse_kinematics(system, frame, rows), q, twist)
+    v = numbers(mbs.models.inverse_differential_kinematics(system, frame, rows), q, twist)
     np.testing.assert_allclose(square @ v.ravel(), twist, atol=1e-8)
 
 

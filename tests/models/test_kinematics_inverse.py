@@ -16,8 +16,8 @@ import mbs
 import mbs.loops
 from mbs.errors import ModelError
 from mbs.models.jacobian_inverse import (
+    inverse_differential_kinematics,
     inverse_jacobian,
-    inverse_kinematics,
     jacobian_determinant,
 )
 from mbs.models.kinematics import jacobian
@@ -43,7 +43,7 @@ def test_arm(name, axes):
         np.testing.assert_allclose(inverse @ J, np.eye(6), rtol=0, atol=1e-11)
         det = float(jacobian_determinant(system, 6, expressed_in=axes)(q))
         assert det == pytest.approx(np.linalg.det(J), rel=1e-11, abs=1e-13)
-        back = inverse_kinematics(system, 6, expressed_in=axes)(q, J @ v)
+        back = inverse_differential_kinematics(system, 6, expressed_in=axes)(q, J @ v)
         np.testing.assert_allclose(np.array(back).ravel(), v, rtol=0, atol=1e-11)
 
 
@@ -222,7 +222,7 @@ def test_functions_are_named_cached_and_differentiable():
     f = inverse_jacobian(system, 6)
     assert (f.name(), f.name_in(), f.name_out()) == ("inverse_jacobian", ["q"], ["J_inv"])
     assert inverse_jacobian(system, 6, rows=range(6)) is f
-    ikm = inverse_kinematics(system, 6)
+    ikm = inverse_differential_kinematics(system, 6)
     assert (ikm.name(), ikm.name_in()) == ("ikm", ["q", "twist"])
     det = jacobian_determinant(system, 6)
     assert (det.name(), det.name_out()) == ("determinant", ["det"])
@@ -252,7 +252,8 @@ def test_functions_are_named_cached_and_differentiable():
     ],
 )
 @pytest.mark.parametrize(
-    "model", [inverse_jacobian, inverse_kinematics, jacobian_determinant, singularities]
+    "model",
+    [inverse_jacobian, inverse_differential_kinematics, jacobian_determinant, singularities],
 )
 def test_wrong_arguments_are_refused(model, arguments, parts):
     system = catalogue_system("rx90")

@@ -93,7 +93,7 @@ OPEN_ALONE = {
 ALONE = {
     "rx90": {
         "inverse_jacobian": last(models.inverse_jacobian),
-        "inverse_kinematics": last(models.inverse_kinematics),
+        "inverse_differential_kinematics": last(models.inverse_differential_kinematics),
         "jacobian_determinant": last(models.jacobian_determinant),
         "inverse_geometry.function": inverse_geometry.function,
     },

@@ -14,7 +14,11 @@ from mbs.models.catalogue.entry import (
     Entry,
     choice,
 )
-from mbs.models.jacobian_inverse import inverse_jacobian, inverse_kinematics, jacobian_determinant
+from mbs.models.jacobian_inverse import (
+    inverse_differential_kinematics,
+    inverse_jacobian,
+    jacobian_determinant,
+)
 from mbs.models.kinematics import (
     jacobian,
     jacobian_dot_velocity,
@@ -61,7 +65,7 @@ KINEMATIC: tuple[Entry, ...] = (
         "Inverse kinematic model",
         "v = J^-1(q) [V; w]",
         SELECTION,
-        inverse_kinematics,
+        inverse_differential_kinematics,
     ),
     Entry(
         "velocities",

@@ -299,11 +299,13 @@ def generated(functions: Iterable[casadi.Function], name: str = "generated", **o
         options: of `casadi.CodeGenerator`.
 
     Raises:
-        ModelError: an input or output is called by what would end a comment or a string of C.
+        ModelError: an input or output is called by what would end a comment or a string of C, or
+            a Function calls machine code.
     """
     generator, every = casadi.CodeGenerator(name, options), list(functions)
     for function in every:
         require_names(function)
+        _require_equations(function)
         generator.add(function)
     return handwritten_text(every) + str(generator.dump())
 
@@ -329,11 +331,30 @@ def calls_machine_code(functions: Iterable[casadi.Function]) -> bool:
     Args:
         functions: any Functions.
     """
-    return any(
-        part.is_a("External") and not is_handwritten(part)
-        for function in functions
+    return any(_machine_code_in(function) for function in functions)
+
+
+def _machine_code_in(function: casadi.Function) -> list[str]:
+    """Names of the external functions that a Function calls."""
+    return [
+        part.name()
         for part in function.find_functions()
-    )
+        if part.is_a("External") and not is_handwritten(part)
+    ]
+
+
+def _require_equations(function: casadi.Function) -> None:
+    """Raise ModelError if a Function calls machine code.
+
+    C text would refer to symbols of a library that nothing loads, which ends the process.
+    """
+    names = _machine_code_in(function)
+    if names:
+        raise ModelError(
+            f"{function.name()}: it calls {', '.join(names)}, which is machine code of this"
+            " process, so that it cannot be written as C; make it from the Function that was given"
+            " to mbs.native.compiled"
+        )
 
 
 def unwritten(source: str) -> str:

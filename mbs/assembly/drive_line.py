@@ -105,8 +105,7 @@ def _fixed_flanges(
             if key in turns:
                 continue
             owner = mechanism.components[key[0]]
-            idle = isinstance(owner, Custom) and (owner.drives or owner.lowered) and not owner.fixed
-            if idle or isinstance(owner, Joint):
+            if isinstance(owner, Joint):
                 raise AssemblyError(
                     f"{mechanism.name}: {type(owner).__name__} {owner.name!r} is connected to the"
                     f" {type(part).__name__} {part.name!r}, so that it cannot move; put a spring, a"

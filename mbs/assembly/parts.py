@@ -162,6 +162,8 @@ def number_or_sx(factor: SX) -> float | SX:
 
 def as_fast(factor: float | SX, coordinate: str) -> str:
     """How often something turns for a turn of a coordinate, in words."""
+    if not coordinate:
+        return "not at all, since its shaft is fixed"
     if isinstance(factor, float) and factor == 1:
         return f"with {coordinate}"
     text = format(factor, "g") if isinstance(factor, float) else str(factor)

@@ -304,8 +304,19 @@ class System:
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds all of it but the models that were built, which are built anew."""
-        return _unpickle, packed(self._described())
+        """A pickle holds everything except the models, which are built again.
+
+        Raises:
+            ModelError: a component is of a class that another process cannot import.
+        """
+        try:
+            return _unpickle, packed(self._described())
+        except (AttributeError, pickle.PicklingError) as error:
+            raise ModelError(
+                f"{self.name}: the system cannot be pickled, since another process cannot import"
+                f" the class of a component ({error}); define the class by a class statement at"
+                " the top of a module"
+            ) from error
 
     def _described(self) -> dict[str, Any]:
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "_cache"}

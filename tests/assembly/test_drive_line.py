@@ -12,6 +12,7 @@ from mbs.components import (
     DCMotor,
     ElasticGear,
     ElasticShaft,
+    FixedFlange,
     Free,
     IdealGear,
     Prismatic,
@@ -337,3 +338,18 @@ def test_the_housing_takes_the_reactions_of_a_motor_and_of_a_bevel_gear():
     own[0] += 0.2 * result["across.v"]
     own[2] += 0.1 * result["spin.v"]
     assert np.abs(own).max() < 1e-8
+
+
+def test_parts_on_a_fixed_shaft_do_not_move():
+    m = mbs.Mechanism("m", gravity=(0, 0, 0))
+    housing, first, second = FixedFlange("f"), ShaftInertia("i", 2.0), ShaftInertia("k", 1.0)
+    gear, torque, free = IdealGear("g", 3.0), TorqueSource("t"), ShaftInertia("free", 1.5)
+    m.connect(housing.flange, first.flange_a)
+    m.connect(first.flange_b, gear.flange_a)
+    m.connect(gear.flange_b, second.flange_a)
+    m.connect(torque.flange, free.flange_a)
+    system = m.assemble()
+    assert [speed.name for speed in system.speeds] == ["free"]
+    assert "IdealGear g" in system.report()
+    result = mbs.simulate.run(system, 1.0, u={"t": 3.0}, quiet=True)
+    assert result["free.v"][-1] == pytest.approx(2.0, abs=1e-9)

@@ -359,13 +359,6 @@ class TestLoads:
             "energy holds the symbol 'stray'", energy=lambda self, at: stray * at.point.p[0]
         )
 
-    def test_inputs_that_nothing_asks_for(self):
-        refused_at_assembly(
-            "nothing depends on the input 'order'",
-            order=custom.input(),
-            loads=lambda self, at: up(),
-        )
-
 
 class TestStatesAndOutputs:
     def test_rates(self):
@@ -1171,3 +1164,54 @@ def test_a_symbol_of_a_text_has_the_unit_of_its_declaration():
         "L": ("1", 1.0),
         "c": ("kg/m", 0.4),
     }
+
+
+class Unread(Custom):
+    """A torque that does not depend on its input."""
+
+    shaft = custom.coordinate()
+    spare = custom.input("N.m")
+
+    def loads(self, at):
+        return {"shaft": -0.5 * at.shaft.v}
+
+
+class Grip(Custom):
+    """Friction whose limit grows with the slip."""
+
+    shaft = custom.coordinate()
+
+    def frictions(self, at):
+        return {"": custom.Friction(slip=at.shaft.v, limit=1 + casadi.fabs(at.shaft.v) / 2)}
+
+
+def shaft_with(component):
+    m = mbs.Mechanism("m", gravity=(0, 0, 0))
+    body = m.add(Body("b", 1, (0, 0, 0), (1, 1, 1)))
+    m.connect(m.world, Revolute("j", actuated=True), body)
+    m.add(component)
+    return m.assemble()
+
+
+def test_inputs_without_effect_are_accepted():
+    system = shaft_with(Unread("c", "j"))
+    motions = [
+        mbs.simulate.run(system, 1.0, v0={"j": 1.0}, u={"c.spare": u}, quiet=True)["j.v"]
+        for u in (0.0, 3.0)
+    ]
+    assert motions[0][-1] == pytest.approx(np.exp(-0.5), abs=1e-8)
+    np.testing.assert_array_equal(*motions)
+
+
+def test_the_limit_of_a_friction_may_grow_with_the_slip():
+    """v' = -(1 + v / 2): v = 4 exp(-t / 2) - 2 until it sticks at t = 2 ln 2."""
+    result = mbs.simulate.run(shaft_with(Grip("g", "j")), 2.0, v0={"j": 2.0}, quiet=True)
+    exact = np.maximum(4 * np.exp(-result.time / 2) - 2, 0)
+    np.testing.assert_allclose(result["j.v"], exact, rtol=0, atol=1e-8)
+    assert result.events[0][0] == pytest.approx(2 * np.log(2), abs=1e-8)
+
+
+def test_a_system_of_a_class_without_a_place_cannot_be_pickled():
+    made = type("Made", (Grip,), {})
+    with pytest.raises(ModelError, match=r"m: the system cannot be pickled.*Made.*class statement"):
+        pickle.dumps(shaft_with(made("g", "j")))

@@ -18,7 +18,7 @@ A message is one sentence: which component, what value, which rule, what to do.
 `Interrupted` stands apart: a KeyboardInterrupt is no error, and `except Exception` lets it by.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 
@@ -87,18 +87,30 @@ class SolverError(MbsError, RuntimeError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """A run was interrupted by control-C; it hands over what it has.
+    """A run was interrupted by control-C; its result is the part that is complete.
 
     Attributes:
         time: at which a motion stopped, s; None where it is not a motion.
-        result: what was reached: the `Result` of a simulation, the `Sweep` of a study.
+        compute: makes the result of a motion, which may take as long as its laws.
     """
 
     def __init__(self, *args: object, time: float | None = None) -> None:
         """As of every exception, with the time."""
         super().__init__(*args)
         self.time = time
-        self.result: Any = None
+        self.compute: Callable[[], Any] | None = None
+        self._result: Any = None
+
+    @property
+    def result(self) -> Any:
+        """The `Result` of a simulation or the `Sweep` of a study; made when it is first read."""
+        if self._result is None and self.compute is not None:
+            self._result, self.compute = self.compute(), None
+        return self._result
+
+    @result.setter
+    def result(self, value: Any) -> None:
+        self._result = value
 
 
 class CompilerError(MbsError, RuntimeError):

@@ -423,6 +423,7 @@ def integrate_legs(
         q = np.array(stop.state[: system.nq])
         where = ", ".join(f"{c.name} = {x:.6g}" for c, x in zip(system.coordinates, q, strict=True))
         lost = _lost(system, q, p) if stop.singular and system.is_closed else ""
+        cause = stop.__cause__
         stop = SolverError(
             f"{system.name}: {_with_names(system, stop)}; the configuration is {where}{lost}",
             state=stop.state,
@@ -430,6 +431,7 @@ def integrate_legs(
             time=stop.time,
             fired=stop.fired,
         )
+        stop.__cause__ = cause
     return legs, stop
 
 
@@ -1294,6 +1296,9 @@ class Simulator:
         if motions and legs[0].first_slope is not None:
             H = _first_bias(system, x0, self._inputs, _own(system, p))
             legs[0] = replace(legs[0], driven=tuple(m.velocity for m in motions), first_bias=H)
+        if isinstance(stop, Interrupted):  # rows may take long where laws do
+            stop.compute = partial(_result, system, legs, p, stop, self._columns)
+            raise stop
         result = _result(system, legs, p, stop, self._columns)
         if stop is not None:
             stop.result = result

@@ -14,9 +14,12 @@ from mbs.solvers.problem import (
     Failure,
     IntegrationEvent,
     IntegrationProblem,
+    LawFailure,
     failed,
+    failure_of,
     fired_of,
     interrupted,
+    stopped_by_law,
 )
 from mbs.solvers.rodas import Rodas
 from mbs.solvers.stepper import EPSILON, Array, Projection, RowTable, Stepper, Stops
@@ -132,7 +135,7 @@ class EventStepper:
         try:
             values = self.indicators(t, x)
         except RuntimeError as error:
-            raise Failure("indicators") from error
+            raise failure_of(error, "indicators") from error
         if not np.isfinite(values).all():
             raise Failure("indicators")
         return values
@@ -143,7 +146,7 @@ class EventStepper:
         try:
             return values, self.rates(t, x)
         except RuntimeError as error:
-            raise Failure("indicators") from error
+            raise failure_of(error, "indicators") from error
 
     def _least(self, values: Array) -> float:
         return float(np.min(values[self.armed], initial=np.inf))
@@ -337,6 +340,8 @@ def run_interpreted(problem: IntegrationProblem, progress: Progress | None) -> E
                 progress(solver.t)
     except SolverError as error:
         stop = error
+    except LawFailure as failure:
+        stop = stopped_by_law(solver.t, failure, solver.x.tolist())
     except KeyboardInterrupt:
         stop = interrupted(solver.t)
     return problem.motion(table.rows[: table.done], log, stop)
@@ -386,7 +391,7 @@ def _projection(problem: IntegrationProblem, p: Array, stops: Stops) -> Projecti
             try:
                 moved, residual = step(stops.law_time(t), x, p)
             except RuntimeError as error:
-                raise Failure("projection") from error
+                raise failure_of(error, "projection") from error
             x = _vector(moved)
             if not (np.isfinite(x).all() and np.isfinite(float(residual))):
                 break
@@ -408,7 +413,7 @@ def _watch(problem: IntegrationProblem, p: Array, solver: Stepper) -> EventStepp
         try:
             moved, modes = map(_vector, jump(at(t), x, p, fired))
         except RuntimeError as error:
-            raise Failure("jump") from error
+            raise failure_of(error, "jump") from error
         if not (np.isfinite(moved).all() and np.isfinite(modes).all()):
             raise Failure("jump")
         p[len(p) - problem.modes :] = modes

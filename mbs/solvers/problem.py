@@ -1,5 +1,6 @@
 """An integration, its functions brought into one form and its arguments checked."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -417,6 +418,36 @@ class Failure(Exception):
     """An evaluation had no answer, so the step must be shortened."""
 
 
+class LawFailure(Exception):
+    """Python code of a law raised an error, so the integration must stop."""
+
+
+_OF_LAW = re.compile(
+    r'Error calling "eval" for object (?P<law>\S+):\n[^\n]*?: (?P<text>.*)', re.DOTALL
+)
+"""Message of CasADi about an error in the `eval` of a Callback."""
+
+
+def failure_of(error: RuntimeError, reason: str) -> Failure:
+    """Return the failure of an evaluation that CasADi ended with an error.
+
+    Args:
+        error: raised by CasADi.
+        reason: key of REASONS, if the evaluation has no value.
+
+    Raises:
+        KeyboardInterrupt: control-C was pressed during the evaluation.
+        LawFailure: a law that is a Callback raised an error.
+    """
+    text = str(error)
+    if text.rstrip().endswith("KeyboardInterrupt"):
+        raise KeyboardInterrupt from error
+    if found := _OF_LAW.search(text):
+        what = " ".join(found["text"].split()) or "an error without a message"
+        raise LawFailure(f"the law {found['law']!r} raised an error: {what}") from error
+    return Failure(reason)
+
+
 _SINGULAR = ("singular", "near miss", "undetermined", "projection")
 
 
@@ -444,6 +475,19 @@ def failed(
         time=t,
         fired=fired,
     )
+
+
+def stopped_by_law(t: float, failure: LawFailure, state: Sequence[float]) -> SolverError:
+    """Return the error of an integration that a law stopped; its cause is that of the law.
+
+    Args:
+        t: time of the last accepted state, s.
+        failure: of the law.
+        state: the last one that was reached.
+    """
+    error = SolverError(f"integration stopped at t = {t:.9g} s: {failure}", state=state, time=t)
+    error.__cause__ = failure.__cause__
+    return error
 
 
 def interrupted(t: float) -> Interrupted:

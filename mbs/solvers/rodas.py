@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mbs.solvers.problem import Failure
+from mbs.solvers.problem import Failure, failure_of
 from mbs.solvers.stepper import Array, Stepper, combine
 
 Jacobian = Callable[[float, Array], tuple[Array, Array]]
@@ -147,7 +147,7 @@ class Rodas(Stepper):
         try:
             J, f_t = self.jacobian(self.t, self.x)
         except RuntimeError as error:
-            raise Failure("rhs") from error
+            raise failure_of(error, "rhs") from error
         if not (np.isfinite(J).all() and np.isfinite(f_t).all()):
             raise Failure("finite")
         self.derivatives = J, f_t

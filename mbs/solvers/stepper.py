@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mbs.solvers.problem import MAX_STEPS, Failure, failed
+from mbs.solvers.problem import MAX_STEPS, Failure, failed, failure_of
 
 Array = npt.NDArray[np.float64]
 RightHandSide = Callable[[float, Array], Array]
@@ -304,7 +304,7 @@ class Stepper(ABC):
         try:
             value = self.rhs(t, x)
         except RuntimeError as error:
-            raise Failure("rhs") from error
+            raise failure_of(error, "rhs") from error
         if not np.isfinite(value).all():
             raise Failure("finite")
         return value

@@ -15,7 +15,7 @@ from mbs.components import (
     TorqueSource,
     custom,
 )
-from mbs.errors import ModelError
+from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.models.state.laws import conditions_of, time_laws
 from mbs.native.compiler import compiler_found
 from mbs.solvers import integrate, integrate_events
@@ -366,3 +366,66 @@ def test_conditions_that_are_equal_for_positive_angles_are_told_apart():
     after = 2.0 - first - (last - middle) / 7
     assert result["i.v"][-1] == pytest.approx(last, abs=1e-10)
     assert result["i.q"][-1] == pytest.approx(0.5 + last * after, abs=1e-10)
+
+
+# Laws written in Python.
+
+
+class PythonLaw(casadi.Callback):
+    """Efforts of six joints by Python code that is called at each evaluation."""
+
+    def __init__(self, code):
+        casadi.Callback.__init__(self)
+        self.code = code
+        self.construct("gains", {"enable_fd": True})
+
+    def get_n_in(self):
+        return 3
+
+    def get_n_out(self):
+        return 1
+
+    def get_sparsity_in(self, i):
+        return casadi.Sparsity.dense(1 if i == 0 else 6, 1)
+
+    def get_sparsity_out(self, i):
+        return casadi.Sparsity.dense(6, 1)
+
+    def eval(self, arguments):
+        return [self.code(*arguments)]
+
+
+@pytest.mark.parametrize("method", ["dopri5", "rodas"])
+def test_the_error_of_a_law_is_the_cause_of_the_stop(method, capfd):
+    def code(t, q, v):
+        if float(t) > 0.05:
+            raise ValueError("the table of gains has no row here")
+        return -5 * v
+
+    system = mbs.load("puma560").assemble()
+    with pytest.raises(
+        SolverError, match=r"the law 'gains' raised an error: the table of"
+    ) as error:
+        mbs.simulate.run(system, 0.2, tau=PythonLaw(code), method=method, quiet=True)
+    assert "the table of gains has no row here" in str(error.value.__cause__)
+    assert error.value.time <= 0.05
+    assert error.value.result.time[-1] <= 0.05
+
+
+def test_control_c_in_a_law_stops_the_run_at_once():
+    """Rows are made when the result is read: until then the law is not called again."""
+    calls = []
+
+    def code(t, q, v):
+        calls.append(float(t))
+        if len(calls) == 300:
+            raise KeyboardInterrupt
+        return -5 * v
+
+    system = mbs.load("puma560").assemble()
+    with pytest.raises(Interrupted) as stop:
+        mbs.simulate.run(system, 20.0, tau=PythonLaw(code), quiet=True)
+    assert len(calls) == 300
+    reached = stop.value.time
+    assert 0 < reached < 20
+    assert stop.value.result.time[-1] == pytest.approx(reached, abs=0.01)

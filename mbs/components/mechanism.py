@@ -113,7 +113,7 @@ def place(outer: Mechanism, inner: Mechanism, name: str) -> Placed:
     outer.cuts.extend(f"{scope}.{joint}" for joint in inner.cuts)
     outer.guess.update({f"{scope}.{name}": value for name, value in inner.guess.items()})
     used = {parameter.name for parameter in outer.used_parameters()}
-    for symbol, value in inner.values.items():
+    for symbol, value in inner.given_values().items():
         if (scoped := f"{scope}.{symbol}") in used:  # not what only its gravity used
             outer.values[scoped] = replace(value, name=scoped)
     return Placed(outer, scope)
@@ -136,6 +136,8 @@ _ATTRIBUTES = frozenset(
     )
 )
 """Attributes of a mechanism."""
+_NO_UNIT = "1"
+"""Unit of a parameter whose unit is not given."""
 _COMPENSATIONS = "_gravcomp", "_gravity"
 """Ends of the names of forces that readers of files make against the weight of bodies."""
 
@@ -158,6 +160,8 @@ class Mechanism:
         notes: what the reader of a file renamed, ignored, doubted or completed; print them.
         numbered: the body of each frame of the table that it was made from, by its number.
         shapes: what its bodies look like, and where on them.
+        values: number or Parameter of each symbol that has a value here. Units, descriptions and
+            bounds of the Parameter replace those of the components.
     """
 
     def __init__(
@@ -186,7 +190,7 @@ class Mechanism:
         self.wires: list[tuple[str, Signal]] = []
         self.frames: dict[str, Point] = {}
         self.shapes: list[tuple[Point, Shape]] = []
-        self.values: dict[str, Parameter] = {}
+        self.values: dict[str, Parameter | float] = {}
         for symbol, value in (parameters or {}).items():
             self.values[symbol] = Parameter(symbol, value)
         if mount is not None:
@@ -510,15 +514,40 @@ class Mechanism:
         for parameter in self.used_parameters():
             known = found.get(parameter.name)
             found[parameter.name] = parameter if known is None else self._merge(known, parameter)
-        for name, value in self.values.items():
+        for name, value in self.given_values().items():
             if name not in found:
                 known_names = ", ".join(found) or "none"
                 raise AssemblyError(
                     f"{self.name}: parameter {name!r} is used by no component; the parameters are:"
                     f" {known_names}"
                 )
-            found[name] = replace(found[name], default=value.default)
+            one = found[name]
+            found[name] = Parameter(
+                name,
+                value.default,
+                unit=one.unit if value.unit == _NO_UNIT else value.unit,
+                description=value.description or one.description,
+                min=one.min if value.min is None else value.min,
+                max=one.max if value.max is None else value.max,
+            )
         return tuple(found.values())
+
+    def given_values(self) -> dict[str, Parameter]:
+        """Values of symbols that were given to the mechanism, with units, descriptions and bounds.
+
+        Raises:
+            DescriptionError: an entry of `values` is no number, or a Parameter of another name.
+        """
+        found = {}
+        for name, value in self.values.items():
+            given = value if isinstance(value, Parameter) else Parameter(name, value)
+            if given.name != name:
+                raise DescriptionError(
+                    f"{self.name}: values[{name!r}] is the parameter {given.name!r}; give it the"
+                    " name of the symbol"
+                )
+            found[name] = given
+        return found
 
     def _merge(self, known: Parameter, other: Parameter) -> Parameter:
         """Two uses of one symbol: a value and bounds may stand at either, but not differ."""

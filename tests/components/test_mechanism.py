@@ -7,7 +7,7 @@ from support.messages import refused
 import mbs
 import mbs.models
 from mbs.components import Body, Box, Coupling, Fixed, PointMass, Revolute
-from mbs.errors import AssemblyError, DescriptionError
+from mbs.errors import AssemblyError, DescriptionError, ModelError
 from mbs.expressions import Parameter
 
 
@@ -360,3 +360,30 @@ def test_gravity_of_a_file_that_compensates_it_stays(tmp_path):
     )
     with pytest.raises(DescriptionError, match=r"b_gravcomp.*compensates the gravity of the file"):
         mbs.load(path, gravity=(0, 0, -1.6))
+
+
+# Values of symbols.
+
+
+def test_values_keep_their_units_and_bounds():
+    m = mbs.Mechanism("m")
+    b = m.add(Body("b", mass=Parameter("M", unit="kg", description="load"), com=("L", 0, 0)))
+    m.connect(m.world, Revolute("j", axis="y"), b)
+    m.values["M"] = Parameter("M", 2.0, min=1.5, max=3.0)
+    m.values["L"] = 0.5
+    assert m.parameters() == (
+        Parameter("M", 2.0, unit="kg", description="load", min=1.5, max=3.0),
+        Parameter("L", 0.5),
+    )
+    system = m.assemble()
+    refused(ModelError, "m: parameter M is 1", by=lambda: system.parameter_values({"M": 1.0}))
+    outer = mbs.Mechanism("outer")
+    outer.add(m)
+    assert {p.name: (p.default, p.min) for p in outer.parameters()} == {
+        "m.M": (2.0, 1.5),
+        "m.L": (0.5, None),
+    }
+    m.values["M"] = Parameter("mass", 2.0)
+    refused(DescriptionError, "m: values['M'] is the parameter 'mass'", by=m.parameters)
+    m.values["M"] = "heavy"
+    refused(DescriptionError, "parameter M", "'heavy'", by=m.parameters)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import casadi
@@ -367,6 +367,8 @@ _CROSSING = 1e-3
 _OFFSET = 1e-7
 """Change of locked positions for a slope [rad or sizes]: closed configurations are accurate to
 1e-12, so that a slope is accurate to 1e-5."""
+_POLISHINGS = 2
+"""Steps after which a configuration is accurate to rounding: it is closed to 1e-12 before."""
 _STEEP = 1e4
 """Slope beyond which the free positions do not follow from the locked ones: the branch turns."""
 _LONGEST_LINE = 400.0
@@ -427,12 +429,60 @@ class _Line:
 
     def slope(self, q: Vector, s: float) -> Vector | None:
         """(nq,) dq/ds of the branch through the closed q; None if the branch turns there."""
+        if 0 < len(self.closing(s).free) < MANY:
+            return self._exact_slope(q, s)
         ahead = s + _OFFSET if s + _OFFSET <= self.length else s - _OFFSET
         near = self.closing(ahead).nearest(self.placed(q, ahead))
         if not near.is_closed:
             return None
         slope: Vector = (near.q - q) / (ahead - s)
         return slope if np.max(np.abs(slope / self.scales), initial=0.0) < _STEEP else None
+
+    def _exact_slope(self, q: Vector, s: float) -> Vector | None:
+        """The same by the derivatives of the rows, which are accurate near singular branches."""
+        low, high = max(s - _OFFSET, 0.0), min(s + _OFFSET, self.length)
+        before, after = self.placed(q, low), self.placed(q, high)
+        rows = replace(self.closing(s), locked=()).rows(q)[1] @ (after - before)
+        if not np.array_equal(*self.parameters):
+            rows += self.closing(high).rows(q)[0] - self.closing(low).rows(q)[0]
+        move = self._shortest(q, s, -rows)
+        if move is None:
+            return None
+        slope: Vector = (after - before + move) / (high - low)
+        return slope if np.max(np.abs(slope / self.scales), initial=0.0) < _STEEP else None
+
+    def _shortest(self, q: Vector, s: float, rows: Vector) -> Vector | None:
+        """(nq,) the smallest move of free positions by which the rows change; None if singular."""
+        closing = self.closing(s)
+        scales = self.scales[closing.free]
+        J = closing.rows(q)[1] / closing.sizes[:, None] * scales
+        U, values, V = np.linalg.svd(J, full_matrices=False)
+        rank = self._rank(len(J), len(values))
+        if not rank or values[rank - 1] <= _SINGULAR * values[0]:
+            return None
+        parts = (U.T @ (rows / closing.sizes))[:rank] / values[:rank]
+        move = np.zeros(self.system.nq)
+        move[closing.free] = scales * (V[:rank].T @ parts)
+        return move
+
+    def _rank(self, rows: int, most: int) -> int:
+        """Rank of the derivative of the rows by the free positions where it is regular."""
+        closure = self.system.closure
+        return (
+            most if closure is None else min(len(closure.rows) + len(self._free_norms(rows)), most)
+        )
+
+    def polished(self, q: Vector) -> Vector:
+        """The configuration at the end, to rounding if the loops are nearly singular there."""
+        closing = self.closing(self.length)
+        if not 0 < len(closing.free) < MANY:
+            return q
+        for _ in range(_POLISHINGS):
+            move = self._shortest(q, self.length, -closing.rows(q)[0])
+            if move is None or np.max(np.abs(move / self.scales)) > _ROOT_OF_ROUNDING:
+                return q
+            q = q + move
+        return q
 
     def side(self, q: Vector, s: float) -> float:
         """Sign of the determinant of the loops by the free positions; 0 if it is not defined."""
@@ -457,10 +507,8 @@ class _Line:
             return False
         J = closing.rows(q)[1] / closing.sizes[:, None] * self.scales[closing.free]
         values = np.linalg.svd(J, compute_uv=False)
-        closure, rank = self.system.closure, len(values)
-        if closure is not None:
-            rank = min(len(closure.rows) + len(self._free_norms(len(J))), rank)
-        return bool(rank and values[rank - 1] < _SINGULAR * values[0])
+        rank = self._rank(len(J), len(values))
+        return bool(rank and values[rank - 1] <= _SINGULAR * values[0])
 
 
 def follow_configuration(
@@ -537,7 +585,7 @@ def _end_of_branch(line: _Line, start: Vector) -> Vector:
         step = (to - s) / 2
         if step < _SMALLEST_STEP:
             raise Unclosable(_ended(line, q, s, "ends"))
-    return _singular_end(line, q) if line.is_singular(q, line.length) else q
+    return _singular_end(line, q) if line.is_singular(q, line.length) else line.polished(q)
 
 
 def _singular_end(line: _Line, q: Vector) -> Vector:

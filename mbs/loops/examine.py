@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -29,6 +30,10 @@ Vector = NDArray[np.float64]
 
 _DETERMINED = 1e-14
 """Squared sine between rows of the passive joints below which these follow no longer."""
+_DIFFERENTIABLE = 2.5e-5
+"""The same for second derivatives, which magnify the rounding of a closed configuration by the
+third power of the inverse sine: 1e-16 becomes 1e-8 at a sine of 5e-3, for lengths, times and speeds
+of size one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,17 +98,19 @@ def examine(
     )
 
 
-def require_determined(system: System, q: Vector, p: Vector) -> None:
-    """Refuse a configuration at which models in the independent joints have no sense.
+def require_determined(system: System, q: Vector, p: Vector, least: float = _DETERMINED) -> None:
+    """Raise an error at a configuration at which a model in independent joints has no meaning.
 
     Args:
         system: with closed loops.
         q: (nq,) positions.
         p: (np,) parameters.
+        least: squared sine between rows of the passive joints that the model needs.
 
     Raises:
         Unclosable: the configuration leaves the loops open.
-        SingularPosture: the independent joints do not determine how the others move.
+        SingularPosture: the independent joints do not determine how the others move, or not well
+            enough for the model.
     """
     residual, leads, opening = (float(x) for x in configuration_health(system)(q, p))
     if opening > OPEN:
@@ -111,22 +118,31 @@ def require_determined(system: System, q: Vector, p: Vector) -> None:
             f"{system.name}: q leaves the loops open by {residual:.3g}; take a configuration of"
             " mbs.loops.solve"
         )
-    if leads <= _DETERMINED:
-        names = ", ".join(system.speeds[k].name for k in system.active)
+    if leads > least:
+        return
+    names = ", ".join(system.speeds[k].name for k in system.active)
+    if leads > _DETERMINED:
         raise SingularPosture(
-            f"{system.name}: the configuration is singular, {names} cannot lead the other joints"
-            " there;"
-            " take another configuration, other independent joints (assemble(active=...)), or"
-            ' coordinates="tree"'
+            f"{system.name}: the configuration is so near a singular one that second derivatives"
+            f" of the loops have no accuracy with {names} as independent joints (sine"
+            f" {leads**0.5:.2g}, {least**0.5:.2g} is needed); take another configuration, or other"
+            " independent joints (assemble(active=...))"
         )
+    raise SingularPosture(
+        f"{system.name}: the configuration is singular, {names} cannot lead the other joints"
+        " there;"
+        " take another configuration, other independent joints (assemble(active=...)), or"
+        ' coordinates="tree"'
+    )
 
 
-def loop_rows(system: System, q: SX) -> list[ValidityRow]:
-    """What a configuration of closed loops must fulfil for models in the independent joints.
+def loop_rows(system: System, q: SX, least: float = _DETERMINED) -> list[ValidityRow]:
+    """Return the conditions on a configuration of closed loops for models in independent joints.
 
     Args:
         system: with closed loops.
         q: (nq, 1) positions.
+        least: squared sine between rows of the passive joints that the model needs.
     """
     _, leads, opening = configuration_health(system)(q, system.p)
     return [
@@ -135,7 +151,7 @@ def loop_rows(system: System, q: SX) -> list[ValidityRow]:
             "undetermined",
             "hold of the independent joints, negative",
             -leads,
-            -_DETERMINED,
+            -least,
             "the independent joints do not determine the others",
         ),
     ]
@@ -143,6 +159,11 @@ def loop_rows(system: System, q: SX) -> list[ValidityRow]:
 
 DETERMINED = ConfigurationCheck(loop_rows, require_determined)
 """Closed loops whose independent joints lead the others."""
+DIFFERENTIABLE = ConfigurationCheck(
+    functools.partial(loop_rows, least=_DIFFERENTIABLE),
+    functools.partial(require_determined, least=_DIFFERENTIABLE),
+)
+"""Closed loops whose second derivatives are accurate."""
 
 
 def configuration_health(system: System) -> Function:

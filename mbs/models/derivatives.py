@@ -25,7 +25,7 @@ from mbs.models.inverse_dynamics import tree_efforts
 from mbs.models.symbols import (
     ModelSymbols,
     check_coordinates,
-    configuration_check,
+    derivatives_check,
     is_reduced,
     outputs_of,
     solution_order,
@@ -270,7 +270,7 @@ def inverse_dynamics_derivatives(
             return inputs, _outputs("tau" + s.suffix, s, names, blocks, tau)
 
         key = ("idm_derivatives", chosen, coordinates, names)
-        check = configuration_check(system, coordinates)
+        check = derivatives_check(system, coordinates)
         return model_function(system, key, symbols, check, TreeLoops(system, "idm_derivatives"))
 
     candidates = ("ad",) if is_reduced(system, coordinates) else _compare(system, "analytical")
@@ -334,7 +334,7 @@ def direct_dynamics_derivatives(
         if chosen == "implicit" and not system.is_closed and system.nv >= _STAGED:
             staged: Function = system.cached(key, lambda: _stage(system, names))
             return staged
-        check = configuration_check(system, coordinates)
+        check = derivatives_check(system, coordinates)
         return model_function(system, key, symbols, check, TreeLoops(system, "ddm_derivatives"))
 
     candidates = ("implicit",) if system.is_closed else _compare(system, "implicit")

@@ -43,7 +43,7 @@ from mbs.models.measurements import readings
 from mbs.models.state.signals import by_name
 from mbs.models.symbols import (
     ModelSymbols,
-    configuration_check,
+    derivatives_check,
     outputs_of,
     part_equations,
     surroundings,
@@ -235,7 +235,7 @@ def linearise(
         inputs = [("q", s.q), ("v" + s.suffix, s.v), ("tau", tau)]
         return inputs, [("zero", casadi.vertcat(still, away)), ("positive", positive)]
 
-    check = configuration_check(system, "independent")
+    check = derivatives_check(system, "independent")
     function = model_function(system, ("linear", *modes, *names), build, check)
     holds: Function | None = None
     words: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())

@@ -10,7 +10,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import ConfigurationCheck, Named, model_function, require_system
 from mbs.errors import ModelError
-from mbs.loops.examine import DETERMINED
+from mbs.loops.examine import DETERMINED, DIFFERENTIABLE
 from mbs.loops.reduction import Reduction, reduction
 from mbs.recursions.composite_body import velocity_antecedents
 from mbs.recursions.force_elements import element_wrenches, sum_wrenches
@@ -78,6 +78,12 @@ def configuration_check(system: System, coordinates: str) -> ConfigurationCheck 
     """
     require_system(system)
     return DETERMINED if is_reduced(system, coordinates) else None
+
+
+def derivatives_check(system: System, coordinates: str) -> ConfigurationCheck | None:
+    """The same for models that contain second derivatives of the loops."""
+    require_system(system)
+    return DIFFERENTIABLE if is_reduced(system, coordinates) else None
 
 
 def check_coordinates(system: System, coordinates: str) -> None:

@@ -105,7 +105,7 @@ def test_the_user_chooses_the_independent_joints():
     [
         (["zz"], AssemblyError, "active names 'zz', which is no velocity"),
         (["c0"], AssemblyError, "c0 cannot be independent, since its joint is cut"),
-        ("a0", DescriptionError, "give a list of names, ['a0']"),
+        ("a0", DescriptionError, "give a list of names, such as ['a0']"),
     ],
 )
 def test_a_wrong_choice_is_refused(active, error, told):

@@ -1,8 +1,11 @@
 """Linear equations of small motions: published eigenvalues, slopes of the motion itself."""
 
+import pickle
+
 import casadi
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.contact_mechanisms import four_bar
 from support.messages import refused
 
@@ -30,7 +33,7 @@ from mbs.components import (
     Spring,
     custom,
 )
-from mbs.errors import ModelError
+from mbs.errors import ModelError, SingularPosture
 from mbs.models import dae, linearise
 
 
@@ -247,3 +250,24 @@ def test_a_system_with_modes_of_its_own_between_events():
     system = m.assemble()
     refused(ModelError, "linearise without mode= has no events", by=lambda: linearise(system))
     assert linearise(system, mode={}).at().A.shape[0] == 2 + len(system.states)
+
+
+@pytest.mark.parametrize("speed", [0.0, 1.0, 3.0])
+def test_second_derivatives_near_a_singular_configuration(speed):
+    """A parallelogram of unit lengths: A21 = 11.772 sin(a0), or an error."""
+    system = catalogue_system("n_four_bar")
+    linear = mbs.models.linearise(system)
+    ddm = mbs.models.direct_dynamics_derivatives(system)
+    assert isinstance(pickle.loads(pickle.dumps(ddm)), type(ddm))
+    for e in (0.1, 0.03, 0.01):
+        A = linear.at(q0={"a0": e}, v0={"a0": speed}).A
+        assert A[1, 0] == pytest.approx(11.772 * np.sin(e), abs=1e-6)
+        q = mbs.loops.solve(system, {"a0": e})
+        assert float(ddm(q, speed, 0)[0]) == pytest.approx(11.772 * np.sin(e), abs=1e-6)
+    for e in (3e-3, 1e-3, 1e-4, 1e-5, 1e-6):
+        with pytest.raises(SingularPosture, match="second derivatives of the loops"):
+            linear.at(q0={"a0": e}, v0={"a0": speed})
+        q = mbs.loops.solve(system, {"a0": e})
+        with pytest.raises(SingularPosture, match="second derivatives of the loops"):
+            ddm(q, speed, 0)
+        assert np.isfinite(float(mbs.models.direct_dynamics(system)(q, speed, 0)))

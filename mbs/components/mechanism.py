@@ -197,12 +197,13 @@ class Mechanism:
             self.change_gravity(mount=mount)
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Set an attribute.
+        """Set an attribute. A class that derives from Mechanism may have attributes of its own.
 
         Raises:
             DescriptionError: a mechanism has no attribute of this name.
         """
-        if name not in _ATTRIBUTES and not hasattr(type(self), name):
+        is_plain = type(self) is Mechanism
+        if is_plain and name not in _ATTRIBUTES and not hasattr(Mechanism, name):
             raise DescriptionError(
                 f"{self.__dict__.get('name', 'mechanism')}: a mechanism has no attribute {name!r};"
                 f" {did_you_mean(name, sorted(one for one in _ATTRIBUTES if one[0] != '_'))}"

@@ -301,6 +301,20 @@ def test_unknown_attributes_are_refused():
     assert m.guess == {"j": 0.1}
 
 
+def test_derived_classes_have_attributes_of_their_own():
+    class Arm(mbs.Mechanism):
+        def __init__(self):
+            super().__init__("arm", gravity=(0, 0, -1))
+            self.hand = self.add(Body("hand", mass=1))
+            self.connect(self.world, Revolute("j", axis="y"), self.hand)
+
+    arm = Arm()
+    assert arm.assemble().nv == 1
+    assert arm.hand.name == "hand"
+    with pytest.raises(DescriptionError, match="arm: gravity cannot be set"):
+        arm.gravity = (0, 0, 0)
+
+
 @pytest.mark.parametrize(
     "make",
     [

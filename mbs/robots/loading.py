@@ -70,8 +70,8 @@ def load(
         packages: folders of the packages that a xacro file or `package://` names.
         gravity: gravity acceleration in the world frame [m/s^2] in place of that of the file.
         mount: rotation of the base in the world, such as ("x", "pi") for a robot that hangs from
-            the ceiling. Gravity is rotated into the axes of the base; poses stay relative to the
-            base.
+            the ceiling. Gravity is rotated into the axes of the base; poses, and the coordinates of
+            a free root, stay relative to the base.
 
     Raises:
         DescriptionError: the name or the suffix is unknown, the description is impossible, a

@@ -206,3 +206,12 @@ def test_gravity_and_mount_of_every_format(tmp_path):
 def test_impossible_gravity_and_mount(given, message):
     with pytest.raises(DescriptionError, match=message):
         mbs.load("planar_2r", **given)
+
+
+def test_a_free_root_falls_along_the_gravity_of_its_mount(file):
+    """Coordinates of the root are relative to the base, which is rotated."""
+    system = mbs.load(file(LEG), base="free", gravity=(0, 0, -2), mount=("x", "pi/2")).assemble()
+    q = np.array(system.configuration)
+    assert q[:4].tolist() == [0, 0, 0, 1]
+    a = mbs.models.direct_dynamics(system)(q, np.zeros(8), np.zeros(8)).full().ravel()
+    np.testing.assert_allclose(a, [0, -2, *np.zeros(6)], rtol=0, atol=1e-12)

@@ -96,6 +96,15 @@ def test_shapes_that_are_left_out_are_said(command, ending) -> None:
     assert (answer.code, answer.err) == (0, f"{note}\nwrote s.{ending}\n")
 
 
+def test_notes_of_assembling_are_said(command) -> None:
+    Path("wheel.toml").write_text(
+        'name = "wheel"\n[[frame]]\nantecedent = 0\n'
+        "[[body]]\nframe = 1\nXX = 1\nYY = 1\nZZ = 3\nM = 1\n"
+    )
+    answer = command("show", "wheel.toml")
+    assert "body 'link1': the principal moments 1, 1, 3 kg m^2 break the triangle" in answer.err
+
+
 def test_a_closed_robot_is_converted_to_sdf(command) -> None:
     command("convert", "sr400", "sr400.sdf")
     one, other = (mbs.load(name).assemble() for name in ("sr400", "sr400.sdf"))

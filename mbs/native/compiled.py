@@ -44,6 +44,9 @@ def compiled(
     an external function, the given Function stays interpreted: the answers are the same, only
     slower.
 
+    CasADi's own C text of a Function that calls the result lacks this code, and ends the process
+    that loads it. Generate C of Functions that call the given Function instead.
+
     Args:
         function: any Function without free symbols.
         derivatives: how often the answer can be differentiated: 0, 1 (Jacobians, forward and

@@ -95,15 +95,17 @@ def test_actuators_with_several_controls_shift_no_others(tmp_path):
         """<mujoco><worldbody><site name="ground"/><body name="a"><joint name="ball" type="ball"/>
         <geom size=".1"/><site name="s"/><body name="b" pos="1 0 0"><joint name="j"/>
         <geom size=".1" pos="0 .1 0"/><body name="c" pos="1 0 0"><joint name="free_running"/>
-        <geom size=".1" pos="0 .1 0"/></body></body></body></worldbody><actuator>
-        <orientation joint="ball"/><orientation site="s" refsite="ground"/>
+        <geom size=".1" pos="0 .1 0"/><body name="d" pos="1 0 0"><joint name="k"/>
+        <geom size=".1" pos="0 .1 0"/></body></body></body></body></worldbody><actuator>
+        <orientation joint="ball" input="quat"/><orientation site="s" refsite="ground"/>
+        <dcmotor joint="k" motorconst="1" resistance="1" input="pos vel" controller="1 0 5"/>
         <motor joint="j" ctrlrange="-3 4" gear="2"/></actuator></mujoco>"""
     )
     mechanism = mbs.load(str(tmp_path / "r.xml"))
     joints = {joint.name: joint for joint in mechanism.joints()}
     assert joints["j"].effort == (-6, 8)
     actuated = {name: bool(joint.actuated) for name, joint in joints.items()}
-    assert actuated == {"ball": True, "j": True, "free_running": False}
+    assert actuated == {"ball": True, "j": True, "free_running": False, "k": True}
     assert [note.element for note in mechanism.notes if "not on a joint" in note.text] == [
         "actuator 1"
     ]

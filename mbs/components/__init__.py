@@ -25,10 +25,12 @@ from mbs.components.constraints import (
 )
 from mbs.components.contact import (
     BoxPlaneContact,
+    CapsuleCapsuleContact,
     CapsulePlaneContact,
     Contact,
     HeightFieldContact,
     SphereBoxContact,
+    SphereCapsuleContact,
     SpherePlaneContact,
     SphereSphereContact,
     WheelPlaneContact,
@@ -141,6 +143,7 @@ from mbs.components.translational import (
     SlidingMass,
     SlidingSpring,
 )
+from mbs.components.wheels import WheelSet
 
 __all__ = [
     "PI",
@@ -154,6 +157,7 @@ __all__ = [
     "Brake",
     "Bushing",
     "Cam",
+    "CapsuleCapsuleContact",
     "CapsulePlaneContact",
     "Cartesian",
     "Clutch",
@@ -256,6 +260,7 @@ __all__ = [
     "SlidingMass",
     "SlidingSpring",
     "SphereBoxContact",
+    "SphereCapsuleContact",
     "SpherePlaneContact",
     "SphereSphereContact",
     "Spherical",
@@ -270,6 +275,7 @@ __all__ = [
     "Trapezoid",
     "Universal",
     "WheelPlaneContact",
+    "WheelSet",
     "World",
     "WrenchSensor",
 ]

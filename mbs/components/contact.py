@@ -18,7 +18,7 @@ from casadi import SX, Function
 
 from mbs.components import custom
 from mbs.components.bodies import three
-from mbs.components.custom import Load, RelativeMotion
+from mbs.components.custom import Approach, Load, RelativeMotion
 from mbs.components.forces import ForceElement
 from mbs.components.shapes import Shape
 from mbs.errors import DescriptionError
@@ -41,6 +41,13 @@ a plane is inside, whatever rounding does."""
 _THIN = 0.03
 """Half the width of a wheel without a round rim in pictures, part of its radius: a disc that is
 seen from its edge, too."""
+_PARALLEL = 1e-6
+"""Weight of the distances from the middles of capsules in the square of their distance. It adds
+1e-5 of a radius to the distance at the ends of capsules of ten radii, a tenth of usual depths. Its
+square root is the angle over which a capsule comes to rest on another one."""
+_SPACING = 0.01
+"""Size [m] of the narrowest bump or body that a point is sure to meet where no size is given: that
+of the ground of feet and wheels."""
 _INSIDE = 1e-9
 """Distance [m] of a centre from a box from which on its direction tells the normal; nearer, and
 inside, the nearest face does."""
@@ -268,13 +275,28 @@ class Contact(ForceElement):
             found |= {name + label: value for name, value in zip(_OUTPUTS, values, strict=True)}
         return found
 
-    def crossings(self, at: Any) -> Mapping[str, SX]:
+    def crossings(self, at: Any) -> Mapping[str, SX | Approach]:
         """The depths: a spot begins and ends to touch where one is zero."""
-        spots = self.spots(self._motion(at), at)
+        motion = self._motion(at)
         return {
-            f"depth{label}": spot.depth + _TOUCHING
-            for label, spot in zip(self.labels, spots, strict=True)
+            f"depth{label}": Approach(spot.depth + _TOUCHING, *self.approach(motion, spot, at))
+            for label, spot in zip(self.labels, self.spots(motion, at), strict=True)
         }
+
+    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+        """Speed [m/s] and pace [1/s] of the depth of a spot, as `custom.Approach` has them.
+
+        The speed is that of the whole body, and the size is the distance of the spot from its
+        frame, at least 1 cm.
+
+        Args:
+            motion: of the frame of the body, seen from that of the ground.
+            spot: one of its spots.
+            at: the parameters.
+        """
+        reach = custom.regular_length(spot.lever)
+        speed = custom.regular_length(motion.V) + reach * custom.regular_length(motion.w)
+        return speed, speed / casadi.fmax(reach, _SPACING)
 
     # How it is computed.
 
@@ -397,6 +419,12 @@ class PlaneContact(Contact):
     def reach(self, at: Any) -> SX:
         """Radius of the spheres [m]."""
         return SX(0)
+
+    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+        """The whole speed; a plane has no size, so that only a turn shortens an approach."""
+        reach = custom.regular_length(spot.lever)
+        turn = custom.regular_length(motion.w)
+        return custom.regular_length(motion.V) + reach * turn, turn
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
         """The lowest point of every sphere."""
@@ -542,6 +570,11 @@ def _cuboid(port: str, size: Any, at: Any) -> Mapping[str, Shape]:
     return {port: Shape("box", known)} if len(known) == len(sides) else {}
 
 
+def _within(value: SX, half: SX) -> SX:
+    """A distance from the middle of a segment, at most half its length."""
+    return casadi.fmin(casadi.fmax(value, -half), half)
+
+
 def _half_size(box: Any, at: Any) -> SX:
     return vector(to_sx(side, at.symbols) for side in box.size) / 2
 
@@ -569,9 +602,107 @@ class SphereSphereContact(Contact):
         depth = at.radius_a + at.radius_b - motion.length
         return [Spot(depth, motion.along, -(at.radius_b - depth / 2) * motion.along)]
 
+    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+        """The relative speed of the centres; the size is the sum of the radii."""
+        speed = custom.regular_length(at.b.v - at.a.v)
+        return speed, speed / (at.radius_a + at.radius_b)
+
     def figures(self, at: Any) -> Mapping[str, Shape]:
         """Both spheres."""
         return {**_ball("a", at.radius_a), **_ball("b", at.radius_b)}
+
+
+class SphereCapsuleContact(Contact):
+    """A sphere and a capsule, at the point of its axis that is nearest.
+
+    Attributes:
+        sphere: frame at its centre.
+        capsule: frame in the middle of the capsule, whose z is its axis.
+        radius: of the sphere [m].
+        capsule_radius: of the capsule [m].
+        length: between the centres of its end spheres [m].
+    """
+
+    ports = ("sphere", "capsule")
+
+    sphere = custom.frame()
+    capsule = custom.frame()
+    radius = custom.parameter("m", min=0)
+    capsule_radius = custom.parameter("m", positive=True)
+    length = custom.parameter("m", positive=True)
+
+    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+        """From the nearest point of the axis to the centre."""
+        along = _within(motion.p[2], at.length / 2)
+        off = motion.p - vector([SX(0), SX(0), along])
+        distance = custom.regular_length(off)
+        depth = at.radius + at.capsule_radius - distance
+        return [Spot(depth, off / distance, -(at.radius - depth / 2) * off / distance)]
+
+    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+        """The speed of the centre, seen from the capsule; the size is the sum of the radii."""
+        speed = custom.regular_length(motion.V)
+        return speed, speed / (at.radius + at.capsule_radius)
+
+    def figures(self, at: Any) -> Mapping[str, Shape]:
+        """The sphere and the capsule."""
+        capsule = Shape("capsule", (at.capsule_radius, at.length))
+        return {**_ball("sphere", at.radius), "capsule": capsule}
+
+
+class CapsuleCapsuleContact(Contact):
+    """Two capsules, at the points of their axes that are nearest.
+
+    Of axes that are parallel no points are nearest. The square of the distance therefore has the
+    term e (s^2 + t^2) of the distances s and t of the points from the middles, e = 1e-6: the points
+    move smoothly from one end to the other while the angle of the axes changes by some 1e-3 rad.
+
+    Source: Ericson 2005, section 5.1.9, for the nearest points of two segments.
+
+    Attributes:
+        a, b: frames in the middle of the capsules, whose z is the axis.
+        radius_a, radius_b: [m].
+        length_a, length_b: between the centres of the end spheres [m].
+    """
+
+    ports = ("b", "a")
+
+    a = custom.frame()
+    b = custom.frame()
+    radius_a = custom.parameter("m", positive=True)
+    length_a = custom.parameter("m", positive=True)
+    radius_b = custom.parameter("m", positive=True)
+    length_b = custom.parameter("m", positive=True)
+
+    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+        """Between the nearest points, in the middle of the overlap."""
+        axis = motion.R[:, 2]
+        cosine, weight = axis[2], 1 + _PARALLEL
+        own, other = motion.p[2], casadi.dot(motion.p, axis)
+        half_a, half_b = at.length_a / 2, at.length_b / 2
+        # the minimum of a convex function of s and t within the lengths
+        s = _within((weight * own - cosine * other) / (weight**2 - cosine**2), half_a)
+        t = _within((cosine * s - other) / weight, half_b)
+        s = _within((own + cosine * t) / weight, half_a)
+        off = motion.p + t * axis - vector([SX(0), SX(0), s])
+        length = custom.regular_length(off)
+        distance = casadi.sqrt(length**2 + _PARALLEL * (s**2 + t**2))
+        depth, normal = at.radius_a + at.radius_b - distance, off / length
+        lever = t * axis - (at.radius_b - depth / 2) * normal
+        return [Spot(depth, normal, lever, length / distance)]
+
+    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+        """The speed of the ends of b, seen from a; the size is the sum of the radii."""
+        turn = at.length_b / 2 * custom.regular_length(motion.w)
+        speed = custom.regular_length(motion.V) + turn
+        return speed, speed / (at.radius_a + at.radius_b)
+
+    def figures(self, at: Any) -> Mapping[str, Shape]:
+        """Both capsules."""
+        return {
+            "a": Shape("capsule", (at.radius_a, at.length_a)),
+            "b": Shape("capsule", (at.radius_b, at.length_b)),
+        }
 
 
 class SphereBoxContact(Contact):
@@ -613,6 +744,11 @@ class SphereBoxContact(Contact):
         depth = at.radius - casadi.if_else(is_outside, distance, nearest)
         return [Spot(depth, normal, -(at.radius - depth / 2) * normal)]
 
+    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+        """The speed of the centre, seen from the box; the size is that of its shortest side."""
+        speed = custom.regular_length(motion.V)
+        return speed, speed / (at.radius + casadi.mmin(_half_size(self, at)))
+
     def figures(self, at: Any) -> Mapping[str, Shape]:
         """The sphere and the box."""
         return {**_ball("sphere", at.radius), **_cuboid("box", self.size, at)}
@@ -630,15 +766,21 @@ class HeightFieldContact(Contact):
         ground: frame of x, y and z.
         height: h, a function of (x, y) made of CasADi operations, or a casadi.Function [m].
         radius: [m].
+        spacing: width of the narrowest bump [m], which no step passes over; the radius when left
+            out, 1 cm for a point.
     """
 
     body = custom.frame()
     ground = custom.frame()
     height: Any = field(kw_only=True)
     radius = custom.parameter("m", 0.0, min=0)
+    spacing: Scalar | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         Contact.__post_init__(self)
+        if self.spacing is not None:
+            self._normalise("spacing")
+            self._require_positive("spacing")
         x, y = SX.sym("x"), SX.sym("y")
         try:
             value = SX(self.height(x, y))
@@ -668,6 +810,13 @@ class HeightFieldContact(Contact):
                 f"{self.name}: height holds the symbols {', '.join(strange)}; make it of x, y and"
                 " numbers"
             )
+
+    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+        """The speed over the ground has no bound for the depth, which a bump may change at once."""
+        size = casadi.if_else(at.radius > 0, at.radius, _SPACING)
+        if self.spacing is not None:
+            size = to_sx(self.spacing, at.symbols)
+        return None, custom.regular_length(motion.V) / size
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
         """The sphere; the ground is not drawn."""

@@ -469,6 +469,28 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Approach:
+    """A crossing whose rate has a known bound, such as the distance of two bodies.
+
+    Simulations look at it so often within a step that it does not fall to zero and rise again
+    between two looks. They need no looks while it is larger than the bound lets it fall.
+
+    Source: Mirtich 1996 for the bound of the time until two bodies touch.
+
+    Attributes:
+        value: (1, 1) what passes through zero.
+        speed: (1, 1) bound of its rate for motion at the present speed in any direction; None
+            where no bound is known.
+        pace: (1, 1) reciprocal of the shortest time in which it falls to zero and rises again
+            [1/s], such as the speed over the size of an obstacle.
+    """
+
+    value: SX
+    speed: SX | None
+    pace: SX
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Event:
     """Something that happens at once.
 
@@ -573,7 +595,7 @@ class Custom(OnPoints):
     - `limits(at)`: between which values its coordinates stay, a pair each, by port.
     - `figures(at)`: what it looks like at its frames, a `Shape` each, of numbers.
     - `crossings(at)`: by label, what passes through zero where the law has a bend or is short:
-      simulations end a step there, and step over none of them.
+      simulations end a step there; an `Approach` for what is short while bodies move far.
 
     Source: Haug 1989 for forces, rows and the work that they do.
 
@@ -762,10 +784,11 @@ class Custom(OnPoints):
         """Between which values its coordinates stay, by port; None for no limit on a side."""
         return {}
 
-    def crossings(self, at: Any) -> Mapping[str, SX]:
+    def crossings(self, at: Any) -> Mapping[str, SX | Approach]:
         """What passes through zero where the law has a bend or is short, by label.
 
-        It is of positions, states and parameters. A step of `mbs.simulate.run` ends there.
+        It is of positions, velocities, states and parameters. A step of `mbs.simulate.run` ends
+        there. An `Approach` says how fast the value can change.
         """
         return {}
 
@@ -941,6 +964,7 @@ _CHECKS: Mapping[str, Callable[[Custom, str, Declared], None]] = {
 """What is given to a component, by kind, and what refuses it."""
 
 __all__ = [
+    "Approach",
     "At",
     "CoordinateAt",
     "Custom",

@@ -514,7 +514,10 @@ class JointStop(JointForce):
     """Elastic stops: nothing between the limits, springs and dampers beyond them.
 
     Over the first `width` beyond a limit the stiffness grows from zero to its full value, so that
-    the force and two derivatives of it are continuous.
+    the force of the spring and two derivatives of it are continuous. The damper exerts at most as
+    much as the spring, so that a stop never pulls.
+
+    Source: Modelica Association 2023, `ElastoGap`, for the limit of the damper.
 
     Attributes:
         lower: limit [rad or m]; None for no stop on that side.
@@ -554,7 +557,8 @@ class JointStop(JointForce):
         total = SX(0)
         for sign, depth, width in self._sides(at.x.q, at.symbols):
             share, ramp, _ = smooth_ramp(depth, width)
-            total += sign * stiffness * ramp + damping * share * at.x.v
+            spring = stiffness * ramp
+            total += sign * spring + one_sided_damping(damping * share * at.x.v, spring)
         return total
 
     def energy(self, at: Any) -> SX:
@@ -589,6 +593,22 @@ def smooth_ramp(depth: SX, width: SX) -> tuple[SX, SX, SX]:
     # u^4 / 4 - u^5 / 10, the integral of the ramp u^3 - u^4 / 2
     area = width**2 * u**4 * (0.25 - 0.1 * u) + 0.5 * beyond * (beyond + width)
     return slope, ramped, area
+
+
+def one_sided_damping(damper: SX, spring: SX) -> SX:
+    """The effort of a damper, at most as large as that of the spring beside it.
+
+    Their sum is then between zero and twice that of the spring: what touches does not pull.
+
+    Source: Modelica Association 2023, `ElastoGap` and `ElastoBacklash`.
+
+    Args:
+        damper: (1, 1) its effort without the limit.
+        spring: (1, 1) not negative.
+    """
+    if damper.is_zero():
+        return damper
+    return casadi.fmin(casadi.fmax(damper, -spring), spring)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,7 +15,7 @@ from casadi import SX
 
 from mbs.components import custom
 from mbs.components.custom import Custom, Load
-from mbs.components.forces import smooth_ramp
+from mbs.components.forces import one_sided_damping, smooth_ramp
 
 
 class HydraulicCylinder(Custom):
@@ -96,7 +96,8 @@ class HydraulicCylinder(Custom):
         rate = at.a.to(at.b).rate
         total = at.p_a * at.area_a - at.p_b * at.area_b - at.friction * rate
         for sign, share, depth, _ in self._ends(at):
-            total += sign * at.end_stiffness * depth - at.end_damping * share * rate
+            spring = at.end_stiffness * depth
+            total += sign * spring - one_sided_damping(at.end_damping * share * rate, spring)
         return SX(total)
 
     @staticmethod

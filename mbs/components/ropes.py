@@ -11,7 +11,7 @@ from casadi import SX
 from mbs.components import custom
 from mbs.components.component import Point
 from mbs.components.custom import Custom, FrameLoad, Load, Row
-from mbs.components.forces import smooth_ramp
+from mbs.components.forces import one_sided_damping, smooth_ramp
 from mbs.errors import DescriptionError
 from mbs.text import quoted
 
@@ -81,7 +81,8 @@ class ElasticRope(_Rope):
     With the stretch x, the sum of the distances of its points less its length, the tension is
     stiffness r(x) + damping s(x) dx/dt, with the ramp r and its slope s of a JointStop: over the
     first `width` of the stretch the stiffness grows from zero to its full value, so that the
-    tension and two derivatives of it are continuous. The damper may push a rope that shortens fast.
+    tension of the spring and two derivatives of it are continuous. The damper exerts at most as
+    much as the spring, so that a rope that shortens fast does not push.
 
     Source: Haug 1989 for forces along distances.
 
@@ -115,7 +116,7 @@ class ElasticRope(_Rope):
 
     def dissipation(self, at: Any) -> SX:
         """What the damper takes."""
-        return SX(at.damping * self._stretch(at)[0] * self._rate(at) ** 2)
+        return SX(self._tensions(at)[1] * self._rate(at))
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """The tension."""
@@ -128,5 +129,10 @@ class ElasticRope(_Rope):
         return sum((a.to(b).rate for a, b in self._segments(at)), SX(0))
 
     def _tension(self, at: Any) -> SX:
+        return sum(self._tensions(at), SX(0))
+
+    def _tensions(self, at: Any) -> tuple[SX, SX]:
+        """The tension of the spring, and that of the damper."""
         slope, ramped, _ = self._stretch(at)
-        return SX(at.stiffness * ramped + at.damping * slope * self._rate(at))
+        spring = at.stiffness * ramped
+        return spring, one_sided_damping(at.damping * slope * self._rate(at), spring)

@@ -17,7 +17,7 @@ from casadi import SX
 from mbs.components import custom
 from mbs.components.custom import Friction, Load, OneWay, Row, Stop
 from mbs.components.drives import OneFlange, TwoFlanges
-from mbs.components.forces import smooth_ramp, smooth_sign
+from mbs.components.forces import one_sided_damping, smooth_ramp, smooth_sign
 from mbs.errors import DescriptionError
 from mbs.expressions import to_float
 
@@ -129,8 +129,8 @@ class ElastoBacklash(_BetweenShafts):
     With the twist x = angle_a - angle_b, the depth beyond the play is d = |x| - backlash / 2. The
     torque from a to b is sign(x) stiffness r(d) + damping s(d) dx/dt, with the ramp r and its
     slope s of a JointStop: over the first `width` beyond the play the stiffness grows from zero
-    to its full value, so that the torque and two derivatives of it are continuous. The damper may
-    hold back a tooth that leaves its flank.
+    to its full value, so that the torque of the spring and two derivatives of it are continuous.
+    The damper exerts at most as much as the spring, so that a tooth never holds a flank back.
 
     Source: Modelica Association 2023 for the element.
 
@@ -161,12 +161,13 @@ class ElastoBacklash(_BetweenShafts):
 
     def _torques(self, at: Any) -> tuple[SX, SX]:
         """The torque of the spring, and that of the damper."""
-        elastic, share = SX(0), SX(0)
+        elastic, damped = SX(0), SX(0)
         for sign, depth in self._sides(at):
             slope, ramped, _ = smooth_ramp(depth, at.width)
-            elastic += sign * at.stiffness * ramped
-            share += slope
-        return elastic, at.damping * share * self._slip(at)
+            spring = at.stiffness * ramped
+            elastic += sign * spring
+            damped += one_sided_damping(at.damping * slope * self._slip(at), spring)
+        return elastic, damped
 
     def _sides(self, at: Any) -> list[tuple[float, SX]]:
         """Direction and depth beyond the play of the two flanks."""

@@ -16,7 +16,7 @@ from casadi import SX
 from mbs.components import custom
 from mbs.components.custom import Friction, Load
 from mbs.components.drives import OneFlange, RigidPart, TwoFlanges
-from mbs.components.forces import smooth_ramp
+from mbs.components.forces import one_sided_damping, smooth_ramp
 from mbs.components.rotational import capacity_of, friction_of
 from mbs.expressions import Expression, expression
 
@@ -126,8 +126,8 @@ class ElastoGap(_BetweenSlides):
     They touch where x = position_b - position_a is below `length`; with the depth
     d = length - x they are pushed apart by stiffness r(d) - damping s(d) dx/dt, with the ramp r and
     its slope s of a JointStop: over the first `width` the stiffness grows from zero to its full
-    value, so that the force and two derivatives of it are continuous. The damper may hold back
-    parts that separate.
+    value, so that the force of the spring and two derivatives of it are continuous. The damper
+    exerts at most as much as the spring, so that it never holds back parts that separate.
 
     Source: Modelica Association 2023 for the element.
 
@@ -149,11 +149,16 @@ class ElastoGap(_BetweenSlides):
 
     def dissipation(self, at: Any) -> SX:
         """What the damper takes."""
-        return SX(at.damping * self._contact(at)[0] * self._rate(at) ** 2)
+        return SX(self._tensions(at)[1] * self._rate(at))
 
     def _tension(self, at: Any) -> SX:
+        return sum(self._tensions(at), SX(0))
+
+    def _tensions(self, at: Any) -> tuple[SX, SX]:
+        """The tension of the spring, never above zero, and that of the damper."""
         slope, ramped, _ = self._contact(at)
-        return SX(-at.stiffness * ramped + at.damping * slope * self._rate(at))
+        spring = at.stiffness * ramped
+        return -spring, one_sided_damping(at.damping * slope * self._rate(at), spring)
 
     def _contact(self, at: Any) -> tuple[SX, SX, SX]:
         return smooth_ramp(at.length - self._extent(at), at.width)

@@ -14,6 +14,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tree import normalised
 from mbs.errors import ModelError
+from mbs.loops.analysis import rows_at
 from mbs.loops.velocity import closure_jacobian, constraint_jacobian, kept_rows
 from mbs.models.actuation import effort_input
 from mbs.models.constrained_accelerations import constrained_accelerations
@@ -248,7 +249,9 @@ def _loose_in_loops(system: System) -> int | None:
     closure, q = system.closure, list(system.configuration)
     assert closure is not None
     active, passive = list(closure.active), list(closure.passive)
-    J = dense(constraint_jacobian(system)(q, system.p_default))[kept_rows(system)]
+    # rows that are chosen for another configuration may be dependent here
+    here = rows_at(system, np.array(q), np.array(system.p_default))
+    J = dense(constraint_jacobian(here)(q, system.p_default))[kept_rows(here)]
     G = np.zeros((system.nv, len(active)))
     G[active], G[passive] = np.eye(len(active)), -np.linalg.solve(J[:, passive], J[:, active])
     A = G.T @ np.array(inertia_matrix(system, "tree")(q)) @ G

@@ -18,6 +18,7 @@ from mbs.assembly import System
 from mbs.assembly.parts import AttachedPart, WireSource
 from mbs.assembly.tree import position_rate, quaternion_slices
 from mbs.components.custom import (
+    Approach,
     At,
     Event,
     FlangeAt,
@@ -123,10 +124,7 @@ class _Check:
         self._contacts()
         self._limits()
         if self.element.has("crossings"):
-            free = casadi.vertcat(self.v, self.system.u)
-            for label, value in self._mapping("crossings", self.at.at(self.part)).items():
-                what = f"the crossing {label!r}"
-                self._require_free_of(self._value(what, value), what, free, "velocities or inputs")
+            self._crossings()
         self._figures()
         self._outputs()
         if loads and (energy is not None or heat is not None):
@@ -436,6 +434,16 @@ class _Check:
             x, low, high = (float(one) for one in found(*point))
             if not np.isfinite(x) or not low <= x <= high:
                 raise AssemblyError(f"{self._title}: {what} is {x:.6g} at a random state; {told}")
+
+    def _crossings(self) -> None:
+        for label, given in self._mapping("crossings", self.at.at(self.part)).items():
+            what, value = f"the crossing {label!r}", given
+            if isinstance(given, Approach):
+                value = given.value
+                self._value(f"the pace of {what}", given.pace)
+                if given.speed is not None:
+                    self._value(f"the speed of {what}", given.speed)
+            self._require_free_of(self._value(what, value), what, self.system.u, "inputs")
 
     def _scalar(self, method: str) -> SX | None:
         if not self.element.has(method):

@@ -17,8 +17,10 @@ from casadi import DM, SX
 from mbs.assembly import System
 from mbs.assembly.parts import AttachedPart, WireSource
 from mbs.assembly.tables import AttachedSensor
-from mbs.assembly.tree import Frame
+from mbs.assembly.tree import Frame, position_rate
+from mbs.components.contact import Contact
 from mbs.components.custom import (
+    Approach,
     At,
     CoordinateAt,
     FlangeAt,
@@ -36,6 +38,11 @@ from mbs.recursions.route import BASE, relative_motion
 from mbs.recursions.velocities import Velocity, link_velocities
 from mbs.spatial import Pose, cross, skew
 from mbs.text import did_you_mean
+
+UNBOUNDED = 1e100
+"""Bound of the speed of a crossing that has none: far above every speed, and finite in C."""
+_ENDING = ("mbs.components.sources",)
+"""Modules whose crossings end steps in FMUs too: laws that jump."""
 
 
 class PartsAt:
@@ -377,19 +384,49 @@ class PartsAt:
             first += len(part.states)
         return found
 
-    def crossings(self, *, of_contacts: bool = True) -> SX:
-        """(nc, 1) what passes through zero where the laws of components have bends.
+    def crossings(self, *, of_bends: bool = True) -> list[Approach]:
+        """What passes through zero where the laws of components have bends.
+
+        Those of the user that are no `Approach` have no pace and the speed zero.
 
         Args:
-            of_contacts: whether those of contacts and curves of this package count too.
+            of_bends: whether those of laws of this package that are continuous count too, such as
+                curves, but not contacts.
         """
-        found = [SX(0, 1)]
+        found = list[Approach]()
         for part in self.parts:
             own = type(part.element).__module__
-            is_contact = own.startswith("mbs.") and own != "mbs.components.sources"
-            if part.element.has("crossings") and (of_contacts or not is_contact):
-                found += map(SX, part.element.crossings(self.at(part)).values())
-        return casadi.vertcat(*found)
+            is_bend = own.startswith("mbs.") and own not in _ENDING
+            is_bend = is_bend and not isinstance(part.element, Contact)
+            if part.element.has("crossings") and (of_bends or not is_bend):
+                for given in part.element.crossings(self.at(part)).values():
+                    if not isinstance(given, Approach):
+                        given = Approach(SX(given), SX(0), SX(0))
+                    found.append(given)
+        return found
+
+    def approaches(self, found: Sequence[Approach]) -> SX:
+        """(nc, 2) speeds and paces of crossings.
+
+        A path that turns returns to an obstacle: the angular velocities on which the rate of a
+        crossing depends belong to its pace.
+
+        Args:
+            found: as `crossings` gives them.
+        """
+        assert self.v is not None
+        rate_q = position_rate(self.tree, self.q, self.v)
+        turning = [k for k, speed in enumerate(self.system.speeds) if speed.unit == "rad/s"]
+        rows = [SX(0, 2)]
+        for one in found:
+            if one.pace.is_zero():
+                rows.append(SX.zeros(1, 2))
+                continue
+            changes = casadi.which_depends(casadi.jtimes(one.value, self.q, rate_q), self.v, 1)
+            square = sum((self.v[k] ** 2 for k in turning if changes[k]), SX(0))
+            speed = SX(UNBOUNDED) if one.speed is None else one.speed
+            rows.append(casadi.horzcat(speed, one.pace + casadi.sqrt(square)))
+        return casadi.vertcat(*rows)
 
     def modes(self) -> SX:
         """(nm, 1) symbols of the modes of all components."""

@@ -569,7 +569,7 @@ def with_crossings(
     modes = () if events is None else tuple(np.ravel(np.asarray(events.modes, dtype=float)))
     if "crossings" not in state.prepared:
         state.prepared["crossings"] = _watch_crossings(state, events, len(x0), len(p), len(modes))
-    (indicators, jump), functions = state.prepared["crossings"]
+    (indicators, jump, approaches), functions = state.prepared["crossings"]
     t0, end = span
     duration = end - t0 or 1.0  # a motion of one time has no events
     start = np.array(state.crossings(t0, x0, [*p, *modes]))[:, 0]
@@ -580,12 +580,14 @@ def with_crossings(
         begin = float(math.floor(ticks_of(t0, duration)))
         places += [*np.zeros(2 * few), *np.full(few, begin), duration]
     first_step = _FIRST_STEP if state.short else 0.0
-    return Events(indicators, jump, [*modes, *places], first_step), functions
+    return Events(indicators, jump, [*modes, *places], first_step, approaches), functions
 
 
 def _watch_crossings(
     state: FullState, events: Events | None, n: int, own: int, modes: int
-) -> tuple[tuple[Function, Function], tuple[Function, Function | None, Passage | None]]:
+) -> tuple[
+    tuple[Function, Function, Function | None], tuple[Function, Function | None, Passage | None]
+]:
     """Indicators and jump with the crossings behind those of others, and the functions.
 
     Args:
@@ -625,9 +627,16 @@ def _watch_crossings(
         state_after = casadi.if_else(jumps, there, x)
         after = [casadi.if_else(jumps, now, pm[own:n_p]) for now in changed]
     after += [casadi.if_else(fired_plain > 0, -sides, sides), then, duration]
+    approaches = None
+    if state.approaches is not None:
+        (known,) = state.approaches.call(at)
+        acting = casadi.horzcat(known, sides > 0)  # a contact whose depth is positive
+        others = [SX.zeros(first, 3), acting, SX.zeros(ends[-1] - first - plain, 3)]
+        approaches = Function("approaches", [t, x, pm], [casadi.vertcat(*others)])
     watched = (
         Function("indicators", [t, x, pm], [casadi.vertcat(*indicators)]),
         Function("jump", [t, x, pm, fired], [state_after, casadi.vertcat(*after)]),
+        approaches,
     )
 
     def held(function: Function) -> Function:
@@ -772,6 +781,9 @@ def _leg(
     if state.crossings is not None:
         crossed = state.crossings(t, x, parameters)
         ending = replace(ending, crossings=Function("crossings", [t, x, pm], [crossed]))
+    if state.approaches is not None:
+        approached = state.approaches(t, x, parameters)
+        ending = replace(ending, approaches=Function("approaches", [t, x, pm], [approached]))
     motion = _motion(ending, x0, times, events, p, options)
     reached = times[: len(motion.x)]
     end = next((event.time for event in motion.events if count in event.fired), None)

@@ -120,6 +120,8 @@ def library_of(equations: Equations) -> ctypes.CDLL | None:
     if equations.indicators is not None:
         names.append("events")
         flags.append("-DMBS_EVENTS")
+    if equations.approaches is not None:
+        flags.append("-DMBS_APPROACHES")
     if equations.passage is not None:
         names.extend(("dense", "passage"))
         flags.append("-DMBS_PASSAGE")
@@ -351,9 +353,10 @@ def integrate_events(
     projected; an indicator that is negative, or falls from zero, asks for another jump at the same
     time, where zero is what is smaller than atol. So it is at the first time too. Indicators and
     their slopes are looked at twice in each step; what falls at one look and rises at the next is
-    searched for a dip below zero. What moves faster than the steps needs max_step.
+    searched for a dip below zero. What moves faster than the steps needs `approaches` in the
+    events, or max_step.
 
-    Source: Cellier and Kofman 2006, chapter 9.
+    Source: Cellier and Kofman 2006, chapter 9; Mirtich 1996 for looks by the bound of a rate.
 
     Args:
         rhs: `rhs(t, x, p) -> xdot`; p ends with the modes, here and in all functions.

@@ -1,5 +1,6 @@
 """Integrations run by the Python twins of the compiled driver."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -48,6 +49,22 @@ of time, and arithmetic on times adds some more."""
 LEAST_TIME = 1e-3
 """Part of the last step by which the rounding of times near zero is measured, not by time itself,
 which has none there."""
+NEAR = 0.5
+"""Product of pace and time between two looks, at most: half an obstacle, or half a radian of a
+turn."""
+FASTER = 1.25
+"""Speed between two looks over that at the looks, which changes little in so short a time."""
+FALL = 0.85
+"""Part of the time to zero until the next look; 2 / (1 + FASTER) would just be near enough."""
+FULL = 0.98
+"""Part of the time of NEAR until the next look, since the pace may grow a little."""
+OFF = 0.1
+"""Part of an indicator by which it may leave the curve of the step: forces follow it and are then
+wrong by as much."""
+SMALLEST = 100.0
+"""Multiple of the tolerance below which an indicator counts as zero there."""
+SHORTER = 0.75
+"""Part of a step that missed a part of a law, at most, of the next try: few tries are needed."""
 AT_START = 1e-3
 """Part of a step before which an event is where the dense output has hardly left the start: what
 the step saw behind the event counts with its square there."""
@@ -63,6 +80,7 @@ class EventStepper:
         indicators: (k,) values that are positive between events.
         rates: (k,) how fast they rise along the motion.
         jump: the state after an event, projected.
+        approaches: (k, 3) as `Events` has them; None where there are none.
         left: indicators at the last look, and how fast they rise there.
         armed: which of them have been positive, so that they can fire.
         due: which of them ask for a jump at the present time.
@@ -75,6 +93,7 @@ class EventStepper:
     indicators: Values
     rates: Values
     jump: Jump
+    approaches: Values | None = None
     left: Look = field(default_factory=lambda: (np.empty(0), np.empty(0)))
     armed: Flags = field(default_factory=lambda: np.empty(0, bool))
     due: Flags = field(default_factory=lambda: np.empty(0, bool))
@@ -173,29 +192,61 @@ class EventStepper:
             if self.due.any():
                 return 0
         armed = self.armed.copy()
-        tried = solver.step(limit)
-        found, end = self._first_event(start), solver.t
-        if found and found[0] < end and found[0] - start > AT_START * (end - start):
-            # its stages behind the event are of other laws: once more, as far as the event alone
+        tried, repeated = solver.step(limit), False
+        while True:
+            found, end = self._first_event(start), solver.t
+            again = found[0] if found else end
+            if found and found[1] is not None:
+                # its stages behind the event are of other laws: once more, as far as the event
+                if repeated or not (again < end and again - start > AT_START * (end - start)):
+                    break
+                repeated = True
+            elif not found:
+                break
             solver.rewind(start)
-            self.left, self.armed = self._look(start), armed
-            tried += solver.step(found[0])
-            found = self._first_event(start)
+            self.left, self.armed = self._look(start), armed.copy()
+            tried += solver.step(again)
         if found:
             event, right = found
+            assert right is not None
             self.due = self.armed & (right <= 0)
             solver.rewind(event)
         return tried
 
-    def _first_event(self, start: float) -> tuple[float, Array] | None:
-        """The first event in the step from start, and the indicators there."""
+    def _first_event(self, start: float) -> tuple[float, Array | None] | None:
+        """The first event in the step from start, and the indicators there.
+
+        None instead of the indicators where the step has missed a part of a law, with the time at
+        which a shorter one ends.
+        """
         here, end, part = start, self.solver.t, 1
+        left, ends = np.empty(0), None
+        if self.approaches is not None:
+            left, last = self._approaches(start), self._approaches(end)
+            if np.any(np.maximum(left, last)[:, 1] * (end - start) > NEAR):
+                ends = self._look(start), self._look(end)
         while here < end:
             planned = start + part * (end - start) / LOOKS if part < LOOKS else end
+            aim = planned if ends is None else min(planned, here + self._time_to_next(left))
+            aim = planned if aim <= here else aim  # a time below its rounding
             if here > start:
-                to, right = planned, self._look(planned)
+                to, right = aim, self._look(aim)
             else:
-                to, right = self._first_look(start, planned)
+                to, right = self._first_look(start, aim)
+            if ends is not None:
+                to, right, there = self._come_near(here, to, left, right)
+                paces = np.maximum(left[:, 1], there[:, 1])
+                if to < end and not _follows(
+                    ends,
+                    (to - start) / (end - start),
+                    end - start,
+                    right[0],
+                    paces,
+                    there[:, 2],
+                    self.solver.atol,
+                ):
+                    return min(to, start + SHORTER * (end - start)), None
+                left = there
             to, right = self._dips(here, to, right)
             if self._least(right[0]) <= 0:
                 return self._locate(here, to, right[0])
@@ -204,6 +255,40 @@ class EventStepper:
             part += to == planned
             here = to
         return None
+
+    def _approaches(self, t: float) -> Array:
+        """(k, 3) approaches at a time within the last step."""
+        assert self.approaches is not None
+        try:
+            near = self.approaches(t, self.solver.state(t))
+        except RuntimeError as error:
+            raise failure_of(error, "indicators") from error
+        if not np.isfinite(near).all():
+            raise Failure("indicators")
+        return near
+
+    def _time_to_next(self, near: Array) -> float:
+        """Time to the next look that is likely to be near enough, from the left one [s]."""
+        speed, pace, _ = near[near[:, 1] > 0].T
+        value = self.left[0][near[:, 1] > 0]
+        falls = np.where((value > 0) & (speed > 0), FALL * value / speed, 0.0)
+        return float(np.min(np.maximum(falls, FULL * NEAR / pace), initial=math.inf))
+
+    def _come_near(self, a: float, b: float, left: Array, right: Look) -> tuple[float, Look, Array]:
+        """A time before b so near a that no indicator can have been at zero in between."""
+        there = self._approaches(b)
+        while not self._are_near(a, b, np.maximum(left, there), right[0]):
+            b = a + 0.5 * (b - a)
+            right, there = self._look(b), self._approaches(b)
+        return b, right, there
+
+    def _are_near(self, a: float, b: float, approaches: Array, right: Array) -> bool:
+        width, low = b - a, self.left[0]
+        if width <= 4 * EPSILON * max(abs(b), LEAST_TIME * self.solver.last_step):
+            return True
+        soon = approaches[:, 1] * width <= NEAR
+        far = (low > 0) & (right > 0) & (low + right > FASTER * approaches[:, 0] * width)
+        return bool(np.all(soon | far))
 
     def _first_look(self, start: float, end: float) -> tuple[float, Look]:
         """What has just left zero may be back at the first look: look earlier."""
@@ -290,6 +375,34 @@ class EventStepper:
         self.last = t
         if self.idle > MAX_IDLE:
             raise Failure("standstill")
+
+
+def _follows(
+    ends: tuple[Look, Look],
+    u: float,
+    h: float,
+    seen: Array,
+    paces: Array,
+    acts: Array,
+    zero: float,
+) -> bool:
+    """Whether indicators on which the equations depend are on the cubic through both ends.
+
+    Args:
+        ends: looks at the ends of the step.
+        u: part of the step.
+        h: length of the step [s].
+        seen: indicators there.
+        paces: of the indicators [1/s].
+        acts: 1 where the equations depend on it.
+        zero: absolute tolerance.
+    """
+    (low, fall), (high, rise) = ends
+    w = 1 - u
+    curve = w**2 * ((1 + 2 * u) * low + u * h * fall) + u**2 * ((1 + 2 * w) * high - w * h * rise)
+    size = np.maximum(np.maximum(np.abs(low), np.abs(high)), SMALLEST * zero)
+    off = (acts > 0) & (paces * h > NEAR) & (np.abs(seen - curve) > OFF * size)
+    return not off.any()
 
 
 def _of(look: Look, k: int) -> tuple[float, float]:
@@ -406,6 +519,7 @@ def _watch(problem: IntegrationProblem, p: Array, solver: Stepper) -> EventStepp
     """The integration with its events, which has looked at the first state."""
     functions, project, at = problem.equations, solver.project, solver.stops.law_time
     indicators, rates, jump = functions.indicators, functions.rates, functions.jump
+    approaches = functions.approaches
     if indicators is None or rates is None or jump is None:
         return None
 
@@ -424,6 +538,7 @@ def _watch(problem: IntegrationProblem, p: Array, solver: Stepper) -> EventStepp
         lambda t, x: _vector(indicators(at(t), x, p)),
         lambda t, x: _vector(rates(at(t), x, p)),
         after,
+        None if approaches is None else lambda t, x: np.asarray(approaches(at(t), x, p).full()),
     )
     watched.start()
     return watched

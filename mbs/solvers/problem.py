@@ -61,12 +61,17 @@ class Events:
         modes: (nm,) at the start.
         first_step: length of the step after an event [s], from which the steps grow; estimated
             from the slopes there where zero, which may be too long for what is short.
+        approaches: `approaches(t, x, p) -> a`, (k, 3) for each indicator: the bound of its rate at
+            the present speed; the reciprocal of the shortest time in which it falls to zero and
+            rises again [1/s], zero where two looks a step are enough; and 1 where the equations
+            depend on it. None where all are zero.
     """
 
     indicators: casadi.Function
     jump: casadi.Function
     modes: npt.ArrayLike = ()
     first_step: float = 0.0
+    approaches: casadi.Function | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,6 +143,7 @@ class Equations:
         indicators: `mbs_indicators(t, x, p) -> g`; None, as the next two, without events.
         rates: `mbs_rates(t, x, p) -> dg/dt` along the motion.
         jump: `mbs_jump(t, x, p, fired) -> (x, modes)`.
+        approaches: `mbs_approaches(t, x, p) -> a`, as `Events` has them; None where there are none.
         passage: `mbs_rows`, `mbs_forces` and `mbs_regularity`; None where no rows become dependent.
         first_step: as `Events` has it.
     """
@@ -148,6 +154,7 @@ class Equations:
     indicators: casadi.Function | None = None
     rates: casadi.Function | None = None
     jump: casadi.Function | None = None
+    approaches: casadi.Function | None = None
     passage: Passage | None = None
     first_step: float = 0.0
 
@@ -162,6 +169,7 @@ class Equations:
             self.indicators,
             self.rates,
             self.jump,
+            self.approaches,
         )
         if through is not None:
             functions = (*functions, through.rows, through.forces, through.regularity)
@@ -287,7 +295,7 @@ def _projection(project: casadi.Function, txp: list[casadi.MX]) -> casadi.Functi
 
 def _event_functions(
     events: Events, txp: list[casadi.MX], slope: casadi.MX
-) -> tuple[casadi.Function, casadi.Function, casadi.Function]:
+) -> tuple[casadi.Function, casadi.Function, casadi.Function, casadi.Function | None]:
     t, x, p = txp
     indicators, jump, n_modes = events.indicators, events.jump, len(numbers(events.modes))
     sizes = [1, x.numel(), p.numel()]
@@ -310,10 +318,17 @@ def _event_functions(
     rate = casadi.jtimes(g, x, slope) + casadi.jtimes(g, t, casadi.MX(1))
     after = [jump(*txp, fired)] if len(left) == 1 else list(jump(*txp, fired))
     modes = casadi.vec(after[1]) if n_modes else casadi.MX(0, 1)
+    near = casadi.MX(0, 3) if events.approaches is None else events.approaches(*txp)
+    if events.approaches is not None and near.shape != (g.numel(), 3):
+        raise ModelError(
+            f"{events.approaches}: approaches of events are approaches(t, x, p) -> a, a"
+            f" ({g.numel()}, 3)"
+        )
     return (
         _dense("mbs_indicators", txp, g),
         _dense("mbs_rates", txp, rate),
         _dense("mbs_jump", [*txp, fired], casadi.vec(after[0]), modes),
+        None if events.approaches is None else _dense("mbs_approaches", txp, near),
     )
 
 
@@ -396,7 +411,8 @@ REASONS = {
     "projection": "the projection onto the constraints does not converge; "
     "look for a singular configuration",
     "singular": "a singular configuration is not passed, the rows of the loops stay dependent "
-    "around it; start elsewhere, or end the run before",
+    "around it, or rounding there exceeds the tolerance; start elsewhere, end the run before, or "
+    "ask for a looser tolerance, 1e-10 or more",
     "near miss": "branches of motion come near each other and do not meet, by so little that what "
     "turns there cannot be told from what goes on; make the branches meet, or miss by more, or ask "
     "for a looser tolerance",

@@ -10,6 +10,7 @@ import mbs
 from mbs.components import (
     Body,
     BoxPlaneContact,
+    CapsuleCapsuleContact,
     CapsulePlaneContact,
     Custom,
     Fixed,
@@ -17,6 +18,7 @@ from mbs.components import (
     HeightFieldContact,
     Prismatic,
     SphereBoxContact,
+    SphereCapsuleContact,
     SpherePlaneContact,
     SphereSphereContact,
     WheelPlaneContact,
@@ -45,6 +47,12 @@ SHAPES = {
     "box": lambda a, b, **law: BoxPlaneContact("c", a, b, size=SIZE, **law),
     "spheres": lambda a, b, **law: SphereSphereContact(
         "c", a, b, radius_a=1.0, radius_b=0.5, **law
+    ),
+    "sphere on capsule": lambda a, b, **law: SphereCapsuleContact(
+        "c", a, b, radius=0.6, capsule_radius=0.4, length=1.2, **law
+    ),
+    "capsules": lambda a, b, **law: CapsuleCapsuleContact(
+        "c", a, b, radius_a=0.5, length_a=1.0, radius_b=0.4, length_b=1.4, **law
     ),
     "sphere on box": lambda a, b, **law: SphereBoxContact("c", a, b, radius=1.0, size=SIZE, **law),
     "field": lambda a, b, **law: HeightFieldContact("c", a, b, radius=0.6, height=waves, **law),
@@ -189,6 +197,68 @@ def test_two_spheres():
     a = mbs.models.direct_dynamics(system)(q, np.zeros(12), np.zeros(12)).full().ravel()
     np.testing.assert_allclose(a[:3], [-K * 0.25 * 0.6, -K * 0.25 * 0.8, 0], rtol=1e-9)
     np.testing.assert_allclose(a[6:9], -a[:3], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("centre", "depth", "normal"),
+    [
+        ((0.3, 0.4, 0.2), 0.1, (0.6, 0.8, 0)),  # beside the axis
+        ((0.3, 0.0, -0.9), 0.1, (0.6, 0, -0.8)),  # beyond an end
+        ((0.0, 0.0, 1.0), 0.1, (0, 0, 1)),
+    ],
+)
+def test_sphere_on_a_capsule(centre, depth, normal):
+    law = {"radius": 0.2, "capsule_radius": 0.4, "length": 1.0, "stiffness": K}
+    system = falling(lambda a, b: SphereCapsuleContact("c", a, b, **law))
+    found, wrench = of(system, centre)
+    assert found["depth"] == pytest.approx(depth, rel=1e-9)
+    np.testing.assert_allclose(wrench[:3], K * depth**1.5 * np.array(normal), rtol=1e-9, atol=1e-9)
+
+
+def two_capsules():
+    law = {"radius_a": 0.3, "length_a": 2.0, "radius_b": 0.2, "length_b": 1.0, "stiffness": K}
+    return falling(lambda b, a: CapsuleCapsuleContact("c", a, b, **law))
+
+
+def test_capsules_overlap_where_their_axes_are_nearest():
+    """Against a search among points of both axes."""
+    system, random = two_capsules(), np.random.default_rng(5)
+    s, t = np.meshgrid(np.linspace(-1, 1, 1601), np.linspace(-0.5, 0.5, 801), indexing="ij")
+    for _ in range(12):
+        turn = random.normal(size=4)
+        turn /= np.linalg.norm(turn)
+        w, x, y, z = turn
+        axis = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+        place = random.uniform(-1, 1, 3) * [1, 1, 1.5]
+        off = [place[k] + t * axis[k] - s * (k == 2) for k in range(3)]
+        nearest = np.sqrt(off[0] ** 2 + off[1] ** 2 + off[2] ** 2).min()
+        found, _ = of(system, place, turn=turn)
+        assert found["depth"] == pytest.approx(0.5 - nearest, abs=2e-5)
+
+
+def test_parallel_capsules_press_on_their_middle():
+    """No moment where they are parallel, and that of an end from some 1e-3 rad on."""
+    system = two_capsules()
+    for angle, arm in ((0.0, 0.0), (2e-2, -0.5), (-2e-2, 0.5)):
+        turn = np.array([np.cos(angle / 2), 0, np.sin(angle / 2), 0])
+        found, wrench = of(system, (0.45 + abs(np.sin(angle)) / 2, 0, 0), turn=turn)
+        assert found["depth"] == pytest.approx(0.05, abs=1e-5)
+        assert wrench[4] == pytest.approx(arm * wrench[0], abs=0.03 * abs(wrench[0]))
+        assert np.linalg.norm(wrench[:3]) == pytest.approx(K * 0.05**1.5, rel=1e-3)
+
+
+def test_a_capsule_comes_to_rest_across_another_one():
+    """It falls a little tilted on a fixed one and rocks until damping and friction hold it."""
+    m = mbs.Mechanism("logs", gravity=(0, 0, -9.81))
+    log = m.add(Body("log", mass=1.0, inertia=(0.09, 0.09, 0.02)))
+    m.connect(m.world, Free("f"), log.at(rotation=("y", -np.pi / 2)))
+    law = {"radius_a": 0.1, "length_a": 1.0, "radius_b": 0.1, "length_b": 1.0}
+    force = {"stiffness": 1e5, "restitution": 0.3, "impact_speed": 0.5, "friction": 0.8}
+    fixed = m.world.at(rotation=("x", np.pi / 2))
+    m.add(CapsuleCapsuleContact("c", fixed, log, **law, **force, friction_law="bristle"))
+    result = mbs.simulate.run(m.assemble(), 2.0, q0={"f.z": 0.21}, quiet=True)
+    assert result["f.z.q"][-1] == pytest.approx(0.2 - (9.81 / 1e5) ** (2 / 3), abs=1e-4)
+    assert result["c.normal_force"][-1] == pytest.approx(9.81, rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -412,19 +482,41 @@ def test_sizes_of_boxes_are_checked():
     )
 
 
-def test_a_crossing_of_velocities_is_refused():
-    class Stick(Custom):
+def test_a_crossing_of_inputs_is_refused():
+    class Push(Custom):
         point = custom.frame()
+        force = custom.input("N")
 
         def loads(self, at):
-            return {"point": custom.force(-at.point.v)}
+            return {"point": custom.force(casadi.vertcat(at.force, 0, 0))}
 
         def crossings(self, at):
-            return {"stop": at.point.v[0]}
+            return {"push": at.force - 1}
 
     m = mbs.Mechanism("m")
     body = m.add(Body("b", mass=1))
     m.connect(m.world, Prismatic("x", axis="x"), body)
-    m.add(Stick("s", body))
-    sentence = "s (Stick): the crossing 'stop' depends on velocities or inputs"
-    refused(AssemblyError, sentence, by=m.assemble)
+    m.add(Push("s", body))
+    refused(AssemblyError, "s (Push): the crossing 'push' depends on inputs", by=m.assemble)
+
+
+def test_a_crossing_may_follow_from_velocities():
+    class Gas(Custom):
+        """Resists with 2 N while the body moves forwards, not while it returns."""
+
+        point = custom.frame()
+
+        def loads(self, at):
+            force = casadi.if_else(at.point.v[0] > 0, -2.0, 0.0)
+            return {"point": custom.force(casadi.vertcat(force, 0, 0))}
+
+        def crossings(self, at):
+            return {"turn": at.point.v[0]}
+
+    m = mbs.Mechanism("m", gravity=(-1.0, 0, 0))
+    body = m.add(Body("b", mass=1))
+    m.connect(m.world, Prismatic("x", axis="x"), body)
+    m.add(Gas("s", body))
+    result = mbs.simulate.run(m.assemble(), 3.0, v0={"x": 3.0}, step=3.0, quiet=True)
+    # it stops after 1 s at 1.5 m and falls for 2 s
+    assert result["x.q"][-1] == pytest.approx(1.5 - 2.0, abs=1e-9)

@@ -164,8 +164,11 @@ def test_stop_damps_only_where_it_is_touched():
     m, _ = one_joint()
     m.add(JointStop("stop", joint="x", upper=1, stiffness=100, damping=20, width=0.1))
     assert effort(m, 0.99, 3.0) == 0
-    assert effort(m, 1.05, 3.0) - effort(m, 1.05) == pytest.approx(0.5 * 20 * 3)
-    assert effort(m, 1.3, -3.0) - effort(m, 1.3) == pytest.approx(-60)
+    assert effort(m, 1.05, 0.05) - effort(m, 1.05) == pytest.approx(0.5 * 20 * 0.05)
+    assert effort(m, 1.3, -1.0) - effort(m, 1.3) == pytest.approx(-20)
+    # at most as much as the spring: it never pulls
+    assert effort(m, 1.05, 3.0) == pytest.approx(2 * effort(m, 1.05))
+    assert effort(m, 1.3, -3.0) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_friction():

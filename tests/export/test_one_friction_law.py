@@ -27,7 +27,8 @@ def by_hand(q, v):
     element = (SLIDING + MORE * np.exp(-((v / FALL) ** 2))) * np.tanh(v / NARROW)
     u = np.clip((q - UPPER) / DEPTH, 0, 1)
     inside = DEPTH * u**3 * (1 - u / 2) + max(q - UPPER - DEPTH, 0)
-    return joint + element + STIFFNESS * inside + DAMPING * u**2 * (3 - 2 * u) * v
+    spring = STIFFNESS * inside
+    return joint + element + spring + np.clip(DAMPING * u**2 * (3 - 2 * u) * v, -spring, spring)
 
 
 @pytest.fixture(scope="module")

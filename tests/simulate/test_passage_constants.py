@@ -24,6 +24,7 @@ RUNS = {
     "parallelogram": (PARALLELOGRAM, 1e-4, {"v0": {"a0": -4.0}}),
     "linkage": (MEETS, 1e-10, {"v0": {"j1": 6.0}}),
     "antiparallelogram": (ANTI, 1e-10, {"v0": {"j1": 6.0}}),
+    "tight": (ANTI, 1e-11, {"v0": {"j1": 6.0}}),
     "miss": (1e-8, 1e-9, {"v0": {"j1": 6.0}}),
     "start": (ANTI, 1e-8, {"q0": FLAT, "v0": [-6 / 7, 2.0, 2.0]}),
     "miss of 3e-6": (PARALLELOGRAM, 1e-8, {"q0": FLAT, "v0": [1, -1 - 3e-6, 1 - 3e-6]}),
@@ -31,8 +32,10 @@ RUNS = {
 }
 STOPS = 1e300
 MOVED = [  # constant, factor, run, parts of the tolerance that tell the one from the other
-    ("PASSAGE_ON", 10, "antiparallelogram", 1.0),
-    ("AHEAD", 10, "linkage", 1.0),
+    ("PASSAGE_ON", 10, "antiparallelogram", 0.15),
+    ("AHEAD", 10, "tight", 0.1),
+    ("DODGED", 0.1, "tight", 0.5),
+    ("DODGES", 0.1, "tight", 0.5),
     ("FLOOR", 10, "miss", STOPS),
     ("AWAY", 10, "miss", STOPS),
     ("BESIDE", 0.1, "start", STOPS),

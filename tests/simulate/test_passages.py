@@ -105,7 +105,8 @@ def test_near_misses_turn_whatever_the_tolerance(longer):
         result = mbs.simulate.run(
             system, 3.0, v0={"j1": 6.0}, tolerance=tolerance, step=0.05, quiet=True
         )
-        assert energy_error(result) < 5 * tolerance
+        # at the nearest, rounding changes velocities by 3e-16 / 1e-8
+        assert energy_error(result) < 5 * tolerance + 5e-9
         assert result["closure_residual"].max() < 1e-13
         ends.append([result[f"{joint}.q"][-1] for joint in ("j1", "j2", "j4")])
     assert np.ptp(ends, axis=0).max() < 5e-3
@@ -310,3 +311,36 @@ def test_a_law_without_a_value_is_named_with_its_time_and_configuration():
                 tau=lambda t, q, v, s=sign: casadi.vertcat(casadi.sqrt(s * (t - 0.5)), 0, 0),
                 quiet=True,
             )
+
+
+@pytest.fixture(scope="module")
+def two_windows():
+    return mbs.robots.n_four_bar(2).assemble()
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("speed", np.linspace(-3, -1, 81))
+def test_errors_behind_singular_configurations_follow_the_tolerance(two_windows, speed):
+    """Two windows of parallelograms move as a pendulum: a'' = -11.445 cos(a)."""
+    y, step, exact = np.array([np.pi / 2, speed]), 2e-3, [np.pi / 2]
+    for k in range(5000):  # Runge-Kutta of order 4 with two half steps, extrapolated
+        whole, half = _pendulum(y, step), _pendulum(_pendulum(y, step / 2), step / 2)
+        y = half + (half - whole) / 15
+        if (k + 1) % 500 == 0:
+            exact.append(y[0])
+    options = {"v0": {"a0": speed}, "step": 1.0, "quiet": True}
+    for tolerance in (1e-5, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11):
+        result = mbs.simulate.run(two_windows, 10.0, tolerance=tolerance, **options)
+        assert np.abs(result["a0.q"] - exact).max() < 100 * tolerance
+
+
+def _pendulum(y, h):
+    """A step of the classical method of order 4."""
+
+    def slope(y):
+        return np.array([y[1], -11.445 * np.cos(y[0])])
+
+    a = slope(y)
+    b = slope(y + h / 2 * a)
+    c = slope(y + h / 2 * b)
+    return y + h / 6 * (a + 2 * b + 2 * c + slope(y + h * c))

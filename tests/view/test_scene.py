@@ -12,6 +12,7 @@ from mbs.components import (
     Body,
     Box,
     BoxPlaneContact,
+    CapsuleCapsuleContact,
     CapsulePlaneContact,
     Custom,
     Cylinder,
@@ -20,6 +21,7 @@ from mbs.components import (
     Prismatic,
     Revolute,
     Shape,
+    SphereCapsuleContact,
     SpherePlaneContact,
     Spring,
     WheelPlaneContact,
@@ -267,6 +269,22 @@ def test_contacts_and_components_of_ones_own_are_drawn_at_their_frames():
     )
     assert (buoy.radius, buoy.colour) == (0.5, "#ff0000")
     assert "visual" not in {one.role for one in scene.primitives}
+
+
+def test_both_bodies_of_a_contact_are_drawn():
+    m = mbs.Mechanism("pair", gravity=(0, 0, -9.81))
+    bodies = [m.add(Body(f"b{k}", mass=1.0, inertia=(0.1, 0.1, 0.1))) for k in range(4)]
+    for k, body in enumerate(bodies):
+        m.connect(m.world.at(k, 0, 1), Free(f"f{k}"), body)
+    pill = {"radius": 0.2, "capsule_radius": 0.1, "length": 0.5, "stiffness": 1e4}
+    m.add(SphereCapsuleContact("one", *bodies[:2], **pill))
+    pills = {"radius_a": 0.1, "length_a": 0.4, "radius_b": 0.2, "length_b": 0.6}
+    m.add(CapsuleCapsuleContact("two", *bodies[2:], stiffness=1e4, **pills))
+    scene = mbs.view.scene(m.assemble())
+    ball, *capsules = [one for one in scene.primitives if one.role == "force" and one.link]
+    assert ball.radius == 0.2
+    assert [one.radius for one in capsules] == [0.1, 0.1, 0.2]
+    assert [one.b[2] for one in capsules] == pytest.approx([0.25, 0.2, 0.3])
 
 
 @pytest.mark.parametrize(

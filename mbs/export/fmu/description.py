@@ -111,6 +111,8 @@ def _check_functions(model: FmuModel) -> None:
         _check_shape(model, "first", model.jumps.first, point, (n_m, k))
         _check_shape(model, "indicators", model.jumps.indicators, point, (k,))
         _check_shape(model, "jump", model.jumps.jump, (*point, k), (nx, n_m))
+        if model.jumps.approaches is not None:
+            _check_shape(model, "approaches", model.jumps.approaches, point, (3 * k,))
 
 
 def _check_target(model: FmuModel) -> None:
@@ -335,6 +337,10 @@ class Jumps:
         jump: `jump(t, x, z, u, p, fired) -> (x, modes)` after an event; fired (k, 1) is 1 for each
             indicator that is not positive.
         names: (k) what each indicator watches, for messages.
+        approaches: `approaches(t, x, z, u, p) -> a`, (k, 3) as `mbs.solvers.Events` has them, for
+            steps of Co-Simulation; None where two looks a step are enough.
+        optional: whether the functions of the model do not depend on the modes, as where all events
+            are of contacts: integrators outside need none of them.
     """
 
     modes: tuple[FmuVariable, ...]
@@ -342,6 +348,8 @@ class Jumps:
     indicators: casadi.Function
     jump: casadi.Function
     names: tuple[str, ...]
+    approaches: casadi.Function | None = None
+    optional: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -518,7 +526,8 @@ class FmuModel:
     @property
     def charted(self) -> bool:
         """Whether integrators outside pass singular configurations: charts.h."""
-        return self.tree is not None and self.tree.passes and self.jumps is None
+        optional = self.jumps is None or self.jumps.optional
+        return self.tree is not None and self.tree.passes and optional
 
     @property
     def slots(self) -> tuple[FmuState, ...]:

@@ -32,6 +32,8 @@ FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 _MANIFEST = "http://fmi-standard.org/fmi-ls-manifest"
 _TIGHTEST = 1e-10  # relative tolerance of a reference: below what users compare with it
 _DIGITS = ".13g"
+_AFTER_CONTACT = 1e-9
+"""Step behind an event [s] where bodies touch, as in `c/solver.c`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,10 +185,16 @@ def _events(model: FmuModel, t: MX, x: MX, p: MX) -> Events:
         raise ExportError(
             f"FMU {model.name}: the start values are beyond {', '.join(passed)}; move them"
         )
+    near, first_step = None, 0.0
+    if model.jumps.approaches is not None:
+        near = Function("approaches", [t, x, p], model.jumps.approaches.call(point))
+        first_step = _AFTER_CONTACT
     return Events(
         Function("indicators", [t, x, p], [g]),
         Function("jump", [t, x, p, fired], moved),
         first.full().ravel(),
+        first_step,
+        near,
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from mbs.errors import ExportError, ModelError
 from mbs.export.fmu.description import FmuModel, FmuVariable, Jumps
+from mbs.models.state.events import MinimalEvents
 from mbs.models.state.tree import TreeState
 from mbs.native.compiled import generated, unwritten
 from mbs.native.plain_source import Work, plain_source
@@ -32,7 +33,8 @@ def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
         Where loops are closed, `mbs_closure(x, z, p) -> (z, residual)` and
         `mbs_sensitivity(x, z, p) -> steepness`, and `mbs_slopes(x, z, p) -> J` where J is watched.
         Of a tree, `mbs_tree_rhs` and others as `TreeState` has them. Where there are events,
-        `mbs_first`, `mbs_indicators` and `mbs_jump` as `Jumps` has them, and
+        `mbs_first`, `mbs_indicators`, `mbs_jump` and, where there are any, `mbs_approaches` as
+        `Jumps` has them, and
         `mbs_rates(t, x, z, u, p, du) -> dg/dt` along the motion, du the rates of the inputs; the
         last three also of a tree, as `mbs_tree_indicators` and so on. Where states and parameters
         have rules, `mbs_excess(x, p)`. For an implicit solver
@@ -118,6 +120,8 @@ def _tree_events(
         "rates": ([*point, du], _forward(events.indicators, own, along)),
         "jump": ([*point, fired], events.jump.call([*own, fired])),
     }
+    if events.approaches is not None:
+        named["approaches"] = point, events.approaches.call(own)
     return [
         casadi.Function(f"mbs_tree_{name}", taken, _dense(values))
         for name, (taken, values) in named.items()
@@ -147,11 +151,24 @@ def _jacobian(model: FmuModel, point: list[casadi.MX], du: casadi.MX) -> list[ca
 def _events(jumps: Jumps, point: list[casadi.MX]) -> list[casadi.Function]:
     fired = casadi.MX.sym("fired", len(jumps.names))
     g = jumps.indicators.call(point)
+    near = []
+    if jumps.approaches is not None:
+        found = _dense(jumps.approaches.call(point))
+        near.append(casadi.Function("mbs_approaches", point, found))
     return [
+        *near,
         casadi.Function("mbs_first", point, _dense(jumps.first.call(point))),
         casadi.Function("mbs_indicators", point, _dense(g)),
         casadi.Function("mbs_jump", [*point, fired], _dense(jumps.jump.call([*point, fired]))),
     ]
+
+
+def _names_of_events(events: Jumps | MinimalEvents | None, prefix: str = "mbs_") -> tuple[str, ...]:
+    """The functions of events that an FMU has."""
+    if events is None:
+        return ()
+    names = _EVENTS if prefix == "mbs_" else _TREE_EVENTS
+    return names if events.approaches is None else (*names, f"{prefix}approaches")
 
 
 def _rates(model: FmuModel, point: list[casadi.MX], du: casadi.MX) -> casadi.MX:
@@ -343,9 +360,10 @@ def header(model: FmuModel, guid: str, work: Work, *, adjoint: bool) -> str:
     if model.closure is not None:
         names = (*names, *_LOOPS, *(("mbs_slopes",) if model.slopes is not None else ()))
     if (tree := model.tree) is not None:
-        names = (*names, *_TREE, *(_TREE_EVENTS if tree.events is not None else ()))
-    if model.jumps is not None:
-        names = (*names, *_EVENTS)
+        names = (*names, *_TREE, *_names_of_events(tree.events, "mbs_tree_"))
+    names = (*names, *_names_of_events(model.jumps))
+    if "mbs_approaches" in names:
+        options += "#define MODEL_APPROACHES\n"
     if (rules := model.rules) is not None:
         names = (*names, "mbs_excess")
         options += f"#define MODEL_RULES_AT_START {rules.at_start}\n"

@@ -8,11 +8,13 @@ from dataclasses import replace
 
 from mbs.assembly import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, RATE_UNIT, Coordinate
+from mbs.components.contact import Contact
 from mbs.components.custom import Friction, OneWay
 from mbs.errors import ModelError
 from mbs.export.fmu.description import FmuState, FmuVariable, Jumps, once
 from mbs.models.contacts import contacts_of
 from mbs.models.geometry import terminal_frame
+from mbs.models.state.crossings import CONTACTS
 from mbs.models.state.drive import InputMotion
 from mbs.models.state.events import element_names
 from mbs.models.state.independent import MinimalState
@@ -266,10 +268,17 @@ def jumps(system: System, state: MinimalState) -> Jumps | None:
     for name in events.modes[len(modes) :]:
         text = f"of a law that jumps: {_CROSSING[name.rpartition('.')[2]]}"
         modes.append(FmuVariable(name=name, description=text))
+    # laws of users may jump where they have crossings
+    smooth = all(
+        isinstance(part.element, Contact) or not part.element.has("crossings")
+        for part in system.parts
+    )
     return Jumps(
         modes=tuple(modes),
         first=events.first,
         indicators=events.indicators,
         jump=events.jump,
         names=events.names,
+        approaches=events.approaches,
+        optional=smooth and all(name.startswith(f"{CONTACTS}.") for name in events.modes),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi
@@ -23,6 +23,8 @@ from mbs.recursions.parts import PartsAt
 # Crossings that may stay at zero or pass it without end.
 
 
+CONTACTS = "contacts"
+"""Before the names of crossings of contacts in FMUs."""
 GUARD_MODES = 4
 """Modes of a guarded crossing: its place, whether it is asleep, a number and a time."""
 _OFTEN = 4
@@ -123,7 +125,14 @@ _ROUNDED = {casadi.OP_FLOOR: 1.0, casadi.OP_CEIL: -1.0}
 
 
 def hold_sides(
-    function: Function, at: Sequence[SX], values: SX, modes: SX, counts: int, inputs: Sequence[SX]
+    function: Function,
+    at: Sequence[SX],
+    values: SX,
+    modes: SX,
+    counts: int,
+    inputs: Sequence[SX],
+    *,
+    loose: int = 0,
 ) -> Function:
     """A function whose conditions have the places of crossings.
 
@@ -134,6 +143,7 @@ def hold_sides(
         modes: modes of the crossings, as `guard` has them.
         counts: number of counts.
         inputs: inputs of the result: symbols that include the symbols of `at` and the modes.
+        loose: number of the first crossings, whose conditions stay as they are.
 
     Returns:
         the function of these inputs. Conditions that are not found in it stay as they are.
@@ -148,7 +158,8 @@ def hold_sides(
         return Function(function.name(), list(inputs), function.call(list(at)))
     elements = [[SX(value.nz[j]) for j in range(value.nnz())] for value in at]
     places, asleep, _ = casadi.vertsplit(modes, [0, k, 2 * k, rest])
-    found = _found_again(graph, [n.numel() for n in at], Function("c", list(at), [values]), counts)
+    crossed = Function("c", list(at), [values])
+    found = _found_again(graph, [n.numel() for n in at], crossed, counts, loose)
     nodes = list[SX]()
     for number, node in enumerate(graph.nodes):
         value = value_of(node, nodes, elements)
@@ -170,7 +181,7 @@ def hold_sides(
 
 
 def _found_again(
-    graph: Graph, sizes: Sequence[int], crossings: Function, counts: int
+    graph: Graph, sizes: Sequence[int], crossings: Function, counts: int, loose: int
 ) -> dict[int, tuple[int, float]]:
     """Crossing and sign of each condition in a graph that is one of the crossings."""
     nodes, numbers, of_counts = list(graph.nodes), list[int](), list[bool]()
@@ -200,7 +211,7 @@ def _found_again(
     found: dict[int, tuple[int, float]] = {}
     for column_of, number in enumerate(numbers):
         op = graph.nodes[number].op
-        for j in range(wanted.shape[1]):
+        for j in range(loose, wanted.shape[1]):
             signs = (_ROUNDED[op],) if op in _ROUNDED else (1.0, -1.0)
             for sign in signs:
                 off = np.abs(seen[:, column_of] - sign * wanted[:, j])
@@ -223,27 +234,46 @@ _SPAN = 1.0
 """Duration by which crossings in a row are known in an FMU [s], which does not know its own."""
 
 
-def part_crossings(system: System) -> Function | None:
-    """`f(q, v, z, u, p) -> sides, counts` at which laws of components jump.
+@dataclass(frozen=True, slots=True, eq=False)
+class WatchedCrossings:
+    """Crossings of a state equation.
 
-    Bends, and built-in contacts and curves, are left to error control.
+    Attributes:
+        sides: (n, 1) values that pass through zero, those of contacts first.
+        counts: (m, 1) values at whose whole numbers laws jump.
+        approaches: (k, 2) speeds and paces of the k contacts, as `Approach` has them.
+    """
+
+    sides: SX
+    counts: SX
+    approaches: SX = field(default_factory=lambda: SX(0, 2))
+
+
+def part_crossings(system: System) -> Function | None:
+    """`f(q, v, z, u, p) -> sides, counts, approaches` at which the laws of components change.
+
+    Bends and curves are left to error control.
 
     Args:
         system: open or closed.
 
     Returns:
-        the Function; None if no law jumps.
+        the Function, whose outputs are those of `WatchedCrossings`; None if no law jumps.
     """
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     parts = PartsAt(system, q, v)
     constants = casadi.vertcat(system.p, parts.modes())
-    found = _jumps(parts.laws(), SX(0, 1), q, constants)
-    states = casadi.vertcat(q, v, system.z)
-    given = parts.crossings(of_contacts=False)
-    sides = casadi.vertsplit(given) if given.numel() else []
-    return _function(
-        [q, v, system.z, system.u, system.p], [*sides, *found.crossings], found.counts, states
-    )
+    laws = _jumps(parts.laws(), SX(0, 1), q, constants)
+    states, point = casadi.vertcat(q, v, system.z), [q, v, system.z, system.u, system.p]
+    given = [one for one in parts.crossings(of_bends=False) if casadi.depends_on(one.value, states)]
+    contacts = [one for one in given if not one.pace.is_zero()]
+    others = [one.value for one in given if one.pace.is_zero()]
+    found = _function(point, [*others, *laws.crossings], laws.counts, states)
+    if not contacts:
+        return found
+    sides, counts = (SX(0, 1), SX(0, 1)) if found is None else found.call(point)
+    every = casadi.vertcat(*(one.value for one in contacts), sides)
+    return dense_function("crossings", point, [every, counts, parts.approaches(contacts)])
 
 
 def drive_crossings(system: System, drive: DriveInputs, extra: int) -> Function | None:
@@ -298,21 +328,23 @@ def _function(
 
 
 def join_crossings(
-    events: MinimalEvents | None, values: Sequence[SX], point: Sequence[SX], source: str
+    events: MinimalEvents | None, values: WatchedCrossings, point: Sequence[SX], source: str
 ) -> MinimalEvents:
     """Events with the events of crossings behind them, which change modes alone.
 
     Args:
         events: other events; None if there are no others.
-        values: sides and counts at the point.
+        values: crossings at the point.
         point: t, x, z, u and p, without modes.
         source: name of the crossings.
     """
-    sides, counts = values
+    sides, counts, near = values.sides, values.counts, values.approaches
     k, n, m = sides.numel() + counts.numel(), sides.numel(), counts.numel()
     *others, p = point
     t, x = point[:2]
-    names = [f"{source}.side{j + 1}" for j in range(n)]
+    c = near.shape[0]
+    names = [f"{CONTACTS}.side{j + 1}" for j in range(c)]
+    names += [f"{source}.side{j + 1}" for j in range(n - c)]
     names += [f"{source}.count{j + 1}" for j in range(m)]
     before = SX.sym("modes", len(events.modes) if events else 0)
     own, known = SX.sym("own", GUARD_MODES * k), len(events.names) if events else 0
@@ -332,6 +364,16 @@ def join_crossings(
         jumps = casadi.mmax(first_fired)
         after, now = casadi.if_else(jumps, there, x), casadi.if_else(jumps, changed, before)
     kinds = ("place", "asleep", "row", "time")
+    approaches = None
+    if c or (events and events.approaches is not None):
+        place, asleep = own[:c], own[k : k + c]
+        awake = casadi.logic_and(casadi.logic_not(asleep), place)
+        known_rows = SX.zeros(known, 3)
+        if events and events.approaches is not None:
+            (known_rows,) = events.approaches.call([*others, casadi.vertcat(p, before)])
+        rows = casadi.horzcat(near * casadi.repmat(awake, 1, 2), place > 0)
+        rows = casadi.vertcat(known_rows, rows, SX.zeros(k + m - c, 3))
+        approaches = dense_function("approaches", every, [rows])
     return MinimalEvents(
         modes=(
             *(events.modes if events else ()),
@@ -349,6 +391,7 @@ def join_crossings(
         ),
         indicators=dense_function("indicators", every, [casadi.vertcat(indicators, watched)]),
         jump=dense_function("jump", [*every, fired], [after, casadi.vertcat(now, then)]),
+        approaches=approaches,
     )
 
 
@@ -359,8 +402,8 @@ def with_part_crossings(
     point: Sequence[SX],
     *,
     wanted: bool,
-) -> tuple[MinimalEvents | None, Sequence[SX]]:
-    """Events with the crossings of components behind them, and their sides and counts.
+) -> tuple[MinimalEvents | None, WatchedCrossings]:
+    """Events with the crossings of components behind them, and these crossings.
 
     Args:
         system: open or closed.
@@ -371,20 +414,20 @@ def with_part_crossings(
     """
     found = part_crossings(system) if wanted else None
     if found is None:
-        return events, (SX(0, 1), SX(0, 1))
-    values = found.call([*motion, system.z, system.u, system.p])
+        return events, WatchedCrossings(SX(0, 1), SX(0, 1))
+    values = WatchedCrossings(*found.call([*motion, system.z, system.u, system.p]))
     return join_crossings(events, values, point, "laws"), values
 
 
-def held_by(function: Function, values: Sequence[SX], point: Sequence[SX]) -> Function:
+def held_by(function: Function, values: WatchedCrossings, point: Sequence[SX]) -> Function:
     """A function of (t, x, z, u, p) that takes the modes of crossings at the end of p.
 
     Args:
         function: state equation; its p may end with other modes.
-        values: sides and counts at the point.
+        values: crossings at the point; laws of contacts, which do not jump, have no side.
         point: t, x, z, u and p, without modes.
     """
-    sides, counts = values
+    sides, counts = values.sides, values.counts
     k = sides.numel() + counts.numel()
     if not k:
         return function
@@ -392,7 +435,8 @@ def held_by(function: Function, values: Sequence[SX], point: Sequence[SX]) -> Fu
     before = SX.sym("before", function.numel_in(4) - p.numel())
     modes = SX.sym("own", GUARD_MODES * k)
     at, inputs = [*others, casadi.vertcat(p, before)], [*others, casadi.vertcat(p, before, modes)]
-    return hold_sides(function, at, casadi.vertcat(sides, counts), modes, counts.numel(), inputs)
+    every, loose = casadi.vertcat(sides, counts), values.approaches.shape[0]
+    return hold_sides(function, at, every, modes, counts.numel(), inputs, loose=loose)
 
 
 def with_more_modes(function: Function, count: int) -> Function:

@@ -215,6 +215,8 @@ class MinimalEvents:
         indicators: `indicators(t, x, z, u, p) -> g`, (k, 1), positive between events.
         jump: `jump(t, x, z, u, p, fired) -> (x, modes)` after an event; fired (k, 1) is 1 for each
             indicator that is not positive, 0 for the others.
+        approaches: `approaches(t, x, z, u, p) -> a`, (k, 3) as `Events` of `mbs.solvers` has them;
+            None where all are zero.
     """
 
     modes: tuple[str, ...]
@@ -222,6 +224,7 @@ class MinimalEvents:
     first: Function
     indicators: Function
     jump: Function
+    approaches: Function | None = None
 
 
 @dataclass(frozen=True, slots=True)

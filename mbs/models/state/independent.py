@@ -29,6 +29,7 @@ from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_dynamics import bias
 from mbs.models.joint_wrenches import shown_outputs
 from mbs.models.state.crossings import (
+    WatchedCrossings,
     drive_crossings,
     held_by,
     join_crossings,
@@ -433,7 +434,7 @@ def with_laws(
         t, x, z, inputs, p = point
         _, _, others, w = _parts(inputs, wiring.sizes)
         q, v = equations.motion.call([t, x, z, _fill(wiring, SX, others), p])
-        values = crossings.call([t, q, v, w, p])
+        values = WatchedCrossings(*crossings.call([t, q, v, w, p]))
         events = join_crossings(events, values, point, "controller")
         rhs = held_by(rhs, values, point)
     return StateEquations(rhs=rhs, motion=equations.motion, events=events, sizes=wiring.sizes[:3])
@@ -456,6 +457,7 @@ def _events(wiring: _Wiring, events: MinimalEvents | None) -> MinimalEvents | No
         first=_idle(wiring, events.first),
         indicators=_driven(wiring, events.indicators),
         jump=_driven(wiring, events.jump),
+        approaches=None if events.approaches is None else _driven(wiring, events.approaches),
     )
 
 

@@ -556,6 +556,8 @@ class FullState:
         passage: for steps through singular configurations of the loops; None where there are none.
         crossings: `crossings(t, x, p)`, what passes through zero where laws jump or bend; None
             where there is nothing. First those that components give, then sides, then counts.
+        approaches: `approaches(t, x, p)`, (k, 2) the speeds and paces of the first crossings, as
+            `Approach` has them; None where all are zero.
         sides: number of the crossings that may stay at zero or pass it without end, such as the
             velocity in a law of dry friction.
         counts: number of the last crossings, at whose whole numbers laws jump.
@@ -571,6 +573,7 @@ class FullState:
     events: tuple[Function, Function] | None = None
     passage: Passage | None = None
     crossings: Function | None = None
+    approaches: Function | None = None
     sides: int = 0
     counts: int = 0
     short: bool = False
@@ -626,7 +629,9 @@ def full_state(
     p = casadi.vertcat(p, contact.values) if contact else p
     signals = effort, inputs
     timing, sides, counts, short = _law_conditions(system, (t, q, v), u, signals, motions, parts)
-    crossed = casadi.vertcat(parts.crossings(), sides, counts)
+    bends = parts.crossings()
+    crossed = casadi.vertcat(SX(0, 1), *(one.value for one in bends), sides, counts)
+    approaches = parts.approaches(bends)
     rate, *observed = with_inputs(system, [rate, *observed], u)
     return FullState(
         rhs=dense_function("rhs", [t, x, p], [rate]),
@@ -637,7 +642,12 @@ def full_state(
         crossings=dense_function("crossings", [t, x, p], [crossed]) if crossed.numel() else None,
         sides=sides.numel(),
         counts=counts.numel(),
-        short=short or parts.crossings().numel() > 0,
+        approaches=(
+            None
+            if approaches.is_zero() or not approaches.numel()
+            else dense_function("approaches", [t, x, p], [with_inputs(system, [approaches], u)[0]])
+        ),
+        short=short or len(bends) > 0,
         timing=timing,
     )
 
@@ -669,8 +679,7 @@ def _law_conditions(
     found = conditions_of(casadi.vertcat(SX(0, 1), *values), t, q, constants)
     own = conditions_of(parts.laws(), SX(0, 1), q, constants)
     crossings, counts = with_inputs(system, own.crossings, u), with_inputs(system, own.counts, u)
-    given = parts.crossings()
-    known = casadi.vertsplit(given) if given.numel() else []
+    known = [one.value for one in parts.crossings()]
     states = casadi.vertcat(q, v, system.z)
     results = []
     for every, others, of_time in (

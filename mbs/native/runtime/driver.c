@@ -5,6 +5,8 @@
  *   MBS_RODAS    mbs_jacobian(t, x, p) -> (d rhs / d x, d rhs / d t); else Dormand and Prince
  *   MBS_EVENTS   mbs_indicators(t, x, p) and mbs_rates(t, x, p), as many values each, and
  *                mbs_jump(t, x, p, fired) -> (x, modes); the modes are the last of p
+ *   MBS_APPROACHES  mbs_approaches(t, x, p) -> three columns, as many values each, as events.h has
+ *                them
  *   MBS_PASSAGE  mbs_rows, mbs_forces and mbs_regularity, as passage.h has them
  */
 #include <math.h>
@@ -49,6 +51,9 @@ GENERATED(mbs_jacobian);
 GENERATED(mbs_indicators);
 GENERATED(mbs_rates);
 GENERATED(mbs_jump);
+#endif
+#ifdef MBS_APPROACHES
+GENERATED(mbs_approaches);
 #endif
 #ifdef MBS_PASSAGE
 GENERATED(mbs_rows);
@@ -126,6 +131,15 @@ static int indicators(void *user, double t, const double *x, double *values) {
 static int rates(void *user, double t, const double *x, double *values) {
     return call(user, mbs_rates, t, x, values, NULL);
 }
+
+#ifdef MBS_APPROACHES
+static int approaches(void *user, double t, const double *x, double *values) {
+    return call(user, mbs_approaches, t, x, values, NULL);
+}
+#define APPROACHES approaches
+#else
+#define APPROACHES NULL
+#endif
 
 static int jump(void *user, double t, double *x, const double *fired) {
     driver *d = user;
@@ -213,6 +227,9 @@ static void sizes(integer *size) {
 #endif
 #ifdef MBS_EVENTS
         mbs_indicators_work, mbs_rates_work,    mbs_jump_work,
+#endif
+#ifdef MBS_APPROACHES
+        mbs_approaches_work,
 #endif
 #ifdef MBS_PASSAGE
         mbs_rows_work,       mbs_forces_work,   mbs_regularity_work,
@@ -312,7 +329,7 @@ EXPORT double mbs_step(const driver *d) { return stepper_wanted_step(&d->solver)
 #ifdef MBS_EVENTS
 /* Before mbs_begin. 1: out of memory. */
 EXPORT int mbs_watch(driver *d, int count, int n_modes) {
-    static const events_model model = {indicators, rates, jump};
+    static const events_model model = {indicators, rates, jump, APPROACHES};
     size_t memory = (size_t)EVENTS_MEMORY(count), work = (size_t)EVENTS_WORK(d->solver.n, count);
     double *first;
     d->event_work = array((size_t)n_modes + memory + work, sizeof *d->event_work);

@@ -11,6 +11,16 @@ static const double DEPARTURE = 1e-8; /* part of a step in which what rises may 
  * step saw behind the event counts with its square there. */
 static const double AT_START = 1e-3;
 
+static const double NEAR = 0.5;    /* product of pace and time between two looks, at most: half an
+                                    * obstacle, or half a radian of a turn */
+static const double FASTER = 1.25; /* the speed between two looks, over that at the looks */
+static const double FALL = 0.85;   /* part of the time to zero until the next look: 2 / (1 + FASTER)
+                                    * would just be near enough */
+static const double FULL = 0.98;   /* part of the time of NEAR, likewise: the pace may grow a little */
+static const double OFF = 0.1;     /* part of an indicator by which it may leave the curve of the
+                                    * step, and multiple of the tolerance */
+static const double SHORTER = 0.75; /* part of a step that missed a law, at most, of the next try */
+
 /* offsets in memory; then k values each of */
 enum { LAST, IDLE, PENDING, UNSEEN, ARRAYS };
 static double *kept(const events *e, int i) {
@@ -32,6 +42,14 @@ static double *middle(const events *e) { return part(e, 1); }
 static double *right_rate(const events *e) { return part(e, 2); }
 static double *middle_rate(const events *e) { return part(e, 3); }
 static double *at_start(const events *e) { return part(e, 4); } /* which could fire there */
+/* approaches, 3 columns each of */
+static double *left_near(const events *e) { return part(e, 5); }
+static double *right_near(const events *e) { return part(e, 8); }
+/* indicators and their rates at both ends of the step */
+static double *first_value(const events *e) { return part(e, 11); }
+static double *first_rate(const events *e) { return part(e, 12); }
+static double *last_value(const events *e) { return part(e, 13); }
+static double *last_rate(const events *e) { return part(e, 14); }
 static void copy(const events *e, double *to, const double *from) {
     memcpy(to, from, sizeof(double) * (size_t)e->count);
 }
@@ -43,6 +61,7 @@ void events_init(events *e, stepper *solver, int count, const events_model *mode
     e->model = model;
     e->memory = memory;
     e->work = work;
+    e->near_at = NAN;
 }
 
 int events_pending(const events *e) { return e->memory[PENDING] > 0.0; }
@@ -77,6 +96,7 @@ static void arm(const events *e, const double *values) {
 
 /* The indicators at the present time, before it is known which of them are due. */
 static int look_here(events *e, const double *x) {
+    e->near_at = NAN;
     e->memory[PENDING] = e->memory[UNSEEN] = 0.0;
     return look(e, x, stepper_time(e->solver), left(e), left_rate(e));
 }
@@ -225,15 +245,115 @@ static int may_repeat(const stepper *s, double start, double event) {
            !s->kept_closed;
 }
 
-/* The first event in the step from start, with the indicators there at the right; HUGE_VAL: none. */
-static int first_event(events *e, const double *x, double start, double *event) {
+/* Approaches at the place of the last look. */
+static int look_near(const events *e, double t, double *near) {
+    if (e->model->approaches(e->solver->user, t, e->work, near)) return EVENTS_INDICATORS_FAILED;
+    return stepper_all_finite(near, 3 * e->count) ? STEPPER_OK : EVENTS_INDICATORS_FAILED;
+}
+
+static double pace(const events *e, int k) {
+    return fmax(left_near(e)[e->count + k], right_near(e)[e->count + k]);
+}
+
+static void move_near(events *e, double t) {
+    memcpy(left_near(e), right_near(e), 3 * sizeof(double) * (size_t)e->count);
+    e->near_at = t;
+}
+
+/* Approaches at both ends of the step from start; *fast: whether they change within it, with the
+ * indicators at both ends. */
+static int look_at_ends(events *e, const double *x, double start, int *fast) {
+    double end = stepper_time(e->solver);
+    int k, status = STEPPER_OK;
+    if (e->near_at != start) {
+        status = stepper_state(e->solver, x, start, e->work);
+        if (!status) status = look_near(e, start, left_near(e));
+    }
+    if (!status) status = stepper_state(e->solver, x, end, e->work);
+    if (!status) status = look_near(e, end, right_near(e));
+    for (k = 0; k < e->count; k++) *fast |= pace(e, k) * (end - start) > NEAR;
+    if (status || !*fast) return status;
+    status = look(e, x, start, first_value(e), first_rate(e));
+    return status ? status : look(e, x, end, last_value(e), last_rate(e));
+}
+
+/* Whether no indicator can have fallen to zero and risen in a time between the looks. */
+static int are_near(const events *e, double a, double b) {
+    double width = b - a, least_width = 1e-3 * stepper_last_step(e->solver);
+    int k;
+    if (width <= 4 * DBL_EPSILON * fmax(fabs(b), least_width)) return 1;
+    for (k = 0; k < e->count; k++) {
+        double speed = FASTER * fmax(left_near(e)[k], right_near(e)[k]);
+        if (pace(e, k) * width <= NEAR) continue;
+        if (left(e)[k] > 0.0 && right(e)[k] > 0.0 && left(e)[k] + right(e)[k] > speed * width)
+            continue;
+        return 0;
+    }
+    return 1;
+}
+
+/* Time to the next look that is likely to be near enough, from the left one. */
+static double time_to_next(const events *e) {
+    double least_time = HUGE_VAL;
+    int k;
+    for (k = 0; k < e->count; k++) {
+        double rate = left_near(e)[e->count + k], speed = left_near(e)[k], time = 0.0;
+        if (rate == 0.0) continue;
+        if (left(e)[k] > 0.0 && speed > 0.0) time = FALL * left(e)[k] / speed;
+        least_time = fmin(least_time, fmax(time, FULL * NEAR / rate));
+    }
+    return least_time;
+}
+
+/* Move the right look at *b towards a until both are near. */
+static int come_near(const events *e, const double *x, double a, double *b) {
+    int status = look_near(e, *b, right_near(e));
+    while (!status && !are_near(e, a, *b)) {
+        *b = a + 0.5 * (*b - a);
+        status = look(e, x, *b, right(e), right_rate(e));
+        if (!status) status = look_near(e, *b, right_near(e));
+    }
+    return status;
+}
+
+/* Whether the indicators on which the equations depend are at t where the cubic through the ends of
+ * the step has them. */
+static int follows(const events *e, double start, double t) {
+    const stepper *s = e->solver;
+    double h = stepper_time(s) - start, u = (t - start) / h, w = 1.0 - u;
+    int k;
+    if (s->fixed > 0.0 || s->kept_closed || t >= stepper_time(s)) return 1;
+    for (k = 0; k < e->count; k++) {
+        double low = first_value(e)[k], high = last_value(e)[k], curve, size;
+        if (right_near(e)[2 * e->count + k] == 0.0 || pace(e, k) * h <= NEAR) continue;
+        curve = w * w * ((1.0 + 2.0 * u) * low + u * h * first_rate(e)[k]) +
+                u * u * ((1.0 + 2.0 * w) * high - w * h * last_rate(e)[k]);
+        size = fmax(fmax(fabs(low), fabs(high)), 100.0 * s->atol);
+        if (fabs(right(e)[k] - curve) > OFF * size) return 0;
+    }
+    return 1;
+}
+
+/* The first event in the step from start, with the indicators there at the right; HUGE_VAL: none.
+ * again: where a shorter step ends, if this one has missed a part of a law; HUGE_VAL: it has not. */
+static int first_event(events *e, const double *x, double start, double *event, double *again) {
     double from = start, end = stepper_time(e->solver);
-    int number = 1, status = STEPPER_OK;
-    *event = HUGE_VAL;
+    int number = 1, near = 0, status = STEPPER_OK;
+    if (e->model->approaches) status = look_at_ends(e, x, start, &near);
+    *event = *again = HUGE_VAL;
     while (!status && from < end) {
-        double next = number < LOOKS ? start + number * (end - start) / LOOKS : end, to = next;
+        double next = number < LOOKS ? start + number * (end - start) / LOOKS : end;
+        double to = near ? fmin(next, from + time_to_next(e)) : next;
+        if (to <= from) to = next; /* a time below its rounding */
         status = from > start ? look(e, x, to, right(e), right_rate(e))
                               : first_look(e, x, start, &to);
+        if (near && !status) {
+            status = come_near(e, x, from, &to);
+            if (!status && !follows(e, start, to)) {
+                *again = fmin(to, start + SHORTER * (end - start));
+                return STEPPER_OK;
+            }
+        }
         if (!status) status = find_dips(e, x, from, &to);
         if (status) return status;
         if (least(e, right(e)) <= 0.0) {
@@ -243,9 +363,11 @@ static int first_event(events *e, const double *x, double start, double *event) 
         arm(e, right(e));
         copy(e, left(e), right(e));
         copy(e, left_rate(e), right_rate(e));
+        if (near) move_near(e, to);
         if (to == next) number++;
         from = to;
     }
+    if (e->model->approaches && !near && !status) move_near(e, end);
     return status;
 }
 
@@ -258,21 +380,26 @@ static int stop_at_event(events *e, double *x, double event) {
 
 int events_step(events *e, double *x, double limit) {
     stepper *s = e->solver;
-    double start = stepper_time(s), event = HUGE_VAL;
-    int status;
+    double start = stepper_time(s), event = HUGE_VAL, again = HUGE_VAL;
+    int status, repeats = 0;
     if (stepper_pass_stop(s)) events_restart(e);
     status = events_look(e, x);
     if (status || events_pending(e)) return status;
     copy(e, at_start(e), armed(e));
     status = stepper_step(s, x, limit);
-    if (!status) status = first_event(e, x, start, &event);
-    if (!status && event < HUGE_VAL && may_repeat(s, start, event)) {
-        /* its stages behind the event are of other laws: once more, as far as the event alone */
+    if (!status) status = first_event(e, x, start, &event, &again);
+    while (!status) {
+        double end = again;
+        if (again == HUGE_VAL) {
+            /* its stages behind the event are of other laws: once more, as far as the event alone */
+            if (event == HUGE_VAL || repeats++ || !may_repeat(s, start, event)) break;
+            end = event;
+        }
         status = stepper_rewind(s, x, start);
         if (!status) status = look(e, x, start, left(e), left_rate(e));
         copy(e, armed(e), at_start(e));
-        if (!status) status = stepper_step(s, x, event);
-        if (!status) status = first_event(e, x, start, &event);
+        if (!status) status = stepper_step(s, x, end);
+        if (!status) status = first_event(e, x, start, &event, &again);
     }
     return status || event == HUGE_VAL ? status : stop_at_event(e, x, event);
 }

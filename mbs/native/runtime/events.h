@@ -12,7 +12,15 @@
  * The indicators and their slopes are looked at twice in each step. What falls at one look and rises
  * at the next may have been below zero between them: tangents show where to look again.
  *
- * Source: Cellier and Kofman 2006, chapter 9; Dowell and Jarratt 1971 for the location.
+ * `approaches` has for each indicator the bound of its rate at the present speed, the reciprocal of
+ * the shortest time in which it falls to zero and rises again, and 1 where the equations depend on
+ * it. Such an indicator is looked at until two looks are so near each other that it cannot have
+ * fallen to zero between them, or has not had the time to. Where the equations depend on one that
+ * leaves the curve which both ends of the step give, the step has missed a part of their law: it is
+ * made once more, to that look.
+ *
+ * Source: Cellier and Kofman 2006, chapter 9; Dowell and Jarratt 1971 for the location; Mirtich 1996
+ * for looks by the bound of the rate.
  */
 #ifndef MBS_EVENTS_H
 #define MBS_EVENTS_H
@@ -20,7 +28,7 @@
 #include "stepper.h"
 
 #define EVENTS_MEMORY(k) (4 + 6 * (k))
-#define EVENTS_WORK(n, k) ((n) + 5 * (k))
+#define EVENTS_WORK(n, k) ((n) + 15 * (k))
 
 enum {
     EVENTS_FIRED = -1, /* an event has just been settled; a table ends there: call again */
@@ -39,6 +47,7 @@ typedef int (*events_jump)(void *user, double t, double *x, const double *fired)
 typedef struct {
     events_values indicators, rates;
     events_jump jump;
+    events_values approaches; /* NULL, or 3 columns: see above */
 } events_model;
 
 /* memory, which the caller owns, holds all that one step hands to the next, as in the stepper. */
@@ -47,6 +56,7 @@ typedef struct {
     int count;
     const events_model *model;
     double *memory, *work;
+    double near_at; /* time at which the approaches of the last look are known; NAN: none */
 } events;
 
 void events_init(events *e, stepper *solver, int count, const events_model *model, double *memory,

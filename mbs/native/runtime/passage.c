@@ -34,6 +34,11 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
 #define BREAK 0.01
 /* Rounding of u' for accelerations of size one and sigma one: it is added to the tolerance. */
 #define NOISE 3e-16
+/* A step that begins further away is refused if a stage comes so near the singular configuration that its rounding exceeds
+ * this multiple of atol, half a tolerance: the next length passes it between two stages. */
+#define DODGED 15.0
+#define DODGES 8 /* refused steps in a row after which more rounding is accepted: 0.83^8 = 0.2 */
+#define MOST_NOISE 1000.0 /* the same after them: 40 tolerances */
 /* Where a guide chooses the branch: the largest move from it onto the rows [rad or m], part of its
  * velocities by which others may differ, and the least velocity of which that is a part. On another
  * branch velocities differ by about their own size. */
@@ -116,6 +121,7 @@ struct passage {
     double alignment; /* of the tangents with those of the chart: 1 at its origin, 0 across */
     int d, ready, charted, kept, singular, lasting;
     int opened; /* the full step is, at the present state */
+    int dodges; /* steps refused since the last one, for the rounding of a stage */
     int missed; /* branches that come near each other were met since the last full step */
 };
 
@@ -959,6 +965,9 @@ static int jumps(passage *g, double t, const double *x, double h, const double *
     return sqrt(gap) > AWAY * FLOOR * g->memory[SIGMA];
 }
 
+/* Rounding of a change of velocities at a part of the largest sigma. */
+static double rounding(double change, double sigma) { return NOISE * change / (sigma * sigma); }
+
 static int chart_attempt(passage *g, const double *x, double h) {
     stepper *s = g->s;
     double t = stepper_time(s), a = 0.0, *candidate = stepper_candidate(s);
@@ -990,7 +999,12 @@ static int chart_attempt(passage *g, const double *x, double h) {
     }
     if (left_branch(g, candidate, g->at, h, a)) return STEPPER_CHART_LEFT;
     error_of(g, h, stepper_trial(s));
-    s->noise = NOISE * h * a / (g->sigma * g->sigma);
+    s->noise = rounding(h * a, g->sigma);
+    if (!begun && !s->cut && !g->missed && rounding(h * a, g->base.sigma / g->memory[SIGMA]) < DODGED * s->atol &&
+        s->noise > (g->dodges < DODGES ? DODGED : MOST_NOISE) * s->atol) {
+        g->dodges++;
+        return STEPPER_ENDS_SINGULAR;
+    }
     s->kept_closed = 1;
     return STEPPER_OK;
 }
@@ -1038,6 +1052,7 @@ static void keep(stepper *s, const double *x, double h) {
     m[REGULARITY] = value;
     m[SEEN_TIME] = t;
     g->kept = g->charted;
+    g->dodges = 0;
     if (!g->charted) {
         g->inner->keep(s, x, h);
         return;

@@ -126,7 +126,8 @@ core_status core_get_indicators(core *c, double *indicators, size_t n) {
         !counted(c, indicators, n, NK + NC, "event indicators"))
         return CORE_ERROR;
 #if MODEL_TREE_OUTSIDE
-    status = charts_show_indicator(c);
+    status = core_show_indicators(c);
+    if (!status) status = charts_show_indicator(c);
     indicators[NK] = c->m.values[CHART];
 #else
     status = core_show_indicators(c);

@@ -224,9 +224,18 @@ int core_init_solver(core *c) {
     return 0;
 }
 
+#ifdef MODEL_APPROACHES
+/* Step behind an event [s], from which steps grow tenfold: a contact is met at any speed before two
+ * bodies are through each other. */
+static const double AFTER_CONTACT = 1e-9;
+#endif
+
 void core_prepare_solver(core *c) {
     c->solver.rtol = c->solver.atol = c->m.tolerance;
 #ifdef MODEL_MAX_STEP
     c->solver.h_max = MODEL_MAX_STEP;
+#endif
+#ifdef MODEL_APPROACHES
+    c->solver.afresh = AFTER_CONTACT;
 #endif
 }

@@ -120,6 +120,7 @@ core_status core_step(core *c, double limit) {
     if (!status && !ON_TREE(c) && !c->m.watched.on) status = guard_restart(c);
     if (status) return status;
 #if NK > 0
+    c->events.near_at = NAN; /* the state may be another one */
     stopped = events_step(&c->events, x, limit);
 #else
     stopped = stepper_step(&c->solver, x, limit);
@@ -163,6 +164,25 @@ static int rates(void *user, double t, const double *x, double *rise) {
     return CALL(ON_TREE(c), rates);
 }
 
+/* Integrators outside that have charts need no events of contacts, which stay positive. */
+#if MODEL_TREE_OUTSIDE
+#define MODEL_CHARTS_ALONE 1
+#else
+#define MODEL_CHARTS_ALONE 0
+#endif
+
+#ifdef MODEL_APPROACHES
+static int approaches(void *user, double t, const double *x, double *near) {
+    core *c = user;
+    if (place(c, &t, x)) return 1;
+    c->res[0] = near;
+    return CALL(ON_TREE(c), approaches);
+}
+#define APPROACHES approaches
+#else
+#define APPROACHES NULL
+#endif
+
 static int jump(void *user, double t, double *x, const double *fired) {
     core *c = user;
     double next[MOST(NX, NT) + 1], modes[NM + 1];
@@ -177,7 +197,7 @@ static int jump(void *user, double t, double *x, const double *fired) {
 }
 
 void core_init_events(core *c) {
-    static const events_model model = {indicators, rates, jump};
+    static const events_model model = {indicators, rates, jump, APPROACHES};
     events_init(&c->events, &c->solver, NK, &model, c->m.events, c->event_work);
 }
 
@@ -215,6 +235,7 @@ static void set_offsets(core *c) {
 
 core_status core_start_events(core *c) {
     int status;
+    if (MODEL_CHARTS_ALONE && !c->m.cosimulation) return CORE_OK;
     synchronize(c);
     status = events_start(&c->events, moving(c));
     if (status) return step_failed(c, status);
@@ -258,6 +279,10 @@ core_status core_show_indicators(core *c) {
     core_status status = core_refresh(c);
     int k, tree = ON_TREE(c) && !(c->m.mode & (INSTANTIATED | INITIALIZATION));
     if (status) return status;
+    if (MODEL_CHARTS_ALONE && !c->m.cosimulation) {
+        for (k = 0; k < NK; k++) shown[k] = 1.0;
+        return CORE_OK;
+    }
     core_point(c, &c->m.time, tree ? moving(c) : c->m.values + STATES, c->m.values + DEPENDENTS);
     c->res[0] = shown;
     if (CALL(tree, indicators))

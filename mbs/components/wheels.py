@@ -1,0 +1,79 @@
+"""Wheels that roll without slipping, several on one axle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import casadi
+from casadi import SX
+
+from mbs.components import custom
+from mbs.components.custom import Custom, Row
+
+
+class WheelSet(Custom):
+    """Two wheels on one axle that roll on a plane without slipping.
+
+    The plane is z = 0 of the frame `ground`, whose z points to the wheels. The axle is y of the
+    frame `axle`, whose origin is the middle between the wheels; the left wheel is at y > 0. Two
+    rows of positions keep the axle at the height of the radius and parallel to the plane. Three
+    rows of velocities, in the direction of travel and along the axle, forbid slip: they are
+    independent at every heading. The wheels themselves are bodies on revolute joints about y.
+
+    Source: Modelica Association 2023, `Joints.RollingWheelSet`, whose axle does not pitch.
+
+    Attributes:
+        ground: the plane.
+        axle: of the body that carries the wheels.
+        left: name of the coordinate of the left wheel, its angle relative to `axle` about y.
+        right: likewise of the right wheel.
+        radius: of the wheels [m].
+        track: distance of the wheels [m].
+        force_left: force of the ground on the left wheel in the direction of travel [N].
+        force_right: likewise on the right wheel.
+        force_lateral: force of the ground on both wheels along the axle [N].
+        force_normal: force of the ground on both wheels away from the plane [N].
+    """
+
+    ground = custom.frame()
+    axle = custom.frame()
+    left = custom.coordinate()
+    right = custom.coordinate()
+    radius = custom.parameter("m", positive=True)
+    track = custom.parameter("m", positive=True)
+    force_left = custom.output("N")
+    force_right = custom.output("N")
+    force_lateral = custom.output("N")
+    force_normal = custom.output("N")
+
+    def rows(self, at: Any) -> Mapping[str, Row | SX]:
+        """The height of the axle, and its inclination."""
+        motion = at.ground.to(at.axle)
+        return {"height": motion.p[2] - at.radius, "level": Row(motion.R[2, 1], "1")}
+
+    def positive(self, at: Any) -> Mapping[str, SX]:
+        """The z axes of axle and plane may differ by any pitch below a right angle."""
+        return {"upright": at.ground.to(at.axle).R[2, 2]}
+
+    def velocity_rows(self, at: Any) -> Mapping[str, SX]:
+        """Velocities of the lowest points of the wheels, along the axle and in travel."""
+        motion = at.ground.to(at.axle)
+        axle = motion.R[:, 1]
+        ahead = casadi.vertcat(axle[1], -axle[0], SX(0))
+        speed, spin = casadi.dot(ahead, motion.V), casadi.dot(axle, motion.w)
+        turn = at.track / 2 * motion.w[2]
+        return {
+            "lateral": casadi.dot(axle, motion.V),
+            "left": speed - turn - at.radius * (spin + at.left.v),
+            "right": speed + turn - at.radius * (spin + at.right.v),
+        }
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The forces of the ground."""
+        return {
+            "force_left": at.lam["left"],
+            "force_right": at.lam["right"],
+            "force_lateral": at.lam["lateral"],
+            "force_normal": at.lam["height"],
+        }

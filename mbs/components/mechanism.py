@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
-from mbs.arguments import names_given
+from mbs.arguments import names_given, values_given
 from mbs.components.bodies import Mount, RigidBody, World, three
 from mbs.components.component import Component, Point, Rotation, in_rotated_axes
 from mbs.components.couplings import Coupling
@@ -128,14 +129,15 @@ def on_placed(point: Point, placed: Mapping[str, Component], scope: str) -> Poin
 C = TypeVar("C", bound=Component)
 
 
-_ATTRIBUTES = frozenset(
-    (
-        *("name", "source", "keep_order", "cuts", "guess", "notes", "numbered", "world"),
-        *("components", "connections", "shafts", "wires", "frames", "shapes", "values"),
-        *("_ports", "_counted"),
-    )
+_ATTRIBUTES: Mapping[str, type] = MappingProxyType(
+    {
+        **dict.fromkeys(("name", "source"), str),
+        **dict.fromkeys(("guess", "numbered", "components", "frames", "values"), dict),
+        **dict.fromkeys(("cuts", "notes", "connections", "shafts", "wires", "shapes"), list),
+        **{"world": World, "keep_order": bool, "_ports": set, "_counted": int},
+    }
 )
-"""Attributes of a mechanism."""
+"""Attributes of a mechanism, and what each of them is."""
 _NO_UNIT = "1"
 """Unit of a parameter whose unit is not given."""
 _COMPENSATIONS = "_gravcomp", "_gravity"
@@ -178,7 +180,7 @@ class Mechanism:
         self.source = source
         self.keep_order = keep_order
         self.cuts: list[str] = []
-        self.guess = dict(guess or {})
+        self.guess = values_given(f"{self.name}: guess", guess, '"j1": 0.3', DescriptionError)
         self.notes: list[Note] = []
         self.numbered: dict[int, str] = {}
         self.world = World(gravity=gravity)
@@ -191,7 +193,8 @@ class Mechanism:
         self.frames: dict[str, Point] = {}
         self.shapes: list[tuple[Point, Shape]] = []
         self.values: dict[str, Parameter | float] = {}
-        for symbol, value in (parameters or {}).items():
+        given = values_given(f"{self.name}: parameters", parameters, '"L1": 0.3', DescriptionError)
+        for symbol, value in given.items():
             self.values[symbol] = Parameter(symbol, value)
         if mount is not None:
             self.change_gravity(mount=mount)
@@ -200,7 +203,7 @@ class Mechanism:
         """Set an attribute. A class that derives from Mechanism may have attributes of its own.
 
         Raises:
-            DescriptionError: a mechanism has no attribute of this name.
+            DescriptionError: a mechanism has no attribute of this name, or it is something else.
         """
         is_plain = type(self) is Mechanism
         if is_plain and name not in _ATTRIBUTES and not hasattr(Mechanism, name):
@@ -212,6 +215,12 @@ class Mechanism:
             raise DescriptionError(
                 f"{self.name}: gravity cannot be set; give gravity= to Mechanism or mbs.load, or"
                 " call change_gravity"
+            )
+        kind = _ATTRIBUTES.get(name, object)
+        if not isinstance(value, kind):
+            raise DescriptionError(
+                f"{self.__dict__.get('name', 'mechanism')}: {name} is {quoted(value)}; give a"
+                f" {kind.__name__}"
             )
         super().__setattr__(name, value)
 

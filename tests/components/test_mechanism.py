@@ -301,6 +301,22 @@ def test_unknown_attributes_are_refused():
     assert m.guess == {"j": 0.1}
 
 
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: mbs.Mechanism("m", parameters=5), "m: parameters is 5; give a dict such as"),
+        (lambda: mbs.Mechanism("m", parameters=["M"]), "m: parameters is ['M']; give a dict"),
+        (lambda: mbs.Mechanism("m", guess=5), "m: guess is 5; give a dict such as"),
+        (lambda: mbs.Mechanism("m", source=5), "m: source is 5; give a str"),
+        (lambda: setattr(mbs.Mechanism("m"), "guess", 5), "m: guess is 5; give a dict"),
+        (lambda: setattr(mbs.Mechanism("m"), "world", "w"), "m: world is 'w'; give a World"),
+        (lambda: setattr(mbs.Mechanism("m"), "cuts", "j"), "m: cuts is 'j'; give a list"),
+    ],
+)
+def test_attributes_of_another_kind_are_refused(call, message):
+    refused(DescriptionError, message, by=call)
+
+
 def test_derived_classes_have_attributes_of_their_own():
     class Arm(mbs.Mechanism):
         def __init__(self):

@@ -4,6 +4,7 @@ import contextlib
 import ctypes
 import functools
 import hashlib
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -84,6 +85,7 @@ def compiled(
         result: Any = with_array_calls(casadi.Function(function), None, like)
     else:
         code = casadi.external(function.name(), str(library))
+        _compiled_names.add(function.name())
         plain = functools.partial(compiled, derivatives=0)
         result = with_array_calls(code, library, like, plain)
     again = functools.partial(compiled, derivatives=derivatives, fast=fast, loops=loops)
@@ -346,12 +348,20 @@ def _machine_code_in(function: casadi.Function) -> list[str]:
     ]
 
 
+_compiled_names: set[str] = set()
+"""Names of the Functions that `compiled` returned in this process; users may link other external
+functions themselves."""
+_DERIVED = re.compile(r"^((jac|fwd\d+|adj\d+)_)*")
+"""Prefixes of the names of derivatives."""
+
+
 def _require_equations(function: casadi.Function) -> None:
-    """Raise ModelError if a Function calls machine code.
+    """Raise ModelError if a Function calls one that `compiled` returned.
 
     C text would refer to symbols of a library that nothing loads, which ends the process.
     """
-    names = _machine_code_in(function)
+    called = _machine_code_in(function)
+    names = [name for name in called if _DERIVED.sub("", name) in _compiled_names]
     if names:
         raise ModelError(
             f"{function.name()}: it calls {', '.join(names)}, which is machine code of this"

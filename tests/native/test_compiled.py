@@ -183,6 +183,9 @@ def test_machine_code_is_not_written_as_c(tmp_path, monkeypatch, write):
         write(problem, *arguments)
     plain = ca.Function("problem", [x, p], [ca.sumsqr(example()(x, p)[0])])
     assert "example_incref" not in mbs.native.c_source(plain)
+    # C of an external function that the user made may be linked by the user
+    monkeypatch.setitem(compiled.__globals__, "_compiled_names", set())
+    assert "example_incref" in mbs.native.c_source(problem)
 
 
 def test_two_processes_may_build_at_once(tmp_path):

@@ -434,7 +434,7 @@ class HandedLoop:
         loop, pencil = prepared.arrangement, prepared.pencil
         elimination = pencil.elimination
         self.arm = handed_of(arm)
-        self.next = None
+        self.next: HandedLoop | None = None
         if prepared.others:
             first, *others = prepared.others
             self.next = HandedLoop(arm, replace(first, others=tuple(others)))
@@ -460,7 +460,7 @@ class HandedLoop:
             None if square else self.mix.ctypes.data,
             None if self.next is None else self.next.address,
         )
-        self.address = ctypes.addressof(self.loop)
+        self.address: int = ctypes.addressof(self.loop)
 
 
 def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbers, Array]:

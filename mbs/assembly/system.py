@@ -204,7 +204,39 @@ def _loops(system: System) -> list[str]:
     if len(closure.motors) > closure.mobility:
         lines.append("  They are more than the mobility: which of them carries a load is a choice.")
     lines.append(f"The loops close to {closure.residual:.1e} at the assembled configuration.")
+    return [*lines, *_configuration(system, closure)]
+
+
+_SHOWN_POSITIONS, _SHOWN_MODES = 12, 3
+"""Most positions of a configuration, and other configurations, in a report."""
+
+
+def _configuration(system: System, closure: Closure) -> list[str]:
+    """The assembled configuration, the guess and other assembly modes."""
+
+    def shown(q: Sequence[float]) -> str:
+        pairs = zip(system.coordinates, q, strict=True)
+        texts = [f"{c.name} = {x:.5g}" for c, x in pairs]
+        more = ", ..." if len(texts) > _SHOWN_POSITIONS else ""
+        return ", ".join(texts[:_SHOWN_POSITIONS]) + more
+
+    lines = [f"Assembled at {shown(system.configuration)}."]
+    at = dict(zip((c.name for c in system.coordinates), system.configuration, strict=True))
+    missed = [(name, x) for name, x in closure.guess if abs(at[name] - x) > _GUESSED]
+    if missed:
+        guesses = ", ".join(f"{name} = {x:.5g}" for name, x in missed[:_SHOWN_POSITIONS])
+        lines.append(f"  Guesses that are not met: {guesses}.")
+    lines += [f"  Another configuration: {shown(q)}." for q in closure.others[:_SHOWN_MODES]]
+    if closure.meets:
+        lines.append(
+            "  The configuration next to the guess is singular: branches of motion meet there."
+            " Guess more positions to choose another branch."
+        )
     return lines
+
+
+_GUESSED = 1e-9
+"""Difference from a guess that is met [rad or m]: closing moves no position that is locked."""
 
 
 def _parameters(system: System) -> list[str]:

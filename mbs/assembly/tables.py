@@ -187,6 +187,10 @@ class Closure:
             configuration, so that other rows may be independent elsewhere.
         gruebler: mobility by the Gruebler-Kutzbach count of rows.
         residual: largest closure residual at the assembled configuration.
+        guess: approximate positions by name that the user gave [rad or m].
+        others: further configurations with the same locked positions, (nq,) each.
+        meets: whether the configuration next to the guess is singular, so that branches of motion
+            meet there.
     """
 
     rows: tuple[int, ...]
@@ -198,6 +202,9 @@ class Closure:
     varies: bool
     gruebler: int
     residual: float
+    guess: tuple[tuple[str, float], ...] = ()
+    others: tuple[tuple[float, ...], ...] = ()
+    meets: bool = False
 
     @property
     def mobility(self) -> int:

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 
 from mbs.assembly import Closure, Coordinate, LoopRow, System
 from mbs.components import MotionJoint
-from mbs.errors import Unclosable
+from mbs.loops.assembled import assembled_configuration
 from mbs.loops.closing import Closing, closure_parameters, constraint_sizes, mechanism_size
 from mbs.loops.closure import row_groups
-from mbs.loops.configuration import closed_configuration
 from mbs.loops.velocity import constraint_jacobian
 from mbs.solvers.rank import dense, independent_rows, null_space_of, rank
 
@@ -53,7 +52,8 @@ def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] 
         Unclosable: no configuration closes the loops.
     """
     p = closure_parameters(system)
-    configuration = _assembled(system, guess, p)
+    assembled = assembled_configuration(system, guess, p)
+    configuration = assembled.q
     nearby = Closing(system, p).nearby(configuration, _REACH, _TRIES, _SEED)
     configurations = [configuration, *islice(nearby, _CONFIGURATIONS)]
     J = constraint_jacobian(system)
@@ -80,6 +80,9 @@ def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] 
         free=_free_positions(regular, kept, active),
         varies=_varies(regular, positions, kept),
         gruebler=system.nv - sum(len(rows) + len(slips) for rows, slips in labels),
+        guess=tuple((name, float(guess[name])) for name in _names(system) if name in guess),
+        others=tuple(tuple(q.tolist()) for q in assembled.others),
+        meets=ranks[0] < generic,
         residual=float(np.max(np.abs(Closing(system, p).rows(configuration)[0]), initial=0.0)),
     )
     return replace(
@@ -91,17 +94,6 @@ def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] 
         loops=_with_rows(system.loops, labels, kept),
         _cache={},
     )
-
-
-def _assembled(system: System, guess: Mapping[str, float], p: Matrix) -> Matrix:
-    """A closed configuration near the guess: motors held first, then everything free."""
-    known = {name: value for name, value in guess.items() if name in _names(system)}
-    start = np.array(system.position(known))
-    motors = tuple(k for k, c in enumerate(system.coordinates) if c.actuated)
-    try:
-        return closed_configuration(Closing(system, p, motors), start, restarts=10)
-    except Unclosable:
-        return closed_configuration(Closing(system, p), start)
 
 
 def _names(system: System) -> list[str]:

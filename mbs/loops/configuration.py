@@ -195,7 +195,7 @@ def _guessed_configuration(closing: Closing, start: Vector, named: list[int]) ->
         closed = closing.nearest(trial)
         if not closed.is_closed and found:
             continue
-        q = _unwound(closing, closed.q, start) if closed.is_closed else None
+        q = unwound(closing, closed.q, start) if closed.is_closed else None
         q = closed_configuration(closing, start) if q is None else q
         far = float(np.max(np.abs(q[named] - start[named]) / scales[named], initial=0.0))
         found.append((far, q))
@@ -204,7 +204,7 @@ def _guessed_configuration(closing: Closing, start: Vector, named: list[int]) ->
     return min(found, key=lambda pair: pair[0])[1]
 
 
-def _unwound(closing: Closing, q: Vector, start: Vector) -> Vector:
+def unwound(closing: Closing, q: Vector, start: Vector) -> Vector:
     """The configuration with angles within half a turn of the start, if that closes the loops."""
     near: Vector = start + difference(closing.system, q, start)
     for part in quaternion_slices(closing.system.tree):
@@ -350,7 +350,8 @@ def start_velocity(
 ) -> Vector:
     """(nv,) the velocities of `start` at its positions q.
 
-    They are the smallest that keep the loops closed and give the joints named in v0 theirs.
+    They are the smallest that keep the loops closed and give the joints named in v0 theirs. Springs
+    of joints stay at rest if the loops allow it.
 
     Raises:
         ModelError: no motion of the loops has these velocities.
@@ -358,7 +359,13 @@ def start_velocity(
     if not system.is_closed:
         return np.array(system.velocity(v0))
     p = [system.parameter_values(parameters)] if system.parameters else []
-    v, missed = smallest_velocity(system, np.array(closure_jacobian(system)(q, *p)), v0)
+    J = np.array(closure_jacobian(system)(q, *p))
+    if isinstance(v0, Mapping) and v0:
+        at_rest = dict.fromkeys(_spring_speeds(system), 0.0)
+        v, missed = smallest_velocity(system, J, {**at_rest, **v0}) if at_rest else (J, "none")
+        if not missed:
+            return v
+    v, missed = smallest_velocity(system, J, v0)
     if missed:
         raise ModelError(
             f"{system.name}: the loops allow no motion with the velocities {missed};"
@@ -366,6 +373,15 @@ def start_velocity(
             + ", ".join(system.speeds[k].name for k in system.active)
         )
     return v
+
+
+def _spring_speeds(system: System) -> list[str]:
+    """Names of the velocities of joints with springs."""
+    return [
+        system.speeds[link.v.start].name
+        for link in system.tree.links
+        if link.v.stop - link.v.start == 1 and not link.stiffness.is_zero()
+    ]
 
 
 def smallest_velocity(system: System, J: Vector, v0: Values) -> tuple[Vector, str]:

@@ -15,7 +15,7 @@ def four_bar() -> Mechanism:
         "four_bar",
         gravity=(0, -9.81, 0),
         source="Textbook mechanism; lengths, density and section are illustrative",
-        guess={"j2": 1.0},
+        guess={"j1": 0.0, "j2": 1.0},
     )
     a, b, c = (
         m.add(Box(name, length=length, width=0.05, density=2700))

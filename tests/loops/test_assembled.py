@@ -1,0 +1,98 @@
+"""Assembly near a guess: the nearest configuration, guesses that are met, springs at rest."""
+
+import numpy as np
+import pytest
+
+import mbs
+from mbs.components import Body, Box, Prismatic, Revolute
+
+
+def slider_crank():
+    m = mbs.Mechanism("slider_crank", gravity=(0, 0, 0))
+    crank = m.add(Box("crank", length=0.1, width=0.04, density=7850))
+    rod = m.add(Box("rod", length=0.4, width=0.03, density=7850))
+    slider = m.add(Body("slider", 1.0, inertia=(1, 1, 1)))
+    m.connect(m.world, Revolute("main", actuated=True), crank.left)
+    m.connect(crank.right, Revolute("big"), rod.left)
+    m.connect(rod.right, Revolute("small"), slider)
+    m.connect(m.world, Prismatic("slide", axis="x"), slider)
+    return m
+
+
+@pytest.mark.parametrize("main", np.linspace(0.1, 6.1, 16))
+def test_the_configuration_nearest_to_a_guess(main):
+    """Both configurations by hand: the rod swings by asin(0.25 sin main) to either side."""
+    system = slider_crank().assemble(guess={"main": main})
+    swing = np.arcsin(0.25 * np.sin(main))
+    modes = []
+    for big in (-main - swing, np.pi - main + swing):
+        slide = 0.1 * np.cos(main) + 0.4 * np.cos(main + big)
+        modes.append((main, (big + np.pi) % (2 * np.pi) - np.pi, slide))
+    assert len(system.closure.others) == 1
+    size = 2.0  # of the mechanism [m]: no decision here is closer than that
+    far = [max(abs(mode[1]), abs(mode[2]) / size) for mode in modes]
+    expected = modes[int(np.argmin(far))]
+    np.testing.assert_allclose(system.configuration, expected, rtol=0, atol=1e-9)
+
+
+def four_bar(joint):
+    m = mbs.Mechanism("four_bar", gravity=(0, 0, 0))
+    lengths = {"a": 0.4, "b": 0.5, "e": 0.5, "c": 0.9}
+    a, b, e, c = (m.add(Box(n, length=x, width=0.03, density=2700)) for n, x in lengths.items())
+    m.connect(m.world, Revolute("j1", actuated=True), a.left)
+    m.connect(a.right, Revolute("j2"), b.left)
+    m.connect(b.right, joint, e.left)
+    m.connect(e.right, Revolute("j3"), c.right)
+    m.connect(m.world.at(0.8), Revolute("j4"), c.left)
+    return m
+
+
+def test_springs_of_joints_stay_at_rest():
+    joint = Revolute("soft", stiffness=1e4, rest=0.1, actuated=False)
+    system = four_bar(joint).assemble(guess={"j1": 0.3, "j2": 1.0})
+    at = dict(zip((c.name for c in system.coordinates), system.configuration, strict=True))
+    assert at["soft"] == 0.1
+    assert at["j1"] == 0.3
+    result = mbs.simulate.run(system, 0.05, quiet=True)
+    assert np.abs(result["soft.v"]).max() < 1e-6
+
+
+def test_springs_of_joints_have_no_velocity_at_the_start():
+    joint = Revolute("soft", stiffness=1e4, actuated=False)
+    system = four_bar(joint).assemble(guess={"j1": 0.3})
+    result = mbs.simulate.run(system, 1e-3, v0={"j1": 5.0}, quiet=True)
+    assert abs(result["soft.v"][0]) < 1e-12
+    rigid = four_bar(mbs.components.Fixed("soft")).assemble(guess={"j1": 0.3})
+    stiff = mbs.simulate.run(rigid, 1e-3, v0={"j1": 5.0}, quiet=True)
+    assert result["j2.v"][0] == pytest.approx(stiff["j2.v"][0], rel=1e-9)
+
+
+def test_guessed_positions_are_met_if_the_others_can_follow():
+    joint = Revolute("free", actuated=False)
+    system = four_bar(joint).assemble(guess={"j2": 1.0, "free": 0.2})
+    at = dict(zip((c.name for c in system.coordinates), system.configuration, strict=True))
+    assert (at["j2"], at["free"]) == (1.0, 0.2)
+    assert mbs.loops.examine(system, system.configuration).is_closed
+
+
+def test_the_report_shows_the_configuration_and_the_guess():
+    report = slider_crank().assemble(guess={"main": 0.4, "big": 3.0, "slide": 0.7}).report()
+    assert "Assembled at main = 0.4, big = 2.8" in report
+    assert "Guesses that are not met: big = 3, slide = 0.7." in report
+    assert "Another configuration: main = 0.4, big = 5.7" in report
+
+
+def test_a_start_where_branches_meet_is_reported():
+    """A parallelogram that lies flat."""
+    m = mbs.Mechanism("flat", gravity=(0, 0, 0))
+    a, b, c = (
+        m.add(Box(n, length=x, width=0.03, density=2700))
+        for n, x in {"a": 0.3, "b": 0.8, "c": 0.3}.items()
+    )
+    m.connect(m.world, Revolute("j1", actuated=True), a.left)
+    m.connect(a.right, Revolute("j2"), b.left)
+    m.connect(b.right, Revolute("j3"), c.right)
+    m.connect(m.world.at(0.8), Revolute("j4"), c.left)
+    system = m.assemble()
+    assert system.closure.meets
+    assert "branches of motion meet there" in system.report()

@@ -1,9 +1,9 @@
-"""Checks of arguments that are lists of names or dicts of values."""
+"""Checks of arguments that are lists of names or dicts of values, and of attributes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from mbs.errors import MbsError, ModelError
 from mbs.text import quoted
@@ -64,3 +64,28 @@ def values_given(
     if not isinstance(value, Mapping):
         raise error(f"{title} is {quoted(value)}; give a dict such as {{{example}}}")
     return dict(value)
+
+
+class MadeOnce:
+    """Base of classes whose public attributes are set in the constructor and never again.
+
+    Attributes:
+        settings: names of the public attributes.
+    """
+
+    settings: ClassVar[tuple[str, ...]] = ()
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set a private attribute, or a public one for the first time.
+
+        Raises:
+            ModelError: the attribute is set already or does not exist; it would have no effect.
+        """
+        is_new = name in self.settings and name not in self.__dict__
+        if not name.startswith("_") and not is_new:
+            kind = type(self).__name__
+            raise ModelError(
+                f"{kind}: attribute {name!r} cannot be set, since a {kind} is prepared when it is"
+                f" made; make another {kind}, or give the value to the call"
+            )
+        super().__setattr__(name, value)

@@ -9,6 +9,7 @@ from casadi import SX
 
 from mbs.assembly.drive_line import drive_line, shaft_rows
 from mbs.assembly.graph import BodyGraph, connection_graph, spanning_tree
+from mbs.assembly.inertias import inertia_notes
 from mbs.assembly.khalil_frames import Cut, Framed, khalil_frames
 from mbs.assembly.parameter_bounds import bounded_fields, parameter_bounds
 from mbs.assembly.parts import (
@@ -34,7 +35,7 @@ from mbs.assembly.tables import (
 )
 from mbs.assembly.tree import zero_position
 from mbs.components import Box, Component, Cylinder, Free, Joint, Mechanism
-from mbs.components.bodies import Mount
+from mbs.components.bodies import Mount, RigidBody
 from mbs.errors import AssemblyError
 from mbs.expressions import Parameter, expression, to_float, to_sx
 from mbs.spatial import Pose
@@ -49,14 +50,16 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
 
     Raises:
         AssemblyError: the components do not form a mechanism.
+        DescriptionError: no body has the inertia of one that may rotate about several axes.
     """
     parameters = mechanism.parameters()
     known = {p.name: p.default for p in parameters if p.default is not None}
-    for component in mechanism.components.values():
-        component.check_values(known)
+    checked = [component.check_values(known) for component in mechanism.components.values()]
+    faulty = [body for body in checked if isinstance(body, RigidBody) and body.inertia_fault]
     described = [c for c in mechanism.components.values() if c.parameters()]
     bounds = parameter_bounds(described, parameters)
     line = drive_line(mechanism)
+    notes = mechanism.notes
     mechanism = with_unknowns(line.mechanism)
     symbols = {parameter.name: SX.sym(parameter.name) for parameter in parameters}
     graph = connection_graph(mechanism, symbols, _trial_values(parameters))
@@ -72,6 +75,8 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     framed = khalil_frames(mechanism, graph, spanning, symbols)
     places = _places(graph, framed)
     prove(mechanism, framed, places, symbols, _trial_values(parameters))
+    on_links = [(body, places[body.name, ""][0]) for body in faulty]
+    notes += [note for note in inertia_notes(framed.tree, on_links) if note not in notes]
     joints = {joint.name: joint for joint in mechanism.joints()}
     in_loops = _looped_joints(framed) | _driven_joints(mechanism)
     moving_links = [

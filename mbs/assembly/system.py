@@ -17,6 +17,7 @@ import numpy as np
 from casadi import DM, SX, Function
 
 from mbs.assembly.drive_line import ShaftRow
+from mbs.assembly.inertias import inertia_notes
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.parameter_bounds import BoundedField, Bounds
 from mbs.assembly.parts import AttachedPart, Quantity
@@ -34,6 +35,7 @@ from mbs.assembly.tables import (
 )
 from mbs.assembly.tree import Tree, position_rate
 from mbs.components import Component
+from mbs.components.bodies import RigidBody
 from mbs.errors import MbsError, ModelError
 from mbs.expressions import Parameter, out_of_bounds
 from mbs.files import PathLike
@@ -645,9 +647,12 @@ class System:
             for parameter, value in zip(self.parameters, p, strict=True)
             if not math.isnan(value)
         }
+        links = {row.name: row.link - 1 for row in self.bodies}
         for component in self.described:
             try:
-                component.check_values(values)
+                checked = component.check_values(values)
+                if isinstance(checked, RigidBody):
+                    inertia_notes(self.tree, [(checked, links.get(checked.name, -1))])
             except MbsError as error:
                 return str(error)
         for name, value in values.items():

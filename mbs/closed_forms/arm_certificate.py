@@ -25,6 +25,7 @@ from mbs.closed_forms.raghavan_roth.numbers import (
     Prepared,
     at,
     complex_roots,
+    for_poses,
     loop_length,
     middle_joints,
     motion_parts,
@@ -51,6 +52,7 @@ are parallel, which holds by structure and leaves 1e-14."""
 
 def complex_candidates(prepared: Prepared, T: Array) -> Complex:
     """(m, 6) complex configurations [rad or m] near which an arm may reach a pose T (4, 4) [m]."""
+    prepared = for_poses(prepared, T[None])[0][0]
     loop = prepared.arrangement
     ways = loop.all_ways(T[None])
     M = prepared.pencil.matrices(ways)

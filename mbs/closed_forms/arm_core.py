@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import functools
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
@@ -422,16 +423,21 @@ class _LoopStruct(ctypes.Structure):
         ("rank", _int),
         ("size", _int),
         ("mix", ctypes.c_void_p),
+        ("next", ctypes.c_void_p),
     )
 
 
 class HandedLoop:
-    """A prepared arm as C sees it; keeps the arrays alive that it points to."""
+    """A prepared arm as C reads it; keeps the arrays alive that it points to."""
 
     def __init__(self, arm: Arm, prepared: Prepared) -> None:
         loop, pencil = prepared.arrangement, prepared.pencil
         elimination = pencil.elimination
         self.arm = handed_of(arm)
+        self.next: HandedLoop | None = None
+        if prepared.others:
+            first, *others = prepared.others
+            self.next = HandedLoop(arm, replace(first, others=tuple(others)))
         self.mix = np.ascontiguousarray(pencil.mix, dtype=float)
         square = self.mix.shape[0] == self.mix.shape[1]
         parts = ("first", "second", "third", "fourth", "fifth")
@@ -452,8 +458,9 @@ class HandedLoop:
             pencil.rank,
             elimination.size,
             None if square else self.mix.ctypes.data,
+            None if self.next is None else self.next.address,
         )
-        self.address = ctypes.addressof(self.loop)
+        self.address: int = ctypes.addressof(self.loop)
 
 
 def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbers, Array]:
@@ -501,8 +508,7 @@ _TABLES = """\
 static const double FUNCTION_gaps[] = {gaps};
 static const unsigned char FUNCTION_prismatic[] = {slides};
 static const arm FUNCTION_arm = {arm};
-{mix}static const roth_loop FUNCTION_loop = {loop};
-static const long long FUNCTION_indices[] = {indices};
+{loops}static const long long FUNCTION_indices[] = {indices};
 static const double FUNCTION_others[] = {others};
 static const pose_solver FUNCTION_solver = {solver};
 
@@ -553,16 +559,13 @@ def general_function(
     nq, arm = len(others), handed.arm
     solver = SolverStruct(nearly=nearly, nq=nq)
     of_arm = {"gaps": "FUNCTION_gaps", "slides": "FUNCTION_prismatic"}
-    of_loop = {"mix": "FUNCTION_mix"} if handed.loop.mix else {}
-    of_solver = {"robot": "&FUNCTION_arm", "loop": "&FUNCTION_loop"}
+    of_solver = {"robot": "&FUNCTION_arm", "loop": "&FUNCTION_loop0"}
     of_solver |= {"indices": "FUNCTION_indices", "others": "FUNCTION_others"}
-    mix = _initializer(handed.mix.ravel())
     own = _TABLES.format(
         gaps=_initializer(arm.gaps.ravel()),
         slides=_initializer(arm.slides),
         arm=_initializer(arm.arm, of_arm),
-        mix=f"static const double FUNCTION_mix[] = {mix};\n" if handed.loop.mix else "",
-        loop=_initializer(handed.loop, of_loop),
+        loops=_loop_tables(handed),
         indices=_initializer(indices),
         others=_initializer(others),
         solver=_initializer(solver, of_solver),
@@ -582,6 +585,20 @@ def general_function(
     )
     work = _CANDIDATES * (nq + 3)
     return handwritten(signature, jacobian, own, _files(_SOURCES), work)
+
+
+def _loop_tables(handed: HandedLoop, number: int = 0) -> str:
+    """C text of a loop of an arm, after the text of the loops that take its place."""
+    owned, text = dict[str, str](), ""
+    if handed.next is not None:
+        text += _loop_tables(handed.next, number + 1)
+        owned["next"] = f"&FUNCTION_loop{number + 1}"
+    if handed.loop.mix:
+        mix = _initializer(handed.mix.ravel())
+        text += f"static const double FUNCTION_mix{number}[] = {mix};\n"
+        owned["mix"] = f"FUNCTION_mix{number}"
+    loop = _initializer(handed.loop, owned)
+    return f"{text}static const roth_loop FUNCTION_loop{number} = {loop};\n"
 
 
 def _initializer(value: Any, owned: Mapping[str, str] = MappingProxyType({})) -> str:

@@ -29,6 +29,13 @@ _ZERO = 1e-12
 was rotated: bodies that small are not described in kg and m."""
 
 
+GROUPED = (
+    "or grouped=True for base parameters, which are sums over several bodies (grouped = true in"
+    " TOML, the comment (* grouped 3 = 1 *) for frame 3 in a .par file)"
+)
+"""Remedy for base parameters in the place of inertial parameters."""
+
+
 def check_mass(name: str, mass: Scalar) -> None:
     """Refuse a mass that is a negative number."""
     value = to_float(mass)
@@ -46,29 +53,47 @@ def _require_mass(name: str, kind: str, given: Scalar | None, other: str = "") -
     return given
 
 
-def check_tensor(name: str, six: Iterable[Scalar], scale: float = 0.0) -> None:
-    """Refuse moments of inertia about the centre of mass that no distribution of mass has.
+def check_tensor(
+    name: str, six: Iterable[Scalar], scale: float = 0.0, remedy: str = "give a positive tensor"
+) -> None:
+    """Raise DescriptionError if a moment of inertia about the centre of mass is negative.
 
     Args:
         name: the body, for the message.
         six: Ixx Ixy Ixz Iyy Iyz Izz.
         scale: size of the numbers that were subtracted to get these, which rounding comes from.
+        remedy: end of the message.
     """
-    numbers = [value for value in map(to_float, six) if value is not None]
-    if len(numbers) < 6:
-        return
-    low, middle, high = np.linalg.eigvalsh(tensor_matrix(numbers))
-    slack = _TOLERANCE * max(abs(high), scale)
-    if low < -slack:
+    low, _, high = _principal_moments(six)
+    if low < -_TOLERANCE * max(abs(high), scale):
         raise DescriptionError(
             f"{name}: the inertia about the centre of mass has the negative principal moment"
-            f" {low:g} kg m^2; give a positive inertia tensor"
+            f" {low:g} kg m^2; {remedy}"
         )
-    if low + middle < high - slack:
-        raise DescriptionError(
-            f"{name}: the principal moments {low:g}, {middle:g}, {high:g} kg m^2 break the triangle"
-            " inequality; the largest must not exceed the sum of the other two"
-        )
+
+
+def tensor_fault(six: Iterable[Scalar], scale: float = 0.0) -> str:
+    """Return why no body has these moments about its centre of mass; empty if one may have them.
+
+    Args:
+        six: Ixx Ixy Ixz Iyy Iyz Izz, without negative principal moments.
+        scale: size of the numbers that were subtracted to get these, which rounding comes from.
+    """
+    low, middle, high = _principal_moments(six)
+    if low + middle >= high - _TOLERANCE * max(abs(high), scale):
+        return ""
+    return (
+        f"the principal moments {low:g}, {middle:g}, {high:g} kg m^2 break the triangle inequality"
+    )
+
+
+def _principal_moments(six: Iterable[Scalar]) -> tuple[float, float, float]:
+    """Principal moments in ascending order; zeros if an element has no value."""
+    numbers = [value for value in map(to_float, six) if value is not None]
+    if len(numbers) < 6:
+        return 0.0, 0.0, 0.0
+    low, middle, high = np.linalg.eigvalsh(tensor_matrix(numbers))
+    return float(low), float(middle), float(high)
 
 
 def tensor_matrix(six: list[float]) -> Any:
@@ -140,6 +165,14 @@ class RigidBody(Component):
         """The frame with these Khalil parameters gamma, b, alpha, d, theta, r."""
         return self.frame.at_khalil(**parameters)
 
+    @property
+    def inertia_fault(self) -> str:
+        """Why no body has this inertia; empty if one may have it.
+
+        It matters only to bodies that rotate about several axes, so that assembling looks at it.
+        """
+        return ""
+
     def inertial(self, symbols: SymbolTable) -> Inertia:
         """Inertia about the origin of the reference frame, on CasADi symbols."""
         raise NotImplementedError
@@ -188,7 +221,9 @@ class Body(RigidBody):
             on such a body, and note it; nothing else should.
 
     Raises:
-        DescriptionError: no mass is given, it is negative, or no body has these moments of inertia.
+        DescriptionError: no mass is given, it is negative, or a principal moment is. Principal
+            moments that break the triangle inequality raise an error at assembly, and are a note
+            for a body that rotates about one axis only.
     """
 
     mass: Scalar | None = None
@@ -205,6 +240,11 @@ class Body(RigidBody):
         if self.checked:
             check_mass(self.name, mass)
             check_tensor(self.name, self.inertia)
+
+    @property
+    def inertia_fault(self) -> str:
+        """Why no body has this inertia; empty if one may have it, or if it is not checked."""
+        return tensor_fault(self.inertia) if self.checked else ""
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
         """Inertia about the origin of the reference frame."""
@@ -244,13 +284,28 @@ class KhalilBody(RigidBody):
         self._normalise(*TEN_PARAMETERS)
         if not self.grouped:
             check_mass(self.name, self.M)
-            self._check_about_com()
+            six, scale = self._about_com()
+            check_tensor(
+                self.name,
+                six,
+                scale,
+                f"give a positive tensor, {GROUPED}",
+            )
 
-    def _check_about_com(self) -> None:
+    @property
+    def inertia_fault(self) -> str:
+        """Why no body has this inertia; empty if one may have it, or if it is grouped."""
+        return "" if self.grouped else tensor_fault(*self._about_com())
+
+    def _about_com(self) -> tuple[list[Scalar], float]:
+        """Inertia about the centre of mass, and the size of the numbers that it is made of.
+
+        The inertia is empty if a parameter has no value or the mass is zero.
+        """
         values = [to_float(getattr(self, name)) for name in TEN_PARAMETERS]
         numbers = [value for value in values if value is not None]
         if len(numbers) < len(TEN_PARAMETERS) or numbers[-1] == 0:
-            return
+            return [], 0.0
         J = tensor_matrix(numbers[:6])
         with np.errstate(over="ignore"):
             c = np.array(numbers[6:9]) / numbers[9]
@@ -261,11 +316,8 @@ class KhalilBody(RigidBody):
                 f" {_LARGEST:g} in SI units are the most; check them and their units"
             )
         J -= numbers[9] * (c @ c * np.eye(3) - np.outer(c, c))
-        check_tensor(
-            self.name,
-            [Number(float(J[k, m])) for k, m in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))],
-            scale=float(max(abs(np.array(numbers[:6])))),
-        )
+        upper = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+        return [float(J[at]) for at in upper], float(max(abs(np.array(numbers[:6]))))
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
         """Inertia about the origin of the reference frame."""

@@ -341,13 +341,13 @@ class Component:
         """The same component, which knows no values of its parameters."""
         return self._change(without_defaults, self.name)
 
-    def check_values(self, values: Mapping[str, float]) -> None:
-        """Refuse values of parameters that the component itself would refuse as numbers.
+    def check_values(self: C, values: Mapping[str, float]) -> C:
+        """Return the component with values of its parameters, checked as in the constructor.
 
         Raises:
             DescriptionError: as in the constructor.
         """
-        self._change(lambda value: with_values(value, values), self.name)
+        return self._change(lambda value: with_values(value, values), self.name)
 
     def _change(self: C, change: Callable[[Expression], Expression], name: str) -> C:
         fresh: dict[str, Any] = {

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 from casadi import SX
 
@@ -189,14 +189,15 @@ class DCMotor(Device):
     tau = custom.output("N.m")
     w = custom.output("rad/s")
 
-    def check_values(self, values: Mapping[str, float]) -> None:
+    def check_values(self, values: Mapping[str, float]) -> Self:
         """Refuse values that the motor itself would refuse, and a symbol of no inductance."""
-        Component.check_values(self, values)
+        checked = Component.check_values(self, values)
         if "i" in self.state_names and to_float(self.inductance, values) == 0:
             raise DescriptionError(
                 f"{self.name}: inductance is {self.inductance}, which has the value 0, but a"
                 " current that is a state needs more; give it one, or write the number 0 for none"
             )
+        return checked
 
     @property
     def own_inertia(self) -> Expression:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
-from mbs.arguments import names_given
+from mbs.arguments import names_given, values_given
 from mbs.components.bodies import Mount, RigidBody, World, three
 from mbs.components.component import Component, Point, Rotation, in_rotated_axes
 from mbs.components.couplings import Coupling
@@ -113,7 +114,7 @@ def place(outer: Mechanism, inner: Mechanism, name: str) -> Placed:
     outer.cuts.extend(f"{scope}.{joint}" for joint in inner.cuts)
     outer.guess.update({f"{scope}.{name}": value for name, value in inner.guess.items()})
     used = {parameter.name for parameter in outer.used_parameters()}
-    for symbol, value in inner.values.items():
+    for symbol, value in inner.given_values().items():
         if (scoped := f"{scope}.{symbol}") in used:  # not what only its gravity used
             outer.values[scoped] = replace(value, name=scoped)
     return Placed(outer, scope)
@@ -128,14 +129,17 @@ def on_placed(point: Point, placed: Mapping[str, Component], scope: str) -> Poin
 C = TypeVar("C", bound=Component)
 
 
-_ATTRIBUTES = frozenset(
-    (
-        *("name", "source", "keep_order", "cuts", "guess", "notes", "numbered", "world"),
-        *("components", "connections", "shafts", "wires", "frames", "shapes", "values"),
-        *("_ports", "_counted"),
-    )
+_ATTRIBUTES: Mapping[str, type] = MappingProxyType(
+    {
+        **dict.fromkeys(("name", "source"), str),
+        **dict.fromkeys(("guess", "numbered", "components", "frames", "values"), dict),
+        **dict.fromkeys(("cuts", "notes", "connections", "shafts", "wires", "shapes"), list),
+        **{"world": World, "keep_order": bool, "_ports": set, "_counted": int},
+    }
 )
-"""Attributes of a mechanism."""
+"""Attributes of a mechanism, and what each of them is."""
+_NO_UNIT = "1"
+"""Unit of a parameter whose unit is not given."""
 _COMPENSATIONS = "_gravcomp", "_gravity"
 """Ends of the names of forces that readers of files make against the weight of bodies."""
 
@@ -158,6 +162,8 @@ class Mechanism:
         notes: what the reader of a file renamed, ignored, doubted or completed; print them.
         numbered: the body of each frame of the table that it was made from, by its number.
         shapes: what its bodies look like, and where on them.
+        values: number or Parameter of each symbol that has a value here. Units, descriptions and
+            bounds of the Parameter replace those of the components.
     """
 
     def __init__(
@@ -174,7 +180,7 @@ class Mechanism:
         self.source = source
         self.keep_order = keep_order
         self.cuts: list[str] = []
-        self.guess = dict(guess or {})
+        self.guess = values_given(f"{self.name}: guess", guess, '"j1": 0.3', DescriptionError)
         self.notes: list[Note] = []
         self.numbered: dict[int, str] = {}
         self.world = World(gravity=gravity)
@@ -186,19 +192,21 @@ class Mechanism:
         self.wires: list[tuple[str, Signal]] = []
         self.frames: dict[str, Point] = {}
         self.shapes: list[tuple[Point, Shape]] = []
-        self.values: dict[str, Parameter] = {}
-        for symbol, value in (parameters or {}).items():
+        self.values: dict[str, Parameter | float] = {}
+        given = values_given(f"{self.name}: parameters", parameters, '"L1": 0.3', DescriptionError)
+        for symbol, value in given.items():
             self.values[symbol] = Parameter(symbol, value)
         if mount is not None:
             self.change_gravity(mount=mount)
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Set an attribute.
+        """Set an attribute. A class that derives from Mechanism may have attributes of its own.
 
         Raises:
-            DescriptionError: a mechanism has no attribute of this name.
+            DescriptionError: a mechanism has no attribute of this name, or it is something else.
         """
-        if name not in _ATTRIBUTES and not hasattr(type(self), name):
+        is_plain = type(self) is Mechanism
+        if is_plain and name not in _ATTRIBUTES and not hasattr(Mechanism, name):
             raise DescriptionError(
                 f"{self.__dict__.get('name', 'mechanism')}: a mechanism has no attribute {name!r};"
                 f" {did_you_mean(name, sorted(one for one in _ATTRIBUTES if one[0] != '_'))}"
@@ -207,6 +215,12 @@ class Mechanism:
             raise DescriptionError(
                 f"{self.name}: gravity cannot be set; give gravity= to Mechanism or mbs.load, or"
                 " call change_gravity"
+            )
+        kind = _ATTRIBUTES.get(name, object)
+        if not isinstance(value, kind):
+            raise DescriptionError(
+                f"{self.__dict__.get('name', 'mechanism')}: {name} is {quoted(value)}; give a"
+                f" {kind.__name__}"
             )
         super().__setattr__(name, value)
 
@@ -510,15 +524,40 @@ class Mechanism:
         for parameter in self.used_parameters():
             known = found.get(parameter.name)
             found[parameter.name] = parameter if known is None else self._merge(known, parameter)
-        for name, value in self.values.items():
+        for name, value in self.given_values().items():
             if name not in found:
                 known_names = ", ".join(found) or "none"
                 raise AssemblyError(
                     f"{self.name}: parameter {name!r} is used by no component; the parameters are:"
                     f" {known_names}"
                 )
-            found[name] = replace(found[name], default=value.default)
+            one = found[name]
+            found[name] = Parameter(
+                name,
+                value.default,
+                unit=one.unit if value.unit == _NO_UNIT else value.unit,
+                description=value.description or one.description,
+                min=one.min if value.min is None else value.min,
+                max=one.max if value.max is None else value.max,
+            )
         return tuple(found.values())
+
+    def given_values(self) -> dict[str, Parameter]:
+        """Values of symbols that were given to the mechanism, with units, descriptions and bounds.
+
+        Raises:
+            DescriptionError: an entry of `values` is no number, or a Parameter of another name.
+        """
+        found = {}
+        for name, value in self.values.items():
+            given = value if isinstance(value, Parameter) else Parameter(name, value)
+            if given.name != name:
+                raise DescriptionError(
+                    f"{self.name}: values[{name!r}] is the parameter {given.name!r}; give it the"
+                    " name of the symbol"
+                )
+            found[name] = given
+        return found
 
     def _merge(self, known: Parameter, other: Parameter) -> Parameter:
         """Two uses of one symbol: a value and bounds may stand at either, but not differ."""

@@ -16,7 +16,7 @@ from mbs.assembly.tree import Link
 from mbs.components import Mechanism
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
-from mbs.export.robot_files import system_of
+from mbs.export.robot_files import shapes_left_out, system_of
 from mbs.files import path_of
 from mbs.formats import CutRow, FrameRow, InertiaRow, RobotTable, write_par
 from mbs.formats.table import BODY_SCALARS, GEOMETRY
@@ -51,7 +51,7 @@ def par(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
         ExportError: the file cannot be written.
     """
     system = system_of(system)
-    write_par(robot_table(system), path_of(path))
+    write_par(robot_table(system), path_of(path), note=shapes_left_out(system))
 
 
 def robot_table(system: System, file: str = ".par") -> RobotTable:

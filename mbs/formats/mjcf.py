@@ -196,8 +196,6 @@ class MjcfModel:
         given = [model.body(k).name for k in range(1, model.nbody)]
         bodies = ("world", *distinct("body", given, plain[1:]))
         flags = Flags.of(mujoco, model)
-        # since MuJoCo 4 an actuator may have several controls, which nu counts
-        count = len(model.actuator_group)
         mjcf = MjcfModel(
             mujoco,
             model,
@@ -207,7 +205,9 @@ class MjcfModel:
             of_kind("site", model.nsite, model.site),
             of_kind("equality", model.neq, model.eq),
             of_kind("tendon", model.ntendon, model.tendon),
-            tuple(k for k in range(count) if flags.drives(int(model.actuator_group[k]))),
+            tuple(
+                k for k in range(_actuators_in(model)) if flags.drives(int(model.actuator_group[k]))
+            ),
             flags,
             {},
         )
@@ -313,6 +313,17 @@ def _apart(name: str, taken: set[str], kind: str) -> str:
 _Range = tuple[float, float]
 
 
+def _actuators_in(model: Any) -> int:
+    """Number of actuators. Since MuJoCo 4 one actuator may have several controls."""
+    return int(getattr(model, "nactuator", model.nu))
+
+
+def _first_of(model: Any, address: str, k: int) -> int:
+    """Row of the first control ("ctrladr") or the first output ("outadr") of actuator k."""
+    rows = getattr(model, f"actuator_{address}", None)  # MuJoCo before 4 has one row each
+    return k if rows is None else int(rows[k])
+
+
 def drives(mjcf: MjcfModel) -> dict[int, dict[int, float | None]]:
     """For each joint the actuators that drive it, and how much effort it gets of a unit of force.
 
@@ -324,7 +335,7 @@ def drives(mjcf: MjcfModel) -> dict[int, dict[int, float | None]]:
     found: dict[int, dict[int, float | None]] = {}
     for k in mjcf.acting:
         kind, number = int(model.actuator_trntype[k]), int(model.actuator_trnid[k, 0])
-        gear = float(model.actuator_gear[k, 0])
+        gear = float(model.actuator_gear[_first_of(model, "outadr", k), 0])
         shares: dict[int, float | None] = {}
         if kind in (int(kinds.mjTRN_JOINT), int(kinds.mjTRN_JOINTINPARENT)):
             shares = {number: gear}
@@ -339,6 +350,8 @@ def drives(mjcf: MjcfModel) -> dict[int, dict[int, float | None]]:
             shares = dict.fromkeys(
                 _between_bodies(mjcf, [int(model.site_bodyid[site]) for site in sites])
             )
+        elif kind == getattr(kinds, "mjTRN_SO3", None) and int(model.actuator_trnid[k, 1]) < 0:
+            shares = {number: None}  # of a ball joint; between two sites it drives no joint
         for j, share in shares.items():
             found.setdefault(j, {})[k] = share
         _note_actuator(mjcf, k, sorted(shares))
@@ -424,9 +437,10 @@ def _force(mjcf: MjcfModel, k: int) -> _Range:
     low, high = -math.inf, math.inf
     if model.actuator_forcelimited[k]:
         low, high = (float(end) for end in model.actuator_forcerange[k])
-    if _is_plain(mjcf, k) and model.actuator_ctrllimited[k] and mjcf.flags.control_ranges:
+    control = _first_of(model, "ctrladr", k)
+    if _is_plain(mjcf, k) and model.actuator_ctrllimited[control] and mjcf.flags.control_ranges:
         gain = float(model.actuator_gainprm[k, 0])
-        ends = sorted(gain * float(end) for end in model.actuator_ctrlrange[k])
+        ends = sorted(gain * float(end) for end in model.actuator_ctrlrange[control])
         low, high = max(low, ends[0]), min(high, ends[1])
     return low, high
 
@@ -506,7 +520,7 @@ class Joints:
         acting = self.acting.get(j, {})
         common: dict[str, Any] = {
             "name": mjcf.joints[j],
-            "actuated": bool(acting) if model.nu else None,
+            "actuated": bool(acting) if _actuators_in(model) else None,
             "Ia": float(model.dof_armature[dof]),
             "Fv": float(model.dof_damping[dof]) if flags.dampers else 0.0,
             "Fs": float(model.dof_frictionloss[dof]) if flags.friction else 0.0,

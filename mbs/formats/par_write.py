@@ -24,7 +24,7 @@ _GEOMETRY = ("b", "d", "r", "gamma", "alpha", "theta")
 _VARIABLE = {0: ("theta", "th"), 1: ("r", "r")}
 
 
-def write_par(table: RobotTable, path: str | Path) -> None:
+def write_par(table: RobotTable, path: str | Path, *, note: str = "") -> None:
     """Write the table as a .par file.
 
     The format knows no names of joints and bodies and no limits: these are lost, and joint j is
@@ -33,16 +33,21 @@ def write_par(table: RobotTable, path: str | Path) -> None:
     says of every joint whether a motor drives it: where the table leaves the choice to the
     assembly, what it chooses.
 
+    Args:
+        table: of frames.
+        path: of the .par file.
+        note: becomes a comment at the begin.
+
     Raises:
         DescriptionError: it is not a table, or a loop, a symbol, a rotor, or the drive of a cut
             joint cannot be said in this format.
         ExportError: the file cannot be written.
     """
     require_table(table)
-    write_text("\n".join(_lines(table)) + "\n", path)
+    write_text("\n".join(_lines(table, note)) + "\n", path)
 
 
-def _lines(table: RobotTable) -> Iterator[str]:
+def _lines(table: RobotTable, note: str) -> Iterator[str]:
     NF, B = len(table.frames), len(table.loops)
     NL, NJ = NF - 2 * B, NF - B
     _check_loops(table, NL, NJ)
@@ -51,6 +56,8 @@ def _lines(table: RobotTable) -> Iterator[str]:
     yield f"(* Robotname = '{re.sub(r'[^A-Za-z0-9 _-]', '_', table.name)}' *)"
     if table.source:
         yield f"(* Source = '{in_bracket_comment(table.source)}' *)"
+    if note:
+        yield f"(* {in_bracket_comment(note)} *)"
     yield from _remarks(table, NJ)
     yield f"NL = {NL}\nNJ = {NJ}\nNF = {NF}\nType = {_kind(table)}"
     yield "\n(* Geometric parameters *)"

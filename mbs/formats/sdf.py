@@ -284,6 +284,9 @@ _SILENT: Mapping[str, set[str]] = {
 }
 """Elements that are read, noted elsewhere, or known to be without effect on the equations."""
 
+_LONGEST_NOTE = 8
+"""Names of links in one note: more are counted, since some files have hundreds."""
+
 _MOVING = {
     *("joint", "mimic", "ball_constraint", "distance_constraint"),
     *("linear_bushing_rpy", "linear_spring_damper", "prismatic_spring"),
@@ -963,7 +966,19 @@ def read_sdf(path: str | Path, *, base: Base | None = None, strict: bool = False
     parts = (*file.links.values(), *file.joints.values(), *file.named.values())
     names = KeptNames({"world", "base"}, {component_name(part.name) for part in parts})
     _SdfBuilding(mechanism, file, base, static and base is None, gravity, names).build()
+    _note_visuals(file)
     return mechanism
+
+
+def _note_visuals(file: _SdfFile) -> None:
+    """One note of the visuals, which are not read."""
+    counts = {link.name: len(link.element.findall("visual")) for link in file.links.values()}
+    drawn = [quoted(name) for name, count in counts.items() if count]
+    if drawn:
+        first = ", ".join(drawn[:_LONGEST_NOTE])
+        more = f" and {len(drawn) - _LONGEST_NOTE} more" if len(drawn) > _LONGEST_NOTE else ""
+        text = f"the {sum(counts.values())} visuals of {first}{more} are not read, nor drawn"
+        file.notes.add("ignored", "<visual>", text)
 
 
 def _version(root: Element, notes: Notes) -> tuple[int, ...]:

@@ -830,11 +830,14 @@ def body_of(reader: Reader, name: str, inertial: Inertial, element: Element | No
     """
     numbers = {"mass": inertial.mass, "com": inertial.com, "inertia": inertial.tensor}
     try:
-        return Body(name, **numbers)
+        body = Body(name, **numbers)
+        reason = body.inertia_fault
     except DescriptionError as error:
         reason = str(error).removeprefix(f"{name}: ").partition(";")[0]
-        reader.note("doubted", f"{reason}, which no body has; taken as it is", element)
-        return Body(name, **numbers, checked=False)
+    if not reason:
+        return body
+    reader.note("doubted", f"{reason}, which no body has; taken as it is", element)
+    return Body(name, **numbers, checked=False)
 
 
 def _leaders(tree: UrdfTree) -> dict[str, str]:

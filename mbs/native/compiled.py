@@ -4,6 +4,7 @@ import contextlib
 import ctypes
 import functools
 import hashlib
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -44,6 +45,9 @@ def compiled(
     an external function, the given Function stays interpreted: the answers are the same, only
     slower.
 
+    CasADi's own C text of a Function that calls the result lacks this code, and ends the process
+    that loads it. Generate C of Functions that call the given Function instead.
+
     Args:
         function: any Function without free symbols.
         derivatives: how often the answer can be differentiated: 0, 1 (Jacobians, forward and
@@ -81,6 +85,7 @@ def compiled(
         result: Any = with_array_calls(casadi.Function(function), None, like)
     else:
         code = casadi.external(function.name(), str(library))
+        _compiled_names.add(function.name())
         plain = functools.partial(compiled, derivatives=0)
         result = with_array_calls(code, library, like, plain)
     again = functools.partial(compiled, derivatives=derivatives, fast=fast, loops=loops)
@@ -299,11 +304,13 @@ def generated(functions: Iterable[casadi.Function], name: str = "generated", **o
         options: of `casadi.CodeGenerator`.
 
     Raises:
-        ModelError: an input or output is called by what would end a comment or a string of C.
+        ModelError: an input or output is called by what would end a comment or a string of C, or
+            a Function calls machine code.
     """
     generator, every = casadi.CodeGenerator(name, options), list(functions)
     for function in every:
         require_names(function)
+        _require_equations(function)
         generator.add(function)
     return handwritten_text(every) + str(generator.dump())
 
@@ -329,11 +336,38 @@ def calls_machine_code(functions: Iterable[casadi.Function]) -> bool:
     Args:
         functions: any Functions.
     """
-    return any(
-        part.is_a("External") and not is_handwritten(part)
-        for function in functions
+    return any(_machine_code_in(function) for function in functions)
+
+
+def _machine_code_in(function: casadi.Function) -> list[str]:
+    """Names of the external functions that a Function calls."""
+    return [
+        part.name()
         for part in function.find_functions()
-    )
+        if part.is_a("External") and not is_handwritten(part)
+    ]
+
+
+_compiled_names: set[str] = set()
+"""Names of the Functions that `compiled` returned in this process; users may link other external
+functions themselves."""
+_DERIVED = re.compile(r"^((jac|fwd\d+|adj\d+)_)*")
+"""Prefixes of the names of derivatives."""
+
+
+def _require_equations(function: casadi.Function) -> None:
+    """Raise ModelError if a Function calls one that `compiled` returned.
+
+    C text would refer to symbols of a library that nothing loads, which ends the process.
+    """
+    called = _machine_code_in(function)
+    names = [name for name in called if _DERIVED.sub("", name) in _compiled_names]
+    if names:
+        raise ModelError(
+            f"{function.name()}: it calls {', '.join(names)}, which is machine code of this"
+            " process, so that it cannot be written as C; make it from the Function that was given"
+            " to mbs.native.compiled"
+        )
 
 
 def unwritten(source: str) -> str:

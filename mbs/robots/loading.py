@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
@@ -13,7 +14,7 @@ from mbs.components import Mechanism
 from mbs.components.component import Rotation
 from mbs.components.locking import Base, fix_root, free_root
 from mbs.errors import DescriptionError
-from mbs.expressions import Parameter, Scalar
+from mbs.expressions import Scalar
 from mbs.formats import from_dict, read_mjcf, read_par, read_sdf, read_toml, read_urdf, to_mechanism
 from mbs.formats.files import component_name
 from mbs.text import did_you_mean, quoted
@@ -69,8 +70,8 @@ def load(
         packages: folders of the packages that a xacro file or `package://` names.
         gravity: gravity acceleration in the world frame [m/s^2] in place of that of the file.
         mount: rotation of the base in the world, such as ("x", "pi") for a robot that hangs from
-            the ceiling. Gravity is rotated into the axes of the base; poses stay relative to the
-            base.
+            the ceiling. Gravity is rotated into the axes of the base; poses, and the coordinates of
+            a free root, stay relative to the base.
 
     Raises:
         DescriptionError: the name or the suffix is unknown, the description is impossible, a
@@ -99,7 +100,7 @@ def load(
             raise DescriptionError(
                 f"{mechanism.name}: parameter {name!r} is not used; {did_you_mean(name, known)}"
             )
-        mechanism.values[name] = Parameter(name, value)
+        mechanism.values[name] = replace(known[name], default=value)
     return mechanism
 
 

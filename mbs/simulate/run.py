@@ -19,7 +19,7 @@ import numpy as np
 from casadi import DM, SX, Function
 from numpy.typing import NDArray
 
-from mbs.arguments import names_given, values_given
+from mbs.arguments import MadeOnce, names_given, values_given
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.parts import WireSource
@@ -1162,7 +1162,7 @@ _KEPT = 8
 starts, and sets of columns."""
 
 
-class Simulator:
+class Simulator(MadeOnce):
     """Motions of one system under the same laws: prepared once, called many times.
 
     Its state equation and its machine code are made at the first call, kept with the system, and on
@@ -1171,6 +1171,8 @@ class Simulator:
 
     `simulator(duration, q0=..., inputs={"j1.tau": 2.0})` is a motion as that of `run`.
     """
+
+    settings = ("system",)
 
     def __init__(
         self,

@@ -7,7 +7,7 @@ from support.messages import refused
 import mbs
 import mbs.models
 from mbs.components import Body, Box, Coupling, Fixed, PointMass, Revolute
-from mbs.errors import AssemblyError, DescriptionError
+from mbs.errors import AssemblyError, DescriptionError, ModelError
 from mbs.expressions import Parameter
 
 
@@ -302,6 +302,36 @@ def test_unknown_attributes_are_refused():
 
 
 @pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: mbs.Mechanism("m", parameters=5), "m: parameters is 5; give a dict such as"),
+        (lambda: mbs.Mechanism("m", parameters=["M"]), "m: parameters is ['M']; give a dict"),
+        (lambda: mbs.Mechanism("m", guess=5), "m: guess is 5; give a dict such as"),
+        (lambda: mbs.Mechanism("m", source=5), "m: source is 5; give a str"),
+        (lambda: setattr(mbs.Mechanism("m"), "guess", 5), "m: guess is 5; give a dict"),
+        (lambda: setattr(mbs.Mechanism("m"), "world", "w"), "m: world is 'w'; give a World"),
+        (lambda: setattr(mbs.Mechanism("m"), "cuts", "j"), "m: cuts is 'j'; give a list"),
+    ],
+)
+def test_attributes_of_another_kind_are_refused(call, message):
+    refused(DescriptionError, message, by=call)
+
+
+def test_derived_classes_have_attributes_of_their_own():
+    class Arm(mbs.Mechanism):
+        def __init__(self):
+            super().__init__("arm", gravity=(0, 0, -1))
+            self.hand = self.add(Body("hand", mass=1))
+            self.connect(self.world, Revolute("j", axis="y"), self.hand)
+
+    arm = Arm()
+    assert arm.assemble().nv == 1
+    assert arm.hand.name == "hand"
+    with pytest.raises(DescriptionError, match="arm: gravity cannot be set"):
+        arm.gravity = (0, 0, 0)
+
+
+@pytest.mark.parametrize(
     "make",
     [
         lambda: Body("b"),
@@ -360,3 +390,30 @@ def test_gravity_of_a_file_that_compensates_it_stays(tmp_path):
     )
     with pytest.raises(DescriptionError, match=r"b_gravcomp.*compensates the gravity of the file"):
         mbs.load(path, gravity=(0, 0, -1.6))
+
+
+# Values of symbols.
+
+
+def test_values_keep_their_units_and_bounds():
+    m = mbs.Mechanism("m")
+    b = m.add(Body("b", mass=Parameter("M", unit="kg", description="load"), com=("L", 0, 0)))
+    m.connect(m.world, Revolute("j", axis="y"), b)
+    m.values["M"] = Parameter("M", 2.0, min=1.5, max=3.0)
+    m.values["L"] = 0.5
+    assert m.parameters() == (
+        Parameter("M", 2.0, unit="kg", description="load", min=1.5, max=3.0),
+        Parameter("L", 0.5),
+    )
+    system = m.assemble()
+    refused(ModelError, "m: parameter M is 1", by=lambda: system.parameter_values({"M": 1.0}))
+    outer = mbs.Mechanism("outer")
+    outer.add(m)
+    assert {p.name: (p.default, p.min) for p in outer.parameters()} == {
+        "m.M": (2.0, 1.5),
+        "m.L": (0.5, None),
+    }
+    m.values["M"] = Parameter("mass", 2.0)
+    refused(DescriptionError, "m: values['M'] is the parameter 'mass'", by=m.parameters)
+    m.values["M"] = "heavy"
+    refused(DescriptionError, "parameter M", "'heavy'", by=m.parameters)

@@ -109,7 +109,7 @@ def test_the_armature_of_a_free_joint_is_kept(tmp_path):
     np.testing.assert_allclose(np.diag(other), np.diag(M), rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("writer", ["urdf", "mjcf", "sdf"])
+@pytest.mark.parametrize("writer", ["urdf", "mjcf", "sdf", "par"])
 def test_shapes_that_are_left_out_are_noted_once(writer, tmp_path):
     m = mbs.Mechanism("m")
     body = m.add(Body("arm", 1.0, (0.1, 0, 0), (0.1, 0.1, 0.1)))

@@ -87,6 +87,30 @@ def test_mjcf_gives_the_efforts_of_its_actuators(tmp_path):
     assert joints["a"].velocity is None
 
 
+def test_actuators_with_several_controls_shift_no_others(tmp_path):
+    mujoco = pytest.importorskip("mujoco")
+    if not hasattr(mujoco.mjtTrn, "mjTRN_SO3"):
+        pytest.skip("actuators have one control before MuJoCo 4")
+    (tmp_path / "r.xml").write_text(
+        """<mujoco><worldbody><site name="ground"/><body name="a"><joint name="ball" type="ball"/>
+        <geom size=".1"/><site name="s"/><body name="b" pos="1 0 0"><joint name="j"/>
+        <geom size=".1" pos="0 .1 0"/><body name="c" pos="1 0 0"><joint name="free_running"/>
+        <geom size=".1" pos="0 .1 0"/><body name="d" pos="1 0 0"><joint name="k"/>
+        <geom size=".1" pos="0 .1 0"/></body></body></body></body></worldbody><actuator>
+        <orientation joint="ball" input="quat"/><orientation site="s" refsite="ground"/>
+        <dcmotor joint="k" motorconst="1" resistance="1" input="pos vel" controller="1 0 5"/>
+        <motor joint="j" ctrlrange="-3 4" gear="2"/></actuator></mujoco>"""
+    )
+    mechanism = mbs.load(str(tmp_path / "r.xml"))
+    joints = {joint.name: joint for joint in mechanism.joints()}
+    assert joints["j"].effort == (-6, 8)
+    actuated = {name: bool(joint.actuated) for name, joint in joints.items()}
+    assert actuated == {"ball": True, "j": True, "free_running": False, "k": True}
+    assert [note.element for note in mechanism.notes if "not on a joint" in note.text] == [
+        "actuator 1"
+    ]
+
+
 def test_an_actuator_without_gear_gives_nothing(tmp_path):
     pytest.importorskip("mujoco")
     idle = '<motor joint="c" gear="0"/><motor joint="d" ctrlrange="-1 2"/>'

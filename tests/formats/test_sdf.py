@@ -430,6 +430,10 @@ NOTED = {
     ),
     "name": (link("world arm"), "link 'world arm': it is 'world_arm' here"),
     "base": (link("base"), "link 'base': it is 'base_link' here"),
+    "visuals": (
+        link("a", INERTIAL + '<visual name="v"/><visual name="w"/>') + link("b", INERTIAL),
+        "<visual>: the 2 visuals of 'a' are not read, nor drawn",
+    ),
     "tensor": (
         link("a", PLAIN.replace("<izz>.3", "<izz>3")),
         "which no body has; taken as it is",

@@ -219,7 +219,7 @@ def test_bad_loop_is_refused(case):
 
 BAD_BODIES = {
     "negative mass": (dict(body__1__M=-2), "hand: mass is -2 kg"),
-    "triangle": (dict(body__1__ZZ=3), "hand: the principal moments"),
+    "negative moment": (dict(body__1__ZZ=-3), "hand: the inertia about the centre of mass has"),
     "negative width": (dict(body__0__Fs_width=-1), "q1: Fs_width is -1"),
     "negative friction": (dict(body__0__Fv=-1), "q1: Fv is -1"),
     "same joint name": (dict(frame__3__name="q1"), "two components are named 'q1'"),

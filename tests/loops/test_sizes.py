@@ -64,6 +64,24 @@ def test_a_loop_that_is_open_by_a_hundredth_is_refused(scaled):
         mbs.simulate.run(system, 0.1, q0=list(q), quiet=True)
 
 
+@pytest.mark.parametrize("size", [1e-6, 1e5, 1e7])
+@pytest.mark.parametrize("driven", ["crank", "slide"])
+def test_a_slider_crank_of_any_size_follows_its_branch(size, driven):
+    m = mbs.Mechanism("slider_crank")
+    a, b = (bar(m, name, size * x, 1.0) for name, x in (("a", 0.1), ("b", 0.4)))
+    slider = m.add(Body("slider", mass=1))
+    m.connect(m.world, Revolute("crank", axis="z", actuated=driven == "crank"), a)
+    m.connect(a.at(0.1 * size), Revolute("knee", axis="z", actuated=False), b)
+    m.connect(b.at(0.4 * size), Revolute("pin", axis="z", actuated=False), slider)
+    m.connect(m.world, Prismatic("slide", axis="x", actuated=driven == "slide"), slider)
+    system = m.assemble(guess={"crank": 0.4, "slide": 0.45 * size})
+    slide = 0.1 * np.cos(0.7) + np.sqrt(0.4**2 - (0.1 * np.sin(0.7)) ** 2)
+    target = {"crank": 0.7} if driven == "crank" else {"slide": slide * size}
+    found = dict(zip((c.name for c in system.coordinates), solve(system, target), strict=True))
+    assert found["crank"] == pytest.approx(0.7, abs=1e-11)
+    assert found["slide"] / size == pytest.approx(slide, abs=1e-11)
+
+
 def test_all_sizes_close_alike(scaled):
     _, system = scaled
     like = four_bar(1.0)

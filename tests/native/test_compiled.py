@@ -169,6 +169,25 @@ def test_machine_code_is_not_compiled_again():
         mbs.export.code(g, "c")
 
 
+@pytest.mark.parametrize("write", [mbs.native.c_source, mbs.export.c_library])
+def test_machine_code_is_not_written_as_c(tmp_path, monkeypatch, write):
+    """Its C text lacks symbols; a library of it ends the process that loads it."""
+    monkeypatch.chdir(tmp_path)
+    g = compiled(example(), derivatives=0)
+    x, p = ca.MX.sym("x", 3), ca.MX.sym("p")
+    problem = ca.Function("problem", [x, p], [ca.sumsqr(g(x, p)[0])])
+    arguments = () if write is mbs.native.c_source else (tmp_path / "library",)
+    with pytest.raises(
+        ModelError, match=r"problem: it calls example, .* make it from the Function that was given"
+    ):
+        write(problem, *arguments)
+    plain = ca.Function("problem", [x, p], [ca.sumsqr(example()(x, p)[0])])
+    assert "example_incref" not in mbs.native.c_source(plain)
+    # C of an external function that the user made may be linked by the user
+    monkeypatch.setitem(compiled.__globals__, "_compiled_names", set())
+    assert "example_incref" in mbs.native.c_source(problem)
+
+
 def test_two_processes_may_build_at_once(tmp_path):
     program = (
         "import casadi as ca\n"

@@ -169,3 +169,49 @@ def test_without_xacrodoc_a_sentence_says_what_to_install(file, monkeypatch):
     monkeypatch.setitem(sys.modules, "xacrodoc", None)
     with pytest.raises(DescriptionError, match=r"casadi-mbs\[xacro\]"):
         mbs.load(file(XACRO, "robot.xacro"))
+
+
+def test_gravity_and_mount_of_every_format(tmp_path):
+    """Efforts against the weight are those in the gravity that the base has in its own axes."""
+    arm = mbs.load("puma560")
+    mbs.export.par(arm, tmp_path / "p.par")
+    mbs.export.urdf(arm, tmp_path / "p.urdf")
+    mbs.export.sdf(arm, tmp_path / "p.sdf")
+    mbs.formats.write_toml(mbs.formats.read_par(tmp_path / "p.par"), tmp_path / "p.toml")
+    q, zero = np.linspace(0.2, 0.7, 6), np.zeros(6)
+
+    def weight(source, **given):
+        system = mbs.load(source, **given).assemble()
+        return mbs.models.inverse_dynamics(system)(q, zero, zero).full().ravel()
+
+    R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    expected = weight("puma560", gravity=R.T @ (1.0, 2.0, -9.0))
+    assert np.abs(expected - weight("puma560")).max() > 1.0
+    for name in ("p.par", "p.urdf", "p.sdf", "p.toml"):
+        for mount in (R, ("z", "pi/2"), [("x", 0.3), ("x", -0.3), ("z", "pi/2")]):
+            found = weight(tmp_path / name, gravity=(1, 2, -9), mount=mount)
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"gravity": 9.81}, "planar_2r, gravity: 9.81 has not three values"),
+        ({"gravity": (0, 0, np.nan)}, "planar_2r, gravity, z: nan is not a finite number"),
+        ({"mount": ("w", 1)}, "planar_2r, mount: rotation axis 'w' is not 'x', 'y' or 'z'"),
+        ({"mount": -np.eye(3)}, "planar_2r, mount: rotation array"),
+        ({"mount": (0, 0, 1)}, r"planar_2r, mount: rotation \(0, 0, 1\) is not a rotation"),
+    ],
+)
+def test_impossible_gravity_and_mount(given, message):
+    with pytest.raises(DescriptionError, match=message):
+        mbs.load("planar_2r", **given)
+
+
+def test_a_free_root_falls_along_the_gravity_of_its_mount(file):
+    """Coordinates of the root are relative to the base, which is rotated."""
+    system = mbs.load(file(LEG), base="free", gravity=(0, 0, -2), mount=("x", "pi/2")).assemble()
+    q = np.array(system.configuration)
+    assert q[:4].tolist() == [0, 0, 0, 1]
+    a = mbs.models.direct_dynamics(system)(q, np.zeros(8), np.zeros(8)).full().ravel()
+    np.testing.assert_allclose(a, [0, -2, *np.zeros(6)], rtol=0, atol=1e-12)

@@ -9,6 +9,7 @@ import casadi
 import numpy as np
 import pytest
 from support.bennett import bennett
+from support.catalogue_systems import catalogue_system
 from support.messages import refused
 
 import mbs
@@ -178,3 +179,14 @@ def test_a_stop_has_the_outputs_that_were_asked_for():
     result = stopped.value.result
     assert list(result.units) == ["x.q"]
     assert result.stopped[0] < 1.0
+
+
+def test_attributes_that_would_have_no_effect_are_refused():
+    system = catalogue_system("planar_2r")
+    simulator = Simulator(system)
+    for name in ("tau", "system", "max_stpe"):
+        with pytest.raises(ModelError, match=f"Simulator: attribute '{name}' cannot be set"):
+            setattr(simulator, name, 1.0)
+    solver = mbs.models.inverse_geometry.solver(system)
+    with pytest.raises(ModelError, match="PoseSolver: attribute 'locked' cannot be set"):
+        solver.locked = {"q1": 0.0}

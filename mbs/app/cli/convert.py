@@ -54,19 +54,25 @@ def convert(
             f"{target}: files of this kind are not written; {did_you_mean(suffix, _WRITTEN)}"
         )
     table = _table(source, parameter) if suffix in _TABLES else None
+    left_out = ""
     if suffix == ".xml":
         from mbs.export import mjcf
+        from mbs.export.robot_files import shapes_left_out
 
-        mjcf(mechanism(source, parameter), target)
+        assembled = mechanism(source, parameter).assemble()
+        left_out = shapes_left_out(assembled)
+        mjcf(assembled, target)
     elif table is not None:
         from mbs.formats import write_par, write_toml
 
         (write_par if suffix == ".par" else write_toml)(table, target)
     else:
         from mbs.app.tasks import exporting
+        from mbs.export.robot_files import shapes_left_out
         from mbs.files import write_bytes
 
         assembled = mechanism(source, parameter).assemble()
+        left_out = shapes_left_out(assembled)
         writers = {
             ".par": exporting.par,
             ".toml": exporting.toml,
@@ -75,6 +81,8 @@ def convert(
         }
         content = writers[suffix](assembled)
         write_bytes(content, target)
+    if left_out:
+        note(f"{target}: {left_out}")
     note(f"wrote {target}")
 
 

@@ -42,7 +42,12 @@ def system(robot: str, parameters: Sequence[str] | None = None) -> System:
         AssemblyError: its components do not form a mechanism.
         Unclosable: its loops cannot be closed.
     """
-    return mechanism(robot, parameters).assemble()
+    described = mechanism(robot, parameters)
+    known = len(described.notes)
+    assembled = described.assemble()
+    for one in described.notes[known:][:_MOST_NOTES]:
+        note(f"{robot}: {one}")
+    return assembled
 
 
 def numbers(texts: Sequence[str] | None, option: str) -> dict[str, float]:

@@ -493,6 +493,11 @@ def _mix(size: int, rows: int) -> Array:
 _PREPARE_SEED, _POSES = 20260211, 2
 # angles of joints 4 and 5 [rad] that no design prefers, so that none has an infinite half angle
 _TRIAL_OFFSETS = np.array([0.0, 0.0, 0.0, 0.7345, -1.1127, 0.0])
+_OTHERS, _WELL = 3, 1e-4
+"""Most other arrangements of an arm, and the least regularity of one."""
+_LEAST = 1e-5
+"""Regularity at a pose below which another arrangement is tried: rounding leaves 1e-11 of the
+angles there."""
 REGULAR = 1e-10
 """Regularity above which the method holds: of a matrix that is always singular rounding leaves
 1e-15, and at it six digits of a root are left."""
@@ -505,10 +510,13 @@ class Prepared:
     Attributes:
         arrangement: of the loop.
         pencil: that makes the matrix.
+        others: the same from other joints, in the order in which they are tried at poses at which
+            the matrix is nearly singular at every angle.
     """
 
     arrangement: Arrangement
     pencil: Pencil
+    others: tuple[Prepared, ...] = ()
 
     @property
     def regularity(self) -> float:
@@ -547,7 +555,37 @@ def prepare(arm: Arm) -> Prepared:
         for loop in arrangements(arm, _TRIAL_OFFSETS)
         for elimination in eliminations(loop.prismatic)
     ]
-    return max(tried, key=lambda prepared: prepared.pencil.merit)
+    tried.sort(key=lambda prepared: -prepared.pencil.merit)
+    others = list[Prepared]()
+    for one in tried[1:]:  # joints 1 and 2 of the loop are eliminated
+        pairs = [_eliminated(other) for other in (tried[0], *others)]
+        if one.regularity > _WELL and _eliminated(one) not in pairs and len(others) < _OTHERS:
+            others.append(one)
+    return replace(tried[0], others=tuple(others))
+
+
+def _eliminated(prepared: Prepared) -> frozenset[int]:
+    """The joints of the arm that are eliminated first."""
+    return frozenset(prepared.arrangement.order[:2].tolist())
+
+
+def for_poses(prepared: Prepared, T: Array) -> list[tuple[Prepared, Numbers]]:
+    """The arrangements whose matrices are regular at poses, and the numbers of these poses.
+
+    Args:
+        prepared: see `prepare`.
+        T: (N, 4, 4) target poses [m].
+    """
+    best, most = np.zeros(len(T), dtype=np.int64), np.full(len(T), -1.0)
+    every = (prepared, *prepared.others)
+    for k, one in enumerate(every):
+        left = np.flatnonzero(most <= _LEAST)
+        if not len(left):
+            break
+        found = _regularities(one.pencil.matrices(one.arrangement.all_ways(T[left])))
+        better = found > most[left]
+        best[left[better]], most[left[better]] = k, found[better]
+    return [(every[k], np.flatnonzero(best == k)) for k in np.unique(best)]
 
 
 def _reached(arm: Arm) -> Array:
@@ -693,15 +731,26 @@ def _companion(coefficients: Array) -> Array:
     return companion
 
 
+def _far_regularities(M: Array) -> Array:
+    """(N, 8) reciprocal conditions of matrices at x = infinity, for each offset."""
+    far = np.einsum("ok,nkab->noab", weights(_OFFSETS + np.pi, M.shape[1]), M)
+    values = np.linalg.svd(far, compute_uv=False)
+    conditions: Array = values[..., -1] / np.maximum(values[..., 0], NONZERO)
+    return conditions
+
+
+def _regularities(M: Array) -> Array:
+    """(N,) regularities of matrices (N, n3, n, n): nearly singular ones have none."""
+    most: Array = np.max(_far_regularities(M), axis=1)
+    return most
+
+
 def _rotate(M: Array) -> tuple[Array, Array]:
     """Offsets (N,), and (N, d + 1, n, n) factors of 1, x, .. for u = offset + 2 atan x.
 
     Of eight offsets the one where the last factor, the matrix at x = infinity, is best conditioned.
     """
-    far = np.einsum("ok,nkab->noab", weights(_OFFSETS + np.pi, M.shape[1]), M)
-    values = np.linalg.svd(far, compute_uv=False)
-    best = np.argmax(values[..., -1] / np.maximum(values[..., 0], NONZERO), axis=1)
-    offset = _OFFSETS[best]
+    offset = _OFFSETS[np.argmax(_far_regularities(M), axis=1)]
     if M.shape[1] == 2:
         c, s = (part[:, None, None] for part in (np.cos(offset / 2), np.sin(offset / 2)))
         return offset, np.stack([c * M[:, 0] + s * M[:, 1], c * M[:, 1] - s * M[:, 0]], axis=1)
@@ -775,7 +824,20 @@ def candidates_many(prepared: Prepared, T: Array) -> tuple[Numbers, Array]:
             " of this"
             f" arm (its regularity is {prepared.regularity:.0e}); use method='search'"
         )
-    loop, T = prepared.arrangement, np.asarray(T, dtype=float)
+    T = np.asarray(T, dtype=float)
+    numbers, found = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 6))]
+    for one, poses in for_poses(prepared, T):
+        number, q = _candidates(one, T[poses])
+        numbers.append(poses[number])
+        found.append(q)
+    every = np.concatenate(numbers)
+    order = np.argsort(every, kind="stable")
+    return every[order], np.concatenate(found)[order]
+
+
+def _candidates(prepared: Prepared, T: Array) -> tuple[Numbers, Array]:
+    """`candidates_many` by one arrangement."""
+    loop = prepared.arrangement
     ways = loop.all_ways(T)
     number, middle = _middle(prepared, prepared.pencil.matrices(ways))
     row, u = completed(ways[number], loop.prismatic, middle)

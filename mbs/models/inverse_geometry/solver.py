@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbs.arguments import MadeOnce
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Array
@@ -84,7 +85,7 @@ class PoseAnswer:
         return f"<PoseAnswer: {len(self)} configurations{note}>"
 
 
-class PoseSolver:
+class PoseSolver(MadeOnce):
     """``solver(T)`` gives all configurations that take a frame to a pose, in microseconds.
 
     Attributes:
@@ -96,6 +97,8 @@ class PoseSolver:
         used: the method that solves regular poses; "search" where there is none but that.
         labels: of all branches of a closed form, in their order; else empty.
     """
+
+    settings = ("system", "frame", "locked", "parameters", "method", "used", "labels")
 
     def __init__(
         self,

@@ -19,7 +19,7 @@ enum {
     ROTH_ROWS = 28       /* equations before they are mixed */
 };
 
-typedef struct {
+typedef struct roth_loop {
     int order[6];            /* the arm's joint that each joint of the loop is */
     int sign;                /* 1; -1 where the loop runs against the arm */
     int prismatic[6];           /* of the loop's joints */
@@ -35,6 +35,8 @@ typedef struct {
     int rank;                /* of what joints 1 and 2 are in */
     int size;                /* of the matrix */
     const double *mix;       /* (size, rows) makes as many equations; NULL: there are as many */
+    const struct roth_loop *next; /* the same arm from another joint, for poses at which the matrix of
+                                     this loop is nearly singular at every angle; or NULL */
 } roth_loop;
 
 /* The matrix that is singular at a solution: its parts with the weights of the angle u of joint 3,
@@ -51,9 +53,13 @@ void roth_weights(int parts, double u, double *weights);
 
 void roth_eliminate(const roth_loop *r, const double transforms[6][16], roth_matrix *m);
 
+/* Finds an offset of the angles at which the matrix is well conditioned. Returns the regularity there:
+ * a nearly singular matrix has none. */
+double roth_regularity(const roth_matrix *m, double *offset);
+
 /* Angles u, ascending, where the matrix is singular, or nearly so for a real angle; a double one is
- * there twice. Gives how many they are. */
-int roth_roots(const roth_matrix *m, double *u);
+ * there twice. Returns their number. */
+int roth_roots(const roth_matrix *m, double offset, double *u);
 
 /* Half angles x4, x5, (ROTH_SHARED,), of the `count` solutions at the angle u; gives for how many
  * of them. */

@@ -29,24 +29,22 @@ static void factorize_at(const roth_matrix *m, double offset, dense_qr *f) {
     dense_factorize(f);
 }
 
-/* An offset at which that matrix, transposed, is well conditioned. */
-static double well_placed(const roth_matrix *m) {
+double roth_regularity(const roth_matrix *m, double *best) {
     double far[ROTH_SIZE * ROTH_SIZE];
     dense_qr f;
-    double best = 0.0, most = -1.0;
+    double most = -1.0;
     int i;
     for (i = 0; i < OFFSETS; i++) {
         double offset = FIRST_OFFSET + i * PI / 4.0, regularity;
         f.A = far;
         factorize_at(m, offset, &f);
         regularity = dense_regularity(&f);
-        if (regularity > WELL) return offset;
-        if (regularity > most) {
-            most = regularity;
-            best = offset;
-        }
+        if (regularity <= most) continue;
+        most = regularity;
+        *best = offset;
+        if (regularity > WELL) break;
     }
-    return best;
+    return most;
 }
 
 /* The factors of 1, x of the polynomial, or of 1 alone where its degree is one. */
@@ -91,9 +89,8 @@ static int ascending(double *u, int count) {
     return count;
 }
 
-int roth_roots(const roth_matrix *m, double *u) {
+int roth_roots(const roth_matrix *m, double offset, double *u) {
     double A[ROTH_ROOTS * ROTH_ROOTS], real[ROTH_ROOTS], imaginary[ROTH_ROOTS];
-    double offset = well_placed(m);
     int i, count = 0, all = companion(m, offset, A), failed = eigenvalues(all, A, real, imaginary);
     /* the steps may go round without end where many roots are one, as of three translations */
     for (i = 0; failed && i < OFFSETS; i++) {

@@ -7,6 +7,9 @@
 /* Gaps between angles that may be one root [rad]: of a multiple one, spread by rounding; of a
  * double one, so that neighbours of its kind are tried apart too. */
 static const double COARSE = 1e-3, FINE = 1e-6;
+/* Regularity of the matrix below which another loop is tried: rounding leaves 1e-11 of the angles
+ * there. */
+static const double LEAST_REGULARITY = 1e-5;
 static const double FAR = 1e3; /* translations, in reaches, that are taken for infinite */
 
 typedef struct {
@@ -74,17 +77,37 @@ static void begin_after_gap(double *u, int count) {
     memcpy(u, sorted, (size_t)count * sizeof(double));
 }
 
+/* The matrix of a loop at a pose; its regularity, and an offset of the angles. */
+static double set_loop(solution *s, const roth_loop *r, const double *T, double *offset) {
+    s->loop = r;
+    roth_transforms(r, T, s->transforms);
+    roth_eliminate(r, (const double(*)[16])s->transforms, &s->matrix);
+    return roth_regularity(&s->matrix, offset);
+}
+
+/* The first loop whose matrix is regular at the pose, or the one whose matrix is the most regular. */
+static void choose_loop(solution *s, const roth_loop *r, const double *T, double *offset) {
+    const roth_loop *best = r;
+    double most = -1.0;
+    for (; r; r = r->next) {
+        double regularity = set_loop(s, r, T, offset);
+        if (regularity > LEAST_REGULARITY) return;
+        if (regularity <= most) continue;
+        most = regularity;
+        best = r;
+    }
+    if (s->loop != best) set_loop(s, best, T, offset);
+}
+
 int roth_candidates(const roth_loop *r, const double *T, double *q) {
-    double u[ROTH_ROOTS];
+    double u[ROTH_ROOTS], offset = 0.0;
     int start, end, first, last, count;
     solution s;
-    s.loop = r;
     s.q = q;
     s.count = 0;
     s.reach = 1.0 + sqrt(T[3] * T[3] + T[7] * T[7] + T[11] * T[11]) / r->length;
-    roth_transforms(r, T, s.transforms);
-    roth_eliminate(r, (const double(*)[16])s.transforms, &s.matrix);
-    count = roth_roots(&s.matrix, u);
+    choose_loop(&s, r, T, &offset);
+    count = roth_roots(&s.matrix, offset, u);
     if (count) begin_after_gap(u, count);
     for (start = 0; start < count; start = end) {
         end = group_end(u, start, count, COARSE);

@@ -83,6 +83,28 @@ def test_notes_of_a_file_are_said_beside_the_output(command) -> None:
     assert answer.out == ""
 
 
+@pytest.mark.parametrize("ending", ["sdf", "par", "xml", "toml"])
+def test_shapes_that_are_left_out_are_said(command, ending) -> None:
+    Path("r.urdf").write_text(
+        '<robot name="r"><link name="b"/><link name="l"><inertial><mass value="1"/><inertia ixx="1"'
+        ' iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial><visual><geometry><box size="1 1 1"/>'
+        '</geometry></visual></link><joint name="j" type="continuous"><parent link="b"/>'
+        '<child link="l"/></joint></robot>'
+    )
+    answer = command("convert", "r.urdf", f"s.{ending}")
+    note = f"s.{ending}: Shapes that are not in this file: 1, on j."
+    assert (answer.code, answer.err) == (0, f"{note}\nwrote s.{ending}\n")
+
+
+def test_notes_of_assembling_are_said(command) -> None:
+    Path("wheel.toml").write_text(
+        'name = "wheel"\n[[frame]]\nantecedent = 0\n'
+        "[[body]]\nframe = 1\nXX = 1\nYY = 1\nZZ = 3\nM = 1\n"
+    )
+    answer = command("show", "wheel.toml")
+    assert "body 'link1': the principal moments 1, 1, 3 kg m^2 break the triangle" in answer.err
+
+
 def test_a_closed_robot_is_converted_to_sdf(command) -> None:
     command("convert", "sr400", "sr400.sdf")
     one, other = (mbs.load(name).assemble() for name in ("sr400", "sr400.sdf"))

@@ -196,7 +196,7 @@ def _table(mechanism: Mechanism) -> RobotTable:
         gravity=mechanism.world.gravity,
         parameters={
             name: value.default
-            for name, value in mechanism.values.items()
+            for name, value in mechanism.given_values().items()
             if value.default is not None
         },
         source=mechanism.source,

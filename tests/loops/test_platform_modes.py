@@ -227,6 +227,11 @@ def test_a_structure_shows_its_cut_forces_in_a_simulation(method):
     again = mbs.simulate.Simulator(system, outputs=["at_a.f.x"])(0.05, q0=result.state())
     np.testing.assert_allclose(again["at_a.f.x"], push, rtol=1e-9)
     refused(
+        ModelError,
+        "triangle: the loops allow no motion with the velocities a = 1.2; leave them out",
+        by=lambda: mbs.simulate.run(system, 0.05, v0={"a": 1.2}),
+    )
+    refused(
         Unclosable,
         "triangle: the loops do not close with a = 1.2",
         by=lambda: mbs.simulate.run(system, 0.05, q0={"a": 1.2}),

@@ -531,20 +531,6 @@ def require_system(system: object) -> None:
         raise ModelError(f"{what} is not a System, of which models are made; {remedy}")
 
 
-def require_motion(system: System) -> None:
-    """Refuse a structure whose loops leave no motion, where there is nothing else to simulate.
-
-    Raises:
-        ModelError: says what it can be asked for.
-    """
-    if system.closure is not None and not system.closure.mobility and not system.z.numel():
-        raise ModelError(
-            f"{system.name}: the loops leave no motion (mobility 0), so that there is nothing to"
-            " simulate; take a joint's constraint away, or use mbs.loops.modes for its"
-            " configurations and mbs.models.joint_wrenches for what its joints carry"
-        )
-
-
 def _elements(system: System) -> dict[str, list[tuple[str, str]]]:
     q = [(coordinate.name, coordinate.unit) for coordinate in system.coordinates]
     free = [system.speeds[k] for k in system.free]

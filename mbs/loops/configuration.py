@@ -159,8 +159,9 @@ def _with_dependent_positions(
             ", ".join(f"{system.coordinates[k].name} = {values[k]:.6g}" for k in wrong)
             for values in (target, q)
         )
+        locked = closing.locked_positions(q)
         raise Unclosable(
-            f"{system.name}: with {closing.locked_positions(q)} the loops do not close with"
+            f"{system.name}: {f'with {locked} ' if locked else ''}the loops do not close with"
             f" {required}, the nearest is {found}; leave positions out, or give them as a guess"
         )
     exact = Closing(system, p, tuple(_indices(system, fixed))).nearest(
@@ -367,10 +368,10 @@ def start_velocity(
             return v
     v, missed = smallest_velocity(system, J, v0)
     if missed:
+        names = ", ".join(system.speeds[k].name for k in system.active)
+        remedy = f"give those of independent joints: {names}" if names else "leave them out"
         raise ModelError(
-            f"{system.name}: the loops allow no motion with the velocities {missed};"
-            " give those of independent joints: "
-            + ", ".join(system.speeds[k].name for k in system.active)
+            f"{system.name}: the loops allow no motion with the velocities {missed}; {remedy}"
         )
     return v
 

@@ -27,8 +27,10 @@ from mbs.loops.velocity import acceleration_bias, independent_constraint_rows
 from mbs.models.contacts import require_no_contacts
 from mbs.models.direct_dynamics import direct_dynamics, independent_dynamics
 from mbs.models.inverse_dynamics import inverse_dynamics, own_efforts
+from mbs.models.measurements import with_readings
 from mbs.models.state.signals import by_name
 from mbs.models.symbols import ModelSymbols, devices, outputs_of, part_equations, symbols_of
+from mbs.recursions.parts import later_sources
 from mbs.result import Result, State, device_states_of, state_of
 from mbs.text import quoted
 
@@ -163,6 +165,7 @@ def implicit(system: System, form: str, constrained: ConstraintRows | None = Non
     q, v, a = s.q, s.v, SX.sym("a", system.nv)
     rows = rows_of(system, q, v, a)
     if constrained is not None:
+        require_no_later(system)
         rows = rows.join(constrained(s, a))
     lam, mu = SX.sym("lam", rows.J.shape[0]), SX(0, 1)
     u, tau, rates = driving(system, q, v)
@@ -252,19 +255,35 @@ def _independent_motion(system: System, q: SX, v_a: SX) -> tuple[SX, SX, SX, SX]
     return u, v, a, rates
 
 
-def driving(system: System, q: SX, v: SX) -> tuple[SX, SX, SX]:
+def require_no_later(system: System) -> None:
+    """Refuse wired accelerations and forces where points that stand change them.
+
+    Raises:
+        ModelError: names the first wire.
+    """
+    for source in later_sources(system):
+        raise ModelError(
+            f"{system.name}: the wire from {source} follows from accelerations or forces, which"
+            " contacts of phases change; take the wire away"
+        )
+
+
+def driving(system: System, q: SX, v: SX, *, resolved: bool = True) -> tuple[SX, SX, SX]:
     """Symbols u, the efforts tau (nv, 1) that they and devices give, and the rates of the states.
 
     Args:
         system: open or closed.
         q: (nq, 1) positions.
         v: (nv, 1) velocities of the tree.
+        resolved: wired readings of accelerations and forces have their values in the rates.
     """
     driven = motors(system)
     u = SX.sym("u", len(driven))
     tau, rates, _ = part_equations(system, q, v)
     for k, number in enumerate(driven):
         tau[number] += u[k]
+    if resolved:
+        (rates,) = with_readings(system, [rates], (q, v, None, tau))
     return casadi.vertcat(u, system.u), tau, rates
 
 

@@ -32,6 +32,7 @@ from mbs.models.dae import (
     equations,
     implicit,
     motors,
+    require_no_later,
     rows_of,
     start_efforts,
 )
@@ -551,7 +552,8 @@ def _explicit(
     """States [q; v] and no z: accelerations and forces are solved for."""
     system = standing.system
     s = symbols_of(system, "tree")
-    u, tau, rates = driving(system, s.q, s.v)
+    require_no_later(system)
+    u, tau, rates = driving(system, s.q, s.v, resolved=False)
     a, f, *_ = outputs_of(system, explicit, s.q, s.v, tau)
     rows = rows_of(system, s.q, s.v, a).join(standing.rows(kept)(s, a))
     made = equations(

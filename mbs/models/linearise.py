@@ -39,7 +39,7 @@ from mbs.models.contacts import (
 from mbs.models.dae import driving, motors, start_efforts
 from mbs.models.direct_dynamics import independent_dynamics
 from mbs.models.joint_wrenches import shown_outputs
-from mbs.models.measurements import readings
+from mbs.models.measurements import readings, with_readings
 from mbs.models.state.signals import by_name
 from mbs.models.symbols import (
     ModelSymbols,
@@ -321,7 +321,7 @@ def _matrices(
     system: System, s: ModelSymbols, tau: SX, names: Sequence[str], modes: Sequence[float]
 ) -> tuple[SX, SX, SX, SX]:
     q, v_a, v = s.q, s.v, s.v_tree
-    efforts, given, rates = driving(system, q, v)
+    efforts, given, rates = driving(system, q, v, resolved=False)
     motor_efforts = efforts[: efforts.numel() - system.u.numel()]
     every = tau + given
     # the independent accelerations
@@ -332,6 +332,7 @@ def _matrices(
     else:
         a_a, every = contact[0].a[list(system.active)], every + contact[0].pushes
     a = s.tree_acceleration(a_a)
+    (rates,) = with_readings(system, [rates], (q, v, a, every))
     # how positions move: dq = T dxi for small displacements xi of the free coordinates
     speed = SX.sym("v", system.nv)
     N = casadi.jacobian(position_rate(system.tree, q, speed), speed)

@@ -12,6 +12,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tables import AttachedSensor
 from mbs.errors import ModelError
+from mbs.models.direct_dynamics import direct_dynamics
 from mbs.models.joint_wrenches import motion_inputs, wrenches_of_joints
 from mbs.models.loop_kinematics import cut_coordinate
 from mbs.models.symbols import (
@@ -19,9 +20,11 @@ from mbs.models.symbols import (
     Surroundings,
     check_coordinates,
     configuration_check,
+    outputs_of,
     surroundings,
     symbols_of,
 )
+from mbs.recursions.parts import later_signal, later_sources
 from mbs.recursions.readings import (
     Readings,
     axes_of,
@@ -93,6 +96,50 @@ def readings(
         read = _READ[attached.sensor.reads](state, attached)
         outputs += [(name, read[quantity.name]) for name, quantity in attached.outputs]
     return outputs
+
+
+def with_readings(
+    system: System,
+    values: list[SX],
+    state: tuple[SX, SX, SX | None, SX],
+    wrenches: SX | None = None,
+) -> list[SX]:
+    """Return expressions in which wired readings of accelerations and forces have their values.
+
+    Args:
+        system: open or closed.
+        values: expressions of rates and outputs of components.
+        state: q, v, a and tau (nv, 1) of the tree; a follows from tau where it is None.
+        wrenches: external wrenches of the model, if it has any.
+
+    Raises:
+        ModelError: a wired sensor reads forces, and the model has external wrenches.
+    """
+    sources = later_sources(system)
+    symbols = casadi.vertcat(SX(0, 1), *(later_signal(system, one) for one in sources))
+    if not symbols.numel() or not casadi.depends_on(casadi.veccat(*values), symbols):
+        return values
+    q, v, a, tau = state
+    if a is None:
+        model = direct_dynamics(system, coordinates="tree")
+        a, *_ = outputs_of(system, model, q, v, tau)
+    motion = (q, v, a, tau) if system.is_closed else (q, v, a)
+    read = outputs_of(system, measurements(system, "tree"), *motion)
+    names = [
+        (attached, quantity) for attached in system.sensors for _, quantity in attached.outputs
+    ]
+    found = []
+    for source in sources:
+        name, _, element = source.signal.partition(".")
+        for (attached, quantity), value in zip(names, read, strict=True):
+            if attached.sensor.name == source.owner and quantity.name == name:
+                if wrenches is not None and wrenches.numel() and attached.joint is not None:
+                    raise ModelError(
+                        f"{system.name}: the wire from {source} carries a force, which external"
+                        " wrenches change; leave the inputs with wrenches out"
+                    )
+                found.append(casadi.vec(value)[quantity.elements.index(element)])
+    return list(casadi.substitute(values, [symbols], [casadi.vertcat(*found)]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,7 +14,7 @@ from mbs.loops.examine import DETERMINED, DIFFERENTIABLE
 from mbs.loops.reduction import Reduction, reduction
 from mbs.recursions.composite_body import velocity_antecedents
 from mbs.recursions.force_elements import element_wrenches, sum_wrenches
-from mbs.recursions.parts import PartsAt
+from mbs.recursions.parts import PartsAt, later_signal, later_sources
 from mbs.recursions.poses import LinkPose, link_poses
 from mbs.recursions.velocities import Acceleration, moving_base, resting_base
 from mbs.spatial import Wrench, transform_wrench
@@ -254,6 +254,12 @@ def devices(system: System) -> Function:
         tau, zdot, parts = part_equations(system, q, v)
         y = parts.outputs()
         every = casadi.vertcat(tau, zdot, y)
+        for source in later_sources(system):
+            if casadi.depends_on(every, later_signal(system, source)):
+                raise ModelError(
+                    f"{system.name}: the rate of a state follows from {source}, which this model"
+                    " does not know; use mbs.models.dae or mbs.simulate.run"
+                )
         inputs = [("v", v), ("z", system.z), ("u", system.u)]
         if casadi.depends_on(every, q):
             inputs.insert(0, ("q", q))

@@ -32,7 +32,7 @@ from mbs.components.custom import (
 from mbs.errors import AssemblyError, ExpressionError, MbsError
 from mbs.expressions import Expression
 from mbs.numbers import NONZERO
-from mbs.recursions.parts import PartsAt
+from mbs.recursions.parts import PartsAt, later_signal, later_sources
 from mbs.text import did_you_mean, one_line, quoted
 
 Array = NDArray[np.float64]
@@ -75,8 +75,31 @@ def check_parts(system: System) -> None:
         for given in part.inputs.values():
             if isinstance(given, WireSource):
                 at.signal(given)
+        _require_state_between(system, part, at)
         if not type(part.element).__module__.startswith("mbs."):  # ours are asked in tests
             check_part(system, part, at)
+
+
+_AT_ONCE = ("loads", "energy", "rows", "velocity_rows", "frictions", "stops", "events", "crossings")
+"""Methods whose results determine accelerations, or are evaluated before these are known."""
+
+
+def _require_state_between(system: System, part: AttachedPart, at: PartsAt) -> None:
+    """Refuse inputs that follow from accelerations or forces, except where they feed rates alone.
+
+    Raises:
+        AssemblyError: the component has a method on which accelerations or events depend.
+    """
+    later = casadi.vertcat(SX(0, 1), *(later_signal(system, one) for one in later_sources(system)))
+    if not later.numel() or not part.element.has(*_AT_ONCE):
+        return
+    for name, given in part.inputs.items():
+        if isinstance(given, WireSource) and casadi.depends_on(at.signal(given), later):
+            raise AssemblyError(
+                f"a wire from {given} to {part.name}.{name} follows from the accelerations or"
+                " forces of the motion itself; put a block with a state between them, such as a"
+                " FirstOrder, or wire what positions and velocities give"
+            )
 
 
 def check_part(system: System, part: AttachedPart, at: PartsAt) -> None:

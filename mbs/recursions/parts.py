@@ -37,12 +37,40 @@ from mbs.recursions.readings import Readings, coordinate_readings, frame_reading
 from mbs.recursions.route import BASE, relative_motion
 from mbs.recursions.velocities import Velocity, link_velocities
 from mbs.spatial import Pose, cross, skew
-from mbs.text import did_you_mean
 
 UNBOUNDED = 1e100
 """Bound of the speed of a crossing that has none: far above every speed, and finite in C."""
+_MOST_READINGS = 1000
+"""Symbols of readings that a system keeps: more than mechanisms have wires."""
 _ENDING = ("mbs.components.sources",)
 """Modules whose crossings end steps in FMUs too: laws that jump."""
+
+
+def later_signal(system: System, source: WireSource) -> SX:
+    """The symbol of a reading that follows from accelerations or forces.
+
+    Rates and outputs depend on it until `mbs.models.measurements.with_readings` replaces it.
+    """
+    symbol: SX = system.recent("readings", source, lambda: SX.sym(str(source)), _MOST_READINGS)
+    return symbol
+
+
+def later_sources(system: System) -> list[WireSource]:
+    """Readings of accelerations and forces that are wired to inputs."""
+    sensors = {attached.sensor.name: attached for attached in system.sensors}
+    wired = [s for part in system.parts for s in part.inputs.values() if isinstance(s, WireSource)]
+    return [
+        source
+        for source in dict.fromkeys(wired)
+        if source.owner in sensors
+        and _is_later(sensors[source.owner], source.signal.partition(".")[0])
+    ]
+
+
+def _is_later(attached: AttachedSensor, name: str) -> bool:
+    if attached.sensor.reads in ("absolute", "relative"):
+        return name in ("a", "wd")
+    return name == "a" if attached.sensor.reads == "coordinate" else attached.joint is not None
 
 
 class PartsAt:
@@ -222,11 +250,7 @@ class PartsAt:
                 " loop; cut another joint, or wire from a sensor on one of the others"
             )
         if name not in readings:
-            raise AssemblyError(
-                f"a wire comes from {source}, which follows from the accelerations or forces of the"
-                " motion itself; wire what positions and velocities give:"
-                f" {did_you_mean(name, readings) if readings else 'such as an angle'}"
-            )
+            return later_signal(self.system, source)
         quantity = next(q for q in attached.quantities if q.name == name)
         number = quantity.elements.index(element)
         return casadi.vec(readings[name])[number]

@@ -644,8 +644,9 @@ def fmu(
             lines between them and a jump where a time is repeated; or a `Result`, whose columns
             feed the inputs of the same names.
         parameters: parameter to its value.
-        start: state, input or other variable with a start value, to its value at the start. Or the
-            `State` of the mechanism that the FMU was made of.
+        start: state, input or other variable with a start value, to its value at the start;
+            positions also under the names of `run`, such as "j1" for "j1.q". Or the `State` of the
+            mechanism that the FMU was made of.
         kind: the interface that is used; the FMU brings the solver for co-simulation.
         step: communication step and distance of the rows, s; by default the one that the FMU
             proposes, else a 500th of the duration. The last one is shorter where steps do not

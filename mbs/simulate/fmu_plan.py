@@ -44,8 +44,29 @@ def start_values(
     every = (*known, *(v.name for v in description.modelVariables))
     fixed = {n for n, v in known.items() if v.causality == "parameter"}
     check_names("parameters", parameters, fixed, every)
-    check_names("start", start, {n for n, v in known.items() if _settable(v)} - fixed, every)
+    allowed = {n for n, v in known.items() if _settable(v)} - fixed
+    start = _full_names(start, allowed, every)
+    check_names("start", start, allowed, every)
     return {name: finite_number(name, value) for name, value in {**start, **parameters}.items()}
+
+
+def _full_names(
+    start: Mapping[str, float], allowed: set[str], every: Iterable[str]
+) -> dict[str, float]:
+    """Starts with the names of coordinates, as `run` takes them, under the names of variables.
+
+    Raises:
+        ModelError: a coordinate is there by both names.
+    """
+    found, others = dict[str, float](), set(every)
+    for name, value in start.items():
+        full = name
+        if name not in others and {f"{name}.q", f"{name}.solved"} & allowed:
+            full = f"{name}.q"
+        if full in start and full != name:
+            raise ModelError(f"start: {name} and {full} are the same variable; give it once")
+        found[full] = value
+    return found
 
 
 def _starts_of(state: State, settable: set[str]) -> dict[str, float]:
@@ -92,11 +113,12 @@ def check_names(what: str, given: Iterable[str], allowed: set[str], known: Itera
         if name not in allowed:
             why = "cannot be set" if name in everything else "does not exist"
             solved = f"{name.removesuffix('.q')}.solved"
-            if name not in everything and name.endswith(".q") and solved in allowed:
+            if name.endswith(".q") and solved in allowed:
                 independent = ", ".join(sorted(n for n in allowed if n.endswith(".q")))
                 raise ModelError(
                     f"{what}: {name} follows from the loops; give {independent}, and {solved} as a"
-                    " guess that chooses the branch"
+                    " guess that chooses the branch; or give the state of a result, such as"
+                    " run(system, 1e-3, q0=...).state(0)"
                 )
             hint = did_you_mean(name, sorted(allowed))
             raise ModelError(f"{what}: variable {name!r} {why} here; {hint}")

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from mbs.arguments import MadeOnce, names_given, values_given
 from mbs.assembly import System
-from mbs.assembly.model_function import require_motion, require_system
+from mbs.assembly.model_function import require_system
 from mbs.assembly.parts import WireSource
 from mbs.assembly.system import Packed, content_of, packed, unpacked
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
@@ -1199,11 +1199,9 @@ class Simulator(MadeOnce):
             method: likewise.
 
         Raises:
-            ModelError: `system` is no System or cannot move, a name is unknown, or a law has the
-                wrong form.
+            ModelError: `system` is no System, a name is unknown, or a law has the wrong form.
         """
         require_system(system)
-        require_motion(system)
         self.system = system
         self._motions = prescribed_motions(system, motion)
         require_contacts_possible(system, self._motions)

@@ -597,13 +597,23 @@ class TestWires:
         assert result["two.same"][-1] == 12.0
 
     @pytest.mark.parametrize("reading", ["enc.a", "tip.a.x"])
-    def test_accelerations(self, reading):
+    def test_accelerations_that_change_themselves(self, reading):
+        class Push(Custom):
+            """A torque at a joint by an input."""
+
+            at_joint = custom.coordinate()
+            u = custom.input()
+
+            def loads(self, at):
+                return {"at_joint": at.u}
+
         m = pendulum()
         m.add(JointSensor("enc", "j1"))
         m.add(AbsoluteSensor("tip", m.components["bar"].right))
-        gain = m.add(Gain("k", 2.0))
+        gain, push = m.add(Gain("k", 2.0)), m.add(Push("push", "j1"))
         m.wire(reading, gain.u)
-        refused(AssemblyError, reading, "accelerations or forces", by=m.assemble)
+        m.wire(gain.y, push.u)
+        refused(AssemblyError, "k.y", "push.u", "accelerations or forces", by=m.assemble)
 
     def test_efforts_of_rows(self):
         m = mbs.Mechanism("m", gravity=(0, 0, -9.81))

@@ -11,6 +11,7 @@ from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.components import Body, Custom, Free, Planar, RollingDisc, custom
+from mbs.errors import ModelError
 
 
 @pytest.mark.sweep
@@ -64,6 +65,24 @@ def test_a_guess_near_the_own_branch_keeps_it(four_bar):
         start_configuration(four_bar, **start),
         atol=1e-9,
     )
+
+
+def test_starts_have_the_names_of_run(four_bar):
+    by_variable = start_configuration(four_bar, **{"j1.q": 0.4})
+    assert np.array_equal(start_configuration(four_bar, j1=0.4), by_variable)
+    assert not np.allclose(start_configuration(four_bar), by_variable)
+    with pytest.raises(ModelError, match=r"start: j1 and j1\.q are the same variable"):
+        start_configuration(four_bar, **{"j1": 0.4, "j1.q": 0.4})
+
+
+@pytest.mark.parametrize("name", ["j2", "j2.q"])
+def test_a_start_of_a_dependent_joint_is_a_state(four_bar, name):
+    said = r"start: j2\.q follows from the loops; give j1\.q, and j2\.solved as a guess"
+    with pytest.raises(ModelError, match=said):
+        start_configuration(four_bar, **{name: 0.9})
+    state = mbs.simulate.run(catalogue_system("four_bar"), 1e-3, q0={"j2": 0.9}).state(0)
+    result = mbs.simulate.fmu(four_bar, 0.001, start=state, step=0.001, quiet=True)
+    assert result["j2.q"][0] == pytest.approx(0.9, abs=1e-9)
 
 
 # ---- other computers ----

@@ -11,8 +11,9 @@ from support.ring_loops import line_symmetric_loop, ring_loop
 import mbs
 import mbs.simulate
 from mbs import Parameter
-from mbs.components import Body, Mechanism, Prismatic, Revolute, Rod
-from mbs.errors import LoopError, ModelError, NoClosedForm
+from mbs.components import Body, Mechanism, Prismatic, Revolute, Rod, WrenchSensor
+from mbs.errors import LoopError, ModelError, NoClosedForm, Unclosable
+from mbs.export import fmu
 from mbs.loops import function, modes, solve
 
 PLATFORMS = {
@@ -186,14 +187,19 @@ def test_structures_list_their_modes():
         assert expected >= 2, kinds
 
 
-def test_a_triangle_carries_its_weight():
-    """Bars of 1 kg at 60 degrees: each foot carries 10 N, and pushes 10 N / 4 / sin 60 out."""
+def triangle():
+    """Two bars of 1 kg on the ground that meet at 60 degrees."""
     m = Mechanism("triangle", gravity=(0, -10, 0), guess={"a": 0.9, "b": 2.2})
     left, right = (m.add(Body(n, mass=1, com=(0.5, 0, 0), inertia=(1, 1, 1))) for n in ("l", "r"))
     m.connect(m.world, Revolute("a"), left)
     m.connect(m.world.at(1.0), Revolute("b"), right)
     m.connect(left.at(1.0), Revolute("c"), right.at(1.0))
-    system = m.assemble()
+    return m
+
+
+def test_a_triangle_carries_its_weight():
+    """Bars of 1 kg at 60 degrees: each foot carries 10 N, and pushes 10 N / 4 / sin 60 out."""
+    system = triangle().assemble()
     wrenches = mbs.models.joint_wrenches(system)
     q = np.array(system.configuration)
     values = wrenches.call([q, *[np.zeros(wrenches.size_in(k)) for k in range(1, wrenches.n_in())]])
@@ -202,12 +208,46 @@ def test_a_triangle_carries_its_weight():
     for name in ("a", "b"):
         force = np.linalg.norm(forces[:3, names.index(name)])
         assert force == pytest.approx(np.hypot(10, 2.5 / np.sin(np.pi / 3)), rel=1e-9)
+
+
+@pytest.mark.parametrize("method", ["dopri5", "rodas"])
+def test_a_structure_shows_its_cut_forces_in_a_simulation(method):
+    """Each foot of the triangle carries 10 N; both push outwards with 10 N / 4 / sin 60."""
+    m = triangle()
+    m.add(WrenchSensor("at_a", "a", axes="world"))
+    m.add(WrenchSensor("at_c", "c", axes="world"))
+    system = m.assemble()
+    result = mbs.simulate.run(system, 0.05, method=method)
+    push = 2.5 / np.sin(np.pi / 3)
+    np.testing.assert_allclose(result["at_a.f.x"], push, rtol=1e-9)
+    np.testing.assert_allclose(result["at_a.f.y"], 10, rtol=1e-9)
+    np.testing.assert_allclose(np.abs(result["at_c.f.x"]), push, rtol=1e-9)
+    np.testing.assert_allclose(result["a.q"], np.pi / 3, rtol=1e-12)
+    np.testing.assert_allclose([result["a.v"], result["b.a"]], 0, atol=1e-12)
+    again = mbs.simulate.Simulator(system, outputs=["at_a.f.x"])(0.05, q0=result.state())
+    np.testing.assert_allclose(again["at_a.f.x"], push, rtol=1e-9)
     refused(
         ModelError,
-        "triangle: the loops leave no motion (mobility 0), so that there is nothing to simulate",
-        "mbs.models.joint_wrenches",
-        by=lambda: mbs.simulate.run(system, 1.0),
+        "triangle: the loops allow no motion with the velocities a = 1.2; leave them out",
+        by=lambda: mbs.simulate.run(system, 0.05, v0={"a": 1.2}),
     )
+    refused(
+        Unclosable,
+        "triangle: the loops do not close with a = 1.2",
+        by=lambda: mbs.simulate.run(system, 0.05, q0={"a": 1.2}),
+    )
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_an_fmu_of_a_structure_shows_its_cut_forces(version, tmp_path):
+    m = triangle()
+    m.add(WrenchSensor("at_a", "a", axes="world"))
+    fmu(m.assemble(), tmp_path / "m.fmu", version=version, outputs=["sensors"])
+    for kind in ("CoSimulation", "ModelExchange"):
+        result = mbs.simulate.fmu(tmp_path / "m.fmu", 0.05, kind=kind)
+        push = 2.5 / np.sin(np.pi / 3)
+        np.testing.assert_allclose(result["at_a.f.x"], push, rtol=1e-9)
+        np.testing.assert_allclose(result["at_a.f.y"], 10, rtol=1e-9)
 
 
 def congruent(width=1.0):

@@ -11,7 +11,7 @@ import casadi
 from casadi import SX, Function
 
 from mbs.assembly import System, symbolic
-from mbs.assembly.model_function import require_motion, require_system
+from mbs.assembly.model_function import require_system
 from mbs.assembly.tree import quaternion_slices
 from mbs.assembly.validity import field_rows, quaternion_rows
 from mbs.errors import ExportError
@@ -194,7 +194,6 @@ def fmu_model(
     Raises:
         ExportError, ModelError, CompilerError: as for `fmu`.
     """
-    require_motion(system)
     wished, settings = wished or Contents(), settings or Settings()
     given = wished.parameters
     if given is not None and (not isinstance(given, list | tuple) or given):

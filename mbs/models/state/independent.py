@@ -28,6 +28,7 @@ from mbs.models.direct_dynamics import hybrid_dynamics, independent_dynamics, in
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_dynamics import bias
 from mbs.models.joint_wrenches import shown_outputs
+from mbs.models.measurements import with_readings
 from mbs.models.state.crossings import (
     WatchedCrossings,
     drive_crossings,
@@ -660,8 +661,10 @@ def _equations(
     given = {m.velocity: law[2] for m, law in zip(layout.motions, laws, strict=True)}
     load = load_of(system, motion.q, external)
     response = minimal_accelerations(system, motion, tau, load, given)
-    rate = _rate(system, layout, motion, response, rates)
     shown = shown_outputs(system, parts, response.a, response.every_effort + load)
+    known = (motion.q, motion.v, response.a, response.every_effort + load)
+    rates, shown = with_readings(system, [rates, shown], known, s.wrenches)
+    rate = _rate(system, layout, motion, response, rates)
     y = outputs_vector(system, layout, motion, response, shown)
     if observe is not None:
         vectors = motion.q, motion.v, response.a, motion.v_a, response.a_a, response.every_effort

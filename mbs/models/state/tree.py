@@ -31,6 +31,7 @@ from mbs.models.direct_dynamics import direct_dynamics, hybrid_dynamics, inertia
 from mbs.models.energy import energy
 from mbs.models.inverse_dynamics import bias
 from mbs.models.joint_wrenches import shown_outputs
+from mbs.models.measurements import with_readings
 from mbs.models.state.crossings import (
     drive_crossings,
     held_by,
@@ -312,6 +313,11 @@ def passage(
     )
 
 
+def _moved(contact: ContactEquations | None, tau: SX) -> tuple[SX | None, SX]:
+    """Accelerations as far as contacts give them, and efforts with those of contacts."""
+    return (None, tau) if contact is None else (contact.a, tau + contact.pushes)
+
+
 def _without_passages(system: System, point: tuple[SX, SX, SX, SX]) -> Passage:
     """That of a system without passages: every configuration counts as regular."""
     t, X, u, p = point
@@ -446,6 +452,8 @@ def tree_state(
     load = load_of(system, q, external)
     contact = contact_equations(system, q, v, tau + load, {})
     point = [s.t, X, none, s.u, system.p]
+    known = (q, v, *_moved(contact, tau + load))
+    (rates,) = with_readings(system, [rates], known, s.wrenches)
     through = passage(
         system, (s.t, X, system.p), SX(tau + load), rates, contact=contact, inputs=s.u
     )
@@ -462,6 +470,8 @@ def tree_state(
     active = list(system.active)
     response = Accelerations(a[active], a, tau, contact)
     shown = shown_outputs(system, parts, a, response.every_effort + load)
+    known = (q, v, a, response.every_effort + load)
+    (shown,) = with_readings(system, [shown], known, s.wrenches)
     motion = TreeMotion(q, q, v[active], v, None, SX.zeros(nv))
     y = outputs_vector(system, layout, motion, response, shown)
     if observe is not None:
@@ -614,6 +624,9 @@ def full_state(
     driven = {one.velocity: one.law(t, system.z, system.p)[2] for one in motions}
     contact = contact_equations(system, q, v, tau, driven)
     a, tau = (contact.a, contact.tau) if contact else _accelerations(system, q, v, tau, motions, t)
+    every = Accelerations(a, a, tau, contact).every_effort
+    y = shown_outputs(system, parts, a, every)
+    z_rate, y = with_readings(system, [z_rate, y], (q, v, a, every))
     rate = casadi.vertcat(position_rate(system.tree, q, v), a, z_rate)
     through = passage(system, (t, x, p), known, z_rate, motions, contact, given_inputs=u)
     touch = (contact.contacts, contact.modes) if contact else None
@@ -622,7 +635,6 @@ def full_state(
     openness = casadi.mmax(casadi.fabs(rows)) if rows.numel() else SX(0)
     E, U = outputs_of(system, energy(system, "tree"), q, v)
     contact_efforts = contact.efforts if contact else SX(0, 1)
-    y = shown_outputs(system, parts, a, Accelerations(a, a, tau, contact).every_effort)
     observed = [a, tau, u, y, contact_efforts, E, U, openness]
     keeps = system.is_closed or motions or touch or quaternion_slices(system.tree)
     corrected = [casadi.vertcat(*kept, z), residual]

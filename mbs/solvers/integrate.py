@@ -19,6 +19,7 @@ from mbs.native import cached_library, compiler_found
 from mbs.native.compiled import calls_machine_code, generated, unwritten
 from mbs.native.compiler import flags_for
 from mbs.native.plain_source import plain_source
+from mbs.solvers.control_c import control_c
 from mbs.solvers.interpreted_run import run_interpreted
 from mbs.solvers.problem import (
     Equations,
@@ -151,7 +152,7 @@ def run_compiled(
     log: list[IntegrationEvent] = []
     stop: SolverError | Interrupted | None = None
     first: Array | None = None
-    with _opened(library, problem) as driver:
+    with _opened(library, problem) as driver, control_c() as check:
         status = library.mbs_begin(driver, _pointer(x))
         if status <= _MORE and problem.equations.passage is not None:
             slope = np.empty(len(x))
@@ -171,6 +172,7 @@ def run_compiled(
                     log.append(_event(library, driver, problem))
                 if progress is not None:
                     progress(library.mbs_time(driver))
+                check()
         except KeyboardInterrupt:
             stop = interrupted(library.mbs_time(driver))
         if stop is None and status > _MORE:

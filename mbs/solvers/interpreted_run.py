@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mbs.errors import Interrupted, SolverError
+from mbs.solvers.control_c import control_c
 from mbs.solvers.dopri5 import Dopri5
 from mbs.solvers.problem import (
     EventMotion,
@@ -440,17 +441,19 @@ def run_interpreted(problem: IntegrationProblem, progress: Progress | None) -> E
     log: list[IntegrationEvent] = []
     stop: SolverError | Interrupted | None = None
     try:
-        if solver.project is not None:
-            solver.x = _begin(solver)
-        watched = _watch(problem, p, solver)
-        while not table.full:
-            if watched is None:
-                solver.fill(table, _CHUNK)
-            elif watched.fill(table, _CHUNK):
-                modes = p[len(p) - problem.modes :].copy()
-                log.append(IntegrationEvent(solver.t, fired_of(watched.fired), modes))
-            if progress is not None:
-                progress(solver.t)
+        with control_c() as check:
+            if solver.project is not None:
+                solver.x = _begin(solver)
+            watched = _watch(problem, p, solver)
+            while not table.full:
+                if watched is None:
+                    solver.fill(table, _CHUNK)
+                elif watched.fill(table, _CHUNK):
+                    modes = p[len(p) - problem.modes :].copy()
+                    log.append(IntegrationEvent(solver.t, fired_of(watched.fired), modes))
+                if progress is not None:
+                    progress(solver.t)
+                check()
     except SolverError as error:
         stop = error
     except LawFailure as failure:

@@ -66,8 +66,8 @@ def test_one_prescribed_joint_of_a_four_bar_fixes_the_motion():
         (["j1", "j4"], "j1, j4 cannot all be prescribed, since the loops tie them (mobility 1)"),
         (["j9"], "there is no velocity 'j9' to prescribe"),
         (["j1", "j1"], "a velocity is prescribed twice"),
-        ("j1", "give a list of names of velocities"),
-        ([], "give a list of names of velocities"),
+        ("j1", "give a list of names, such as ['j1']"),
+        ([], "give names of velocities"),
     ],
 )
 def test_impossible_prescriptions_are_refused(names, told):

@@ -232,3 +232,30 @@ def rows_are_kept(stop):
     assert part.stopped == (part.time[-1], str(stop))
     np.testing.assert_allclose(part["x.q"], part.time**2 / 4, atol=1e-6)
     assert 5 <= len(part) <= 8
+
+
+class Deleted:
+    """Presses control-C while it is deleted, where Python drops the exception."""
+
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a process does not send itself control-C there")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("compiled", [True, False])
+def test_control_c_that_python_drops_is_noticed(compiled):
+    t, x = casadi.SX.sym("t"), casadi.SX.sym("x")
+    rhs = casadi.Function("rhs", [t, x], [-x])
+    kept = [Deleted()]
+
+    def progress(reached):
+        if reached > 1:
+            kept.clear()
+
+    times = np.linspace(0, 10, 101)
+    options = {"progress": progress, "compiled": compiled, "max_step": 1e-3}
+    motion = integrate_events(rhs, [1.0], times, None, partial=True, **options)
+    assert isinstance(motion.stop, Interrupted)
+    assert len(motion.x) < 30
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

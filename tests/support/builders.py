@@ -178,7 +178,7 @@ def public_builders():
     ):
         for name in module.__all__:
             entry = getattr(module, name)
-            if inspect.isfunction(entry):
+            if inspect.isfunction(entry) and entry.__name__ == name and name != "aba":
                 signature = inspect.signature(entry)
                 gives = str(signature.return_annotation).strip("'")
                 if "system" in signature.parameters and gives in ("Function", "Regressor"):

@@ -30,7 +30,7 @@ INSTALL := $(RUN)/python -m pip install --quiet --disable-pip-version-check --ed
 
 LOWEST := build/lowest/bin/python
 
-.PHONY: help demo check test test-all test-lowest guides kernels lint types layers docs clean
+.PHONY: help demo check test test-all test-lowest guides kernels kernels-short lint types layers docs clean
 
 help:
 	@echo "make demo     install mbs into $(VENV) and run examples/01_four_bar.py; files go to build/four_bar"
@@ -39,7 +39,8 @@ help:
 	@echo "make test-all the same with every case of every sweep, and make guides"
 	@echo "make guides   every page in the installation that it documents, in build/guides"
 	@echo "make test-lowest  the tests with the lowest versions that pyproject.toml allows, in build/lowest; Python 3.11 or 3.12"
-	@echo "make kernels  a part of the tests with the linear algebra of another processor"
+	@echo "make kernels  the tests of numerical subjects as other processors compute; SETTINGS names some"
+	@echo "make kernels-short  a part of them under one kernel"
 	@echo "make lint     ruff: style and format"
 	@echo "make types    mypy, strict"
 	@echo "make layers   import-linter: no module imports a higher layer"
@@ -74,9 +75,13 @@ build/lowest/.made: pyproject.toml .ci/lowest
 	  --constraint build/lowest/versions.txt --editable ".[dev,cross,tables]"
 	@touch $@
 
-# What is asked of another processor, tried on this one: NumPy's OpenBLAS takes the kernels that the
-# variable names, and rounds in another way.
+# The tests of numerical subjects as other processors compute: some settings are chosen by
+# make kernels SETTINGS="Haswell x86-64-v3".
 kernels: $(VENV)/.dev
+	@$(RUN)/python .ci/kernels $(SETTINGS)
+
+# A part of them under one kernel.
+kernels-short: $(VENV)/.dev
 	@$(RUN)/python benchmarks/fingerprint.py --kernels Nehalem Zen --threads 1
 	@OPENBLAS_CORETYPE=Nehalem $(RUN)/python -m pytest -n 2 --dist worksteal $(OTHER_KERNELS)
 

@@ -136,23 +136,35 @@ def flags_for(source: str) -> tuple[str, ...]:
     return (level, *FLAGS[1:])
 
 
-def at_chosen_level(flags: Sequence[str]) -> tuple[str, ...]:
-    """The flags at the level of optimization that MBS_OPTIMIZE names; as they are without it.
+def chosen_flags(flags: Sequence[str]) -> tuple[str, ...]:
+    """Return flags with the level of optimization and the architecture that the user chose.
 
-    The numbers that code without contraction gives are the same at every level.
+    MBS_OPTIMIZE names the level. The numbers that code without contraction gives are the same at
+    every level. MBS_ARCHITECTURE names the architecture, such as x86-64-v3; without it, fast code is
+    compiled for the processor of this computer.
 
     Raises:
-        CompilerError: MBS_OPTIMIZE is no level.
+        CompilerError: MBS_OPTIMIZE is no level, or MBS_ARCHITECTURE is no name.
     """
     level = os.environ.get("MBS_OPTIMIZE", "").strip()
-    if not level:
-        return tuple(flags)
-    if level not in ("0", "1", "2", "3"):
+    if level not in ("", "0", "1", "2", "3"):
         raise CompilerError(
             f"environment variable MBS_OPTIMIZE is {level!r}; set it to 0, 1, 2 or 3"
         )
-    levels = {f"-O{number}" for number in range(4)}
-    return tuple(f"-O{level}" if flag in levels else flag for flag in flags)
+    architecture = os.environ.get("MBS_ARCHITECTURE", "").strip()
+    if not re.fullmatch(r"[A-Za-z0-9_.-]*", architecture):
+        raise CompilerError(
+            f"environment variable MBS_ARCHITECTURE is {architecture!r}; set it to a name that the"
+            " compiler knows, such as x86-64-v3"
+        )
+    chosen = list(flags)
+    if level:
+        levels = {f"-O{number}" for number in range(4)}
+        chosen = [f"-O{level}" if flag in levels else flag for flag in chosen]
+    if architecture:
+        chosen = [flag for flag in chosen if not flag.startswith(("-march=", "-mcpu="))]
+        chosen.append(f"-march={architecture}")
+    return tuple(chosen)
 
 
 def compile_library(
@@ -376,7 +388,7 @@ def cached_library(
     Raises:
         CompilerError: there is no compiler, or it refused the code.
     """
-    chosen, flags = compiler or find_compiler(), at_chosen_level(flags)
+    chosen, flags = compiler or find_compiler(), chosen_flags(flags)
     try:
         return _library_in(cache_dir(), files, flags, chosen, suffix, common, together)
     except OSError:  # the disk of the cache is full, or a file in it belongs to somebody else

@@ -35,7 +35,7 @@ from mbs.native.c_code import (
 )
 from mbs.native.compiler import (
     BUILD,
-    at_chosen_level,
+    chosen_flags,
     cache_dir,
     cached_library,
     find_compiler,
@@ -485,7 +485,7 @@ def _index_key(text: str, options: str) -> str:
     compiler = find_compiler()
     facts = (casadi.CasadiMeta.version(), *compiler.command, compiler.version, processor())
     digest = hashlib.sha256()
-    for part in (*facts, *at_chosen_level(FAST_FLAGS), _writer(), options, text):
+    for part in (*facts, *chosen_flags(FAST_FLAGS), _writer(), options, text):
         digest.update(part.encode())
         digest.update(b"\0")
     return digest.hexdigest()[:40]

@@ -5,7 +5,7 @@ import pytest
 
 from mbs.errors import CompilerError
 from mbs.native import compile_library, compiler_found, find_compiler
-from mbs.native.compiler import FLAGS, at_chosen_level, flags_for
+from mbs.native.compiler import FLAGS, chosen_flags, flags_for
 
 
 def test_a_compiler_is_found():
@@ -81,9 +81,18 @@ def test_long_code_is_optimized_less():
 
 def test_the_level_of_optimization_can_be_chosen(monkeypatch):
     monkeypatch.setenv("MBS_OPTIMIZE", "0")
-    assert at_chosen_level(("-O2", "-fPIC")) == ("-O0", "-fPIC")
+    assert chosen_flags(("-O2", "-fPIC")) == ("-O0", "-fPIC")
     monkeypatch.setenv("MBS_OPTIMIZE", "")
-    assert at_chosen_level(("-O2", "-fPIC")) == ("-O2", "-fPIC")
+    assert chosen_flags(("-O2", "-fPIC")) == ("-O2", "-fPIC")
     monkeypatch.setenv("MBS_OPTIMIZE", "fast")
     with pytest.raises(CompilerError, match=r"MBS_OPTIMIZE is 'fast'; set it to 0, 1, 2 or 3"):
-        at_chosen_level(("-O2",))
+        chosen_flags(("-O2",))
+
+
+def test_the_architecture_can_be_chosen(monkeypatch):
+    monkeypatch.setenv("MBS_OPTIMIZE", "")
+    monkeypatch.setenv("MBS_ARCHITECTURE", "x86-64-v3")
+    assert chosen_flags(("-O2", "-march=native", "-fPIC")) == ("-O2", "-fPIC", "-march=x86-64-v3")
+    monkeypatch.setenv("MBS_ARCHITECTURE", "x86 64")
+    with pytest.raises(CompilerError, match="MBS_ARCHITECTURE is 'x86 64'; set it to a name"):
+        chosen_flags(("-O2",))

@@ -203,7 +203,10 @@ def arguments(tmp_path):
         "`run(parameters=)`": (lambda x: end(parameters=x), by_name({"A": 0.41})),
         "`run(duration=)`": (lambda x: rows(duration=x), {"number": DURATION}),
         "`run(step=)`": (lambda x: rows(step=x), {"number": 0.1}),
-        "`run(tolerance=)`": (lambda x: rows(tolerance=x), {"number": 1e-6}),
+        "`run(tolerance=)`": (
+            lambda x: rows(tolerance=x),
+            {"number": 1e-6, "dict": {"others": 1e-6}, "NaN": {"rad": float("nan")}},
+        ),
         "`run(max_step=)`": (lambda x: rows(max_step=x), {"number": 0.01}),
         "`run(method=)`": (lambda x: rows(method=x), {"text": "rodas", "unknown name": "euler"}),
         "`Simulator(inputs=)`": (lambda x: simulated(x), names("brake.u")),

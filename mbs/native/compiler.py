@@ -140,8 +140,8 @@ def chosen_flags(flags: Sequence[str]) -> tuple[str, ...]:
     """Return flags with the level of optimization and the architecture that the user chose.
 
     MBS_OPTIMIZE names the level. The numbers that code without contraction gives are the same at
-    every level. MBS_ARCHITECTURE names the architecture, such as x86-64-v3; without it, fast code is
-    compiled for the processor of this computer.
+    every level. MBS_ARCHITECTURE names the architecture, such as x86-64-v3. Fast code is compiled
+    for the processor of this computer without it.
 
     Raises:
         CompilerError: MBS_OPTIMIZE is no level, or MBS_ARCHITECTURE is no name.

@@ -35,9 +35,9 @@ from mbs.native.c_code import (
 )
 from mbs.native.compiler import (
     BUILD,
-    chosen_flags,
     cache_dir,
     cached_library,
+    chosen_flags,
     find_compiler,
     is_whole,
 )

@@ -72,6 +72,7 @@ from mbs.result import (
     velocities_of,
 )
 from mbs.simulate.arguments import count_steps, positive
+from mbs.simulate.tolerances import Tolerance, Tolerances, small_motions, tolerances_of
 from mbs.solvers import EventMotion, Events, integrate_events
 from mbs.solvers.integrate import is_compilable
 from mbs.solvers.problem import METHODS, IntegrationEvent, Passage, failed
@@ -1121,7 +1122,14 @@ def require_state_of(system: System, state: State) -> None:
             )
 
 
-def _result(system: System, legs: Sequence[Leg], p: Array, stop: Stop, columns: _Columns) -> Result:
+def _result(
+    system: System,
+    legs: Sequence[Leg],
+    p: Array,
+    stop: Stop,
+    columns: _Columns,
+    allowed: Tolerances,
+) -> Result:
     times, x = np.concatenate([leg.times for leg in legs]), np.vstack([leg.x for leg in legs])
     nq, n, np_own = system.nq, system.nq + system.nv, len(system.parameters)
     blocks, contact = [x], legs[0].contact
@@ -1142,11 +1150,15 @@ def _result(system: System, legs: Sequence[Leg], p: Array, stop: Stop, columns: 
     happened = [event for leg in legs for event in leg.happened]
     events = list_events(system, contact, happened)
     stopped = None if stop is None or stop.time is None else (stop.time, str(stop))
+    info: dict[str, object] = {"tolerance": allowed.common}
+    if small := small_motions(system, x[:, :nq], allowed):
+        info["note"] = f"less than 100 tolerances: {', '.join(small)}; ask for a smaller tolerance"
     return Result(
         times,
         values,
         columns.units,
         name=system.name,
+        info=info,
         events=events,
         system=system,
         stopped=stopped,
@@ -1248,7 +1260,7 @@ class Simulator(MadeOnce):
         inputs: Mapping[str, float] | None = None,
         parameters: Mapping[str, float] | None = None,
         step: float = 0.01,
-        tolerance: float = 1e-8,
+        tolerance: Tolerance = 1e-8,
         max_step: float | None = None,
         quiet: bool = True,
     ) -> Result:
@@ -1272,7 +1284,7 @@ class Simulator(MadeOnce):
         """
         system, motions = self.system, self._motions
         duration = positive(duration, "duration [s]", system.name)
-        tolerance = positive(tolerance, "tolerance", system.name)
+        allowed = tolerances_of(system, tolerance)
         longest = math.inf
         if max_step is not None:
             longest = positive(max_step, "max_step [s]", system.name)
@@ -1290,7 +1302,7 @@ class Simulator(MadeOnce):
         placed = start_positions(system, motions, q0, speeds, z, own, begin)
         x0 = np.concatenate([*_started(system, *placed, p, guess), z])
         times = np.linspace(begin, begin + duration, steps + 1)
-        rtol, atol = step_tolerances(tolerance)
+        rtol, atol = step_tolerances(allowed.common)
         with progress(f"simulating {system.name}", 0.0, duration, quiet=quiet) as reached:
             legs, stop = integrate_legs(
                 system,
@@ -1302,6 +1314,7 @@ class Simulator(MadeOnce):
                 method=self._method,
                 rtol=rtol,
                 atol=atol,
+                sizes=allowed.sizes,
                 max_step=longest,
                 progress=reached,
             )
@@ -1309,9 +1322,9 @@ class Simulator(MadeOnce):
             H = _first_bias(system, x0, self._inputs, _own(system, p))
             legs[0] = replace(legs[0], driven=tuple(m.velocity for m in motions), first_bias=H)
         if isinstance(stop, Interrupted):  # rows may take long where laws do
-            stop.compute = partial(_result, system, legs, p, stop, self._columns)
+            stop.compute = partial(_result, system, legs, p, stop, self._columns, allowed)
             raise stop
-        result = _result(system, legs, p, stop, self._columns)
+        result = _result(system, legs, p, stop, self._columns, allowed)
         if stop is not None:
             stop.result = result
             raise stop
@@ -1454,7 +1467,7 @@ def run(
     guess: Guess = None,
     parameters: Mapping[str, float] | None = None,
     step: float = 0.01,
-    tolerance: float = 1e-8,
+    tolerance: Tolerance = 1e-8,
     max_step: float | None = None,
     method: str = "dopri5",
     quiet: bool = False,
@@ -1495,8 +1508,11 @@ def run(
             the loops are closed.
         parameters: values of symbols, the others at their defaults.
         step: time between the rows of the result [s]; it does not change the accuracy.
-        tolerance: what the error of the motion should stay near [rad, m, rad/s or m/s]. A step
-            may err by a twenty-fifth of it, and by a thousandth relative to large coordinates.
+        tolerance: error of the motion to be expected [rad, m, rad/s or m/s]. A step may err by a
+            twenty-fifth of it, and by a thousandth relative to large coordinates. Or a dict of
+            tolerances by unit, such as "rad" and "m/s", and by name, such as "j1.q"; "others" is
+            for the other states. Positions that move by less than 100 tolerances are named in
+            `result.info["note"]`.
         max_step: the longest step of the integration [s]; only errors and laws limit it by default.
             It is needed where a law is short in space and smooth, such as a narrow potential well.
         method: "dopri5", Dormand and Prince's explicit pair, or "rodas", the linearly implicit

@@ -216,6 +216,7 @@ def _load(path: Path, has_events: bool, has_passage: bool) -> ctypes.CDLL:
             ctypes.c_int,
             [handle, pointer, pointer, integer, pointer, ctypes.POINTER(integer), integer],
         ),
+        "mbs_sizes": (None, [handle, pointer]),
         "mbs_stops": (None, [handle, pointer, pointer, integer]),
         "mbs_time": (real, [handle]),
         "mbs_step": (real, [handle]),
@@ -247,6 +248,8 @@ def _opened(library: ctypes.CDLL, problem: IntegrationProblem) -> Iterator[ctype
         if driver and not full and (through := problem.equations.passage) is not None:
             sizes = (ctypes.c_int * len(through.size))(*through.size)
             full = library.mbs_pass(driver, sizes, through.typical) != 0
+        if driver and problem.sizes is not None:
+            library.mbs_sizes(driver, _pointer(problem.sizes))
         if driver and len(ends):
             library.mbs_stops(driver, _pointer(ends), _pointer(jumps), len(ends))
         if full:
@@ -343,6 +346,7 @@ def integrate_events(
     atol: float = 1e-8,
     max_step: float = math.inf,
     stops: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
+    sizes: npt.ArrayLike | None = None,
     progress: Progress | None = None,
     compiled: bool = True,
     partial: bool = False,
@@ -375,6 +379,7 @@ def integrate_events(
         stops: times at which steps end, s, in increasing order, and for each whether functions may
             jump there as functions of time. Up to such a time they are asked before it, then
             behind it, and a step begins anew. None when left out.
+        sizes: (nx,) factors of the absolute tolerance of each state; one if left out.
         progress: called now and then with the time reached, s.
         compiled: False for the same algorithm in Python.
         partial: True for what was reached, with its `stop`, where the integration cannot go on or
@@ -399,7 +404,7 @@ def integrate_events(
         kept[key] = made, library_of(made) if key[1] else None
     functions, library = kept[key]
     modes = () if events is None else events.modes
-    given = problem(functions, x0, times, p, modes, (rtol, atol), max_step, stops)
+    given = problem(functions, x0, times, p, modes, (rtol, atol), max_step, stops, sizes)
     motion = _run(given, library, progress)
     if motion.stop is not None and not partial:
         raise motion.stop

@@ -472,6 +472,7 @@ def _stepper(problem: IntegrationProblem, p: Array) -> Stepper:
     stops = Stops(*problem.stops)
     stops.start(start)
     project = _projection(problem, p, stops)
+    sizes = np.ones(len(state)) if problem.sizes is None else problem.sizes
     control = problem.rtol, problem.atol, problem.max_step, functions.first_step
 
     def slope(t: float, x: Array) -> Array:
@@ -483,8 +484,10 @@ def _stepper(problem: IntegrationProblem, p: Array) -> Stepper:
         return np.asarray(J.full()), _vector(f_t)
 
     if functions.jacobian is None:
-        return Dopri5(slope, project, start, state, *control, stops=stops)
-    return Rodas(slope, project, start, state, *control, stops=stops, jacobian=jacobian)
+        return Dopri5(slope, project, start, state, *control, stops=stops, sizes=sizes)
+    return Rodas(
+        slope, project, start, state, *control, stops=stops, sizes=sizes, jacobian=jacobian
+    )
 
 
 def _begin(solver: Stepper) -> Array:

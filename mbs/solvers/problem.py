@@ -191,6 +191,7 @@ class IntegrationProblem:
         max_step: the longest step, s.
         stops: times at which steps end, s, in increasing order; whether laws of time may jump
             there, so that a step begins anew.
+        sizes: (nx,) factors of the absolute tolerance of each state; None if all are one.
     """
 
     equations: Equations
@@ -202,6 +203,7 @@ class IntegrationProblem:
     atol: float
     max_step: float
     stops: tuple[Array, npt.NDArray[np.bool_]]
+    sizes: Array | None = None
 
     def motion(
         self, x: Array, log: Sequence[IntegrationEvent], stop: SolverError | Interrupted | None
@@ -341,6 +343,7 @@ def problem(
     tolerances: tuple[float, float],
     max_step: float,
     stops: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
+    sizes: npt.ArrayLike | None = None,
 ) -> IntegrationProblem:
     """The integration of given functions.
 
@@ -353,6 +356,7 @@ def problem(
         tolerances: relative and absolute tolerance of the error of one step.
         max_step: the longest step, s; infinite when only the error limits it.
         stops: as in `IntegrationProblem`; none when left out.
+        sizes: as in `IntegrationProblem`.
 
     Raises:
         ModelError: an argument does not fit the functions.
@@ -383,7 +387,11 @@ def problem(
             "integrate: stops must be finite times in increasing order, and as many flags"
         )
     every = np.concatenate([own, m])
-    return IntegrationProblem(functions, x, t, every, len(m), rtol, atol, max_step, (ends, jumps))
+    factors = None if sizes is None else numbers(sizes)
+    if factors is not None and (len(factors) != n or not np.all(factors > 0)):
+        raise ModelError(f"integrate: sizes must be {n} positive numbers, one for each state")
+    limits = rtol, atol, max_step
+    return IntegrationProblem(functions, x, t, every, len(m), *limits, (ends, jumps), factors)
 
 
 def numbers(values: npt.ArrayLike) -> Array:

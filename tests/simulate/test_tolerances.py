@@ -1,0 +1,65 @@
+"""Tolerances of units and of single states; notes on small motions."""
+
+import importlib
+
+import numpy as np
+import pytest
+
+import mbs
+from mbs.components import Body, Prismatic, Revolute, Spring
+from mbs.errors import ModelError
+
+INTEGRATE = importlib.import_module("mbs.solvers.integrate")
+
+
+@pytest.fixture(scope="module")
+def system():
+    """A mass on a spring that vibrates by micrometres, and a rotor."""
+    m = mbs.Mechanism("m", gravity=(0, 0, 0))
+    slider, rotor = m.add(Body("s", 1.0)), m.add(Body("r", 1.0, inertia=(1, 1, 1)))
+    m.connect(m.world, Prismatic("x", axis="x"), slider)
+    m.connect(m.world, Revolute("phi", axis="z"), rotor)
+    m.add(Spring("spring", m.world.at(-1, 0, 0), slider, stiffness=(2 * np.pi) ** 2, length=1.0))
+    return m.assemble()
+
+
+START = {"q0": {"x": 1e-6}, "v0": {"phi": 1.0}, "step": 0.05, "quiet": True}
+
+
+def error(result):
+    """Largest error of the vibration [m]."""
+    return np.abs(result["x.q"] - 1e-6 * np.cos(2 * np.pi * result.time)).max()
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("method", ["dopri5", "rodas"])
+def test_tolerances_by_unit_and_by_name(system, method, compiled, monkeypatch):
+    if not compiled:
+        monkeypatch.setattr(INTEGRATE, "compiler_found", lambda: False)
+    coarse = mbs.simulate.run(system, 5.0, tolerance=1e-5, method=method, **START)
+    assert error(coarse) > 3e-10
+    for fine in ({"m": 1e-12, "m/s": 1e-12}, {"x.q": 1e-12, "x.v": 1e-12}, {"others": 1e-12}):
+        given = {"others": 1e-5, **fine}
+        result = mbs.simulate.run(system, 5.0, tolerance=given, method=method, **START)
+        assert error(result) < 1e-10
+        assert "note" not in result.info
+
+
+def test_small_motions_are_noted(system):
+    result = mbs.simulate.run(system, 5.0, tolerance=1e-5, **START)
+    assert result.info["note"] == "less than 100 tolerances: x; ask for a smaller tolerance"
+    assert result.info["tolerance"] == 1e-5
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"deg": 1e-6}, r"tolerance names 'deg', which is no unit and no state; use one of others"),
+        ({"x": 1e-6}, r"tolerance names 'x'.*use one of others, m, rad, m/s, rad/s, x.q"),
+        ({"rad": 0}, r"tolerance of rad is 0; give a finite positive number"),
+        ({"rad": None}, r"tolerance of rad is None"),
+    ],
+)
+def test_other_tolerances_are_refused(system, given, message):
+    with pytest.raises(ModelError, match=message):
+        mbs.simulate.run(system, 1.0, tolerance=given, **START)

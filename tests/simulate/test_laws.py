@@ -429,3 +429,43 @@ def test_control_c_in_a_law_stops_the_run_at_once():
     reached = stop.value.time
     assert 0 < reached < 20
     assert stop.value.result.time[-1] == pytest.approx(reached, abs=0.01)
+
+
+# Efforts of closed systems.
+
+
+def test_laws_of_closed_systems_have_the_efforts_of_their_models():
+    """Two motors of a five-bar, as numbers, a law, and a Function of the independent velocities."""
+    system = mbs.load("five_bar").assemble()
+    names = [system.speeds[k].name for k in system.motors]
+    assert (system.nv, len(names)) == (4, 2)
+    options = {"quiet": True, "step": 0.1, "q0": dict.fromkeys(names, 0.2)}
+    by_name = mbs.simulate.run(
+        system, 0.3, tau=dict(zip(names, (0.3, -0.2), strict=True)), **options
+    )
+    t, q, v = casadi.SX.sym("t"), casadi.SX.sym("q", system.nq), casadi.SX.sym("v", 2)
+    for tau in (
+        [0.3, -0.2],
+        np.array([0.3, -0.2]),
+        lambda t, q, v: casadi.vertcat(0.3, -0.2),
+        casadi.Function("law", [t, q, v], [casadi.vertcat(0.3, -0.2 + 0 * v[0])]),
+    ):
+        result = mbs.simulate.run(system, 0.3, tau=tau, **options)
+        np.testing.assert_allclose(result.values, by_name.values, rtol=0, atol=1e-9)
+    damped = mbs.simulate.run(
+        system, 0.3, tau=casadi.Function("law", [t, q, v], [-0.05 * v]), **options
+    )
+    index = [system.speeds[k].name for k in system.active]
+    for name in index:
+        np.testing.assert_allclose(damped[f"{name}.tau"], -0.05 * damped[f"{name}.v"], atol=1e-12)
+    with pytest.raises(ModelError, match=r"tau has 3 values, the system has 4: .*, the models 2: "):
+        mbs.simulate.run(system, 0.3, tau=lambda t, q, v: casadi.vertcat(1, 2, 3), **options)
+
+
+def test_a_law_that_needs_numbers_is_refused():
+    system = mbs.load("planar_2r").assemble()
+    for law in (lambda t, q, v: [float(q[0]), 0.0], lambda t, q, v: float(q[0]) * q):
+        with pytest.raises(
+            ModelError, match=r"finite numbers|float\(q\[0\]\).*make NaN of symbols"
+        ):
+            mbs.simulate.run(system, 0.1, tau=law, quiet=True)

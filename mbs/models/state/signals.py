@@ -31,11 +31,13 @@ class LawArgument:
         name: of the argument.
         noun: what its values are.
         elements: the name of every value.
+        short: indices of the values that models of a closed system take; a law may return these.
     """
 
     name: str
     noun: str
     elements: Sequence[str]
+    short: Sequence[int] = ()
 
 
 def signal_function(
@@ -64,10 +66,17 @@ def signal_function(
     else:
         values, by_name = _trace(system, signal, given, (t, q, v))
     size = len(signal.elements)
+    if signal.short and values.numel() == len(signal.short) != size:
+        whole = SX(size, 1)
+        whole[list(signal.short)] = values
+        values = whole
     if values.numel() != size:
+        names, taken = signal.elements, ""
+        if signal.short and len(signal.short) != size:
+            taken = f", the models {len(signal.short)}: {', '.join(names[k] for k in signal.short)}"
         raise ModelError(
             f"{system.name}: {signal.name} has {values.numel()} values, the system has {size}:"
-            f" {', '.join(signal.elements)}"
+            f" {', '.join(names)}{taken}"
         )
     if driven is not None and not by_name:
         _require_driven(system, signal, values, driven)
@@ -86,8 +95,11 @@ def _trace(
 ) -> tuple[SX, bool]:
     """The values as an expression of t, q and v, and whether they were given by name."""
     _check_inputs(system, signal, function, point)
+    t, q, v = point
+    if isinstance(function, Function) and function.numel_in(2) != v.numel():
+        v = v[list(system.active)]
     try:
-        values = function(*point)
+        values = function(t, q, v)
     except Exception as error:
         raise untraceable(system, f"{signal.name}(t, q, v)", error) from error
     by_name = isinstance(values, Mapping)
@@ -103,7 +115,24 @@ def _trace(
             f" {len(signal.elements)} {signal.noun}, finite numbers or CasADi expressions of t, q"
             " and v"
         )
+    if _has_nan(result):
+        raise ModelError(
+            f"{system.name}: {signal.name}(t, q, v) has a part that is not a number: float(q[0]) and"
+            " functions such as math.sin make NaN of symbols; build it from CasADi operations, such"
+            " as casadi.sin and casadi.if_else"
+        )
     return result, by_name
+
+
+def _has_nan(value: SX) -> bool:
+    """Whether an expression contains a constant that is not a number."""
+    graph = Function("law", [casadi.vertcat(SX(0, 1), *casadi.symvar(value))], [value])
+    constants = (
+        graph.instruction_constant(k)
+        for k in range(graph.n_instructions())
+        if graph.instruction_id(k) == casadi.OP_CONST
+    )
+    return any(np.isnan(constant) for constant in constants)
 
 
 def _in_order(system: System, signal: LawArgument, values: Mapping[str, Any]) -> list[Any]:
@@ -149,10 +178,13 @@ def _check_inputs(
     if isinstance(function, Function):
         sizes = [function.numel_in(k) for k in range(function.n_in())]
         expected = [symbol.numel() for symbol in point]
-        if sizes != expected or function.n_out() != 1:
+        independent = [*expected[:2], len(system.active)]
+        if sizes not in (expected, independent) or function.n_out() != 1:
+            other = "" if independent == expected else f" or {independent}"
             raise ModelError(
                 f"{system.name}: {signal.name} has inputs of sizes {sizes} and {function.n_out()}"
-                f" outputs; give a Function of (t, q, v), of sizes {expected}, with one output"
+                f" outputs; give a Function of (t, q, v), of sizes {expected}{other}, with one"
+                " output"
             )
         return
     try:
@@ -187,7 +219,8 @@ def effort_function(system: System, tau: Effort) -> Function | None:
     Args:
         system: open or closed.
         tau: constants of motors by name, or all of them, or a function of (t, q, v), or None. A
-            function that returns a dict names joints, also such as have no motor.
+            function that returns a dict names joints, also such as have no motor. Values of a
+            closed system may be those of all joints of the tree, or those that its models take.
 
     Returns:
         the Function; None when there is no effort.
@@ -198,13 +231,19 @@ def effort_function(system: System, tau: Effort) -> Function | None:
     """
     if tau is None:
         return None
-    signal = LawArgument("tau", "efforts", [speed.name for speed in system.speeds])
+    names = [speed.name for speed in system.speeds]
+    signal = LawArgument("tau", "efforts", names, system.motors)
     driven = [speed.name for speed in system.speeds if speed.actuated]
     if callable(tau):
         return signal_function(system, signal, tau, driven)
-    values = SX(DM(system.effort(tau)))
     if isinstance(tau, Mapping):
         _require_motors(system, tau, driven)
+    else:
+        array = doubles(tau)
+        short = len(system.motors)
+        if not isinstance(array, str) and array.size == short != system.nv:
+            tau = dict(zip((names[k] for k in system.motors), array.ravel().tolist(), strict=True))
+    values = SX(DM(system.effort(tau)))
     return signal_function(system, signal, values, driven)
 
 

@@ -117,9 +117,9 @@ def _trace(
         )
     if _has_nan(result):
         raise ModelError(
-            f"{system.name}: {signal.name}(t, q, v) has a part that is not a number: float(q[0]) and"
-            " functions such as math.sin make NaN of symbols; build it from CasADi operations, such"
-            " as casadi.sin and casadi.if_else"
+            f"{system.name}: {signal.name}(t, q, v) has a part that is not a number: float(q[0])"
+            " and functions such as math.sin make NaN of symbols; build it from CasADi operations,"
+            " such as casadi.sin and casadi.if_else"
         )
     return result, by_name
 
@@ -236,14 +236,15 @@ def effort_function(system: System, tau: Effort) -> Function | None:
     driven = [speed.name for speed in system.speeds if speed.actuated]
     if callable(tau):
         return signal_function(system, signal, tau, driven)
-    if isinstance(tau, Mapping):
-        _require_motors(system, tau, driven)
-    else:
-        array = doubles(tau)
-        short = len(system.motors)
-        if not isinstance(array, str) and array.size == short != system.nv:
-            tau = dict(zip((names[k] for k in system.motors), array.ravel().tolist(), strict=True))
-    values = SX(DM(system.effort(tau)))
+    given = tau
+    if not isinstance(tau, Mapping):
+        array, short = doubles(tau), len(system.motors)
+        if not isinstance(array, str) and array.ndim and array.size == short != system.nv:
+            motors = (names[k] for k in system.motors)
+            given = dict(zip(motors, array.ravel().tolist(), strict=True))
+    values = SX(DM(system.effort(given)))
+    if isinstance(given, Mapping):
+        _require_motors(system, given, driven)
     return signal_function(system, signal, values, driven)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.components.joints import Motion
 from mbs.errors import Unclosable
-from mbs.loops.closing import OPEN, Closing, candidates, difference
+from mbs.loops.closing import CLOSED, Closing, candidates, difference
 from mbs.loops.configuration import closed_configuration, unwound
 
 Vector = NDArray[np.float64]
@@ -44,9 +44,10 @@ class Assembled:
 def assembled_configuration(system: System, guess: Mapping[str, float], p: Vector) -> Assembled:
     """Return the closed configuration nearest to a guess.
 
-    Positions are locked in stages until the loops close: all except the unknowns of components;
-    then guessed positions, positions of motors and springs of joints at rest; then fewer of them,
-    the springs last.
+    A guess that closes the loops is the configuration; positions without a guess are zero there.
+    Otherwise positions are locked in stages until the loops close. If a position is guessed, all
+    except the unknowns of components are locked first. Then guessed positions, positions of motors
+    and springs of joints at rest are locked; then fewer of them, the springs last.
     Free angles are within half a turn of their guess, or of zero. Of configurations that are
     equally near, the one with the larger first position is taken.
 
@@ -60,6 +61,10 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
     """
     names = [coordinate.name for coordinate in system.coordinates]
     known = {name: value for name, value in guess.items() if name in names}
+    given = np.array(system.position(known))
+    as_it_is = Closing(system, p)
+    if as_it_is.openness(given) <= CLOSED and as_it_is.faces(given):
+        return Assembled(given)
     rest = rest_positions(system, p)
     start = np.array(system.position({**{names[k]: x for k, x in rest.items()}, **known}))
     guessed = {k for k, name in enumerate(names) if name in known and name not in _unknowns(system)}
@@ -102,7 +107,7 @@ def _stages(system: System, guessed: set[int], rest: set[int]) -> Iterator[set[i
     unknown = {k for k, name in enumerate(names) if name in _unknowns(system)}
     motors = {k for k, c in enumerate(system.coordinates) if c.actuated}
     stages = []
-    if unknown:
+    if unknown and guessed:
         stages.append(set(range(system.nq)) - unknown)
     stages += [guessed | motors | rest, guessed | rest, (guessed & motors) | rest, motors | rest]
     stages += [rest, guessed, guessed & motors, motors, set()]
@@ -116,7 +121,7 @@ def _nearest(closing: Closing, start: Vector, guessed: set[int]) -> Assembled | 
     system, free = closing.system, closing.free
     if not free:
         return (
-            Assembled(start) if closing.openness(start) <= OPEN and closing.faces(start) else None
+            Assembled(start) if closing.openness(start) <= CLOSED and closing.faces(start) else None
         )
     first = closing.nearest(start)
     if first.is_closed:

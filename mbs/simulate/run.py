@@ -1174,6 +1174,19 @@ _KEPT = 8
 starts, and sets of columns."""
 
 
+_LOOKS = 1000
+"""Steps of a motion under laws in which no pulse can be found beforehand, at least: pulses of one
+thousandth of the duration are met."""
+
+
+def _is_opaque(law: Function | None) -> bool:
+    """Whether a law calls code that is no expression: a Callback or a function of a library."""
+    if law is None:
+        return False
+    names = [one.class_name() for one in (law, *law.find_functions())]
+    return any("Callback" in name or "External" in name for name in names)
+
+
 class Simulator(MadeOnce):
     """Motions of one system under the same laws: prepared once, called many times.
 
@@ -1288,6 +1301,8 @@ class Simulator(MadeOnce):
         longest = math.inf
         if max_step is not None:
             longest = positive(max_step, "max_step [s]", system.name)
+        elif _is_opaque(self._effort) or _is_opaque(self._inputs):
+            longest = duration / _LOOKS
         steps = count_steps(duration, positive(step, "step [s]", system.name), system.name)
         own = system.parameter_values(parameters)
         p = np.array([*own, *self._values(inputs)])
@@ -1514,6 +1529,7 @@ def run(
             for the other states. Positions that move by less than 100 tolerances are named in
             `result.info["note"]`.
         max_step: the longest step of the integration [s]; only errors and laws limit it by default.
+            Under laws that are Callbacks or external functions it is a thousandth of the duration.
             It is needed where a law is short in space and smooth, such as a narrow potential well.
         method: "dopri5", Dormand and Prince's explicit pair, or "rodas", the linearly implicit
             RODAS5P for stiff systems.

@@ -14,7 +14,8 @@ def control_c() -> Iterator[Callable[[], None]]:
     """Give a function that raises KeyboardInterrupt if control-C was pressed.
 
     Python drops a KeyboardInterrupt that is raised while an object is deleted. The function raises
-    it again. Other handlers of the signal, and other threads, are left alone.
+    it again. A call of CasADi that is interrupted may return None: errors after control-C are
+    KeyboardInterrupts too. Other handlers of the signal, and other threads, are left alone.
     """
     pressed = [False]
 
@@ -33,5 +34,9 @@ def control_c() -> Iterator[Callable[[], None]]:
     signal.signal(signal.SIGINT, handler)
     try:
         yield check
+    except Exception as error:
+        if pressed[0]:
+            raise KeyboardInterrupt from error
+        raise
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -103,6 +103,13 @@ def test_a_bead_on_a_parabola_keeps_its_energy_and_feels_newton():
     np.testing.assert_allclose(result["wire.force_y"], 0.5 * (result["y.a"] + G), atol=1e-9)
 
 
+def test_a_bead_rests_where_two_pieces_of_the_wire_meet():
+    """Rounding moves it to and fro over the point: the crossing is not watched for a while."""
+    x = np.linspace(-1, 1, 21)
+    result = run(bead(np.c_[x, x**2, 0 * x], s=1.47), 3.0, q0={"x": 0.0})
+    np.testing.assert_allclose(result["x.q"], 0, atol=1e-12)
+
+
 def test_a_bead_goes_round_and_round_a_closed_wire():
     system = bead(np.c_[np.cos(CIRCLE), np.sin(CIRCLE), 0 * CIRCLE], closed=True)
     result = run(system, 2.0, v0={"y": 9.0})

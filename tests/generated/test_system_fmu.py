@@ -40,7 +40,7 @@ def slider_crank():
     m.connect(crank.right, Revolute("j2"), rod.left)
     m.connect(rod.right, Revolute("j3"), piston)
     m.connect(m.world, Prismatic("s", axis="x"), piston)
-    return m.assemble(guess={"s": 0.7})
+    return m.assemble(guess={"j1": 0.0, "s": 0.7})
 
 
 CASES = {

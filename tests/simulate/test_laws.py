@@ -372,11 +372,11 @@ def test_conditions_that_are_equal_for_positive_angles_are_told_apart():
 
 
 class PythonLaw(casadi.Callback):
-    """Efforts of six joints by Python code that is called at each evaluation."""
+    """Efforts of joints by Python code that is called at each evaluation."""
 
-    def __init__(self, code):
+    def __init__(self, code, size=6):
         casadi.Callback.__init__(self)
-        self.code = code
+        self.code, self.size = code, size
         self.construct("gains", {"enable_fd": True})
 
     def get_n_in(self):
@@ -386,13 +386,20 @@ class PythonLaw(casadi.Callback):
         return 1
 
     def get_sparsity_in(self, i):
-        return casadi.Sparsity.dense(1 if i == 0 else 6, 1)
+        return casadi.Sparsity.dense(1 if i == 0 else self.size, 1)
 
     def get_sparsity_out(self, i):
-        return casadi.Sparsity.dense(6, 1)
+        return casadi.Sparsity.dense(self.size, 1)
 
     def eval(self, arguments):
         return [self.code(*arguments)]
+
+
+@pytest.mark.parametrize("method", ["dopri5", "rodas"])
+def test_a_short_pulse_in_python_code_has_its_whole_effect(method):
+    """No condition can be read in Python code: the steps are short."""
+    law = PythonLaw(lambda t, q, v: np.exp(-(((float(t) - 7.3) / 0.02) ** 2)), size=1)
+    assert last_speed(law, method=method) == pytest.approx(0.02 * np.sqrt(np.pi), rel=1e-6)
 
 
 @pytest.mark.parametrize("method", ["dopri5", "rodas"])

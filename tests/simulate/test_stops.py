@@ -1,5 +1,6 @@
 """Motions that stop, by an error or by control-C, hand over what they have."""
 
+import contextlib
 import os
 import pickle
 import signal
@@ -16,6 +17,7 @@ from mbs.components import CoulombFriction, PointMass, Prismatic, RigidStop
 from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.result import Result
 from mbs.solvers import integrate_events
+from mbs.solvers.control_c import control_c
 
 END = 0.55
 QUIET = {"quiet": True, "tolerance": 1e-9}
@@ -39,6 +41,14 @@ def stopped(system, duration=1.0, **options):
     with pytest.raises(SolverError) as caught:
         mbs.simulate.run(system, duration, tau=until(END), **QUIET, **options)
     return caught.value
+
+
+@pytest.fixture(autouse=True)
+def control_c_is_heard():
+    """Shells start jobs in the background with signals of control-C ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(scope="module")
@@ -259,3 +269,19 @@ def test_control_c_that_python_drops_is_noticed(compiled):
     assert isinstance(motion.stop, Interrupted)
     assert len(motion.x) < 30
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def fails_under_control_c(is_pressed):
+    with control_c():
+        if is_pressed:
+            with contextlib.suppress(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+        raise TypeError
+
+
+@pytest.mark.parametrize("is_pressed", [False, True])
+def test_errors_after_control_c_are_interrupts(is_pressed):
+    """A call of CasADi that is interrupted may return None, and what reads it fails."""
+    with pytest.raises(KeyboardInterrupt if is_pressed else TypeError) as caught:
+        fails_under_control_c(is_pressed)
+    assert isinstance(caught.value.__cause__, TypeError) == is_pressed

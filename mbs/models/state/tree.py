@@ -565,7 +565,7 @@ class FullState:
             and Coulomb friction, whose modes are then the last of p; None where there are none.
         passage: for steps through singular configurations of the loops; None where there are none.
         crossings: `crossings(t, x, p)`, what passes through zero where laws jump or bend; None
-            where there is nothing. First those that components give, then sides, then counts.
+            where there is nothing. First those of contacts, then sides, then counts.
         approaches: `approaches(t, x, p)`, (k, 2) the speeds and paces of the first crossings, as
             `Approach` has them; None where all are zero.
         sides: number of the crossings that may stay at zero or pass it without end, such as the
@@ -641,9 +641,12 @@ def full_state(
     p = casadi.vertcat(p, contact.values) if contact else p
     signals = effort, inputs
     timing, sides, counts, short = _law_conditions(system, (t, q, v), u, signals, motions, parts)
-    bends = parts.crossings()
-    crossed = casadi.vertcat(SX(0, 1), *(one.value for one in bends), sides, counts)
-    approaches = parts.approaches(bends)
+    given_crossings = parts.crossings()
+    contacts = [one for one in given_crossings if not one.pace.is_zero()]
+    bends = [one.value for one in given_crossings if one.pace.is_zero()]
+    sides = casadi.vertcat(SX(0, 1), *bends, sides)
+    crossed = casadi.vertcat(SX(0, 1), *(one.value for one in contacts), sides, counts)
+    approaches = parts.approaches(contacts)
     rate, *observed = with_inputs(system, [rate, *observed], u)
     return FullState(
         rhs=dense_function("rhs", [t, x, p], [rate]),
@@ -659,7 +662,7 @@ def full_state(
             if approaches.is_zero() or not approaches.numel()
             else dense_function("approaches", [t, x, p], [with_inputs(system, [approaches], u)[0]])
         ),
-        short=short or len(bends) > 0,
+        short=short or len(given_crossings) > 0,
         timing=timing,
     )
 

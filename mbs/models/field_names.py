@@ -44,7 +44,7 @@ _OLD = frozenset(("rows", "columns", "expressed_in", "coordinates"))
 """Arguments of the differential model, which had this name until version 0.2."""
 
 
-def inverse_kinematics(system: System, T: Any, *args: Any, **options: Any) -> Solutions:
+def inverse_kinematics(system: System, T: Any = None, *args: Any, **options: Any) -> Solutions:
     """Return every configuration at which a frame has a pose.
 
     Args:
@@ -57,7 +57,7 @@ def inverse_kinematics(system: System, T: Any, *args: Any, **options: Any) -> So
         ModelError: the arguments are those of `inverse_differential_kinematics`, which had this
             name until version 0.2; or as for `mbs.models.inverse_geometry.solve`.
     """
-    if isinstance(T, int | str) or _OLD & set(options):
+    if T is None or isinstance(T, int | str) or _OLD & set(options):
         raise ModelError(
             f"inverse_kinematics takes a pose (4, 4) now, not {T!r}; the model from a twist to"
             " joint velocities is mbs.models.inverse_differential_kinematics(system, frame, rows)"

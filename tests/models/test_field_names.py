@@ -47,7 +47,8 @@ def test_inverse_kinematics_takes_a_pose(arm):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "options"), [((6,), {}), (("link6",), {}), ((np.eye(4),), {"rows": [0, 1, 2]})]
+    ("arguments", "options"),
+    [((), {}), ((6,), {}), (("link6",), {}), ((np.eye(4),), {"rows": [0, 1, 2]})],
 )
 def test_the_former_meaning_of_inverse_kinematics_is_refused(arm, arguments, options):
     with pytest.raises(ModelError, match="inverse_differential_kinematics"):

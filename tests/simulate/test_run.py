@@ -1,5 +1,7 @@
 """Simulation of open and closed systems against closed forms and conservation laws."""
 
+import math
+
 import casadi
 import numpy as np
 import pytest
@@ -170,6 +172,7 @@ def test_without_a_compiler_the_same_numbers(monkeypatch):
         (dict(tau=lambda t, q, v: None), "tau(t, q, v) returns None; return 1 efforts"),
         (dict(tau=lambda t, q, v: "1"), "tau(t, q, v) returns '1'; return 1 efforts"),
         (dict(tau=lambda t, q, v: np.nan), "tau(t, q, v) returns nan; return 1 efforts"),
+        (dict(tau=lambda t, q, v: math.sin(t)), "such as math.sin make NaN of symbols; build it"),
         (dict(tau=lambda t, q, v: [LOOSE]), "tau(t, q, v) holds the symbols loose"),
         (dict(tau=lambda t, q, v: casadi.sin("x")), "(an operation of CasADi was given what it"),
         (

@@ -113,13 +113,11 @@ def _trace(
         raise ModelError(
             f"{system.name}: {signal.name}(t, q, v) returns {quoted(values)}; return"
             f" {len(signal.elements)} {signal.noun}, finite numbers or CasADi expressions of t, q"
-            " and v"
+            f" and v{'' if result is None else _SYMBOLS}"
         )
     if _has_nan(result):
         raise ModelError(
-            f"{system.name}: {signal.name}(t, q, v) has a part that is not a number: float(q[0])"
-            " and functions such as math.sin make NaN of symbols; build it from CasADi operations,"
-            " such as casadi.sin and casadi.if_else"
+            f"{system.name}: {signal.name}(t, q, v) has a part that is not a number{_SYMBOLS}"
         )
     return result, by_name
 
@@ -154,6 +152,12 @@ def _require_driven(
                 f" actuated=True, return zero for it, or return a dict that names it, as in"
                 f" {{{name!r}: value}}"
             )
+
+
+_SYMBOLS = (
+    ": float(q[0]) and functions such as math.sin make NaN of symbols; build it from CasADi"
+    " operations, such as casadi.sin and casadi.if_else"
+)
 
 
 def untraceable(system: System, what: str, error: Exception) -> ModelError:

@@ -34,7 +34,7 @@ class Assembled:
 
     Attributes:
         q: (nq,) positions [rad or m].
-        others: further configurations with the same locked positions, nearest first.
+        others: further configurations with the same locked positions.
     """
 
     q: Vector
@@ -62,13 +62,13 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
     names = [coordinate.name for coordinate in system.coordinates]
     known = {name: value for name, value in guess.items() if name in names}
     given = np.array(system.position(known))
-    as_it_is = Closing(system, p)
-    if as_it_is.openness(given) <= CLOSED and as_it_is.faces(given):
+    if _closes(Closing(system, p), given):
         return Assembled(given)
     rest = rest_positions(system, p)
     start = np.array(system.position({**{names[k]: x for k, x in rest.items()}, **known}))
-    guessed = {k for k, name in enumerate(names) if name in known and name not in _unknowns(system)}
-    for locked in _stages(system, guessed, set(rest)):
+    unknown = _unknowns(system)
+    guessed = {k for k, name in enumerate(names) if name in known} - unknown
+    for locked in _stages(system, unknown, guessed, set(rest)):
         closing = Closing(system, p, tuple(sorted(locked)))
         found = _nearest(closing, start, guessed)
         if found is not None:
@@ -94,17 +94,18 @@ def rest_positions(system: System, p: Vector) -> dict[int, float]:
     return found
 
 
-def _unknowns(system: System) -> set[str]:
-    """Names of the coordinates that are unknowns of components."""
-    return {
+def _unknowns(system: System) -> set[int]:
+    """Indices of the coordinates that are unknowns of components."""
+    names = {
         f"{part.name}.{name}" for part in system.parts for name in part.element.names_of("unknown")
     }
+    return {k for k, coordinate in enumerate(system.coordinates) if coordinate.name in names}
 
 
-def _stages(system: System, guessed: set[int], rest: set[int]) -> Iterator[set[int]]:
+def _stages(
+    system: System, unknown: set[int], guessed: set[int], rest: set[int]
+) -> Iterator[set[int]]:
     """Indices of locked positions, fewer in each stage."""
-    names = [coordinate.name for coordinate in system.coordinates]
-    unknown = {k for k, name in enumerate(names) if name in _unknowns(system)}
     motors = {k for k, c in enumerate(system.coordinates) if c.actuated}
     stages = []
     if unknown and guessed:
@@ -120,9 +121,7 @@ def _nearest(closing: Closing, start: Vector, guessed: set[int]) -> Assembled | 
     """The closed configuration nearest to the start; None if none is found."""
     system, free = closing.system, closing.free
     if not free:
-        return (
-            Assembled(start) if closing.openness(start) <= CLOSED and closing.faces(start) else None
-        )
+        return Assembled(start) if _closes(closing, start) else None
     first = closing.nearest(start)
     if first.is_closed:
         q = unwound(closing, first.q, start)
@@ -142,6 +141,11 @@ def _nearest(closing: Closing, start: Vector, guessed: set[int]) -> Assembled | 
             best = other
     others = [q for q in found if np.abs(difference(system, q, best)).max() > _EQUAL]
     return Assembled(best, tuple(others))
+
+
+def _closes(closing: Closing, q: Vector) -> bool:
+    """Whether a configuration closes the loops as it is."""
+    return closing.openness(q) <= CLOSED and closing.faces(q)
 
 
 def _distance(closing: Closing, q: Vector, start: Vector, indices: range | list[int]) -> float:

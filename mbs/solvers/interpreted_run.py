@@ -152,13 +152,7 @@ class EventStepper:
         return fired_of(self.fired) if str(failure) in ("settle", "standstill") else ()
 
     def _values(self, t: float, x: Array) -> Array:
-        try:
-            values = self.indicators(t, x)
-        except RuntimeError as error:
-            raise failure_of(error, "indicators") from error
-        if not np.isfinite(values).all():
-            raise Failure("indicators")
-        return values
+        return _finite(lambda: self.indicators(t, x))
 
     def _look(self, t: float) -> Look:
         x = self.solver.state(t)
@@ -259,14 +253,9 @@ class EventStepper:
 
     def _approaches(self, t: float) -> Array:
         """(k, 3) approaches at a time within the last step."""
-        assert self.approaches is not None
-        try:
-            near = self.approaches(t, self.solver.state(t))
-        except RuntimeError as error:
-            raise failure_of(error, "indicators") from error
-        if not np.isfinite(near).all():
-            raise Failure("indicators")
-        return near
+        approaches = self.approaches
+        assert approaches is not None
+        return _finite(lambda: approaches(t, self.solver.state(t)))
 
     def _time_to_next(self, near: Array) -> float:
         """Time to the next look that is likely to be near enough, from the left one [s]."""
@@ -376,6 +365,17 @@ class EventStepper:
         self.last = t
         if self.idle > MAX_IDLE:
             raise Failure("standstill")
+
+
+def _finite(indicators: Callable[[], Array]) -> Array:
+    """Values of indicators, or of approaches; a Failure if they have none."""
+    try:
+        values = indicators()
+    except RuntimeError as error:
+        raise failure_of(error, "indicators") from error
+    if not np.isfinite(values).all():
+        raise Failure("indicators")
+    return values
 
 
 def _follows(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from casadi import DM
 from fingerprint import differences, fingerprint, under
-from support.catalogue_systems import catalogue_system
+from support.catalogue_systems import CLOSED, catalogue_system
 
 import mbs
 from mbs.loops import analysis
@@ -16,25 +16,6 @@ from mbs.solvers.rank import EQUAL, first_best, graded, independent_rows
 
 NOISE = 1e-9
 """Of entries of the Jacobian: a choice by less than that is luck, or has a rule."""
-
-CLOSED = (
-    "akr3000",
-    "andrews_squeezer",
-    "bricard",
-    "delta",
-    "differential_wrist",
-    "five_bar",
-    "four_bar",
-    "modelica_four_bar",
-    "modelica_rod_four_bar",
-    "n_four_bar",
-    "single_cylinder_engine",
-    "slider_crank",
-    "sr400",
-    "stewart_platform",
-    "whipple_bicycle",
-)
-"""The mechanisms of the catalogue with loops."""
 
 KERNELS = (("Prescott", "1"), ("Haswell", "2"))
 """Rounding differs in all products of more than a few elements, and between numbers of threads."""

@@ -42,17 +42,25 @@ class Assembled:
 
 
 def assembled_configuration(system: System, guess: Mapping[str, float], p: Vector) -> Assembled:
-    """Return the closed configuration nearest to a guess.
+    """Return the configuration that closes the loops and is nearest to a guess.
 
-    A guess that closes the loops is the configuration; positions without a guess are zero there.
-    Otherwise positions are locked in stages until the loops close. If a position is guessed, all
-    except the unknowns of components are locked first. Then guessed positions, positions of motors
-    and springs of joints at rest are locked; then fewer of them, the springs last.
-    Free angles are within half a turn of their guess, or of zero. Of configurations that are
-    equally near, the one with the larger first position is taken.
+    A position without a guess counts as zero. A guess that closes the loops is returned unchanged.
+    Otherwise some positions are held while the others are solved for. The sets of held positions
+    are tried one after the other, until one of them closes the loops:
+
+    1. if a position is guessed: all positions except the unknowns of components, such as the
+       parameter of a curve;
+    2. guessed positions, positions of motors, and joints with a spring; a joint with a spring that
+       has no guess is held where the spring has no force;
+    3. smaller sets of these; those without the joints with springs come last.
+
+    The distance of two configurations is the largest difference of a position. Lengths are divided
+    by the size of the mechanism. Of two configurations at the same distance, the one with the
+    larger position is returned, at the first position that differs.
+    Solved angles are within half a turn of their guess, or of zero.
 
     Args:
-        system: with open loops.
+        system: its loops need not be closed yet.
         guess: approximate positions by coordinate name [rad or m].
         p: (np,) parameters.
 
@@ -82,7 +90,10 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
 
 
 def rest_positions(system: System, p: Vector) -> dict[int, float]:
-    """Return the positions at which springs of joints are at rest, by index in q [rad or m]."""
+    """Return positions at which springs of joints have no force [rad or m], by index in q.
+
+    Joints without a spring are left out.
+    """
     found = dict[int, float]()
     for link in system.tree.links:
         if link.motion in (Motion.FREE, Motion.SPHERICAL):

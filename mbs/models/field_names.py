@@ -49,13 +49,14 @@ def inverse_kinematics(system: System, T: Any = None, *args: Any, **options: Any
 
     Args:
         system: open or closed.
-        T: (4, 4) pose of the frame relative to the base.
+        T: (4, 4) pose of the frame relative to the base. It is required.
         *args: the other arguments of `mbs.models.inverse_geometry.solve`.
         **options: the same by name.
 
     Raises:
-        ModelError: the arguments are those of `inverse_differential_kinematics`, which had this
-            name until version 0.2; or as for `mbs.models.inverse_geometry.solve`.
+        ModelError: there is no pose, or the arguments are those of
+            `inverse_differential_kinematics`, which had this name up to version 0.2. The other
+            errors are those of `mbs.models.inverse_geometry.solve`.
     """
     if T is None or isinstance(T, int | str) or _OLD & set(options):
         raise ModelError(

@@ -1528,8 +1528,9 @@ def run(
             tolerances by unit, such as "rad" and "m/s", and by name, such as "j1.q"; "others" is
             for the other states. Positions that move by less than 100 tolerances are named in
             `result.info["note"]`.
-        max_step: the longest step of the integration [s]; only errors and laws limit it by default.
-            Under laws that are Callbacks or external functions it is a thousandth of the duration.
+        max_step: the longest step of the integration [s]. Error control, the times at which laws
+            jump, and short laws limit the steps by default. If a law calls a Callback or an
+            external function, whose jumps cannot be found, the default is duration / 1000.
             It is needed where a law is short in space and smooth, such as a narrow potential well.
         method: "dopri5", Dormand and Prince's explicit pair, or "rodas", the linearly implicit
             RODAS5P for stiff systems.

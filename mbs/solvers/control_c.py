@@ -11,11 +11,12 @@ from types import FrameType
 
 @contextmanager
 def control_c() -> Iterator[Callable[[], None]]:
-    """Give a function that raises KeyboardInterrupt if control-C was pressed.
+    """Context manager that yields `check()`, which raises KeyboardInterrupt after control-C.
 
-    Python drops a KeyboardInterrupt that is raised while an object is deleted. The function raises
-    it again. A call of CasADi that is interrupted may return None: errors after control-C are
-    KeyboardInterrupts too. Other handlers of the signal, and other threads, are left alone.
+    Python drops a KeyboardInterrupt that is raised in a finalizer: call `check` now and then. An
+    interrupted call of CasADi may return None. An error that leaves the block after control-C
+    becomes a KeyboardInterrupt, with that error as its cause. The context manager does nothing if
+    SIGINT has another handler, or outside the main thread.
     """
     pressed = [False]
 

@@ -47,12 +47,16 @@ def ticks_of(t: Any, duration: Any) -> Any:
 
 
 def guard(t: SX, values: SX, counts: int, modes: SX, fired: SX, duration: Any) -> tuple[SX, SX]:
-    """Indicators and next modes of crossings that may stay at zero or pass it without end.
+    """Return the indicators of crossings and their modes after an event, without chattering.
 
-    The modes are four columns: places, whether crossings are asleep, numbers of crossings in a row,
-    and times of the last changes in ticks. A place is the side, 1 or -1, or 0 where the value is
-    exactly zero, until it is not; of a count it is the whole number. A crossing that was passed
-    many times in a row sleeps for a pause, in which error control alone follows the law.
+    A crossing may stay at zero, or pass it again and again. After `_OFTEN` events in a row it is
+    asleep for a pause: its events are not located, and error control alone follows the law.
+
+    The modes are four columns of k elements: places; 1 for crossings that are asleep; the number of
+    events in a row; the time of the last event [ticks, see `ticks_of`]. The place of a value is its
+    sign, 1 or -1; it is 0 from the time at which the value is exactly zero until the value is not.
+    The place of a count is its whole number, rounded down. Events within `_IN_A_ROW` ticks of each
+    other are in a row.
 
     Args:
         t: time [s].

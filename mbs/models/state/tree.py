@@ -564,10 +564,11 @@ class FullState:
         events: `indicators(t, x, p) -> g` and `jump(t, x, p, fired) -> (x, modes)` of rigid stops
             and Coulomb friction, whose modes are then the last of p; None where there are none.
         passage: for steps through singular configurations of the loops; None where there are none.
-        crossings: `crossings(t, x, p)`, what passes through zero where laws jump or bend; None
-            where there is nothing. First those of contacts, then sides, then counts.
-        approaches: `approaches(t, x, p)`, (k, 2) the speeds and paces of the first crossings, as
-            `Approach` has them; None where all are zero.
+        crossings: `crossings(t, x, p)`, a column of event indicators; None if the system has
+            none. The indicators of the k contacts come first, then the sides, then the counts. A
+            law jumps or bends if a side changes its sign, or a count its whole number.
+        approaches: `approaches(t, x, p)`, (k, 2), the speeds and paces of the contacts, as
+            `Approach` has them; None if there are no contacts.
         sides: number of the crossings that may stay at zero or pass it without end, such as the
             velocity in a law of dry friction.
         counts: number of the last crossings, at whose whole numbers laws jump.

@@ -82,6 +82,7 @@ class _DescribedLink:
         joint: its name.
         antecedent: number of the link before it, -1 for the base.
         motion: that moves it; along or about z for revolute and prismatic ones.
+        backward: see `Link`.
         pose: the frame of the motion at zero in that of the antecedent's motion, both as described.
         given: the Khalil parameters of the pose, where it was described by them.
         edge: the joint.
@@ -93,6 +94,7 @@ class _DescribedLink:
     joint: str
     antecedent: int
     motion: Motion
+    backward: bool
     pose: Pose
     given: Khalil | None
     edge: Edge
@@ -202,6 +204,7 @@ def _extend(
                 edge.joint.name,
                 parent,
                 freedom.motion,
+                not branch.forward and freedom.motion not in _ALONG_Z,
                 here @ aligned,
                 given if aligned.is_identity() else None,
                 edge,
@@ -286,6 +289,7 @@ def _links(
                 name=draft.name,
                 antecedent=draft.antecedent,
                 motion=motion,
+                backward=draft.backward,
                 via=frame.via,
                 placement=frame.placement,
                 inertia=inertia,

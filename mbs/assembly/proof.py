@@ -192,13 +192,8 @@ def _motion(name: str, freedoms: Sequence[Freedom], q: Mapping[str, Array]) -> A
 
 
 def _motion_back(name: str, freedoms: Sequence[Freedom], q: Mapping[str, Array]) -> Array:
-    """Frame_a in frame_b, where frame_b is nearer to the base; a quaternion rotates the farther."""
-    T: Array = np.eye(4)
-    for freedom in reversed(freedoms):
-        motion = _elementary_motion(freedom, q[freedom.coordinate_of(name)])
-        free = freedom.motion in (Motion.SPHERICAL, Motion.FREE)
-        T = T @ (motion if free else _inverse(motion))
-    return T
+    """Frame_a of a joint in its frame_b."""
+    return _inverse(_motion(name, freedoms, q))
 
 
 def _elementary_motion(freedom: Freedom, q: Array) -> Array:
@@ -276,7 +271,8 @@ def _assembled(
         T = poses[link.antecedent + 1]
         for _ in link.frames:
             T = T @ next(placed)
-        poses.append(T @ _elementary_motion(Freedom(link.motion), q[link.name]))
+        moved = _elementary_motion(Freedom(link.motion), q[link.name])
+        poses.append(T @ (_inverse(moved) if link.backward else moved))
     inside = _at_samples([pose.matrix for _, pose in frames], symbols, rows)
     return np.array(poses)[[link + 1 for link, _ in frames]] @ inside
 

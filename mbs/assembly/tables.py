@@ -38,22 +38,28 @@ from mbs.text import did_you_mean
 Places = Mapping[tuple[str, str], tuple[int, Pose]]
 """Link and pose of every body, by its name and "", and of the frames "a" and "b" of every joint."""
 
+QUATERNION = ("qw", "qx", "qy", "qz")
+"""Elements of the quaternion of a joint."""
+
+ANGULAR = ("wx", "wy", "wz")
+"""Elements of its angular velocity."""
+
 _POSITIONS = {
     Motion.REVOLUTE: (("", "revolute", "rad"),),
     Motion.PRISMATIC: (("", "prismatic", "m"),),
-    Motion.SPHERICAL: tuple((k, "quaternion", "1") for k in ("qw", "qx", "qy", "qz")),
+    Motion.SPHERICAL: tuple((k, "quaternion", "1") for k in QUATERNION),
     Motion.FREE: (
         *((k, "translation", "m") for k in "xyz"),
-        *((k, "quaternion", "1") for k in ("qw", "qx", "qy", "qz")),
+        *((k, "quaternion", "1") for k in QUATERNION),
     ),
 }
 _VELOCITIES = {
     Motion.REVOLUTE: (("", "revolute", "rad/s"),),
     Motion.PRISMATIC: (("", "prismatic", "m/s"),),
-    Motion.SPHERICAL: tuple((k, "rotation", "rad/s") for k in ("wx", "wy", "wz")),
+    Motion.SPHERICAL: tuple((k, "rotation", "rad/s") for k in ANGULAR),
     Motion.FREE: (
         *((k, "translation", "m/s") for k in ("vx", "vy", "vz")),
-        *((k, "rotation", "rad/s") for k in ("wx", "wy", "wz")),
+        *((k, "rotation", "rad/s") for k in ANGULAR),
     ),
 }
 EFFORT_UNIT = {"rad/s": "N.m", "m/s": "N"}
@@ -432,7 +438,8 @@ class AttachedSensor:
     Attributes:
         sensor: its description.
         frames: link (-1 for the base) and pose in the link's frame, of each of its points, or of
-            frame_a and frame_b of its joint.
+            frame_a and frame_b of its joint; none for a coordinate, except that of a spherical
+            joint that is cut.
         coordinate: name of the coordinate that it reads, or nothing.
         joint: number of its joint in `system.joints`, None where it is on none.
         quantities: what it reads.
@@ -499,7 +506,7 @@ def attached_sensors(
     found: list[AttachedSensor] = []
     for sensor in sensors_of(mechanism):
         if isinstance(sensor, JointSensor):
-            found.append(_on_coordinate(sensor, tables))
+            found.append(_on_coordinate(sensor, tables, joints))
         elif isinstance(sensor, OnJoint):
             found.append(_on_joint(mechanism, sensor, joints))
         else:
@@ -544,14 +551,20 @@ def _on_joint(mechanism: Mechanism, sensor: OnJoint, joints: Sequence[JointRow])
     return AttachedSensor(sensor, frames, "", number, sensor.measured, sensor.joint)
 
 
-def _on_coordinate(sensor: JointSensor, tables: tuple[Sequence[Coordinate], ...]) -> AttachedSensor:
+def _on_coordinate(
+    sensor: JointSensor, tables: tuple[Sequence[Coordinate], ...], joints: Sequence[JointRow]
+) -> AttachedSensor:
     q, v, cut = ({row.name: row for row in table} for table in tables)
     name = sensor.joint
-    if name in cut and cut[name].kind not in ("revolute", "prismatic"):
-        raise AssemblyError(
-            f"{sensor.name}: the joint of {name!r} is cut to open a loop and rotates in all"
-            " directions; put a RelativeSensor between its frame_a and frame_b"
-        )
+    balls = {row.name: row for row in joints if row.cut and row.kind == "spherical"}
+    joint, _, element = name.rpartition(".")
+    if joint in balls and element in QUATERNION + ANGULAR:
+        ball = balls[joint]
+        quantities = [Quantity("q", "1")]
+        if element in ANGULAR:
+            quantities = [Quantity("v", "rad/s"), Quantity("a", ACCELERATION_UNIT["rad/s"])]
+        frames = ball.frame_a, ball.frame_b
+        return AttachedSensor(sensor, frames, name, None, tuple(quantities), name)
     if not any(name in table for table in (q, v, cut)):
         known = dict.fromkeys([*q, *v, *cut])
         raise AssemblyError(

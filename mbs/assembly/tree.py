@@ -49,6 +49,8 @@ class Link:
         name: of the motion: the joint's name, with a suffix when the joint has several.
         antecedent: number of link i, or -1 for the base.
         motion: how frame j moves from its placement.
+        backward: whether the tree passes a SPHERICAL or FREE motion from frame_b to frame_a. Its
+            positions then tell link i seen from link j, and its velocities are in frame i.
         via: fixed frames between frame i and the placement, one after the other; none where the
             common perpendicular of the axes of i and j is near.
         placement: frame j with respect to the last of them, or to frame i, at the zero position of
@@ -68,6 +70,7 @@ class Link:
     name: str
     antecedent: int
     motion: Motion
+    backward: bool
     via: tuple[Khalil, ...]
     placement: Khalil
     inertia: Inertia

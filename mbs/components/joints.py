@@ -606,9 +606,9 @@ class Universal(Joint):
 
 @dataclass(frozen=True, slots=True)
 class Spherical(Joint):
-    """Any rotation, as a unit quaternion; its velocity is angular, in frame_b; 3 rows.
+    """Any rotation: a unit quaternion, the orientation of frame_b in frame_a; 3 rows.
 
-    The quaternion orients the frame that is further from the base, seen from the nearer one.
+    The velocity is the angular velocity of frame_b relative to frame_a, in the axes of frame_b.
     """
 
     @property
@@ -623,10 +623,10 @@ class Spherical(Joint):
 
 @dataclass(frozen=True, slots=True)
 class Free(Joint):
-    """No constraint at all: position and unit quaternion.
+    """No constraint at all: position and unit quaternion of frame_b in frame_a.
 
-    They place the frame that is further from the base, seen from the nearer one; the velocity is
-    its [linear; angular] velocity, in its own axes.
+    The velocity is the [linear; angular] velocity of frame_b relative to frame_a, in the axes of
+    frame_b.
     """
 
     @property

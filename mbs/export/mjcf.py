@@ -29,7 +29,13 @@ from mbs.components import (
 )
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
-from mbs.export.robot_files import shapes_left_out, system_of, write_xml
+from mbs.export.robot_files import (
+    check_backward_drives,
+    child_positions,
+    shapes_left_out,
+    system_of,
+    write_xml,
+)
 from mbs.expressions import to_sx
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose
@@ -61,9 +67,11 @@ def mjcf(
 
     Every link is a body under its antecedent, with the name of the first body that it carries and
     the inertia of all of them; the others are welded to it without a mass of their own. q is
-    MuJoCo's qpos, the assembled configuration its keyframe `home`. A loop closes by connect or
-    weld, which MuJoCo keeps softly; couplings are equalities of joints or fixed tendons, springs
-    and dampers between points are spatial tendons. Actuated joints have motors of gear 1.
+    MuJoCo's qpos, the assembled configuration its keyframe `home`. Only spherical and free joints
+    that connect the outer body to the inner one have another qpos: the pose of the outer body. A
+    loop closes by connect or weld, which MuJoCo keeps softly; couplings are equalities of joints or
+    fixed tendons, springs and dampers between points are spatial tendons. Actuated joints have
+    motors of gear 1.
 
     What is lost: symbols, whose values are written; largest velocities; the width of Coulomb
     friction, which is a constraint in MuJoCo. Masses and moments of moving bodies that are zero
@@ -128,8 +136,9 @@ class _Writer:
         for force in system.parts:
             self._add_force(force)
         root.extend(part for part in (self.tendons, equalities, self._motors()) if len(part))
+        qpos = child_positions(system, system.configuration)
         frame = SubElement(root, "keyframe")
-        SubElement(frame, "key", name="home", qpos=self._text(DM(system.configuration)))
+        SubElement(frame, "key", name="home", qpos=self._text(DM(qpos)))
         return root
 
     def _refuse(self, what: str, remedy: str) -> ModelError:
@@ -138,6 +147,7 @@ class _Writer:
     def _check(self) -> None:
         """Refuse what the format cannot say."""
         system = self.system
+        check_backward_drives(system, "MJCF")
         for part in [*(row.name for row in system.shafts), *(row.name for row in system.devices)]:
             raise self._refuse(
                 f"{part}: an MJCF file has no drive lines", "give Ia and effort to the joint"

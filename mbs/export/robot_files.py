@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from xml.etree.ElementTree import Comment, Element, indent, tostring
+
+import numpy as np
+from casadi import DM, SX
 
 from mbs.assembly import System
 from mbs.components import Mechanism
+from mbs.components.joints import Motion
 from mbs.errors import ModelError
 from mbs.files import path_of, write_bytes
+from mbs.recursions.poses import link_poses
+from mbs.spatial import origin
 from mbs.text import quoted
 
 
@@ -25,6 +32,38 @@ def system_of(system: object) -> System:
             f"{quoted(system)} is a {type(system).__name__}; give a System or a Mechanism"
         )
     return system
+
+
+def child_positions(system: System, q: Sequence[float]) -> list[float]:
+    """Return the positions q as robot files count them.
+
+    Robot files tell the pose of the outer body in the inner one. Positions of spherical and free
+    joints that connect the outer body to the inner one tell the pose of the inner body in the
+    outer one.
+    """
+    found = [float(value) for value in q]
+    for link, pose in zip(system.tree.links, link_poses(system.tree, SX(DM(found))), strict=True):
+        if link.backward:
+            p = np.array(DM(origin(pose.motion))).ravel() if link.motion is Motion.FREE else ()
+            w, x, y, z = found[link.q.stop - 4 : link.q.stop]
+            found[link.q] = [*p, w, -x, -y, -z]
+    return found
+
+
+def check_backward_drives(system: System, file: str) -> None:
+    """Refuse drives and friction of joints from the outer body to the inner one.
+
+    Raises:
+        ModelError: they act on other velocities than those that the file knows.
+    """
+    for link in system.tree.links:
+        acting = (link.Fv, link.Fs, link.Ia) if link.motion is Motion.FREE else (link.Fs,)
+        if link.backward and not all(value.is_zero() for value in acting):
+            raise ModelError(
+                f"{system.name}/{link.name}: its friction or rotor inertia acts on velocities of"
+                f" the inner body relative to the outer one, which {file} files do not have;"
+                " connect the inner body first"
+            )
 
 
 def shapes_left_out(system: System) -> str:

@@ -211,7 +211,7 @@ class _SdfWriting:
             T[:3, :3] = np.array(DM(quaternion_rotation(casadi.SX(DM(q[-4:])))))
             if link.motion is Motion.FREE:
                 T[:3, 3] = q[:3]
-        return T
+        return inverse(T) if link.backward else T
 
     def _drive(self, joint: Element, link: Link) -> None:
         """Axis, dynamics, limits and motor of a joint of one axis."""

@@ -19,7 +19,12 @@ from mbs.assembly.tree import Link
 from mbs.components import Mechanism
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
-from mbs.export.robot_files import shapes_left_out, system_of, write_xml
+from mbs.export.robot_files import (
+    check_backward_drives,
+    shapes_left_out,
+    system_of,
+    write_xml,
+)
 from mbs.formats.urdf import UNLIMITED
 from mbs.text import listed, quoted
 
@@ -88,6 +93,7 @@ def _check(system: System) -> None:
         fail(f"{system.cuts[0].edge.joint.name} closes a loop")
     if system.parts or system.shafts:
         fail("it has force elements or a drive line")
+    check_backward_drives(system, "URDF")
     for link in system.tree.links:
         if link.motion is Motion.SPHERICAL:
             fail(f"{link.name} is a spherical joint")

@@ -141,7 +141,8 @@ def _nearest(closing: Closing, start: Vector, guessed: set[int]) -> Assembled | 
     elif len(free) > _FEW:
         return None
     found = [q] if first.is_closed else []
-    for other in candidates(closing, start):
+    for candidate in candidates(closing, start):
+        other = unwound(closing, candidate, start)
         if not any(np.abs(difference(system, other, one)).max() < _EQUAL for one in found):
             found.append(other)
     if not found:

@@ -10,7 +10,8 @@ from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
-from mbs.assembly.tables import AttachedSensor
+from mbs.assembly.tables import ANGULAR, QUATERNION, AttachedSensor
+from mbs.closed_forms.spatial import unit_quaternion
 from mbs.errors import ModelError
 from mbs.models.direct_dynamics import direct_dynamics
 from mbs.models.joint_wrenches import motion_inputs, wrenches_of_joints
@@ -32,7 +33,7 @@ from mbs.recursions.readings import (
     frame_readings,
     in_axes,
 )
-from mbs.recursions.route import frame_velocity
+from mbs.recursions.route import frame_velocity, relative_acceleration, relative_motion
 from mbs.recursions.velocities import (
     Acceleration,
     Velocity,
@@ -185,11 +186,26 @@ def _on_frames(state: _Observed, attached: AttachedSensor) -> Readings:
 
 def _coordinate(state: _Observed, attached: AttachedSensor) -> Readings:
     system, s, name = state.system, state.s, attached.coordinate
+    if attached.frames:
+        return _cut_rotation(state, attached)
     if name in [row.name for row in system.cut_coordinates]:
         q, v, a = cut_coordinate(system, s, state.a, name)
         return {"q": q, "v": v, "a": a}
     tables = system.coordinates, system.speeds
     return coordinate_readings(name, tables, s.q, s.v_tree, state.a)
+
+
+def _cut_rotation(state: _Observed, attached: AttachedSensor) -> Readings:
+    """An element of the quaternion or of the angular velocity of a spherical joint that is cut."""
+    frame_a, frame_b = attached.frames
+    motion = relative_motion(state.system.tree, frame_a, frame_b, state.s.q, state.velocities)
+    element = attached.coordinate.rpartition(".")[2]
+    if element in QUATERNION:
+        return {"q": unit_quaternion(motion.R)[QUATERNION.index(element)]}
+    rate = relative_acceleration(motion, frame_a, frame_b, state.accelerations)
+    w, wd = (casadi.mtimes(motion.R.T, x) for x in (motion.w, rate.wd))
+    number = ANGULAR.index(element)
+    return {"v": w[number], "a": wd[number]}
 
 
 def _transmitted(state: _Observed, attached: AttachedSensor) -> Readings:

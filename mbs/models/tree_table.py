@@ -43,6 +43,12 @@ def unknown_to_core(system: System) -> str:
                 " direct_dynamics"
             )
     for j, link in enumerate(system.tree.links):
+        if link.backward:
+            return (
+                f"joint {link.name} connects its frame_b to the side of the base, which tree_core"
+                " does not know; exchange its frames, or use mbs.models.inverse_dynamics and"
+                " direct_dynamics"
+            )
         if link.rotor is not None and link.rotor.carrier not in (j, link.antecedent, -1):
             return (
                 f"the rotor of {link.name} is on neither of the links of the joint,"

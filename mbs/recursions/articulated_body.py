@@ -225,7 +225,8 @@ _DIRECTIONS = {
     Motion.SPHERICAL: (3, 4, 5),
     Motion.FREE: (0, 1, 2, 3, 4, 5),
 }
-"""Where each velocity of a motion stands in a twist [linear; angular] of frame j."""
+"""Where each velocity of a motion stands in a twist [linear; angular] where its directions are
+constant."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -236,11 +237,13 @@ class JointElimination:
         inner: displacements from that frame to the frame of the link.
         outer: displacements from the antecedent to it.
         pivots: in the order in which they were taken.
+        sign: -1 where positive velocities move the link against the directions of the pivots.
     """
 
     inner: tuple[Displacement, ...]
     outer: tuple[Displacement, ...]
     pivots: tuple[Pivot, ...]
+    sign: int
 
 
 def solve_inertia(tree: Tree, poses: list[LinkPose], right: SX) -> SX:
@@ -334,7 +337,10 @@ def _eliminations(
         link, pose = tree.links[j], poses[j]
         inner: tuple[Displacement, ...] = ()
         outer, body = pose.steps, articulated[j]
-        if j in leaves and link.motion.nv == 1:
+        if link.backward:
+            inner, outer = pose.motion, pose.seat
+            body = body_through(inner, body)
+        elif j in leaves and link.motion.nv == 1:
             inner, outer = pose.motion, pose.seat
             body = ArticulatedInertia.of(pose.motion[0].body(rigid[j]))
         drive, pivots = _drive(tree, poses, j), list[Pivot]()
@@ -343,7 +349,7 @@ def _eliminations(
         for direction in _DIRECTIONS[link.motion]:
             pivots.append(Pivot.of(body, direction, drive))
             body = body.without(pivots[-1])
-        result.append(JointElimination(inner, outer, tuple(pivots)))
+        result.append(JointElimination(inner, outer, tuple(pivots), -1 if link.backward else 1))
         if link.antecedent >= 0:
             articulated[link.antecedent] += body_through(outer, body)
     return result[::-1]
@@ -370,14 +376,15 @@ def _solution(
         link, joint = tree.links[j], joints[j]
         wrench = _moved_wrench(joint.inner, needed[j])
         for number, pivot in zip(_numbers(link), joint.pivots, strict=True):
-            wrench, left[number] = pivot.transmit(wrench, efforts[number])
+            wrench, left[number] = pivot.transmit(wrench, joint.sign * efforts[number])
         if link.antecedent >= 0:
             needed[link.antecedent] += _moved_wrench(joint.outer, wrench)
     x, twists = zeros(tree.nv), [zeros(6)] * (len(tree.links) + 1)
     for j, link in enumerate(tree.links):
         twist = _moved_twist(joints[j].outer, twists[link.antecedent])
         for number, pivot in reversed(list(zip(_numbers(link), joints[j].pivots, strict=True))):
-            twist, x[number] = pivot.accelerate(twist, left[number])
+            twist, own = pivot.accelerate(twist, left[number])
+            x[number] = joints[j].sign * own
         twists[j] = _moved_twist(joints[j].inner, twist)
     return x
 

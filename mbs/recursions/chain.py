@@ -56,7 +56,7 @@ class ChainJoint:
         index: index of its position; of a ring in q, beyond the end of it for a cut joint; None
             for a spherical joint whose position nothing asks for. Four numbers follow from there
             for a quaternion.
-        sign: -1 where the chain runs through the joint backwards.
+        sign: -1 where the chain runs through the joint from its frame_b to its frame_a.
         cut: whether it belongs to the joint that closes a loop.
         spin: of a spherical joint between a rod that may spin and its antecedent.
     """
@@ -302,6 +302,7 @@ class ChainBuilder:
 
 def _joint(tree: Tree, k: int, sign: int, spins: Mapping[int, Spin]) -> ChainJoint:
     link = tree.links[k]
+    sign = -sign if link.backward else sign
     return ChainJoint(link.name, link.motion, link.q.start, sign, spin=spins.get(link.q.start))
 
 

@@ -35,18 +35,18 @@ def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
             body = pose.motion[0].body(body)
         else:
             steps = pose.steps
-        for column, (linear, angular) in enumerate(unit_motions(link.motion)):
+        for column, (linear, angular) in enumerate(unit_motions(link, pose)):
             f, m = body.momentum(linear, angular)
             spin = _at_seat(pose, link.motion, momentum_on(link, j))
             m = m + spin
-            A[link.v, link.v.start + column] = effort(link.motion, f, m)
+            A[link.v, link.v.start + column] = effort(link, pose, f, m)
             f_i, m_i = wrench_through(steps, f, m)
             m_i = m_i + momentum_on(link, link.antecedent)
             _fill_ancestors(A, tree, poses, j, column, (f_i, m_i))
         for k in range(link.v.start, link.v.stop):
             A[k, k] += link.Ia
         if link.rotor is not None:
-            A[link.v, link.v] += link.rotor.seen_at_joint + effort(link.motion, zeros(), spin)
+            A[link.v, link.v] += link.rotor.seen_at_joint + effort(link, pose, zeros(), spin)
         if link.antecedent >= 0:
             composite[link.antecedent] += body_through(steps, body)
     return A
@@ -65,7 +65,7 @@ def _fill_ancestors(
     i = tree.links[j].antecedent
     while i >= 0:
         link = tree.links[i]
-        entries = effort(link.motion, *wrench)
+        entries = effort(link, poses[i], *wrench)
         A[link.v, k] = entries
         A[k, link.v] = entries.T
         wrench = poses[i].wrench(*wrench)

@@ -110,5 +110,5 @@ def element_efforts(acting: PartsAt, poses: list[LinkPose]) -> SX:
 def wrench_efforts(tree: Tree, poses: list[LinkPose], wrenches: Mapping[int, Wrench]) -> SX:
     """(nv, 1) efforts along the motions that transmit wrenches of links to the base."""
     carried = transmitted_wrenches(tree, poses, wrenches)
-    efforts = (effort(link.motion, f, m) for link, (f, m) in zip(tree.links, carried, strict=True))
-    return casadi.vertcat(*efforts)
+    at = zip(tree.links, poses, carried, strict=True)
+    return casadi.vertcat(*(effort(link, pose, *wrench) for link, pose, wrench in at))

@@ -38,7 +38,7 @@ from mbs.recursions.route import (
     relative_pose,
     reverse_path,
 )
-from mbs.recursions.velocities import unit_motions
+from mbs.recursions.velocities import unit_motions_at_joint
 from mbs.spatial import Pose, Rotation, cross, is_zero, skew, zeros
 
 
@@ -170,7 +170,7 @@ def _local_columns(tree: Tree, branch: list[PathStep], arms: list[SX]) -> list[t
     for number, step in enumerate(branch):
         if isinstance(step, JointAt):
             link = tree.links[step.link]
-            for column, (linear, angular) in enumerate(unit_motions(link.motion)):
+            for column, (linear, angular) in enumerate(unit_motions_at_joint(link)):
                 V = linear if is_zero(angular) else linear + cross(angular, arms[number])
                 result.append((number, (link.v.start + column, V, angular)))
     return result

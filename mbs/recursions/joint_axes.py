@@ -20,8 +20,10 @@ from mbs.spatial import Displacement, Rotation, ScrewDisplacement, cross, is_zer
 
 # The unit motions of a joint and their rates, as seen by an observer at the joint.
 #
-# A unit motion stays fixed in the link before the joint. Its first and second rates are what a
-# small displacement along it adds to the velocities and accelerations of everything behind it.
+# The unit motions of a joint are fixed in one of its two links, the carrier: in the link behind
+# the joint, or, of a backward joint, in the link before it. A small displacement along a unit
+# motion adds to the velocities and accelerations of everything behind the joint, as these see it,
+# the first and second rate of the unit motion where it is fixed in the other link.
 #
 # Source: Singh, Russell & Wensing 2022 (the vectors written there as Psi with one and two dots).
 
@@ -42,6 +44,11 @@ class Twist:
         angular = casadi.mtimes(R, self.angular)
         return Twist(casadi.mtimes(R, self.linear) + cross(p, angular), angular)
 
+    def rate_on(self, carrier: Twist) -> Twist:
+        """Its rate where it is fixed on what moves with the velocity of the carrier."""
+        turning = cross(carrier.angular, self.linear) + cross(carrier.linear, self.angular)
+        return Twist(turning, cross(carrier.angular, self.angular))
+
     def power(self, f: SX, m: SX) -> SX:
         """What a force f and a moment m about the same point do along the motion."""
         return casadi.dot(self.linear, f) + casadi.dot(self.angular, m)
@@ -53,7 +60,8 @@ class Line:
 
     Attributes:
         unit: the motion for a unit velocity.
-        spin: (3, 1) rate of its angular part, when it is fixed in the link before the joint.
+        spin: (3, 1) rate of its angular part, when it is fixed in the link that is not its
+            carrier.
         second: its second rate, fixed in the same link.
         faster: its rate fixed in the link before the joint, and fixed in the link behind it,
             added: what a unit of velocity adds to the accelerations.
@@ -79,21 +87,23 @@ class Line:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineObserver:
-    """Motion of the links around a joint, for an observer who moves with its origin.
+    """Motion of the links of a joint, for an observer who moves with the origin of frame j.
 
     Attributes:
-        v: (3, 1) velocity of the link before the joint [m/s].
+        v: (3, 1) velocity of the link that is not the carrier [m/s].
         w: (3, 1) its angular velocity [rad/s].
         vd: (3, 1) its acceleration, minus gravity [m/s^2].
         wd: (3, 1) its angular acceleration [rad/s^2].
-        w_behind: (3, 1) angular velocity of the link behind the joint.
+        v_carrier: (3, 1) velocity of the carrier [m/s].
+        w_carrier: (3, 1) its angular velocity [rad/s].
     """
 
     v: SX
     w: SX
     vd: SX
     wd: SX
-    w_behind: SX
+    v_carrier: SX
+    w_carrier: SX
 
 
 def revolute_line(dot: SX, ddot: SX, vd: SX) -> Line:
@@ -122,9 +132,9 @@ def prismatic_line(dot: SX, ddot: SX) -> Line:
     )
 
 
-def free_lines(motion: Motion, seen: LineObserver) -> tuple[Line, ...]:
-    """The unit motions of a joint with several velocities, fixed in the link behind it."""
-    return tuple(_free_line(Twist(*unit), seen) for unit in unit_motions(motion))
+def free_lines(link: Link, pose: LinkPose, seen: LineObserver) -> tuple[Line, ...]:
+    """The unit motions of a joint with several velocities."""
+    return tuple(_free_line(Twist(*unit), seen) for unit in unit_motions(link, pose))
 
 
 def _free_line(unit: Twist, seen: LineObserver) -> Line:
@@ -135,8 +145,8 @@ def _free_line(unit: Twist, seen: LineObserver) -> Line:
         cross(seen.wd, t) + cross(seen.w, t_dot) + cross(seen.vd, s) + cross(2 * seen.v, s_dot),
         cross(seen.wd, s) + cross(seen.w, s_dot),
     )
-    behind = Twist(cross(seen.w_behind, t), cross(seen.w_behind, s))
-    return Line(unit, s_dot, second, rate + behind)
+    carried = Twist(cross(seen.w_carrier, t) + cross(seen.v_carrier, s), cross(seen.w_carrier, s))
+    return Line(unit, s_dot, second, rate + carried)
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,15 +213,19 @@ def _of_several(
     link: Link, pose: LinkPose, before: Acceleration, own: Acceleration, v: SX
 ) -> JointAxes:
     """The frame of the link itself, for joints of several velocities."""
-    linear, angular = motion_behind(link.motion, v)
+    linear, angular = motion_behind(link, pose, v)
     path: tuple[AxesStep, ...] = (
         *_drift(linear),
         *reversed(pose.steps),
         *_drift(cross(before.w, pose.p)),
     )
-    vd = pose.apply_inverse(before.vd + casadi.mtimes(before.rate.U, pose.p))
-    seen = LineObserver(-linear, own.w - angular, vd, pose.apply_inverse(before.wd), own.w)
-    return JointAxes(None, path, False, free_lines(link.motion, seen), own.w)
+    if link.backward:
+        seen = LineObserver(zeros(), own.w, own.vd, own.wd, -linear, own.w - angular)
+    else:
+        vd = pose.apply_inverse(before.vd + casadi.mtimes(before.rate.U, pose.p))
+        wd = pose.apply_inverse(before.wd)
+        seen = LineObserver(-linear, own.w - angular, vd, wd, zeros(), own.w)
+    return JointAxes(None, path, False, free_lines(link, pose, seen), own.w)
 
 
 def _of_one(
@@ -223,7 +237,7 @@ def _of_one(
     ddot = vector([wd[1] + w[0] * w[2], w[1] * w[2] - wd[0], own.rate.U[2, 2]])
     screw = pose.motion[0]
     assert isinstance(screw, ScrewDisplacement)
-    linear, _ = motion_behind(link.motion, v)
+    linear, _ = motion_behind(link, pose, v)
     height = ScrewDisplacement.about("z", SX(0), screw.t)
     path: tuple[AxesStep, ...] = (
         *_drift(linear),

@@ -22,11 +22,12 @@ from mbs.recursions.newton_euler import momentum_on, spin_momenta
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.regrouping import regroup, shift_frames
 from mbs.recursions.velocities import (
-    effort,
+    effort_at_joint,
     link_accelerations,
+    motion_at_joint,
     motion_behind,
     resting_base,
-    unit_motions,
+    unit_motions_at_joint,
 )
 from mbs.spatial import (
     Displacement,
@@ -85,9 +86,9 @@ class VelocityField:
         drag = step.rotation.apply(self.drag) + cross(velocity, f)
         return VelocityField(f, m, f_rate, m_rate, drag)
 
-    def row(self, motion: Motion, w: SX) -> SX:
-        """Entries of B in the row of u for the velocities of a link that turns at w."""
-        return effort(motion, cross(self.f, w), cross(self.m, w) + self.drag)
+    def row(self, link: Link, w: SX) -> SX:
+        """Entries of B in the row of u for the velocities of a link; its directions turn at w."""
+        return effort_at_joint(link, cross(self.f, w), cross(self.m, w) + self.drag)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -204,11 +205,13 @@ class LagrangeForm:
 class _FormPlace:
     """Where the columns of a joint are written: its seat, or the frame of its link.
 
+    The directions of the joint are constant there.
+
     Joints with parallel axes, one after the other, may have parallel places: what comes from
     behind them is then turned once, by the sum of their angles.
 
     Attributes:
-        w: (3, 1) angular velocity of link j.
+        w: (3, 1) angular velocity of link j; of link i where the joint is backward.
         g: (3, 1) gravity acceleration.
         inner: from the place to frame j; empty when it is frame j.
         outer: to the place from frame i, or from the place of joint i when that is parallel.
@@ -264,9 +267,10 @@ def lagrange_form(tree: Tree, poses: list[LinkPose], v: SX) -> LagrangeForm:
         for step, _ in reversed(place.inner):
             body = body.through(step)
         body = body + placed[j]
-        _fill_columns(work, j, body)
+        moved = body.moved(*motion_at_joint(link, 0.5 * v[link.v]))
+        _fill_columns(work, j, moved if link.backward else body)
         if link.antecedent >= 0:
-            body = body.moved(*motion_behind(link.motion, 0.5 * v[link.v]))
+            body = moved
             for step, _ in reversed(place.outer):
                 body = body.through(step)
             (placed if place.parallel else framed)[link.antecedent] += body
@@ -283,17 +287,20 @@ def _places(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_Form
     gravity: list[SX] = []
     for j, link in enumerate(tree.links):
         pose, i = poses[j], link.antecedent
-        linear, angular = motion_behind(link.motion, v[link.v])
+        linear, angular = motion_behind(link, pose, v[link.v])
         w_i, g_i = (w[i], gravity[i]) if i >= 0 else (zeros(), tree.gravity)
         gravity.append(pose.apply_inverse(g_i))
         if link.motion is Motion.REVOLUTE and _follows(tree, poses, j, w):
             result.append(_parallel(pose, result[i], angular))
             continue
         steps = _moving_steps(pose, w_i, linear)
-        if i < 0 or link.motion.nv > 1:
+        seat = len(pose.seat)
+        if link.backward:
+            at_seat = pose.at_seat(w_i), pose.at_seat(g_i)
+            result.append(_FormPlace(*at_seat, steps[seat:], steps[:seat]))
+        elif i < 0 or link.motion.nv > 1:
             result.append(_FormPlace(w[j], gravity[j], [], steps))
         else:
-            seat = len(pose.seat)
             seat_w, seat_g = pose.at_seat(w_i) + angular, pose.at_seat(g_i)
             result.append(_FormPlace(seat_w, seat_g, steps[seat:], steps[:seat]))
     return result
@@ -347,16 +354,16 @@ def _fill_columns(work: _FormWork, j: int, body: Augmented) -> None:
     """Columns and rows of the velocities of joint j, its own block and those of its ancestors."""
     form, link, place = work.form, work.tree.links[j], work.places[j]
     spin = _at(place.inner, rotor_column(link, j, work.w[j]))
-    for number, (linear, angular) in enumerate(unit_motions(link.motion)):
+    for number, (linear, angular) in enumerate(unit_motions_at_joint(link)):
         k = link.v.start + number
         column = body.column(place.w, linear, angular)
         form.Q[k] = -casadi.dot(place.g, column.f)
         column = column + spin
-        form.A[link.v, k] = effort(link.motion, column.f, column.m)
-        form.B[link.v, k] = effort(link.motion, column.f_rate, column.m_rate)
+        form.A[link.v, k] = effort_at_joint(link, column.f, column.m)
+        form.B[link.v, k] = effort_at_joint(link, column.f_rate, column.m_rate)
         if link.rotor is not None:
-            form.A[k, k] += link.rotor.seen_at_joint + effort(link.motion, spin.f, spin.m)
-            form.B[k, k] += spin.row(link.motion, place.w)
+            form.A[k, k] += link.rotor.seen_at_joint + effort_at_joint(link, spin.f, spin.m)
+            form.B[k, k] += spin.row(link, place.w)
         _fill_ancestors(work, j, k, column)
 
 
@@ -375,16 +382,18 @@ def _fill_ancestors(work: _FormWork, j: int, k: int, column: VelocityField) -> N
     form, tree, places, w = work.form, work.tree, work.places, work.w
     driven = tree.links[j]
     while (i := tree.links[j].antecedent) >= 0:
-        link, parallel = tree.links[i], places[j].parallel
+        link, at_place = tree.links[i], places[j].parallel
         column = _at(places[j].outer, column)
         if tree.links[j] is driven:
             carried = rotor_column(driven, i, w[i])
-            column = column + (_at(places[i].inner, carried) if parallel else carried)
-        entries = effort(link.motion, column.f, column.m)
+            column = column + (_at(places[i].inner, carried) if at_place else carried)
+        if link.backward:
+            column, at_place = _at(places[i].inner, column), True
+        entries = effort_at_joint(link, column.f, column.m)
         form.A[link.v, k], form.A[k, link.v] = entries, entries.T
-        form.B[link.v, k] = effort(link.motion, column.f_rate, column.m_rate)
-        form.B[k, link.v] = column.row(link.motion, places[i].w if parallel else w[i]).T
-        column = column if parallel else _at(places[i].inner, column)
+        form.B[link.v, k] = effort_at_joint(link, column.f_rate, column.m_rate)
+        form.B[k, link.v] = column.row(link, places[i].w if at_place else w[i]).T
+        column = column if at_place else _at(places[i].inner, column)
         j = i
 
 

@@ -148,7 +148,7 @@ def newton_euler(
     efforts = rotor_efforts(tree, a, motions, base)
     for j, link in reversed(list(enumerate(tree.links))):
         i = link.antecedent
-        efforts[link.v] += effort(link.motion, *wrenches[j])
+        efforts[link.v] += effort(link, poses[j], *wrenches[j])
         if i >= 0:
             wrenches[i] = add_wrenches(wrenches[i], poses[j].wrench(*wrenches[j]))
     return Dynamics(motions, own, wrenches, efforts)

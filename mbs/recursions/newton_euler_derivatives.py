@@ -440,6 +440,8 @@ def _fill(
             if own is not None:
                 column = column.with_couple(own)
             _set_own(result, k, link.v.start, axes[j].lines, column)
+            if link.backward:
+                _turn_row(result, k, link.v.start, axes[j].lines, subtrees[j])
             if own is not None:
                 result.dv[k, k] += casadi.dot(line.unit.angular, own.dv)
                 result.A[k, k] += casadi.dot(line.unit.angular, own.da)
@@ -507,6 +509,15 @@ def _set_own(
     """The entries of velocity k with those of its own joint, from number `start` on."""
     for h, line in enumerate(lines, start):
         result.dq[k, h], result.dv[k, h], result.A[k, h] = column.row(line)
+
+
+def _turn_row(
+    result: EffortDerivatives, k: int, start: int, lines: tuple[Line, ...], subtree: SubtreeMotion
+) -> None:
+    """Add what velocity k of a backward joint, fixed on the link before, does not turn with it."""
+    unit = lines[k - start].unit
+    for h, line in enumerate(lines, start):
+        result.dq[k, h] += line.unit.rate_on(unit).power(subtree.f, subtree.m)
 
 
 def _set_pairs(

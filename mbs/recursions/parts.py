@@ -244,7 +244,8 @@ class PartsAt:
             readings = coordinate_readings(attached.coordinate, tables, self.q, self.v)
         elif sensor.reads in ("absolute", "relative", "distance"):
             readings = frame_readings(self.tree, attached, self.q, self.moving)
-        if attached.coordinate in [row.name for row in self.system.cut_coordinates]:
+        cut = [row.name for row in self.system.cut_coordinates]
+        if attached.coordinate in cut or (attached.coordinate and attached.frames):
             raise AssemblyError(
                 f"a wire comes from {source}, whose joint {attached.coordinate!r} is cut to open a"
                 " loop; cut another joint, or wire from a sensor on one of the others"

@@ -146,11 +146,18 @@ def _joint(
             return seat, (ScrewDisplacement.about("z", at.theta + q, at.r),)
         case Motion.PRISMATIC:
             return seat, (ScrewDisplacement.about("z", at.theta, at.r + q),)
-    free = FreeDisplacement(
-        MatrixRotation(quaternion_rotation(q[link.motion.nq - 4 :])),
-        q[0:3] if link.motion is Motion.FREE else zeros(),
+    return seat + _moving(ScrewDisplacement.about("z", at.theta, at.r)), (_free(link, q),)
+
+
+def _free(link: Link, q: SX) -> FreeDisplacement:
+    """The displacement of a spherical or free motion; its inverse where it is passed backward."""
+    R = quaternion_rotation(q[link.motion.nq - 4 :])
+    R = R.T if link.backward else R
+    if link.motion is not Motion.FREE:
+        return FreeDisplacement(MatrixRotation(R), zeros())
+    return FreeDisplacement(
+        MatrixRotation(R), -casadi.mtimes(R, q[0:3]) if link.backward else q[0:3]
     )
-    return seat + _moving(ScrewDisplacement.about("z", at.theta, at.r)), (free,)
 
 
 def _moving(*steps: ScrewDisplacement) -> tuple[ScrewDisplacement, ...]:

@@ -188,21 +188,36 @@ class PathTwist:
 
 def path_twists(tree: Tree, poses: list[LinkPose]) -> list[list[PathTwist]]:
     """For every link unit velocities of the joints from the base to it, in its frame."""
-    return _carry(tree, poses, _unit_twists(tree))
+    return _carry(tree, poses, _unit_twists(tree, poses))
 
 
 def path_twist_rates(
     tree: Tree, poses: list[LinkPose], velocities: list[Velocity]
 ) -> list[list[PathTwist]]:
-    """How those of `path_twists` change, each fixed on the link of its joint, seen at rest.
+    """How those of `path_twists` change, seen at rest.
+
+    Each is fixed on the link of its joint, of a backward joint on the link before.
 
     Args:
         tree: the links.
         poses: each with respect to its antecedent.
         velocities: of the links.
     """
-    pairs = zip(_unit_twists(tree), velocities, strict=True)
-    return _carry(tree, poses, [[twist.rate(v) for twist in own] for own, v in pairs])
+    own = [
+        [twist.rate(_of_directions(tree, poses[j], velocities, j)) for twist in twists]
+        for j, twists in enumerate(_unit_twists(tree, poses))
+    ]
+    return _carry(tree, poses, own)
+
+
+def _of_directions(tree: Tree, pose: LinkPose, velocities: list[Velocity], j: int) -> Velocity:
+    """Velocity, in frame j, of what the unit motions of joint j are fixed on."""
+    if not tree.links[j].backward:
+        return velocities[j]
+    i = tree.links[j].antecedent
+    before = velocities[i] if i >= 0 else Velocity(zeros(), zeros())
+    V = before.V + cross(before.w, pose.p)
+    return Velocity(pose.apply_inverse(V), pose.apply_inverse(before.w))
 
 
 def seen_by_links(tree: Tree, poses: list[LinkPose], vector: SX) -> list[SX]:
@@ -216,10 +231,10 @@ def seen_by_links(tree: Tree, poses: list[LinkPose], vector: SX) -> list[SX]:
     return result
 
 
-def _unit_twists(tree: Tree) -> list[list[PathTwist]]:
+def _unit_twists(tree: Tree, poses: list[LinkPose]) -> list[list[PathTwist]]:
     return [
-        [PathTwist(link.v.start + k, t, n) for k, (t, n) in enumerate(unit_motions(link.motion))]
-        for link in tree.links
+        [PathTwist(link.v.start + k, t, n) for k, (t, n) in enumerate(unit_motions(link, pose))]
+        for link, pose in zip(tree.links, poses, strict=True)
     ]
 
 

@@ -74,7 +74,7 @@ class PathTranslation:
 
 @dataclass(frozen=True, slots=True)
 class JointAt:
-    """Where joint k acts: on its axis z, or in frame k when it has three axes."""
+    """Where joint k acts: on its axis z, or where the directions of its three axes are constant."""
 
     link: int
 
@@ -118,13 +118,13 @@ def _link_steps(k: int, link: Link, q: SX) -> list[PathStep]:
     if motion is Motion.REVOLUTE:
         steps.append(RotationAboutZ(q))
     steps += [RotationAboutZ(place.theta), PathTranslation(vector([0, 0, height]))]
-    if motion is Motion.FREE:
-        steps.append(PathTranslation(q[0:3]))
     if motion in (Motion.SPHERICAL, Motion.FREE):
-        steps += [
+        free: list[PathStep] = [
+            PathTranslation(q[0:3] if motion is Motion.FREE else zeros()),
             OtherRotation(MatrixRotation(quaternion_rotation(q[motion.nq - 4 :]))),
             JointAt(k),
         ]
+        steps += reverse_path(free) if link.backward else free
     return [*(step for step in steps if not _is_idle(step)), OriginOf(k)]
 
 

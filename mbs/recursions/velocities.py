@@ -10,24 +10,30 @@ from dataclasses import dataclass
 import casadi
 from casadi import SX
 
-from mbs.assembly.tree import Tree
+from mbs.assembly.tree import Link, Tree
 from mbs.components.joints import Motion
 from mbs.recursions.poses import LinkPose
-from mbs.spatial import cross, formula, is_zero, vector, zeros
+from mbs.spatial import cross, formula, is_zero, origin, vector, wrench_through, zeros
 
 # What an elementary motion adds to a link: its velocity, and the effort that it feels.
+#
+# The directions of a motion are constant in frame j. A backward motion has them in its seat, which
+# is the frame_b of its joint, and moves frame j against its velocities.
 
 
-def motion_behind(motion: Motion, v: SX) -> tuple[SX, SX]:
-    """Linear and angular velocity of frame j with respect to its placement, both in frame j."""
-    match motion:
+def motion_at_joint(link: Link, v: SX) -> tuple[SX, SX]:
+    """Linear and angular velocity of frame j relative to link i, where its directions are constant.
+
+    They are of the body of link j, about the origin of frame j and in its axes; of a backward
+    motion about the origin of its seat and in the axes of the seat.
+    """
+    match link.motion:
         case Motion.REVOLUTE:
             return zeros(), _along_z(v)
         case Motion.PRISMATIC:
             return _along_z(v), zeros()
-        case Motion.SPHERICAL:
-            return zeros(), v
-    return v[0:3], v[3:6]
+    v = -v if link.backward else v
+    return (zeros(), v) if link.motion is Motion.SPHERICAL else (v[0:3], v[3:6])
 
 
 def _along_z(v: SX) -> SX:
@@ -36,22 +42,48 @@ def _along_z(v: SX) -> SX:
     return column
 
 
-def effort(motion: Motion, f: SX, m: SX) -> SX:
-    """The part of a wrench, force f and moment m about the origin of frame j, along the motion."""
-    match motion:
+def effort_at_joint(link: Link, f: SX, m: SX) -> SX:
+    """The part of a wrench along the motion; the wrench is about and in the same frame."""
+    match link.motion:
         case Motion.REVOLUTE:
             return m[2]
         case Motion.PRISMATIC:
             return f[2]
-        case Motion.SPHERICAL:
-            return m
-    return casadi.vertcat(f, m)
+    along = m if link.motion is Motion.SPHERICAL else casadi.vertcat(f, m)
+    return -along if link.backward else along
 
 
-def unit_motions(motion: Motion) -> list[tuple[SX, SX]]:
+def unit_motions_at_joint(link: Link) -> list[tuple[SX, SX]]:
+    """Linear and angular velocity for a unit of each velocity of a link, in the same frame."""
+    identity = SX.eye(link.motion.nv)
+    return [motion_at_joint(link, casadi.densify(identity[:, k])) for k in range(link.motion.nv)]
+
+
+def motion_behind(link: Link, pose: LinkPose, v: SX) -> tuple[SX, SX]:
+    """Linear and angular velocity of frame j relative to its seat, both in frame j."""
+    return _behind(link, pose, motion_at_joint(link, v))
+
+
+def unit_motions(link: Link, pose: LinkPose) -> list[tuple[SX, SX]]:
     """Linear and angular velocity in frame j for a unit of each of its velocities."""
-    identity = SX.eye(motion.nv)
-    return [motion_behind(motion, casadi.densify(identity[:, k])) for k in range(motion.nv)]
+    return [_behind(link, pose, unit) for unit in unit_motions_at_joint(link)]
+
+
+def _behind(link: Link, pose: LinkPose, velocity: tuple[SX, SX]) -> tuple[SX, SX]:
+    """A velocity that `motion_at_joint` gives, about and in frame j."""
+    if not link.backward:
+        return velocity
+    linear, angular = velocity
+    linear = linear + cross(angular, origin(pose.motion))
+    turn = pose.motion[0].rotation
+    return turn.apply_inverse(linear), turn.apply_inverse(angular)
+
+
+def effort(link: Link, pose: LinkPose, f: SX, m: SX) -> SX:
+    """The part of a wrench, force f and moment m about the origin of frame j, along the motion."""
+    if link.backward:
+        f, m = wrench_through(pose.motion, f, m)
+    return effort_at_joint(link, f, m)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +107,7 @@ def link_velocities(
     for link, pose in zip(tree.links, poses, strict=True):
         i = link.antecedent
         before = result[i] if i >= 0 else (base or Velocity(zeros(), zeros()))
-        linear, angular = motion_behind(link.motion, v[link.v])
+        linear, angular = motion_behind(link, pose, v[link.v])
         moved = before.V if is_zero(before.w) else before.V + cross(before.w, pose.p)
         result.append(
             Velocity(pose.apply_inverse(moved) + linear, pose.apply_inverse(before.w) + angular)
@@ -217,8 +249,8 @@ def link_accelerations(
     for j, link in enumerate(tree.links):
         pose = poses[j]
         before = result[link.antecedent] if link.antecedent >= 0 else base
-        linear, angular = motion_behind(link.motion, v[link.v])
-        linear_rate, _ = motion_behind(link.motion, a[link.v])
+        linear, angular = motion_behind(link, pose, v[link.v])
+        linear_rate, _ = motion_behind(link, pose, a[link.v])
         w, wd, rate = _rotation(tree, poses, j, v, a, [*result, base])
         carried = before.vd + casadi.mtimes(before.rate.U, pose.p)
         vd = pose.apply_inverse(carried) + linear_rate
@@ -234,8 +266,8 @@ def _rotation(
     link, pose = tree.links[j], poses[j]
     before = motions[link.antecedent]
     if link.motion.nv > 1:
-        _, angular = motion_behind(link.motion, v[link.v])
-        _, angular_rate = motion_behind(link.motion, a[link.v])
+        _, angular = motion_behind(link, pose, v[link.v])
+        _, angular_rate = motion_behind(link, pose, a[link.v])
         w_i = pose.apply_inverse(before.w)
         w = w_i + angular
         wd = pose.apply_inverse(before.wd) + angular_rate + cross(w_i, angular)

@@ -121,13 +121,18 @@ def test_a_reversed_joint_moves_the_other_way_round(kind, seed):
 
 
 @pytest.mark.parametrize("kind", [Spherical, Free])
-def test_a_reversed_quaternion_orients_the_further_frame(kind):
+@pytest.mark.parametrize("seed", range(3))
+def test_a_reversed_quaternion_still_orients_frame_b(kind, seed):
+    rng = np.random.default_rng(seed)
     m = mbs.Mechanism("m")
     body = m.add(solid("b"))
-    m.connect(body, kind("j"), m.world)
+    on_body = body.at(*rng.uniform(-1, 1, 3), rotation=random_rotation(rng))
+    ground = m.world.at(*rng.uniform(-1, 1, 3), rotation=random_rotation(rng))
+    m.connect(on_body, kind("j"), ground)
     system = m.assemble()
-    q, _, _ = random_state(system, np.random.default_rng(1))
-    np.testing.assert_allclose(pose_of(system, "b", q), moved(kind("j"), q), atol=1e-13)
+    q, _, _ = random_state(system, rng)
+    inverse = np.linalg.inv(placed(on_body) @ moved(kind("j"), q))
+    np.testing.assert_allclose(pose_of(system, "b", q), placed(ground) @ inverse, atol=1e-13)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.closed_mechanisms import closed_chain, planar_loop
+from support.closed_mechanisms import planar_loop
 from support.messages import refused
 
 import mbs
@@ -98,17 +98,6 @@ def test_assemblies_refused(make, parts):
     for sensor in make(m, b):
         m.add(sensor)
     refused(AssemblyError, *parts, by=m.assemble)
-
-
-def test_a_cut_ball_has_no_coordinates_to_read():
-    mechanism, guess = closed_chain(0, "spherical")
-    mechanism.add(JointSensor("s", "closing.qw"))
-    refused(
-        AssemblyError,
-        "s: the joint of 'closing.qw' is cut to open a loop and rotates in all directions",
-        "put a RelativeSensor",
-        by=lambda: mechanism.assemble(guess=guess),
-    )
 
 
 def test_systems_without_sensors():

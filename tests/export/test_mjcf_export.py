@@ -27,7 +27,8 @@ from mbs.components import (
 )
 from mbs.components.joints import Motion
 from mbs.errors import ExportError, ModelError
-from mbs.models import direct_dynamics, inertia_matrix, inverse_dynamics, transform
+from mbs.export.robot_files import child_positions
+from mbs.models import direct_dynamics, energy, inertia_matrix, inverse_dynamics, transform
 
 mujoco = pytest.importorskip("mujoco")
 twins = pytest.importorskip("formats.test_mujoco_spec")
@@ -281,3 +282,42 @@ def test_a_weld_that_closes_a_loop_comes_back(tmp_path):
     q = np.array(system.configuration)
     one, two = (direct_dynamics(s, coordinates="tree") for s in (system, back))
     assert close(values(one, q, 0 * tau, tau), values(two, q, 0 * tau, tau))
+
+
+def outer_first(**drive):
+    """A free body and an arm on a ball, both connected from the outer body to the inner one."""
+    m = Mechanism("outer")
+    flyer = m.add(Body("flyer", mass=1, com=(0.1, 0, 0), inertia=(0.1, 0.2, 0.25)))
+    m.connect(flyer, Free("free", **drive), m.world)
+    ball = m.add(Body("ball", mass=2, com=(0, 0.1, 0.2), inertia=(0.1, 0.12, 0.15)))
+    m.connect(ball, Spherical("socket", Fv=0.3), m.world.at(0, 0, 0.3, rotation=("y", 1.0)))
+    hand = m.add(Body("hand", mass=1, com=(0.1, 0.1, 0), inertia=(0.1, 0.1, 0.15)))
+    m.connect(ball.at(0.2, 0, 0), Revolute("j", axis="y"), hand)
+    return m
+
+
+def test_joints_from_the_outer_body_have_the_qpos_of_the_outer_body(tmp_path):
+    system = outer_first().assemble()
+    mbs.export.mjcf(system, tmp_path / "m.xml")
+    back = mbs.load(tmp_path / "m.xml").assemble()
+    q, _, _ = state(system)
+    qpos = child_positions(system, q)
+    assert not np.allclose(q, qpos)
+    for name in ("flyer", "ball", "hand"):
+        assert close(values(transform(system, name), q), values(transform(back, name), qpos))
+    one, other = (float(energy(s)(x, np.zeros(s.nv))[1]) for s, x in ((system, q), (back, qpos)))
+    assert one == pytest.approx(other, abs=1e-12)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "m.xml"))
+    np.testing.assert_allclose(
+        model.key_qpos[0], child_positions(system, system.configuration), atol=1e-15
+    )
+
+
+def test_friction_between_other_velocities_than_those_of_the_file_is_refused(tmp_path):
+    m = outer_first(Ia=0.1)
+    m.lock({"socket": (1, 0, 0, 0)})
+    for write, file in ((mbs.export.mjcf, "MJCF"), (mbs.export.urdf, "URDF")):
+        with pytest.raises(ModelError) as error:
+            write(m, tmp_path / "m.xml")
+        assert "outer/free: its friction or rotor inertia acts on velocities" in str(error.value)
+        assert f"which {file} files do not have; connect the inner body first" in str(error.value)

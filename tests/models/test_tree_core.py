@@ -65,13 +65,20 @@ def floating():
     return m.assemble()
 
 
+ONE_AXIS = ("revolute", "prismatic")
+"""Kinds of joints that the core knows when they connect their frame_b to the side of the base."""
+
+
 def kinds_of(seed):
     return random_tree(seed, n=6, kinds=ALL_KINDS).mechanism.assemble()
 
 
 TREES = {
     **{f"tree{k}": functools.partial(kinds_of, k) for k in range(4)},
-    **{f"driven{k}": lambda k=k: driven_tree(k, n=5).assemble() for k in (1, 2, 3, 11)},
+    **{
+        f"driven{k}": lambda k=k: driven_tree(k, n=5, backward=ONE_AXIS).assemble()
+        for k in (1, 2, 3, 11)
+    },
     "rubbing": rubbing,
     "unordered": unordered,
     "floating": floating,

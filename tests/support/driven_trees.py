@@ -10,19 +10,25 @@ from mbs.components import Free, Mechanism, Prismatic, Revolute, Rotor, Spherica
 KINDS = ("revolute", "prismatic", "spherical", "free")
 
 
-def driven_tree(seed, n=4, kinds=KINDS):
-    """A mechanism of n joints; every second one is connected from the outer body to the inner."""
+def driven_tree(seed, n=4, kinds=KINDS, backward=KINDS):
+    """A mechanism of n joints; every second one is connected from the outer body to the inner.
+
+    Only joints of the kinds in `backward` are.
+    """
     rng = np.random.default_rng(seed)
     mechanism = Mechanism(f"driven{seed}", gravity=tuple(rng.uniform(-10, 10, 3)))
     bodies = [mechanism.world]
     for k in range(n):
         body = mechanism.add(random_body(rng, f"body{k}"))
-        joint = _joint(rng, kinds[int(rng.integers(len(kinds)))], f"j{k}")
+        kind = kinds[int(rng.integers(len(kinds)))]
+        joint = _joint(rng, kind, f"j{k}")
         free = isinstance(joint, Free)
         before = bodies[0 if free else int(rng.integers(len(bodies)))]
         inner = before.at(*rng.uniform(-0.5, 0.5, 3), rotation=random_rotation(rng))
         outer = body.at(*rng.uniform(-0.5, 0.5, 3), rotation=random_rotation(rng))
-        mechanism.connect(*((outer, joint, inner) if k % 2 else (inner, joint, outer)))
+        mechanism.connect(
+            *((outer, joint, inner) if k % 2 and kind in backward else (inner, joint, outer))
+        )
         bodies.append(body)
     return mechanism
 

@@ -1,0 +1,72 @@
+"""Coordinates and wrenches of joints do not depend on which joint of a loop is cut.
+
+The cut decides how the tree runs through the joints. What `connect(a, joint, b)` describes is the
+motion of b relative to a in any case.
+"""
+
+import numpy as np
+import pytest
+from support.ring_loops import ring_loop
+
+from mbs import models
+from mbs.assembly.tables import ANGULAR, QUATERNION
+from mbs.components import JointSensor, WrenchSensor
+
+LOOPS = ["RSUR", "RRSRR", "RCSR", "RSRU", "RRSC"]
+"""Loops of mobility one whose first joint has a motor."""
+
+
+def observed(kinds, seed, cut):
+    """A loop with a sensor for every coordinate and every wrench."""
+    m = ring_loop(seed, kinds, cut=cut)
+    for joint in list(m.joints()):
+        m.add(WrenchSensor(f"wrench_{joint.name}", joint.name))
+        for freedom in joint.freedoms:
+            name = freedom.coordinate_of(joint.name)
+            own = [name]
+            if freedom.motion.nq == 4:
+                own = [f"{name}.{element}" for element in QUATERNION + ANGULAR]
+            for coordinate in own:
+                m.add(JointSensor(f"read_{coordinate.replace('.', '_')}", coordinate))
+    return m.assemble()
+
+
+def readings(system):
+    """What the sensors read where the motor moves at 0.7 rad/s and 0.3 rad/s2."""
+    f = models.measurements(system)
+    values = f.call([np.array(system.configuration), [0.7], [0.3]])
+    return dict(zip(f.name_out(), (value.full().ravel() for value in values), strict=True))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("kinds", LOOPS)
+def test_every_cut_gives_the_same_numbers(kinds, seed):
+    systems = [observed(kinds, seed, cut) for cut in range(1, len(kinds))]
+    expected, *others = map(readings, systems)
+    assert len(expected) >= 3 * len(kinds)
+    for found in others:
+        for name, value in expected.items():
+            size = max(1.0, np.max(np.abs(value)))
+            np.testing.assert_allclose(found[name], value, atol=1e-8 * size, err_msg=name)
+
+
+@pytest.mark.parametrize("kinds", LOOPS)
+def test_every_cut_is_assembled_in_the_same_configuration(kinds):
+    positions = {}
+    for cut in range(1, len(kinds)):
+        system = ring_loop(2, kinds, cut=cut).assemble({"j0": 0.4})
+        for coordinate, value in zip(system.coordinates, system.configuration, strict=True):
+            positions.setdefault(coordinate.name, []).append(value)
+    for name, values in positions.items():
+        np.testing.assert_allclose(values, values[0], atol=1e-9, err_msg=name)
+        assert abs(values[0]) <= np.pi
+
+
+def test_the_tree_passes_spherical_joints_both_ways():
+    directions = {
+        link.backward
+        for cut in range(1, 5)
+        for link in observed("RRSRR", 1, cut).tree.links
+        if link.motion.nq == 4
+    }
+    assert directions == {True, False}

@@ -19,7 +19,8 @@ import numpy as np
 
 from mbs.loops.configuration import start as configuration
 from mbs.models.state.tree import full_state
-from mbs.simulate.run import step_tolerances, with_crossings
+from mbs.simulate.run import with_crossings
+from mbs.simulate.tolerances import step_tolerances
 from mbs.solvers.integrate import library_of, run_compiled
 from mbs.solvers.problem import equations, problem
 

@@ -36,7 +36,8 @@ from mbs.loops.configuration import start
 from mbs.models.state.signals import effort_function
 from mbs.models.state.tree import full_state
 from mbs.robots import n_four_bar
-from mbs.simulate.run import integrate_legs, step_tolerances
+from mbs.simulate.run import integrate_legs
+from mbs.simulate.tolerances import step_tolerances
 
 GROWTH = (10, 20, 40, 80, 160)
 """Windows of which `--growth` takes the time."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -20,10 +19,10 @@ from mbs.loops.configuration import start
 from mbs.models import transform
 from mbs.models.state.signals import effort_function
 from mbs.models.state.tree import FullState, full_state
+from mbs.native.compiler import compiler_found
 from mbs.robots import andrews_squeezer, bricard, flyball_governor, n_four_bar, simple_pendulum
-from mbs.simulate.run import step_tolerances
-from mbs.solvers.integrate import library_of, run_compiled
-from mbs.solvers.problem import equations, problem
+from mbs.simulate.run import integrate_legs
+from mbs.simulate.tolerances import step_tolerances
 
 Array = np.ndarray[Any, Any]
 
@@ -135,7 +134,6 @@ class Made:
     system: System
     state: FullState
     x0: Array
-    library: ctypes.CDLL
     seconds: dict[str, float]
 
 
@@ -147,18 +145,27 @@ def made(case: Case) -> Made:
     state = _timed(
         seconds, "equation", lambda: full_state(system, effort_function(system, case.tau))
     )
-    functions = equations(state.rhs, state.project, case.method, None)
-    library = _timed(seconds, "compile", lambda: library_of(functions))
-    if library is None:
+    if not compiler_found():
         raise SystemExit("there is no C compiler; mbs is measured compiled")
-    return Made(system, state, x0, library, seconds)
+    own = Made(system, state, x0, seconds)
+    _timed(seconds, "compile", run(case, own, 1e-3, np.array([0.0, 1e-9])))
+    return own
 
 
 def run(case: Case, of: Made, tolerance: float, times: Array) -> Callable[[], Array]:
-    """The integration alone, (m, nq + nv) states at times."""
-    functions = equations(of.state.rhs, of.state.project, case.method, None)
-    given = problem(functions, of.x0, times, None, (), step_tolerances(tolerance), np.inf)
-    return lambda: run_compiled(of.library, given, None).x
+    """The integration that `mbs.simulate.run` makes, (m, nq + nv) states at times."""
+    rtol, atol = step_tolerances(tolerance)
+    options: dict[str, Any] = {"method": case.method, "rtol": rtol, "atol": atol}
+
+    def states() -> Array:
+        legs, stop = integrate_legs(
+            of.system, lambda _: of.state, of.x0, times, np.zeros(0), **options
+        )
+        if stop is not None:
+            raise stop
+        return np.concatenate([leg.x for leg in legs])
+
+    return states
 
 
 def outputs(case: Case, system: System, states: Array) -> Array:

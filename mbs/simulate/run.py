@@ -1317,7 +1317,7 @@ class Simulator(MadeOnce):
         placed = start_positions(system, motions, q0, speeds, z, own, begin)
         x0 = np.concatenate([*_started(system, *placed, p, guess), z])
         times = np.linspace(begin, begin + duration, steps + 1)
-        rtol, atol = step_tolerances(allowed.common)
+        rtol, atol, sizes = allowed.of_step()
         with progress(f"simulating {system.name}", 0.0, duration, quiet=quiet) as reached:
             legs, stop = integrate_legs(
                 system,
@@ -1329,7 +1329,7 @@ class Simulator(MadeOnce):
                 method=self._method,
                 rtol=rtol,
                 atol=atol,
-                sizes=allowed.sizes,
+                sizes=sizes,
                 max_step=longest,
                 progress=reached,
             )
@@ -1526,8 +1526,8 @@ def run(
         tolerance: error of the motion to be expected [rad, m, rad/s or m/s]. A step may err by a
             twenty-fifth of it, and by a thousandth relative to large coordinates. Or a dict of
             tolerances by unit, such as "rad" and "m/s", and by name, such as "j1.q"; "others" is
-            for the other states. Positions that move by less than 100 tolerances are named in
-            `result.info["note"]`.
+            for the other states. A pair has an absolute and a relative tolerance. Positions that
+            move by less than 100 tolerances are named in `result.info["note"]`.
         max_step: the longest step of the integration [s]. Error control, the times at which laws
             jump, and short laws limit the steps by default. If a law calls a Callback or an
             external function, whose jumps cannot be found, the default is duration / 1000.
@@ -1601,10 +1601,3 @@ def _first_bias(system: System, x0: Array, inputs: Function | None, p: Array) ->
     point = {"q": q, "v": v, "z": x0[n:], "u": u, "p": p}
     found = bias(system, "tree")
     return np.array(found(*(point[name] for name in found.name_in())))[:, 0]
-
-
-def step_tolerances(tolerance: float) -> tuple[float, float]:
-    """Relative and absolute tolerance of a step for that of a motion, kept above rounding."""
-    # errors of steps add up, and angles that count revolutions make no room for larger ones;
-    # below some ten roundings steps would only become shorter
-    return max(1e-3 * tolerance, 1e-14), max(0.04 * tolerance, 1e-13)

@@ -14,13 +14,21 @@ from mbs.simulate.arguments import positive
 from mbs.text import did_you_mean, quoted
 
 Array = NDArray[np.float64]
-Tolerance = float | Mapping[str, float]
-"""A number for all states; or numbers by the unit or the name of states."""
+Tolerance = float | Mapping[str, float | tuple[float, float]]
+"""A number for all states; or numbers by the unit or the name of states. Instead of a number, a
+pair: an absolute and a relative tolerance."""
 
 OTHERS = "others"
 """Key of the tolerance of the states that are not named."""
 DEFAULT = 1e-8
 """Tolerance of a motion [rad, m, rad/s or m/s]."""
+_SHARE = 0.04
+"""Part of the tolerance of a motion that a step may err by."""
+_RELATIVE = 0.025
+"""Relative tolerance of a motion for an absolute one of 1. It is small, since angles that count
+revolutions make no room for larger errors."""
+_LEAST_ABSOLUTE, _LEAST_RELATIVE = 1e-13, 1e-14
+"""Smallest tolerances of a step: some ten roundings of numbers of size one."""
 _SMALL = 100.0
 """Tolerances below which a motion is small: its relative error is more than a percent."""
 
@@ -30,12 +38,34 @@ class Tolerances:
     """Tolerances of the states of a motion.
 
     Attributes:
-        common: tolerance of the states that are not named.
-        sizes: (nx,) tolerances of all states as multiples of it; None if all are equal.
+        common: absolute tolerance of the states that are not named.
+        absolute, relative: (nx,) tolerances of all states.
+        named: whether states have tolerances of their own.
     """
 
     common: float
-    sizes: Array | None = None
+    absolute: Array
+    relative: Array
+    named: bool
+
+    def of_step(self) -> tuple[float, float, Array | None]:
+        """Relative and absolute tolerance of a step, and the (2, nx) factors of each state.
+
+        A step may err by a twenty-fifth of the tolerance of the motion, since errors of steps add
+        up. Tolerances stay above ten roundings, below which steps would only become shorter.
+        """
+        rtol, atol = step_tolerances(self.common)
+        if not self.named:
+            return rtol, atol, None
+        absolute = np.maximum(_SHARE * self.absolute, _LEAST_ABSOLUTE) / atol
+        relative = np.maximum(_SHARE * self.relative, _LEAST_RELATIVE) / rtol
+        return rtol, atol, np.array([absolute, relative])
+
+
+def step_tolerances(tolerance: float) -> tuple[float, float]:
+    """Relative and absolute tolerance of a step for one tolerance of a motion."""
+    relative = max(_SHARE * _RELATIVE * tolerance, _LEAST_RELATIVE)
+    return relative, max(_SHARE * tolerance, _LEAST_ABSOLUTE)
 
 
 def tolerances_of(system: System, given: Tolerance) -> Tolerances:
@@ -45,28 +75,46 @@ def tolerances_of(system: System, given: Tolerance) -> Tolerances:
         system: open or closed.
         given: a number; or a dict from units, such as "rad" and "m/s", and names, such as "j1.q",
             to numbers. A name counts before a unit. "others" is for the other states, 1e-8 if left
-            out.
+            out. A number is the absolute tolerance; the relative one is a fortieth of it. A pair
+            has both.
 
     Raises:
         ModelError: a key is no unit and no state of the system, or a number is not positive.
     """
     if not isinstance(given, Mapping):
-        return Tolerances(positive(given, "tolerance", system.name))
+        common = positive(given, "tolerance", system.name)
+        every = np.full(system.nq + system.nv + len(system.states), common)
+        return Tolerances(common, every, _RELATIVE * every, False)
     states = [(f"{c.name}.q", c.unit) for c in system.coordinates]
     states += [(f"{s.name}.v", s.unit) for s in system.speeds]
     states += list(system.states)
     known = [OTHERS, *dict.fromkeys(unit for _, unit in states), *(name for name, _ in states)]
-    numbers = dict[str, float]()
+    numbers = dict[str, tuple[float, float]]()
     for key, value in given.items():
         if key not in known:
             raise ModelError(
                 f"{system.name}: tolerance names {quoted(key)}, which is no unit and no state;"
                 f" {did_you_mean(str(key), known)}"
             )
-        numbers[key] = positive(value, f"tolerance of {key}", system.name)
-    common = numbers.get(OTHERS, DEFAULT)
-    every = [numbers.get(name, numbers.get(unit, common)) for name, unit in states]
-    return Tolerances(common, np.array(every) / common)
+        numbers[key] = _pair(value, f"tolerance of {key}", system.name)
+    others = numbers.get(OTHERS, (DEFAULT, _RELATIVE * DEFAULT))
+    pairs = [numbers.get(name, numbers.get(unit, others)) for name, unit in states]
+    absolute, relative = np.array(pairs).reshape(-1, 2).T
+    return Tolerances(others[0], absolute, relative, True)
+
+
+def _pair(value: object, what: str, where: str) -> tuple[float, float]:
+    """The absolute and the relative tolerance that a number or a pair gives."""
+    if isinstance(value, tuple | list):
+        if len(value) != 2:
+            raise ModelError(
+                f"{where}: {what} is {quoted(value)}; give a number, or a pair of an absolute and a"
+                " relative tolerance"
+            )
+        absolute, relative = (positive(one, what, where) for one in value)
+        return absolute, relative
+    number = positive(value, what, where)
+    return number, _RELATIVE * number
 
 
 def small_motions(system: System, q: Array, tolerances: Tolerances) -> tuple[str, ...]:
@@ -78,7 +126,5 @@ def small_motions(system: System, q: Array, tolerances: Tolerances) -> tuple[str
         tolerances: of the motion.
     """
     moved = np.ptp(q, axis=0) if len(q) else np.zeros(q.shape[1])
-    sizes = np.ones(q.shape[1]) if tolerances.sizes is None else tolerances.sizes[: q.shape[1]]
-    least = tolerances.common * sizes
-    found = (moved > 0) & (moved < _SMALL * least)
+    found = (moved > 0) & (moved < _SMALL * tolerances.absolute[: q.shape[1]])
     return tuple(c.name for c, small in zip(system.coordinates, found, strict=True) if small)

@@ -216,7 +216,7 @@ def _load(path: Path, has_events: bool, has_passage: bool) -> ctypes.CDLL:
             ctypes.c_int,
             [handle, pointer, pointer, integer, pointer, ctypes.POINTER(integer), integer],
         ),
-        "mbs_sizes": (None, [handle, pointer]),
+        "mbs_sizes": (None, [handle, pointer, pointer]),
         "mbs_stops": (None, [handle, pointer, pointer, integer]),
         "mbs_time": (real, [handle]),
         "mbs_step": (real, [handle]),
@@ -249,7 +249,7 @@ def _opened(library: ctypes.CDLL, problem: IntegrationProblem) -> Iterator[ctype
             sizes = (ctypes.c_int * len(through.size))(*through.size)
             full = library.mbs_pass(driver, sizes, through.typical) != 0
         if driver and problem.sizes is not None:
-            library.mbs_sizes(driver, _pointer(problem.sizes))
+            library.mbs_sizes(driver, *map(_pointer, problem.sizes))
         if driver and len(ends):
             library.mbs_stops(driver, _pointer(ends), _pointer(jumps), len(ends))
         if full:
@@ -379,7 +379,8 @@ def integrate_events(
         stops: times at which steps end, s, in increasing order, and for each whether functions may
             jump there as functions of time. Up to such a time they are asked before it, then
             behind it, and a step begins anew. None when left out.
-        sizes: (nx,) factors of the absolute tolerance of each state; one if left out.
+        sizes: (2, nx) factors of the absolute and of the relative tolerance of each state; one if
+            left out.
         progress: called now and then with the time reached, s.
         compiled: False for the same algorithm in Python.
         partial: True for what was reached, with its `stop`, where the integration cannot go on or

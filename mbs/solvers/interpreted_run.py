@@ -472,7 +472,7 @@ def _stepper(problem: IntegrationProblem, p: Array) -> Stepper:
     stops = Stops(*problem.stops)
     stops.start(start)
     project = _projection(problem, p, stops)
-    sizes = np.ones(len(state)) if problem.sizes is None else problem.sizes
+    sizes = np.ones((2, 1)) if problem.sizes is None else problem.sizes
     control = problem.rtol, problem.atol, problem.max_step, functions.first_step
 
     def slope(t: float, x: Array) -> Array:

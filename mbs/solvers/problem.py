@@ -191,7 +191,8 @@ class IntegrationProblem:
         max_step: the longest step, s.
         stops: times at which steps end, s, in increasing order; whether laws of time may jump
             there, so that a step begins anew.
-        sizes: (nx,) factors of the absolute tolerance of each state; None if all are one.
+        sizes: (2, nx) factors of the absolute and of the relative tolerance of each state; None if
+            all are one.
     """
 
     equations: Equations
@@ -387,9 +388,11 @@ def problem(
             "integrate: stops must be finite times in increasing order, and as many flags"
         )
     every = np.concatenate([own, m])
-    factors = None if sizes is None else numbers(sizes)
-    if factors is not None and (len(factors) != n or not np.all(factors > 0)):
-        raise ModelError(f"integrate: sizes must be {n} positive numbers, one for each state")
+    factors = None if sizes is None else np.ascontiguousarray(sizes, dtype=float)
+    if factors is not None and (factors.shape != (2, n) or not np.all(factors > 0)):
+        raise ModelError(
+            f"integrate: sizes must be 2 rows of {n} positive numbers, one for each state"
+        )
     limits = rtol, atol, max_step
     return IntegrationProblem(functions, x, t, every, len(m), *limits, (ends, jumps), factors)
 

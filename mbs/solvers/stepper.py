@@ -135,7 +135,7 @@ class Stepper(ABC):
         slope: slope at the present state, or None when it is not known.
         last_step: length of the last step.
         last_end: time at its end.
-        sizes: (n,) factors of the absolute tolerance.
+        sizes: (2, n) factors of the absolute and of the relative tolerance, or (2, 1).
         moved: whether the last projection moved the state, compared with the tolerances.
     """
 
@@ -156,7 +156,7 @@ class Stepper(ABC):
     slope: Array | None = None
     dense: tuple[Array, ...] = ()
     stops: Stops = field(default_factory=lambda: Stops(np.empty(0), np.empty(0, bool)))
-    sizes: Array | float = 1.0
+    sizes: Array = field(default_factory=lambda: np.ones((2, 1)))
 
     @abstractmethod
     def _open(self, slope: Array) -> None:
@@ -312,7 +312,8 @@ class Stepper(ABC):
         return value
 
     def _norm(self, v: Array, y: Array) -> float:
-        scale = self.atol * self.sizes + self.rtol * np.maximum(np.abs(self.x), np.abs(y))
+        absolute, relative = self.atol * self.sizes[0], self.rtol * self.sizes[1]
+        scale = absolute + relative * np.maximum(np.abs(self.x), np.abs(y))
         r = v / scale
         return float(np.sqrt(np.dot(r, r) / len(r))) if len(r) else 0.0
 

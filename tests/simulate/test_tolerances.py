@@ -46,6 +46,28 @@ def test_tolerances_by_unit_and_by_name(system, method, compiled, monkeypatch):
         assert "note" not in result.info
 
 
+@pytest.mark.parametrize("compiled", [True, False])
+def test_relative_tolerances_of_some_states(compiled, monkeypatch):
+    """A rotor far from zero on a spring: its angle may err in proportion, if it is said so."""
+    if not compiled:
+        monkeypatch.setattr(INTEGRATE, "compiler_found", lambda: False)
+    m = mbs.Mechanism("m", gravity=(0, 0, 0))
+    rotor = m.add(Body("r", 1.0, inertia=(1, 1, 1)))
+    m.connect(m.world, Revolute("phi", stiffness=(2 * np.pi) ** 2, rest=1e4), rotor)
+    system = m.assemble()
+
+    def found(relative):
+        tolerance = {"rad": (1e-9, relative), "rad/s": 1e-2}
+        options = {"q0": {"phi": 1e4 + 1.0}, "step": 0.05, "quiet": True, "tolerance": tolerance}
+        result = mbs.simulate.run(system, 2.0, **options)
+        exact = 1e4 + np.cos(2 * np.pi * result.time)
+        return np.abs(result["phi.q"] - exact).max()
+
+    loose, tight = found(1e-7), found(1e-11)
+    assert 1e-5 < loose < 1e-2
+    assert tight < 1e-6
+
+
 def test_small_motions_are_noted(system):
     result = mbs.simulate.run(system, 5.0, tolerance=1e-5, **START)
     assert result.info["note"] == "less than 100 tolerances: x; ask for a smaller tolerance"
@@ -59,6 +81,11 @@ def test_small_motions_are_noted(system):
         ({"x": 1e-6}, r"tolerance names 'x'.*use one of others, m, rad, m/s, rad/s, x.q"),
         ({"rad": 0}, r"tolerance of rad is 0; give a finite positive number"),
         ({"rad": None}, r"tolerance of rad is None"),
+        ({"rad": (1e-8, 0)}, r"tolerance of rad is 0; give a finite positive number"),
+        (
+            {"rad": (1e-8,)},
+            r"tolerance of rad is .*give a number, or a pair of an absolute",
+        ),
     ],
 )
 def test_other_tolerances_are_refused(system, given, message):

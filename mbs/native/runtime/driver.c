@@ -324,7 +324,10 @@ EXPORT void mbs_stops(driver *d, const double *stops, const double *hard, long l
 }
 
 /* Before mbs_begin: factors of atol, (n,), which stay with the caller. */
-EXPORT void mbs_sizes(driver *d, const double *sizes) { d->solver.nominal = sizes; }
+EXPORT void mbs_sizes(driver *d, const double *absolute, const double *relative) {
+    d->solver.nominal = absolute;
+    d->solver.relative = relative;
+}
 
 EXPORT double mbs_time(const driver *d) { return stepper_time(&d->solver); }
 EXPORT double mbs_step(const driver *d) { return stepper_wanted_step(&d->solver); }

@@ -117,7 +117,8 @@ static double norm(const stepper *s, const double *v, const double *x, const dou
     int i;
     for (i = 0; i < s->n; i++) {
         double size = s->nominal ? s->nominal[i] : 1.0;
-        double r = v[i] / (s->atol * size + s->noise + s->rtol * fmax(fabs(x[i]), fabs(y[i])));
+        double part = s->rtol * (s->relative ? s->relative[i] : 1.0);
+        double r = v[i] / (s->atol * size + s->noise + part * fmax(fabs(x[i]), fabs(y[i])));
         sum += r * r;
     }
     return s->n ? sqrt(sum / s->n) : 0.0;

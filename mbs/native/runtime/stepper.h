@@ -61,6 +61,7 @@ struct stepper {
     double fixed;  /* length of all steps; 0: error control finds it */
     double afresh; /* length of the first step after a jump; 0: it is estimated */
     const double *nominal; /* typical size of each state, which scales atol; NULL: 1 */
+    const double *relative; /* factor of rtol of each state; NULL: 1 */
     long max_steps;
     double *memory, *work;
     long steps, rejected, since_output;

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
+import casadi
 import numpy as np
-from casadi import Function
+from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.components.joints import Motion
 from mbs.errors import Unclosable
-from mbs.loops.closing import CLOSED, Closing, candidates, difference
-from mbs.loops.configuration import closed_configuration, unwound
+from mbs.loops.closing import CLOSED, Closing, candidates, difference, unwound
+from mbs.loops.configuration import closed_configuration
+from mbs.loops.cut_positions import cut_positions
+from mbs.solvers.least_squares import gauss_newton
 
 Vector = NDArray[np.float64]
 
 _FEW = 24
 """Free positions up to which other configurations are searched: a search costs a start each, and
 larger mechanisms are assembled near their guesses."""
-_NEAR = 0.5
+_NEAR = 0.1
 """Distance of a configuration from its start below which no other one is searched [rad, or sizes of
 the mechanism]: branches that are nearer to each other meet there."""
 _EQUAL = 1e-6
@@ -55,8 +58,9 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
     3. smaller sets of these; those without the joints with springs come last.
 
     The distance of two configurations is the largest difference of a position. Lengths are divided
-    by the size of the mechanism. Of two configurations at the same distance, the one with the
-    larger position is returned, at the first position that differs.
+    by the size of the mechanism. Positions of joints that are cut count too. Of two configurations
+    at the same distance, the one with the larger position is returned, at the first position that
+    differs, in the order of the description.
     Solved angles are within half a turn of their guess, or of zero.
 
     Args:
@@ -70,23 +74,130 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
     names = [coordinate.name for coordinate in system.coordinates]
     known = {name: value for name, value in guess.items() if name in names}
     given = np.array(system.position(known))
-    if _closes(Closing(system, p), given):
-        return Assembled(given)
     rest = rest_positions(system, p)
     start = np.array(system.position({**{names[k]: x for k, x in rest.items()}, **known}))
+    target = _Target.of(system, p, start, guess)
+    if _closes(Closing(system, p), given) and target.meets_cuts(given):
+        return Assembled(given)
     unknown = _unknowns(system)
     guessed = {k for k, name in enumerate(names) if name in known} - unknown
-    for locked in _stages(system, unknown, guessed, set(rest)):
+    stages = list(_stages(system, unknown, guessed, set(rest)))
+    for locked in stages:
         closing = Closing(system, p, tuple(sorted(locked)))
-        found = _nearest(closing, start, guessed)
+        found = _nearest(closing, target)
         if found is not None:
-            return found
+            return _with_cuts_met(found, target, stages)
     motors = tuple(k for k, c in enumerate(system.coordinates) if c.actuated)
     try:
         q = closed_configuration(Closing(system, p, motors), start, restarts=10)
     except Unclosable:
         q = closed_configuration(Closing(system, p), start)
     return Assembled(unwound(Closing(system, p), q, start))
+
+
+# What configurations are compared with: the guess, also of joints that are cut.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Target:
+    """Positions of all joints that an assembled configuration is to be near to.
+
+    Positions of joints that are cut follow those of q. The comparison does not depend on the joint
+    of a loop that is cut.
+
+    Attributes:
+        system: its loops need not be closed yet.
+        p: (np,) parameters.
+        start: (nq,) positions.
+        cut: (c,) positions of `system.cut_coordinates`.
+        guessed: indices of the guessed ones among all positions.
+    """
+
+    system: System
+    p: Vector
+    start: Vector
+    cut: Vector
+    guessed: tuple[int, ...]
+
+    @staticmethod
+    def of(system: System, p: Vector, start: Vector, guess: Mapping[str, float]) -> _Target:
+        """The target of a start and a guess by coordinate name."""
+        rows = system.cut_coordinates
+        cut = [guess.get(row.name, float(row.name.endswith(".qw"))) for row in rows]
+        names = [row.name for row in (*system.coordinates, *rows)]
+        guessed = tuple(k for k, name in enumerate(names) if name in guess)
+        return _Target(system, p, start, np.array(cut, dtype=float), guessed)
+
+    @property
+    def guessed_cuts(self) -> list[int]:
+        """Indices of guessed positions among those of cut joints."""
+        return [k - self.system.nq for k in self.guessed if k >= self.system.nq]
+
+    def cut_moves(self, q: Vector) -> Vector:
+        """(c,) differences of positions of cut joints from the target [rad, m or 1]."""
+        rows = self.system.cut_coordinates
+        found = np.array(cut_positions(self.system)(q, self.p)).ravel()
+        moves = found - self.cut
+        turns = np.array([row.unit == "rad" for row in rows], dtype=bool)
+        moves[turns] = np.remainder(moves[turns] + np.pi, 2 * np.pi) - np.pi
+        for k, row in enumerate(rows):
+            if row.name.endswith(".qw"):
+                part = slice(k, k + 4)
+                moves[part] = min(moves[part], found[part] + self.cut[part], key=_largest)
+        return moves
+
+    def meets_cuts(self, q: Vector) -> bool:
+        """Whether guessed positions of cut joints have their values."""
+        guessed = self.guessed_cuts
+        return not guessed or _largest(self.cut_moves(q)[guessed]) < _EQUAL
+
+    def distances(self, q: Vector, size: float) -> tuple[float, float]:
+        """Largest move of a guessed position and of any [rad, or sizes of the mechanism].
+
+        Args:
+            q: (nq,) configuration.
+            size: of the mechanism [m].
+        """
+        rows = (*self.system.coordinates, *self.system.cut_coordinates)
+        scales = np.where([row.unit.startswith("m") for row in rows], size, 1.0)
+        moves = np.concatenate([difference(self.system, q, self.start), self.cut_moves(q)])
+        moves = np.abs(moves / scales)
+        return _largest(moves[list(self.guessed)]), _largest(moves)
+
+
+def _largest(values: Vector) -> float:
+    return float(np.max(np.abs(values), initial=0.0))
+
+
+def _with_cuts_met(found: Assembled, target: _Target, stages: Iterable[set[int]]) -> Assembled:
+    """The configuration with guessed positions of cut joints, if the others can follow."""
+    if target.meets_cuts(found.q):
+        return found
+    system, p, guessed = target.system, target.p, target.guessed_cuts
+    q, given = SX.sym("q", system.nq), SX.sym("p", system.p.numel())
+    own = cut_positions(system)(q, given)[guessed]
+    slopes = Function("cut_slopes", [q, given], [casadi.densify(casadi.jacobian(own, q))])
+    for locked in stages:
+        closing = Closing(system, p, tuple(sorted(locked)))
+        free = closing.free
+
+        def residual(x: Vector, closing: Closing = closing) -> tuple[Vector, Vector]:
+            at = found.q.copy()
+            at[closing.free] = x
+            r, J = closing.rows(at)
+            more = np.array(slopes(at, p))[:, closing.free]
+            return np.concatenate([r, target.cut_moves(at)[guessed]]), np.vstack([J, more])
+
+        met = list[Vector]()
+        for start in (found.q, *candidates(closing, target.start)):
+            root = gauss_newton(residual, start[free])
+            at = found.q.copy()
+            at[free] = root.x
+            if root.converged and closing.faces(at):
+                met.append(unwound(closing, at, target.start))
+        if met:
+            return _best(closing, met, target)
+    return found
 
 
 def rest_positions(system: System, p: Vector) -> dict[int, float]:
@@ -128,30 +239,32 @@ def _stages(
             yield locked
 
 
-def _nearest(closing: Closing, start: Vector, guessed: set[int]) -> Assembled | None:
-    """The closed configuration nearest to the start; None if none is found."""
-    system, free = closing.system, closing.free
+def _nearest(closing: Closing, target: _Target) -> Assembled | None:
+    """The closed configuration nearest to the target; None if none is found."""
+    system, free, start = closing.system, closing.free, target.start
     if not free:
         return Assembled(start) if _closes(closing, start) else None
     first = closing.nearest(start)
     if first.is_closed:
         q = unwound(closing, first.q, start)
-        if len(free) > _FEW or _distance(closing, q, start, range(system.nq)) < _NEAR:
+        if len(free) > _FEW or target.distances(q, closing.size)[1] < _NEAR:
             return Assembled(q)
     elif len(free) > _FEW:
         return None
     found = [q] if first.is_closed else []
-    for candidate in candidates(closing, start):
-        other = unwound(closing, candidate, start)
+    for other in candidates(closing, start):
         if not any(np.abs(difference(system, other, one)).max() < _EQUAL for one in found):
             found.append(other)
-    if not found:
-        return None
+    return _best(closing, found, target) if found else None
+
+
+def _best(closing: Closing, found: list[Vector], target: _Target) -> Assembled:
+    """The nearest of some configurations to the target, and the others."""
     best = found[0]
     for other in found[1:]:
-        if _is_nearer(closing, other, best, start, guessed):
+        if _is_nearer(closing, other, best, target):
             best = other
-    others = [q for q in found if np.abs(difference(system, q, best)).max() > _EQUAL]
+    others = [q for q in found if np.abs(difference(closing.system, q, best)).max() > _EQUAL]
     return Assembled(best, tuple(others))
 
 
@@ -160,26 +273,19 @@ def _closes(closing: Closing, q: Vector) -> bool:
     return closing.openness(q) <= CLOSED and closing.faces(q)
 
 
-def _distance(closing: Closing, q: Vector, start: Vector, indices: range | list[int]) -> float:
-    """Largest difference of positions from the start [rad, or sizes of the mechanism]."""
-    lengths = [c.unit.startswith("m") for c in closing.system.coordinates]
-    scales = np.where(lengths, closing.size, 1.0)
-    moves = np.abs(difference(closing.system, q, start)) / scales
-    return float(np.max(moves[list(indices)], initial=0.0))
-
-
-def _is_nearer(
-    closing: Closing, q: Vector, other: Vector, start: Vector, guessed: set[int]
-) -> bool:
-    """Whether a configuration is nearer to the start than another one.
+def _is_nearer(closing: Closing, q: Vector, other: Vector, target: _Target) -> bool:
+    """Whether a configuration is nearer to the target than another one.
 
     Guessed positions are compared first, then all positions; of two configurations that are equally
-    near, the one with the larger first position is nearer.
+    near, the one with the larger first position is nearer, in the order of the description.
     """
-    for indices in (sorted(guessed), list(range(closing.system.nq))):
-        gap = _distance(closing, q, start, indices) - _distance(closing, other, start, indices)
-        if abs(gap) > _EQUAL:
-            return gap < 0
-    moves = difference(closing.system, q, other)
-    apart = np.flatnonzero(np.abs(moves) > _EQUAL)
-    return bool(len(apart) and moves[apart[0]] > 0)
+    own, others = (target.distances(one, closing.size) for one in (q, other))
+    for distance, least in zip(own, others, strict=True):
+        if abs(distance - least) > _EQUAL:
+            return distance < least
+    system = closing.system
+    order = {row.name: number for number, row in enumerate(system.joints)}
+    moves = difference(system, q, other)
+    apart = [k for k in range(system.nq) if abs(moves[k]) > _EQUAL]
+    first = min(apart, key=lambda k: order.get(system.coordinates[k].joint, k), default=None)
+    return first is not None and bool(moves[first] > 0)

@@ -709,6 +709,27 @@ def _ended(line: _Line, q: Vector, s: float, what: str) -> str:
     )
 
 
+def unwound(closing: Closing, q: Vector, start: Vector) -> Vector:
+    """The configuration with angles within half a turn of the start, if that closes the loops.
+
+    Of a quaternion and its negative, which are the same orientation, the one nearer to the start is
+    taken; of two that are equally near, the one whose first element is positive.
+    """
+    near: Vector = start + difference(closing.system, q, start)
+    for part in quaternion_slices(closing.system.tree):
+        near[part] = _sign(q[part], start[part]) * q[part]
+    near[list(closing.locked)] = q[list(closing.locked)]
+    return near if closing.openness(near) < CLOSED else q
+
+
+def _sign(quaternion: Vector, start: Vector) -> float:
+    """1, or -1 where the negative of a quaternion is nearer to the start."""
+    for value in (float(quaternion @ start), *quaternion):
+        if abs(value) > _HALF_TURN:
+            return float(np.sign(value))
+    return 1.0
+
+
 def candidates(closing: Closing, start: Vector) -> list[Vector]:
     """Closed configurations with the locked positions of the start, nearest first, a few at most.
 
@@ -719,15 +740,19 @@ def candidates(closing: Closing, start: Vector) -> list[Vector]:
     rng, free = np.random.default_rng(_SEED), closing.free
     lengths = [closing.system.coordinates[k].unit.startswith("m") for k in free]
     reach = np.where(lengths, closing.size, np.pi)
+    turning = [part for part in quaternion_slices(closing.system.tree) if part.start in free]
     found: list[Vector] = []
     for number in range(_TRIES):
         trial = start.copy()
-        trial[free] += (number > 0) * reach * rng.uniform(-1, 1, len(free))
+        if number:
+            trial[free] += reach * rng.uniform(-1, 1, len(free))
+            for part in turning:
+                quaternion = rng.standard_normal(4)
+                trial[part] = quaternion / np.linalg.norm(quaternion)
         closed = closing.nearest(trial)
         if not closed.is_closed:
             continue
-        q = start + difference(closing.system, closed.q, start)
-        q = q if closing.openness(q) < CLOSED else closed.q
+        q = unwound(closing, closed.q, start)
         if all(np.max(np.abs(difference(closing.system, q, one))) > _OTHER for one in found):
             found.append(q)
         if len(found) == _CANDIDATES:
@@ -736,5 +761,7 @@ def candidates(closing: Closing, start: Vector) -> list[Vector]:
     return found
 
 
+_HALF_TURN = 1e-6
+"""Elements and scalar products of unit quaternions that decide no sign: rounding is below."""
 _OTHER = 1e-4
 """Smallest difference of two listed configurations [rad or m]; iterations leave 1e-10."""

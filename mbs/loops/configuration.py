@@ -8,18 +8,16 @@ import numpy as np
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
-from mbs.assembly.tree import quaternion_slices
 from mbs.assembly.validity import plain_fault
 from mbs.errors import LoopError, ModelError, Unclosable
 from mbs.loops.closing import (
-    CLOSED,
     OPEN,
     Closed,
     Closing,
     Vector,
     closure_parameters,
-    difference,
     follow_configuration,
+    unwound,
 )
 from mbs.loops.function import configuration_on, fixed_positions, independent_names
 from mbs.loops.velocity import closure_jacobian
@@ -41,8 +39,6 @@ _RESTARTS = 60
 _SEED = 20260101
 _LARGEST_ANGLE = np.pi
 _GUESSES = 16
-_HALF_TURN = 1e-6
-"""Elements and scalar products of unit quaternions that decide no sign: rounding is below."""
 _NEAR = 0.3
 """Distance from a guess [rad or m] within which the first configuration found is taken."""
 
@@ -205,27 +201,6 @@ def _guessed_configuration(closing: Closing, start: Vector, named: list[int]) ->
         if far < _NEAR:
             break
     return min(found, key=lambda pair: pair[0])[1]
-
-
-def unwound(closing: Closing, q: Vector, start: Vector) -> Vector:
-    """The configuration with angles within half a turn of the start, if that closes the loops.
-
-    Of a quaternion and its negative, which are the same orientation, the one nearer to the start is
-    taken; of two that are equally near, the one whose first element is positive.
-    """
-    near: Vector = start + difference(closing.system, q, start)
-    for part in quaternion_slices(closing.system.tree):
-        near[part] = _sign(q[part], start[part]) * q[part]
-    near[list(closing.locked)] = q[list(closing.locked)]
-    return near if closing.openness(near) < CLOSED else q
-
-
-def _sign(quaternion: Vector, start: Vector) -> float:
-    """1, or -1 where the negative of a quaternion is nearer to the start."""
-    for value in (float(quaternion @ start), *quaternion):
-        if abs(value) > _HALF_TURN:
-            return float(np.sign(value))
-    return 1.0
 
 
 def closed_configuration(closing: Closing, start: Vector, restarts: int = _RESTARTS) -> Vector:

@@ -12,17 +12,17 @@ from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tree import position_rate
 from mbs.components import Free, Spherical, Universal
-from mbs.components.component import in_plane
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
 from mbs.loops.closure import cut_twist
+from mbs.loops.cut_positions import cut_position
 from mbs.loops.examine import DETERMINED
 from mbs.loops.reduction import reduction, tree_rows
 from mbs.loops.velocity import acceleration_bias, determining_rows, independent_constraint_rows
 from mbs.models.symbols import ModelSymbols, symbols_of
 from mbs.recursions.route import relative_pose
 from mbs.solvers.linear import solve_square
-from mbs.spatial import Pose, cross, zeros
+from mbs.spatial import Pose, zeros
 
 
 def velocity_closure(system: System) -> Function:
@@ -193,29 +193,5 @@ def cut_coordinate(system: System, s: ModelSymbols, a: SX, name: str) -> tuple[S
     C = cut_velocities(system, s.q, cut)[number, :]
     speed = SX.sym("v", system.nv)
     bias = casadi.substitute(acceleration_bias(system, s.q, speed, C), speed, s.v_tree)
-    value = _position(cut, number, pose)
+    value = cut_position(cut, number, pose)
     return value, casadi.mtimes(C, s.v_tree), casadi.mtimes(C, a) + bias
-
-
-def _position(cut: Cut, number: int, pose: Pose) -> SX:
-    """A freedom read from frame_b seen from frame_a.
-
-    A turn of a universal joint leaves the axis of the other one in its place.
-    """
-    joint = cut.edge.joint
-    freedom = joint.freedoms[number]
-    axis = SX(DM(list(freedom.axis)))
-    if freedom.motion is Motion.PRISMATIC:
-        return casadi.dot(axis, pose.p)
-    if isinstance(joint, Universal):
-        other = SX(DM(list(joint.freedoms[1 - number].axis)))
-        if number == 0:
-            return _angle(axis, other, casadi.mtimes(pose.R, other))
-        return -_angle(axis, other, casadi.mtimes(pose.R.T, other))
-    start = SX(DM(list(in_plane(freedom.axis)[0])))
-    return _angle(axis, start, casadi.mtimes(pose.R, start))
-
-
-def _angle(axis: SX, start: SX, end: SX) -> SX:
-    """The turn about an axis that takes one direction across it to another one [rad]."""
-    return casadi.atan2(casadi.dot(cross(axis, start), end), casadi.dot(start, end))

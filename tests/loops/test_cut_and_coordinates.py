@@ -11,6 +11,7 @@ from support.ring_loops import ring_loop
 from mbs import models
 from mbs.assembly.tables import ANGULAR, QUATERNION
 from mbs.components import JointSensor, WrenchSensor
+from mbs.loops.cut_positions import cut_positions
 
 LOOPS = ["RSUR", "RRSRR", "RCSR", "RSRU", "RRSC"]
 """Loops of mobility one whose first joint has a motor."""
@@ -50,16 +51,32 @@ def test_every_cut_gives_the_same_numbers(kinds, seed):
             np.testing.assert_allclose(found[name], value, atol=1e-8 * size, err_msg=name)
 
 
-@pytest.mark.parametrize("kinds", LOOPS)
-def test_every_cut_is_assembled_in_the_same_configuration(kinds):
+@pytest.mark.parametrize(
+    ("kinds", "seed", "guess"),
+    [
+        *((kinds, 2, {"j0": 0.4}) for kinds in LOOPS),
+        ("RSUR", 1, {"j0": 0.2}),
+        ("RSUR", 3, {"j0": 0.2}),
+        ("RRSRR", 1, {"j0": 0.2}),
+        ("RRSRR", 2, {"j3": -0.1}),
+        ("RRSRR", 2, {"j3": -0.3}),
+    ],
+)
+def test_every_cut_is_assembled_in_the_same_configuration(kinds, seed, guess):
+    """Also where another branch is near, and where the guess is of the joint that is cut."""
     positions = {}
     for cut in range(1, len(kinds)):
-        system = ring_loop(2, kinds, cut=cut).assemble({"j0": 0.4})
-        for coordinate, value in zip(system.coordinates, system.configuration, strict=True):
-            positions.setdefault(coordinate.name, []).append(value)
+        system = ring_loop(seed, kinds, cut=cut).assemble(guess)
+        at_cut = np.array(cut_positions(system)(system.configuration, [])).ravel()
+        names = [row.name for row in (*system.coordinates, *system.cut_coordinates)]
+        values = [*system.configuration, *at_cut]
+        for name, value in zip(names, values, strict=True):
+            positions.setdefault(name, []).append(value)
     for name, values in positions.items():
         np.testing.assert_allclose(values, values[0], atol=1e-9, err_msg=name)
         assert abs(values[0]) <= np.pi
+    for name, value in guess.items():
+        assert positions[name][0] == pytest.approx(value, abs=1e-9)
 
 
 def test_the_tree_passes_spherical_joints_both_ways():

@@ -1,0 +1,64 @@
+"""Positions of the joints that are cut to open loops, read from the frames at the cut."""
+
+from __future__ import annotations
+
+import casadi
+from casadi import DM, SX, Function
+
+from mbs.assembly import System
+from mbs.assembly.khalil_frames import Cut
+from mbs.closed_forms.spatial import unit_quaternion
+from mbs.components import Universal
+from mbs.components.component import in_plane
+from mbs.components.joints import Motion
+from mbs.recursions.route import relative_pose
+from mbs.spatial import Pose, cross
+
+
+def cut_positions(system: System) -> Function:
+    """``cut_positions(q, p) -> c``: positions of `system.cut_coordinates` [rad, m, quaternion].
+
+    Angles are between -pi and pi. The first element of a quaternion is not negative.
+    """
+
+    def build() -> Function:
+        q = SX.sym("q", system.nq)
+        found = [SX(0, 1)]
+        for cut in system.cuts:
+            joint = cut.edge.joint
+            if not cut.welded:
+                pose = relative_pose(system.tree, q, *cut.frames)
+                for number, freedom in enumerate(joint.freedoms):
+                    ball = freedom.motion is Motion.SPHERICAL
+                    found.append(
+                        unit_quaternion(pose.R) if ball else cut_position(cut, number, pose)
+                    )
+        outputs = [casadi.densify(casadi.vertcat(*found))]
+        return Function("cut_positions", [q, system.p], outputs, ["q", "p"], ["c"])
+
+    function: Function = system.cached("cut positions", build)
+    return function
+
+
+def cut_position(cut: Cut, number: int, pose: Pose) -> SX:
+    """A freedom read from frame_b seen from frame_a.
+
+    A turn of a universal joint leaves the axis of the other one in its place.
+    """
+    joint = cut.edge.joint
+    freedom = joint.freedoms[number]
+    axis = SX(DM(list(freedom.axis)))
+    if freedom.motion is Motion.PRISMATIC:
+        return casadi.dot(axis, pose.p)
+    if isinstance(joint, Universal):
+        other = SX(DM(list(joint.freedoms[1 - number].axis)))
+        if number == 0:
+            return _angle(axis, other, casadi.mtimes(pose.R, other))
+        return -_angle(axis, other, casadi.mtimes(pose.R.T, other))
+    start = SX(DM(list(in_plane(freedom.axis)[0])))
+    return _angle(axis, start, casadi.mtimes(pose.R, start))
+
+
+def _angle(axis: SX, start: SX, end: SX) -> SX:
+    """The turn about an axis that takes one direction across it to another one [rad]."""
+    return casadi.atan2(casadi.dot(cross(axis, start), end), casadi.dot(start, end))

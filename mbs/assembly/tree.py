@@ -50,7 +50,7 @@ class Link:
         antecedent: number of link i, or -1 for the base.
         motion: how frame j moves from its placement.
         backward: whether the tree passes a SPHERICAL or FREE motion from frame_b to frame_a. Its
-            positions then tell link i seen from link j, and its velocities are in frame i.
+            positions are then the pose of link i in link j; its velocities are in axes of link i.
         via: fixed frames between frame i and the placement, one after the other; none where the
             common perpendicular of the axes of i and j is near.
         placement: frame j with respect to the last of them, or to frame i, at the zero position of

@@ -1,4 +1,4 @@
-"""What writers of robot files share: the system that is meant, its XML on disk."""
+"""Functions that all writers of robot files use: assembly, coordinates, notes, files."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ def system_of(system: object) -> System:
 
 
 def child_positions(system: System, q: Sequence[float]) -> list[float]:
-    """Return the positions q as robot files count them.
+    """Return the positions q in the coordinates of robot files.
 
-    Robot files tell the pose of the outer body in the inner one. Positions of spherical and free
-    joints that connect the outer body to the inner one tell the pose of the inner body in the
-    outer one.
+    In a robot file the quaternion of a joint is the orientation of the child body in the parent
+    body. In a system it is the orientation of frame_b in frame_a. Both differ if a spherical or
+    free joint has the child body on its frame_a.
     """
     found = [float(value) for value in q]
     for link, pose in zip(system.tree.links, link_poses(system.tree, SX(DM(found))), strict=True):
@@ -51,10 +51,10 @@ def child_positions(system: System, q: Sequence[float]) -> list[float]:
 
 
 def check_backward_drives(system: System, file: str) -> None:
-    """Refuse drives and friction of joints from the outer body to the inner one.
+    """Refuse drives and friction of free and spherical joints with the child body on frame_a.
 
     Raises:
-        ModelError: they act on other velocities than those that the file knows.
+        ModelError: friction or rotor inertia acts on velocities that the file does not have.
     """
     for link in system.tree.links:
         acting = (link.Fv, link.Fs, link.Ia) if link.motion is Motion.FREE else (link.Fs,)

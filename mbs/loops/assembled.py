@@ -48,8 +48,8 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
     """Return the configuration that closes the loops and is nearest to a guess.
 
     A position without a guess counts as zero. A guess that closes the loops is returned unchanged.
-    Otherwise some positions are held while the others are solved for. The sets of held positions
-    are tried one after the other, until one of them closes the loops:
+    Otherwise some positions are held, and the loops are closed with the other positions. Several
+    sets of held positions are tried in turn, until the loops close:
 
     1. if a position is guessed: all positions except the unknowns of components, such as the
        parameter of a curve;
@@ -58,9 +58,9 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
     3. smaller sets of these; those without the joints with springs come last.
 
     The distance of two configurations is the largest difference of a position. Lengths are divided
-    by the size of the mechanism. Positions of joints that are cut count too. Of two configurations
-    at the same distance, the one with the larger position is returned, at the first position that
-    differs, in the order of the description.
+    by the size of the mechanism. Positions of joints that are cut count too. If two
+    configurations are at the same distance, the first position that differs decides, in the order
+    of the description: the larger value is taken.
     Solved angles are within half a turn of their guess, or of zero.
 
     Args:
@@ -95,22 +95,22 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
     return Assembled(unwound(Closing(system, p), q, start))
 
 
-# What configurations are compared with: the guess, also of joints that are cut.
+# Comparison of configurations with the guess.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Target:
     """Positions of all joints that an assembled configuration is to be near to.
 
-    Positions of joints that are cut follow those of q. The comparison does not depend on the joint
-    of a loop that is cut.
+    All positions are q, then the positions of joints that are cut. Therefore the comparison does
+    not depend on the joint of a loop that is cut.
 
     Attributes:
         system: its loops need not be closed yet.
         p: (np,) parameters.
         start: (nq,) positions.
         cut: (c,) positions of `system.cut_coordinates`.
-        guessed: indices of the guessed ones among all positions.
+        guessed: indices of the guessed positions among all positions.
     """
 
     system: System
@@ -130,7 +130,7 @@ class _Target:
 
     @property
     def guessed_cuts(self) -> list[int]:
-        """Indices of guessed positions among those of cut joints."""
+        """Indices of guessed positions in `system.cut_coordinates`."""
         return [k - self.system.nq for k in self.guessed if k >= self.system.nq]
 
     def cut_moves(self, q: Vector) -> Vector:
@@ -156,7 +156,7 @@ class _Target:
 
         Args:
             q: (nq,) configuration.
-            size: of the mechanism [m].
+            size: size of the mechanism [m].
         """
         rows = (*self.system.coordinates, *self.system.cut_coordinates)
         scales = np.where([row.unit.startswith("m") for row in rows], size, 1.0)
@@ -274,10 +274,10 @@ def _closes(closing: Closing, q: Vector) -> bool:
 
 
 def _is_nearer(closing: Closing, q: Vector, other: Vector, target: _Target) -> bool:
-    """Whether a configuration is nearer to the target than another one.
+    """Whether the configuration q is nearer to the target than the configuration `other`.
 
-    Guessed positions are compared first, then all positions; of two configurations that are equally
-    near, the one with the larger first position is nearer, in the order of the description.
+    Guessed positions are compared first, then all positions. If both are equally near, the first
+    position that differs decides, in the order of the description: the larger value is nearer.
     """
     own, others = (target.distances(one, closing.size) for one in (q, other))
     for distance, least in zip(own, others, strict=True):

@@ -41,9 +41,12 @@ def cut_positions(system: System) -> Function:
 
 
 def cut_position(cut: Cut, number: int, pose: Pose) -> SX:
-    """A freedom read from frame_b seen from frame_a.
+    """Position of one freedom of a cut joint [rad or m].
 
-    A turn of a universal joint leaves the axis of the other one in its place.
+    Args:
+        cut: the joint.
+        number: index of the freedom in the joint.
+        pose: frame_b of the joint in frame_a.
     """
     joint = cut.edge.joint
     freedom = joint.freedoms[number]
@@ -60,5 +63,5 @@ def cut_position(cut: Cut, number: int, pose: Pose) -> SX:
 
 
 def _angle(axis: SX, start: SX, end: SX) -> SX:
-    """The turn about an axis that takes one direction across it to another one [rad]."""
+    """The rotation about an axis that brings `start` to `end` [rad]; both are orthogonal to it."""
     return casadi.atan2(casadi.dot(cross(axis, start), end), casadi.dot(start, end))

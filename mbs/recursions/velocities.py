@@ -15,10 +15,11 @@ from mbs.components.joints import Motion
 from mbs.recursions.poses import LinkPose
 from mbs.spatial import cross, formula, is_zero, origin, vector, wrench_through, zeros
 
-# What an elementary motion adds to a link: its velocity, and the effort that it feels.
+# Motion subspaces of joints: velocities that a joint adds to its link, and efforts along them.
 #
-# The directions of a motion are constant in frame j. A backward motion has them in its seat, which
-# is the frame_b of its joint, and moves frame j against its velocities.
+# The directions of a motion are constant in frame j. The directions of a backward motion are
+# constant in its seat, which is frame_b of the joint; positive velocities move frame j against
+# them.
 
 
 def motion_at_joint(link: Link, v: SX) -> tuple[SX, SX]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -105,10 +105,14 @@ class ConfigurationCheck:
     Attributes:
         rows: `rows(system, q)` at symbols q and `system.p`.
         refuse: `refuse(system, q, p)` raises the error that says why numbers are not taken.
+        verify: `verify(system, names, evaluate, inputs, outputs)` raises an error if numeric
+            outputs, in the order of their names, have no accuracy; `evaluate(inputs)` returns the
+            outputs at other inputs. None if nothing is verified.
     """
 
     rows: Callable[[System, SX], list[ValidityRow]]
     refuse: Callable[[System, Any, Any], None]
+    verify: Callable[[System, list[str], Any, dict[str, DM], Sequence[DM]], None] | None = None
 
 
 _SAME_UNIT = {unit: unit for unit in EFFORT_UNIT}
@@ -183,6 +187,7 @@ class ModelFunction(Function):
                 f" of the shapes {self._shapes()}"
             ) from error
         self._require_numbers(outputs)
+        self._verify(inputs, outputs)
         if kwargs:
             every = outputs if isinstance(outputs, tuple) else (outputs,)
             return dict(zip(self.name_out(), every, strict=True))
@@ -402,6 +407,19 @@ class ModelFunction(Function):
         found = Function("rows", [symbols[name] for name in given], [excess])(*given.values())
         broken = rows[int(np.argmin(found.full().ravel() <= 0))]
         raise ModelError(f"{self._title}: {broken.sentence}")
+
+    def _verify(self, inputs: dict[str, Any], outputs: Any) -> None:
+        """Raise an error if outputs of numeric inputs have no accuracy."""
+        check = self._check_configuration
+        every = outputs if isinstance(outputs, tuple) else (outputs,)
+        if check is None or check.verify is None or not all(isinstance(o, DM) for o in every):
+            return
+
+        def evaluate(values: Mapping[str, DM]) -> list[DM]:
+            return list(Function.call(self, [*values.values()]))
+
+        given = {name: DM(value) for name, value in inputs.items()}
+        check.verify(self._system, self.name_out(), evaluate, given, every)
 
     def _require_numbers(self, outputs: Any) -> None:
         every = outputs if isinstance(outputs, tuple) else (outputs,)

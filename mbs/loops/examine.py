@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -30,10 +29,10 @@ Vector = NDArray[np.float64]
 
 _DETERMINED = 1e-14
 """Squared sine between rows of the passive joints below which these follow no longer."""
-_DIFFERENTIABLE = 2.5e-5
+LEAST_SINE = 2.5e-5
 """The same for second derivatives, which magnify the rounding of a closed configuration by the
-third power of the inverse sine: 1e-16 becomes 1e-8 at a sine of 5e-3, for lengths, times and speeds
-of size one."""
+third power of the inverse sine and by squared speeds: 1e-16 becomes 1e-8 at a sine of 5e-3 and
+speeds of one. `mbs.loops.accuracy` tests what large speeds leave of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,11 +158,6 @@ def loop_rows(system: System, q: SX, least: float = _DETERMINED) -> list[Validit
 
 DETERMINED = ConfigurationCheck(loop_rows, require_determined)
 """Closed loops whose independent joints lead the others."""
-DIFFERENTIABLE = ConfigurationCheck(
-    functools.partial(loop_rows, least=_DIFFERENTIABLE),
-    functools.partial(require_determined, least=_DIFFERENTIABLE),
-)
-"""Closed loops whose second derivatives are accurate."""
 
 
 def configuration_health(system: System) -> Function:

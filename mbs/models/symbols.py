@@ -10,7 +10,8 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import ConfigurationCheck, Named, model_function, require_system
 from mbs.errors import ModelError
-from mbs.loops.examine import DETERMINED, DIFFERENTIABLE
+from mbs.loops.accuracy import DIFFERENTIABLE
+from mbs.loops.examine import DETERMINED
 from mbs.loops.reduction import Reduction, reduction
 from mbs.recursions.composite_body import velocity_antecedents
 from mbs.recursions.force_elements import element_wrenches, sum_wrenches

@@ -271,3 +271,49 @@ def test_second_derivatives_near_a_singular_configuration(speed):
         with pytest.raises(SingularPosture, match="second derivatives of the loops"):
             ddm(q, speed, 0)
         assert np.isfinite(float(mbs.models.direct_dynamics(system)(q, speed, 0)))
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_second_derivatives_at_any_size_and_speed(size):
+    """A parallelogram of rods of this length under gravity in proportion: the same derivatives."""
+    m = mbs.Mechanism("parallelogram", gravity=(0, -9.81 * size, 0))
+    inertia = (0, size**2 / 12, size**2 / 12)
+    rods = [m.add(Body(n, mass=1, com=(size / 2, 0, 0), inertia=inertia)) for n in "lrc"]
+    hinges = [Revolute(n, axis="z", actuated=False) for n in ("a0", "a1", "b0", "c0")]
+    m.connect(m.world, hinges[0], rods[0])
+    m.connect(m.world.at(size), hinges[1], rods[1])
+    m.connect(rods[0].at(size), hinges[2], rods[2])
+    m.connect(rods[2].at(size), hinges[3], rods[1].at(size))
+    m.cut(hinges[3])
+    m.guess.update({"a0": np.pi / 2, "a1": np.pi / 2, "b0": -np.pi / 2})
+    system = m.assemble(active=["a0"])
+    linear = mbs.models.linearise(system)
+    ddm = mbs.models.direct_dynamics_derivatives(system)
+    answered = set()
+    for e in (0.3, 0.1, 0.03, 0.012, 0.01, 0.008, 3e-3, 1e-4):
+        q = mbs.loops.solve(system, {"a0": e})
+        for speed in (0.1, 3.0, 100.0):
+            bound = {"rel": 3e-5, "abs": 1e-9 * speed**2}
+            try:
+                found = linear.at(q0={"a0": e}, v0={"a0": speed}).A[1, 0]
+            except SingularPosture:
+                with pytest.raises(SingularPosture, match="second derivatives of the loops"):
+                    ddm(q, speed, 0)
+            else:
+                answered.add((e, speed))
+                assert found == pytest.approx(11.772 * np.sin(e), **bound)
+                assert float(ddm(q, speed, 0)[0]) == pytest.approx(11.772 * np.sin(e), **bound)
+    assert {e for e, _ in answered} == {0.3, 0.1, 0.03, 0.012, 0.01, 0.008}
+    assert {(e, 0.1) for e in (0.3, 0.1, 0.03, 0.012, 0.01, 0.008)} < answered
+    assert {(e, speed) for e in (0.3, 0.1) for speed in (3.0, 100.0)} < answered
+    assert not answered & {(0.01, 100.0), (0.012, 100.0), (0.008, 100.0)}
+
+
+def test_every_column_of_a_map_is_tested_for_rounding():
+    system = catalogue_system("n_four_bar")
+    ddm = mbs.models.direct_dynamics_derivatives(system)
+    q = [mbs.loops.solve(system, {"a0": e}) for e in (0.5, 0.01)]
+    columns, rest, many = casadi.DM(np.array(q).T), casadi.DM.zeros(1, 2), ddm.map(2)
+    assert many(columns, casadi.DM([[100.0, 1.0]]), rest)[0].is_regular()
+    with pytest.raises(SingularPosture, match="at these velocities"):
+        many(columns, casadi.DM([[1.0, 100.0]]), rest)

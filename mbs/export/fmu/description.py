@@ -470,6 +470,10 @@ class FmuModel:
         slopes: `slopes(x, z, p) -> J`, how the equations of the closure change with z; the signs of
             the determinants of its diagonal blocks show on which side of a singular configuration
             z is. None when nothing watches them.
+        sines: `sines(x, z, p) -> (2, 1)`, squared sines that measure the distance from singular
+            configurations: of the rows of the dependent joints and of all rows of the loops, see
+            `mbs.loops.examine`. Derivatives are refused where they are too small. None if nothing
+            is checked.
         passive: the first output that is a velocity of a dependent joint, the first that is an
             acceleration of one, and how many of each there are.
         tree: the same motion in all coordinates, which "dopri5" and "rodas" integrate, and
@@ -503,6 +507,7 @@ class FmuModel:
     dependents: tuple[FmuVariable, ...] = ()
     closure: casadi.Function | None = None
     slopes: casadi.Function | None = None
+    sines: casadi.Function | None = None
     passive: tuple[int, int, int] = (0, 0, 0)
     tree: TreeState | None = None
     jumps: Jumps | None = None

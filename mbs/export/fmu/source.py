@@ -9,6 +9,7 @@ import numpy as np
 
 from mbs.errors import ExportError, ModelError
 from mbs.export.fmu.description import FmuModel, FmuVariable, Jumps
+from mbs.loops.examine import LEAST_SINE
 from mbs.models.state.events import MinimalEvents
 from mbs.models.state.tree import TreeState
 from mbs.native.compiled import generated, unwritten
@@ -31,7 +32,8 @@ def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
         of the parameters alone; `mbs_adjoint(t, x, z, u, p, wxdot, wy, wz, wg) -> (gt, gx, gu,
         gp)`.
         Where loops are closed, `mbs_closure(x, z, p) -> (z, residual)` and
-        `mbs_sensitivity(x, z, p) -> steepness`, and `mbs_slopes(x, z, p) -> J` where J is watched.
+        `mbs_sensitivity(x, z, p) -> steepness`, `mbs_slopes(x, z, p) -> J` where J is watched, and
+        `mbs_sines(x, z, p)` where `FmuModel.sines` is given.
         Of a tree, `mbs_tree_rhs` and others as `TreeState` has them. Where there are events,
         `mbs_first`, `mbs_indicators`, `mbs_jump` and, where there are any, `mbs_approaches` as
         `Jumps` has them, and
@@ -51,13 +53,7 @@ def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
     ]
     if adjoint:
         answers.append(_adjoint(model, point))
-    if model.closure is not None:
-        loop, whole = [x, z, _own(model, p)], [x, z, p]
-        answers.append(casadi.Function("mbs_closure", whole, _dense(model.closure.call(loop))))
-        answers.append(casadi.Function("mbs_sensitivity", whole, [_steep(model, loop)]))
-        if model.slopes is not None:
-            J = casadi.densify(model.slopes.call(loop)[0])
-            answers.append(casadi.Function("mbs_slopes", whole, [J]))
+    answers.extend(_loops(model, [x, z, p]))
     if (tree := model.tree) is not None:
         X = casadi.MX.sym("X", tree.start.numel_out(0))
         answers.extend(_tree(tree, [t, X, x, z, u, p]))
@@ -81,6 +77,20 @@ def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
         slopes = _dense([J, rise])
         answers.append(casadi.Function("mbs_tree_jacobian", [*whole, du], slopes))
     return tuple(answers)
+
+
+def _loops(model: FmuModel, whole: list[casadi.MX]) -> list[casadi.Function]:
+    """The functions of x, z and p of closed loops."""
+    if model.closure is None:
+        return []
+    x, z, p = whole
+    loop = [x, z, _own(model, p)]
+    found = {"closure": _dense(model.closure.call(loop)), "sensitivity": [_steep(model, loop)]}
+    if model.slopes is not None:
+        found["slopes"] = [casadi.densify(model.slopes.call(loop)[0])]
+    if model.sines is not None:
+        found["sines"] = _dense(model.sines.call(loop))
+    return [casadi.Function(f"mbs_{name}", whole, values) for name, values in found.items()]
 
 
 def _tree(tree: TreeState, symbols: list[casadi.MX]) -> list[casadi.Function]:
@@ -294,6 +304,16 @@ _TREE = tuple(
 _EVENTS = ("mbs_first", "mbs_indicators", "mbs_rates", "mbs_jump")
 _TREE_EVENTS = ("mbs_tree_indicators", "mbs_tree_rates", "mbs_tree_jump")
 
+
+def _names_of_loops(model: FmuModel) -> tuple[str, ...]:
+    """The functions of closed loops that an FMU has."""
+    if model.closure is None:
+        return ()
+    watched = ("mbs_slopes",) if model.slopes is not None else ()
+    measured = ("mbs_sines",) if model.sines is not None else ()
+    return (*_LOOPS, *watched, *measured)
+
+
 _HEADER = """\
 /* Sizes and tables of the model, generated together with modelDescription.xml. */
 #ifndef MBS_MODEL_H
@@ -357,8 +377,9 @@ def header(model: FmuModel, guid: str, work: Work, *, adjoint: bool) -> str:
     options = ""
     if adjoint:
         names, options = (*names, "mbs_adjoint"), "#define MODEL_ADJOINT\n"
-    if model.closure is not None:
-        names = (*names, *_LOOPS, *(("mbs_slopes",) if model.slopes is not None else ()))
+    names = (*names, *_names_of_loops(model))
+    if "mbs_sines" in names:
+        options += f"#define MODEL_SINES {LEAST_SINE!r} /* squared; no derivatives below it */\n"
     if (tree := model.tree) is not None:
         names = (*names, *_TREE, *_names_of_events(tree.events, "mbs_tree_"))
     names = (*names, *_names_of_events(model.jumps))

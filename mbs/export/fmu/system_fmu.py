@@ -29,6 +29,7 @@ from mbs.export.fmu.interface import (
 from mbs.export.fmu.pack import require_version, require_writable, write_fmu
 from mbs.export.fmu.variables import dependents, inputs, jumps, outputs, parameters, states
 from mbs.files import PathLike, path_of
+from mbs.loops.examine import configuration_health, row_independence
 from mbs.models.state.independent import MinimalState, consistent_start, minimal_state
 from mbs.models.state.tree import tree_state
 from mbs.native.bare_source import Target
@@ -236,6 +237,7 @@ def fmu_model(
         rhs=state.rhs,
         closure=state.closure,
         slopes=state.slopes,
+        sines=_sines(system, state),
         passive=_passive(state),
         tree=tree,
         jumps=jumps(system, state),
@@ -264,6 +266,18 @@ def _rules(system: System, state: MinimalState) -> Rules | None:
         sentences=tuple(row.sentence for row in rows),
         at_start=len(starts),
     )
+
+
+def _sines(system: System, state: MinimalState) -> Function | None:
+    """`FmuModel.sines` of a closed system; None if its state has no dependent positions."""
+    if state.closure is None or system.closure is None:
+        return None
+    x, z, p = (SX.sym(name, state.closure.size1_in(k)) for k, name in enumerate("xzp"))
+    q = SX.zeros(system.nq)
+    q[list(state.positions)] = x[: len(state.positions)]
+    q[list(state.dependents)] = z
+    leads = configuration_health(system)(q, p)[1]
+    return Function("sines", [x, z, p], [casadi.vertcat(leads, row_independence(system)(q, p))])
 
 
 def _arrays(state: MinimalState) -> tuple[Group, ...]:

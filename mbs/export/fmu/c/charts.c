@@ -16,7 +16,18 @@
 #define LEAVE 1.5  /* of that room, from which on the joints serve again: not at once, back and forth */
 #define NEAR 1e-6  /* of that room: importers find the limit to less, from either side */
 #define TURNED 0.5 /* of the tangents at the origin, 60 degrees: well before a chart ends (passage.c) */
-#define DIFFERENCE 1e-5 /* step of a difference: cube root of the rounding of a state, 1e-15 */
+/* Move of a state for a difference, in typical sizes. Differences of sixth order err by its sixth power,
+ * 1e-18 of a derivative, and by the rounding of accelerations, 1e-12 where derivatives are not refused
+ * before, divided by it. */
+#define DIFFERENCE 1e-3
+#define STEPS 12      /* lengths that are tried until one moves the state so far */
+#define FIRST_STEP 1e-6
+#define SHORTER 0.1
+#define LONGER 100.0
+/* Largest error of derivatives of accelerations, part of the largest one; and of squared rates, for
+ * derivatives that are zero. */
+#define INACCURATE 3e-6
+#define IDLE 1e-10
 
 /* A state of the tree, its slope, and that of the states. */
 typedef struct {
@@ -50,20 +61,30 @@ static void foretell(const core *c, double *guide) {
         guide[i] += 0.5 * dt * dt * m->slope[size.nq + i];
 }
 
-/* Where the states are coordinates of a chart. */
-static int by_chart(core *c, const double *y, found *f) {
-    const core_charts *m = &c->m.charts;
-    double guide[NT], none[NT];
-    foretell(c, guide);
+/* Where the states are coordinates of a chart, on the branch of a state near them. */
+static int near_guide(core *c, const double *y, const double *guide, found *f) {
     memset(f->rate, 0, sizeof f->rate);
-    if (passage_state(c->passage, c->m.time, y, guide, f->X, f->slope, f->rate,
-                      &c->m.charts.alignment))
-        return 1;
-    if (passage_jumps(c->passage, m->time, m->X, m->slope, c->m.time - m->time, f->X, f->slope))
-        return 1;
+    return passage_state(c->passage, c->m.time, y, guide, f->X, f->slope, f->rate,
+                         &c->m.charts.alignment);
+}
+
+/* Outputs there. */
+static int chart_outputs(core *c, found *f) {
+    double none[NT];
     if (core_call_tree(c, f->X, none, f->y)) return 1;
     core_show_slope(f->slope, f->y); /* near the singular configuration itself from beside it */
     return 0;
+}
+
+/* The same on the branch that the last states on the motion lead to. */
+static int by_chart(core *c, const double *y, found *f) {
+    const core_charts *m = &c->m.charts;
+    double guide[NT];
+    foretell(c, guide);
+    if (near_guide(c, y, guide, f)) return 1;
+    if (passage_jumps(c->passage, m->time, m->X, m->slope, c->m.time - m->time, f->X, f->slope))
+        return 1;
+    return chart_outputs(c, f);
 }
 
 static int found_state(core *c, found *f) {
@@ -222,41 +243,116 @@ core_status charts_update(core *c, int *changed) {
     return status;
 }
 
-/* Rates, outputs and joints a part of the distance along a direction. */
-static int beside(core *c, const charts_tangent *along, double part, found *f) {
-    double *v = c->m.values, y[NX + 1];
-    int i;
+/* Rates, outputs and joints a part of the distance along a direction; the state of the tree moves about
+ * as fast as ahead. */
+static int beside(core *c, const charts_tangent *along, const double *ahead, double part, found *f) {
+    double *v = c->m.values, y[NX + 1], guide[NT];
+    core_memory kept = c->m;
+    int i, status;
     c->m.time += part * along->dt;
     for (i = 0; i < NX; i++) y[i] = v[SLOTS + i] + part * along->dx[i];
     for (i = 0; i < NU; i++) v[INPUTS + i] += part * along->du[i];
     for (i = 0; i < NP; i++) v[PARAMETERS + i] += part * along->dp[i];
-    return by_chart(c, y, f);
+    for (i = 0; i < NT; i++) guide[i] = c->m.tree[i] + part * ahead[i];
+    status = near_guide(c, y, guide, f) || chart_outputs(c, f);
+    c->m = kept;
+    return status;
 }
 
-core_status charts_difference(core *c, charts_tangent *along) {
-    core_memory kept = c->m;
-    double size = fabs(along->dt), step;
-    found f[2];
-    int i, side, status = 0;
-    for (i = 0; i < NX; i++) size = fmax(size, fabs(along->dx[i]));
-    for (i = 0; i < NU; i++) size = fmax(size, fabs(along->du[i]));
-    for (i = 0; i < NP; i++) size = fmax(size, fabs(along->dp[i]));
-    step = DIFFERENCE / fmax(size, DBL_MIN / DBL_EPSILON);
-    for (side = 0; side < 2 && !status; side++) {
-        status = beside(c, along, side ? step : -step, f + side);
-        c->m = kept;
+/* Largest velocity of the tree, of accelerations the square root, in typical sizes [1/s]. */
+static double typical_rate(const core *c) {
+    static const passage_size size = MODEL_PASSAGE;
+    double rate = 0.0;
+    int i;
+    for (i = 0; i < size.nv; i++) {
+        rate = fmax(rate, fabs(c->m.tree[size.nq + i]) * MODEL_TREE_UNITS[i]);
+        rate = fmax(rate, sqrt(fabs(c->m.slope[size.nq + i]) * MODEL_TREE_UNITS[i]));
     }
+    return rate > 0.0 ? rate : 1.0;
+}
+
+/* How far two states and their slopes are apart, in typical sizes. */
+static double distance(const found *a, const found *b, double rate) {
+    static const passage_size size = MODEL_PASSAGE;
+    double far = 0.0;
+    int i, plain = size.nq == size.nv;
+    for (i = 0; i < size.nq; i++)
+        far = fmax(far, fabs(a->X[i] - b->X[i]) * (plain ? MODEL_TREE_UNITS[i] : 1.0));
+    for (i = 0; i < size.nv; i++) {
+        int k = size.nq + i;
+        far = fmax(far, fabs(a->X[k] - b->X[k]) * MODEL_TREE_UNITS[i] / rate);
+        far = fmax(far, fabs(a->slope[k] - b->slope[k]) * MODEL_TREE_UNITS[i] / (rate * rate));
+    }
+    return far;
+}
+
+/* The part of a direction that moves the state by DIFFERENCE, and how fast the state of the tree moves;
+ * 1 if there is none. */
+static int step_of(core *c, const charts_tangent *along, double rate, double *ahead, double *step) {
+    double size = rate * fabs(along->dt), far, longest = HUGE_VAL;
+    found f[2];
+    int i, pass;
+    for (i = 0; i < NX; i++) size = fmax(size, fabs(along->dx[i]));
+    for (i = 0; i < NU; i++)
+        size = fmax(size, fabs(along->du[i]) / fmax(1.0, fabs(c->m.values[INPUTS + i])));
+    for (i = 0; i < NP; i++)
+        size = fmax(size, fabs(along->dp[i]) / fmax(DBL_MIN, fabs(c->m.values[PARAMETERS + i])));
+    *step = FIRST_STEP / fmax(size, DBL_MIN / DBL_EPSILON);
+    memset(ahead, 0, NT * sizeof *ahead);
+    for (pass = 0; pass < STEPS; pass++) {
+        if (beside(c, along, ahead, -*step, f) || beside(c, along, ahead, *step, f + 1)) {
+            longest = *step;
+            *step *= SHORTER;
+            continue;
+        }
+        for (i = 0; i < NT; i++) ahead[i] = (f[1].X[i] - f[0].X[i]) / (2.0 * *step);
+        far = 0.5 * distance(f, f + 1, rate);
+        if (far > 0.5 * DIFFERENCE && far < 2.0 * DIFFERENCE) return 0;
+        *step *= fmin(LONGER, DIFFERENCE / fmax(far, DIFFERENCE / LONGER));
+        if (!(*step < longest)) *step = 0.5 * longest;
+    }
+    return beside(c, along, ahead, *step, f);
+}
+
+/* Derivatives of a number by central differences of three distances; *error: by which two of them
+ * less exact ones differ. */
+static double derivative(const double *d, double step, double *error) {
+    double six = (45.0 * d[0] - 9.0 * d[1] + d[2]) / (60.0 * step);
+    *error = fabs(six - (8.0 * d[0] - d[1]) / (12.0 * step));
+    return six;
+}
+
+#define DERIVATIVE_OF(field)                                                                          \
+    (d[0] = f[1].field - f[0].field, d[1] = f[3].field - f[2].field, d[2] = f[5].field - f[4].field,  \
+     derivative(d, step, &error))
+
+core_status charts_difference(core *c, charts_tangent *along) {
+    static const passage_size size = MODEL_PASSAGE;
+    double rate = typical_rate(c), step, d[3], error, most = 0.0, worst = 0.0;
+    found f[6];
+    double ahead[NT];
+    int i, k, status;
+    status = step_of(c, along, rate, ahead, &step);
+    for (k = 0; k < 6 && !status; k++)
+        status = beside(c, along, ahead, (k % 2 ? step : -step) * (k / 2 + 1), f + k);
     if (status) return core_no_answer(c, "%s: no derivative at time %.9g", c->name, c->m.time);
-    for (i = 0; i < NX; i++) along->dxdot[i] = (f[1].rate[i] - f[0].rate[i]) / (2 * step);
-    for (i = 0; i < NY; i++) along->dy[i] = (f[1].y[i] - f[0].y[i]) / (2 * step);
+    for (i = 0; i < size.nv; i++) {
+        double scale = MODEL_TREE_UNITS[i];
+        most = fmax(most, fabs(DERIVATIVE_OF(slope[size.nq + i])) * scale);
+        worst = fmax(worst, error * scale);
+    }
+    if (!(worst <= INACCURATE * most + IDLE * rate * rate * DIFFERENCE / step))
+        return core_not_differentiable(c, 0.0);
+    for (i = 0; i < NX; i++) along->dxdot[i] = DERIVATIVE_OF(rate[i]);
+    for (i = 0; i < NY; i++) along->dy[i] = DERIVATIVE_OF(y[i]);
     for (i = 0; i < NX; i++) {
-        int k = MODEL_TREE_STATES[i];
-        along->djoints[i] = (f[1].X[k] - f[0].X[k]) / (2 * step);
-        along->dslopes[i] = (f[1].slope[k] - f[0].slope[k]) / (2 * step);
+        k = MODEL_TREE_STATES[i];
+        along->djoints[i] = DERIVATIVE_OF(X[k]);
+        along->dslopes[i] = DERIVATIVE_OF(slope[k]);
     }
     for (i = 0; i < NZ; i++) {
-        int k = MODEL_TREE_DEPENDENTS[i];
-        along->dz[i] = (f[1].X[k] - f[0].X[k]) / (2 * step);
+        k = MODEL_TREE_DEPENDENTS[i];
+        along->dz[i] = DERIVATIVE_OF(X[k]);
     }
     return CORE_OK;
 }

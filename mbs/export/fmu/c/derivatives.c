@@ -48,9 +48,110 @@ static double *unknown_of(tangents *d, core_reference ref) {
     return ref < CHART ? d->drate + (ref - RATES) : NULL;
 }
 
+#ifdef MODEL_SINES
+
+/* Squared sine below which rounding of the dependent positions can be seen in second derivatives. */
+#define ROUNDED 2.5e-3
+/* Move of the states for a test of rounding, in nominal sizes. The exact derivatives differ by about
+ * this part, and those of rounded positions by more where they have no accuracy. */
+#define TRIAL_MOVE 1e-12
+#define TRIALS 3
+/* Largest effect of rounding, part of the derivatives. */
+#define ROUNDING 1e-5
+/* The same, part of squared speeds in nominal sizes, for derivatives that are zero. */
+#define ROUNDING_OF_SPEEDS 1e-10
+
+/* Accelerations along a direction of all states, in nominal sizes, a trial move away from the state;
+ * the speeds are those of the state. */
+static int trial_accelerations(core *c, int trial, double *accelerations) {
+    static const double MOVES[TRIALS] = {-TRIAL_MOVE, TRIAL_MOVE, 2.0 * TRIAL_MOVE};
+    const double *nominal = MODEL_NOMINAL;
+    double x[NX + 1], z[NZ + 1], next[NZ + 1], residual, none;
+    tangents d;
+    int i, pass;
+    memset(&d, 0, sizeof d);
+    for (i = 0; i < NX; i++) {
+        x[i] = c->m.values[STATES + i] + (MODEL_LEADS[i] ? MOVES[trial] * nominal[STATES + i] : 0.0);
+        d.dx[i] = nominal[STATES + i] * (1.0 + (double)i / NX);
+    }
+    memcpy(z, c->m.values + DEPENDENTS, NZ * sizeof *z);
+    for (pass = 0; pass < 2; pass++) {
+        c->arg[0] = x;
+        c->arg[1] = z;
+        c->arg[2] = c->m.values + PARAMETERS;
+        c->res[0] = next;
+        c->res[1] = &residual;
+        if (mbs_closure(c->arg, c->res, c->iw, c->w, 0)) return 1;
+        memcpy(z, next, NZ * sizeof *z);
+    }
+    core_point(c, &c->m.time, x, z);
+    c->arg[5] = &none;
+    none = 0.0;
+    c->arg[6] = d.dx;
+    c->arg[7] = d.du;
+    c->arg[8] = d.dp;
+    c->res[0] = d.dxdot;
+    c->res[1] = d.dy;
+    c->res[2] = d.dz;
+    c->res[3] = d.dg;
+    if (mbs_tangent(c->arg, c->res, c->iw, c->w, 0)) return 1;
+    for (i = 0; i < NX; i++) accelerations[i] = d.dxdot[i] / nominal[STATES + i];
+    for (i = 0; i < N_PASSIVE; i++)
+        accelerations[NX + i] = d.dy[PASSIVE_A + i] / nominal[OUTPUTS + PASSIVE_A + i];
+    return 0;
+}
+
+/* Derivatives do not depend on the last digits of the dependent positions. */
+static int is_accurate(core *c) {
+    double found[TRIALS][NX + N_PASSIVE + 1], size = 0.0, difference = 0.0, speed = 0.0;
+    int i, k;
+    for (k = 0; k < TRIALS; k++)
+        if (trial_accelerations(c, k, found[k])) return 0;
+    for (i = 0; i < NX + N_PASSIVE; i++) {
+        size = fmax(size, fabs(found[0][i]));
+        for (k = 1; k < TRIALS; k++) difference = fmax(difference, fabs(found[k][i] - found[0][i]));
+    }
+    for (i = 0; i < NX; i++)
+        speed = fmax(speed, fabs(c->m.values[DERIVATIVES + i]) / MODEL_NOMINAL[STATES + i]);
+    for (i = 0; i < N_PASSIVE; i++)
+        speed = fmax(speed, fabs(c->m.values[OUTPUTS + PASSIVE_V + i]) /
+                                MODEL_NOMINAL[OUTPUTS + PASSIVE_V + i]);
+    return difference <= ROUNDING * size + ROUNDING_OF_SPEEDS * speed * speed;
+}
+
+#endif
+
+/* Second derivatives of the loops magnify the rounding of a closed configuration by the third power of
+ * the inverse sine, and by squared speeds. They are refused where too little accuracy is left. */
+static core_status differentiable(core *c) {
+#ifdef MODEL_SINES
+    double sines[2], sine;
+    c->arg[0] = c->m.values + STATES;
+    c->arg[1] = c->m.values + DEPENDENTS;
+    c->arg[2] = c->m.values + PARAMETERS;
+    c->res[0] = sines;
+    if (mbs_sines(c->arg, c->res, c->iw, c->w, 0)) sines[0] = sines[1] = 0.0;
+    sine = sines[in_chart(c)];
+    if (sine > ROUNDED || (sine > MODEL_SINES && (in_chart(c) || is_accurate(c)))) return CORE_OK;
+    return core_not_differentiable(c, sqrt(fmax(sine, 0.0)));
+#else
+    (void)c;
+    return CORE_OK;
+#endif
+}
+
+core_status core_not_differentiable(core *c, double sine) {
+    return core_refuse(c, "%s: at time %.9g the configuration is so near a singular one (%s; sine %.2g) "
+                       "that second derivatives of the loops have no accuracy at these velocities; ask "
+                       "for derivatives at another configuration, at smaller velocities, or choose "
+                       "other independent joints (assemble(active=...))", c->name, c->m.time,
+                       core_where(c), sine);
+}
+
 /* All references can be used, all seeds are finite, and the calculated values are up to date. */
 static core_status ready(core *c, const core_reference *unknown, size_t n_unknown, const core_reference *known,
                          size_t n_known, const double *seed, size_t n_seed) {
+    core_status status;
     tangents d;
     size_t i;
     if (!core_allowed(c, INITIALIZATION | RUNNING | INTERMEDIATE, "a derivative"))
@@ -66,7 +167,8 @@ static core_status ready(core *c, const core_reference *unknown, size_t n_unknow
     for (i = 0; i < n_seed; i++)
         if (!isfinite(seed[i]))
             return core_refuse(c, "%s: seed %g of a derivative is not finite", c->name, seed[i]);
-    return core_refresh(c);
+    status = core_refresh(c);
+    return status ? status : differentiable(c);
 }
 
 static void point(core *c) {

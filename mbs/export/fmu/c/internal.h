@@ -23,6 +23,9 @@ core_status core_before_stop(core *c, double time);
 core_status core_check_rules(core *c);
 core_status core_no_answer(core *c, const char *format, ...);
 
+/* Refuses derivatives near a singular configuration; sine: the distance from it. */
+core_status core_not_differentiable(core *c, double sine);
+
 /* The states in words. */
 const char *core_where(core *c);
 

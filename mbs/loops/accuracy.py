@@ -1,0 +1,170 @@
+"""Accuracy of second derivatives of the loops near singular configurations."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+
+import casadi
+import numpy as np
+from casadi import DM, SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.model_function import ConfigurationCheck
+from mbs.errors import SingularPosture
+from mbs.loops.closing import mechanism_size, relative_rows
+from mbs.loops.examine import LEAST_SINE, configuration_health, loop_rows, require_determined
+from mbs.loops.velocity import scales
+
+Array = NDArray[np.float64]
+Evaluate = Callable[[Mapping[str, DM]], Sequence[DM]]
+
+_ROUNDED = 2.5e-3
+"""Squared sine between rows of the passive joints, below which rounding of the closed configuration
+is tested. At a sine of 0.05 it changes second derivatives by 1e-11 of squared speeds."""
+_MOVE = 1e-12
+"""Move of a position for a test [rad, or m in sizes of the mechanism]: exact derivatives change by
+about this part."""
+_TRIALS, _SEED = 3, 20261128
+_NEWTON = 3
+"""Newton steps onto the loops after a move: they converge quadratically."""
+_DEPENDENT = 1e-9
+"""Part of the largest singular value below which a row of the loops is redundant."""
+_ROUNDING = 1e-5
+"""Largest effect of rounding on second derivatives, part of the largest element of a row."""
+_ROUNDING_OF_SPEEDS = 1e-10
+"""The same as a part of squared speeds, for derivatives that are zero."""
+
+
+def require_accurate(
+    system: System,
+    names: Sequence[str],
+    evaluate: Evaluate,
+    inputs: Mapping[str, DM],
+    outputs: Sequence[DM],
+) -> None:
+    """Raise an error if second derivatives depend on the last digits of the positions.
+
+    Their rounding grows with the third power of the inverse sine between the rows of the passive
+    joints and with squared speeds, so that no sine alone limits it. The derivatives are evaluated
+    again at configurations that are as closed and differ by rounding.
+
+    Args:
+        system: with closed loops.
+        names: names of the outputs; "A" and derivatives by positions, "_dq", are tested.
+        evaluate: returns the outputs at other inputs.
+        inputs: numeric values of the inputs; one or several columns.
+        outputs: values at these inputs.
+
+    Raises:
+        SingularPosture: the derivatives have no accuracy at these velocities.
+    """
+    q, p = inputs["q"].full(), inputs.get("p", DM(0, 1)).full()
+    count = q.shape[1]
+    tested = [k for k, name in enumerate(names) if name == "A" or "_dq" in name]
+    if len(q) != system.nq or p.shape[1] not in (1, count):
+        return
+    p = np.broadcast_to(p, (len(p), count))
+    health = configuration_health(system)
+    leads = [float(health(q[:, k], p[:, k])[1]) for k in range(count)]
+    near = [k for k in range(count) if leads[k] < _ROUNDED]
+    if not near or not tested:
+        return
+    floors = _floors(system, names, inputs, outputs, tested, count)
+    rng, sizes = np.random.default_rng(_SEED), _sizes(system, p[:, near[0]])
+    for _ in range(_TRIALS):
+        moved = q.copy()
+        for k in near:
+            start = q[:, k] + _MOVE * sizes * rng.uniform(-1, 1, system.nq)
+            moved[:, k] = _closed(system, start, p[:, k])
+        others = evaluate({**inputs, "q": DM(moved)})
+        for k, number in [(k, number) for k in near for number in tested]:
+            found, other = (_column(x[number], k, count) for x in (outputs, others))
+            allowed = _ROUNDING * np.max(np.abs(found), axis=1) + floors[number][k]
+            if not np.all(np.max(np.abs(other - found), axis=1) <= allowed):
+                _refuse(system, leads[k])
+
+
+def _refuse(system: System, leads: float) -> None:
+    names = ", ".join(system.speeds[k].name for k in system.active)
+    raise SingularPosture(
+        f"{system.name}: the configuration is so near a singular one that second derivatives of the"
+        f" loops have no accuracy at these velocities with {names} as independent joints (sine"
+        f" {leads**0.5:.2g}; rounding changes them by more than {_ROUNDING:g}); take another"
+        " configuration, smaller velocities, or other independent joints (assemble(active=...))"
+    )
+
+
+def _column(value: DM, k: int, count: int) -> Array:
+    """The part of an output that belongs to column k of the inputs."""
+    full = np.asarray(value.full(), dtype=float)
+    width = full.shape[1] // count
+    return full[:, k * width : (k + 1) * width]
+
+
+def _floors(
+    system: System,
+    names: Sequence[str],
+    inputs: Mapping[str, DM],
+    outputs: Sequence[DM],
+    tested: Sequence[int],
+    count: int,
+) -> dict[int, list[Array]]:
+    """Effects of rounding that are allowed in each row of an output, for each column of inputs."""
+    units = scales(system).columns([system.speeds[k].unit for k in system.active])
+    v = np.broadcast_to(inputs["v_a"].full(), (len(units), count))
+    squares = np.max((v / units[:, None]) ** 2, axis=0, initial=0.0)
+    masses = [k for k, name in enumerate(names) if name.startswith("dtau") and "_da" in name]
+
+    def rows(number: int, k: int) -> Array:
+        """Accelerations of size one, or efforts that belong to them."""
+        found = np.zeros(outputs[number].shape[0])
+        if names[number].startswith("dtau"):
+            sizes = (float(np.max(np.abs(_column(outputs[i], k, count)))) for i in masses)
+            return found + max(sizes, default=0.0)
+        first = len(system.free) if names[number] == "A" else 0
+        found[first : first + len(units)] = units
+        return found
+
+    return {
+        number: [_ROUNDING_OF_SPEEDS * squares[k] * rows(number, k) for k in range(count)]
+        for number in tested
+    }
+
+
+def _sizes(system: System, p: Array) -> Array:
+    """Sizes of positions [rad or m]."""
+    size = float(Function("size", [system.p], [mechanism_size(system)])(p))
+    units = [coordinate.unit for coordinate in system.coordinates]
+    return np.array([size if unit.startswith("m") else 1.0 for unit in units])
+
+
+def _closed(system: System, q: Array, p: Array) -> Array:
+    """The configuration nearest to q that closes the loops."""
+    for _ in range(_NEWTON):
+        rows, slopes = (x.full() for x in _closure(system)(q, p))
+        if rows.size:
+            q = q - np.linalg.lstsq(slopes, rows.ravel(), rcond=_DEPENDENT)[0]
+    return q
+
+
+def _closure(system: System) -> Function:
+    """``closure(q, p) -> rows, slopes`` of all rows in parts of the size of the mechanism."""
+
+    def build() -> Function:
+        q = SX.sym("q", system.nq)
+        rows = relative_rows(system, q)
+        slopes = casadi.jacobian(rows, q)
+        return Function("closure", [q, system.p], [rows, slopes], {"cse": True})
+
+    function: Function = system.cached("relative closure with slopes", build)
+    return function
+
+
+DIFFERENTIABLE = ConfigurationCheck(
+    functools.partial(loop_rows, least=LEAST_SINE),
+    functools.partial(require_determined, least=LEAST_SINE),
+    require_accurate,
+)
+"""Closed loops whose second derivatives are accurate."""

@@ -39,7 +39,7 @@ from mbs.components.bodies import RigidBody
 from mbs.errors import MbsError, ModelError
 from mbs.expressions import Parameter, out_of_bounds
 from mbs.files import PathLike
-from mbs.numbers import doubles
+from mbs.numbers import numbers_given
 from mbs.spatial import Pose
 from mbs.text import did_you_mean, listed, quoted, without_values
 
@@ -608,7 +608,7 @@ class System:
     def _numbers(self, values: Any, what: str) -> list[float]:
         if isinstance(values, (list, tuple)):  # numpy makes no array of several (1, 1) of CasADi
             values = [float(x) if isinstance(x, DM) and x.numel() == 1 else x for x in values]
-        array = doubles(values)
+        array = numbers_given(values)
         if isinstance(array, str):
             raise ModelError(f"{self.name}: the {what} {array}")
         if not np.isfinite(array).all():

@@ -11,6 +11,7 @@ from mbs.assembly.parts import guesses_of_unknowns
 from mbs.components import Mechanism
 from mbs.errors import AssemblyError
 from mbs.loops.analysis import analyse
+from mbs.numbers import numbers_given
 from mbs.recursions.part_checks import check_parts
 from mbs.text import did_you_mean
 
@@ -60,9 +61,12 @@ def _choose(system: System, active: Sequence[str]) -> tuple[int, ...]:
 
 def _check_guess(system: System, guess: Mapping[str, float]) -> None:
     known = [c.name for c in (*system.coordinates, *system.cut_coordinates)]
-    for name in guess:
+    for name, value in guess.items():
         if name not in known:
             raise AssemblyError(
                 f"{system.name}: the guess names {name!r}, which is no coordinate;"
                 f" {did_you_mean(name, known)}"
             )
+        number = numbers_given(value)
+        if isinstance(number, str):
+            raise AssemblyError(f"{system.name}: the guess of {name} {number}")

@@ -59,7 +59,7 @@ from mbs.models.state.tree import FullState, full_state
 from mbs.models.symbols import part_equations
 from mbs.native import compiled
 from mbs.native.compiler import cache_dir
-from mbs.numbers import OnArrays, doubles, on_arrays
+from mbs.numbers import OnArrays, has_boolean, numbers_given, on_arrays
 from mbs.progress import progress
 from mbs.recursions.parts import part_event_names
 from mbs.result import (
@@ -285,7 +285,7 @@ def device_states(system: System, z0: Mapping[str, float] | Sequence[float] | No
 
 
 def _numbers(system: System, what: str, values: Any) -> list[float]:
-    array = doubles(values)
+    array = numbers_given(values)
     if isinstance(array, str) or not np.isfinite(array).all() or array.ndim == 0:
         raise ModelError(f"{system.name}: {what} is {quoted(values)}; give finite numbers")
     return [float(value) for value in array.ravel()]
@@ -970,7 +970,7 @@ def _value(system: System, name: str, law: Any, t: SX) -> SX:
         except Exception as error:
             raise untraceable(system, f"the motion of {name}", error) from error
     try:
-        value = SX(given)
+        value = SX(0, 0) if has_boolean(given) else SX(given)
     except Exception:
         value = SX(0, 0)
     constant = not casadi.symvar(value)

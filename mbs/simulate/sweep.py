@@ -27,7 +27,7 @@ from mbs.assembly import System
 from mbs.assembly.system import packed, unpacked
 from mbs.errors import ExportError, Interrupted, MbsError, ModelError, SolverError
 from mbs.files import check_archive, path_of, write_text
-from mbs.numbers import doubles
+from mbs.numbers import numbers_given
 from mbs.progress import progress
 from mbs.result import Result, State, optional_module, state_of
 from mbs.simulate.fmu import fmu
@@ -76,7 +76,7 @@ def _combinations(grid: Mapping[str, Iterable[float]]) -> Iterable[Case]:
 
 
 def _number(name: str, value: object) -> float:
-    array = doubles(value)
+    array = numbers_given(value)
     if isinstance(array, str):
         raise ModelError(f"sweep: {name} {array}")
     if array.size != 1:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mbs.arguments import names_given, values_given
 from mbs.assembly import System
 from mbs.errors import ModelError
-from mbs.numbers import doubles
+from mbs.numbers import has_boolean, numbers_given
 from mbs.text import did_you_mean, quoted
 
 Array = NDArray[np.float64]
@@ -106,7 +106,7 @@ def _trace(
     if by_name:
         values = _in_order(system, signal, values)
     try:
-        result = _column(values)
+        result = None if has_boolean(values) else _column(values)
     except Exception:
         result = None
     if result is None or (not casadi.symvar(result) and not casadi.evalf(result).is_regular()):
@@ -242,7 +242,7 @@ def effort_function(system: System, tau: Effort) -> Function | None:
         return signal_function(system, signal, tau, driven)
     given = tau
     if not isinstance(tau, Mapping):
-        array, short = doubles(tau), len(system.motors)
+        array, short = numbers_given(tau), len(system.motors)
         if not isinstance(array, str) and array.ndim and array.size == short != system.nv:
             motors = (names[k] for k in system.motors)
             given = dict(zip(motors, array.ravel().tolist(), strict=True))
@@ -378,7 +378,7 @@ def by_name(
             raise ModelError(
                 f"{system.name}: {what} names {quoted(given)}; {did_you_mean(str(given), known)}"
             )
-        number = doubles(value)
+        number = numbers_given(value)
         if isinstance(number, str) or number.size != 1 or not np.isfinite(number).all():
             raise ModelError(
                 f"{system.name}: {what} gives {quoted(value)} for {name}; give a finite number"

@@ -7,7 +7,7 @@ import math
 import pickle
 import sys
 import threading
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from types import FunctionType
 from typing import TYPE_CHECKING, Any
@@ -34,6 +34,7 @@ from mbs.assembly.tables import (
     link_rows,
 )
 from mbs.assembly.tree import Tree, position_rate
+from mbs.assembly.variable_names import EFFORTS, GUESSES, VELOCITIES, by_coordinate
 from mbs.components import Component
 from mbs.components.bodies import RigidBody
 from mbs.errors import MbsError, ModelError
@@ -561,18 +562,38 @@ class System:
     def position(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
         """Positions q from values by coordinate name, the others as in the assembled configuration.
 
+        Names of variables of FMUs, such as j1.q, are accepted in place of j1.
+
         Raises:
             ModelError: a name is unknown, or a sequence has the wrong length.
         """
-        return self._fill(values, self.coordinates, list(self.configuration), "position")
+        start, given = list(self.configuration), self.plain_names(values, GUESSES)
+        return self._fill(given, self.coordinates, start, "position")
 
     def velocity(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
         """Velocities v from values by name, the others zero; errors as for `position`."""
-        return self._fill(values, self.speeds, [0.0] * self.nv, "velocity")
+        given = self.plain_names(values, VELOCITIES)
+        return self._fill(given, self.speeds, [0.0] * self.nv, "velocity")
 
     def effort(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
         """Joint efforts tau from values by name, the others zero; errors as for `position`."""
-        return self._fill(values, self.speeds, [0.0] * self.nv, "effort")
+        given = self.plain_names(values, EFFORTS)
+        return self._fill(given, self.speeds, [0.0] * self.nv, "effort")
+
+    def plain_names(self, values: Any, kinds: Collection[str]) -> Any:
+        """Return values by coordinate name, such as j1, for names such as j1.q.
+
+        Args:
+            values: values by name; anything else is returned as it is.
+            kinds: ends of names that are accepted, such as ("q",).
+
+        Raises:
+            ModelError: a value is given by both names, or the name is of another quantity.
+        """
+        if not isinstance(values, Mapping):
+            return values
+        rows = (*self.coordinates, *self.cut_coordinates, *self.speeds)
+        return by_coordinate(self.name, values, {row.name for row in rows}, kinds)
 
     def _fill(
         self,

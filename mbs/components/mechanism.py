@@ -465,7 +465,7 @@ class Mechanism:
                 f"{self.name}: guess is {quoted(guess)}; give a dict of names to positions"
             )
         names = names_given(f"{self.name}: active", active, "j1", DescriptionError)
-        return assemble(self, {**self.guess, **(guess or {})}, names)
+        return assemble(self, guess or {}, names)
 
     def _require_use(self, component: Component) -> None:
         """Refuse a component that no equation would know."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 from mbs.assembly import System
 from mbs.assembly.open_system import open_system
 from mbs.assembly.parts import guesses_of_unknowns
+from mbs.assembly.variable_names import GUESSES
 from mbs.components import Mechanism
 from mbs.errors import AssemblyError
 from mbs.loops.analysis import analyse
@@ -23,17 +24,18 @@ def assemble(
 
     Args:
         mechanism: components and connections.
-        guess: approximate positions by coordinate name, where loops are closed near to.
+        guess: approximate positions by coordinate name, where loops are closed near to. They
+            replace those of the mechanism.
         active: velocities that are to be independent where there are loops.
 
     Raises:
         AssemblyError: the components do not form a mechanism, or a guess names no coordinate.
         Unclosable: no configuration closes the loops.
     """
-    guess = {**guesses_of_unknowns(mechanism), **guess}
+    guess = _laid_over(guesses_of_unknowns(mechanism), mechanism.guess, guess)
     system = open_system(mechanism, (*guess, *active))
     check_parts(system)
-    _check_guess(system, guess)
+    guess = _plain_guess(system, guess)
     chosen = _choose(system, active)
     if system.cuts or system.couplings or any(p.element.binds for p in system.parts):
         return analyse(system, guess, chosen)
@@ -59,9 +61,31 @@ def _choose(system: System, active: Sequence[str]) -> tuple[int, ...]:
     return tuple(dict.fromkeys(names.index(name) for name in active))
 
 
-def _check_guess(system: System, guess: Mapping[str, float]) -> None:
+def _laid_over(*guesses: Mapping[str, float]) -> dict[str, float]:
+    """Return guesses in which a later one replaces earlier ones of the same coordinate."""
+    found: dict[str, float] = {}
+    for guess in guesses:
+        later = {_base(name) for name in guess}
+        found = {name: value for name, value in found.items() if _base(name) not in later}
+        found |= guess
+    return found
+
+
+def _base(name: str) -> str:
+    """Return the name of the coordinate in the name of a variable, such as j1 in j1.q."""
+    base, _, kind = str(name).rpartition(".")
+    return base if kind in GUESSES else str(name)
+
+
+def _plain_guess(system: System, guess: Mapping[str, float]) -> dict[str, float]:
+    """Return a guess by names of coordinates, such as j1 for j1.q.
+
+    Raises:
+        AssemblyError: a name is no coordinate, or a value is no number.
+    """
     known = [c.name for c in (*system.coordinates, *system.cut_coordinates)]
-    for name, value in guess.items():
+    found: dict[str, float] = system.plain_names(guess, GUESSES)
+    for name, value in found.items():
         if name not in known:
             raise AssemblyError(
                 f"{system.name}: the guess names {name!r}, which is no coordinate;"
@@ -70,3 +94,4 @@ def _check_guess(system: System, guess: Mapping[str, float]) -> None:
         number = numbers_given(value)
         if isinstance(number, str):
             raise AssemblyError(f"{system.name}: the guess of {name} {number}")
+    return found

@@ -10,6 +10,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tree import quaternion_slices
 from mbs.assembly.validity import plain_fault
+from mbs.assembly.variable_names import GUESSES, POSITIONS, VELOCITIES
 from mbs.errors import LoopError, ModelError, Unclosable
 from mbs.loops.closing import (
     CLOSED,
@@ -83,8 +84,8 @@ def solve(
         ModelError: a name is unknown, or a value is not finite; or guess and branch are given.
     """
     require_system(system)
-    given: Values = positions_of(q_active)
-    guess = positions_of(guess)
+    given: Values = system.plain_names(positions_of(q_active), POSITIONS)
+    guess = system.plain_names(positions_of(guess), GUESSES)
     if not isinstance(guess, Mapping | None):
         raise ModelError(
             f"{system.name}: guess is {quoted(guess)}; give a dict of coordinate names to values"
@@ -328,7 +329,7 @@ def start_position(
     guess: Guess = None,
 ) -> Vector:
     """(nq,) the positions of `start`."""
-    given: Values = positions_of(q0)
+    given: Values = system.plain_names(positions_of(q0), POSITIONS)
     if guess is not None and not isinstance(given, Mapping | None):
         raise ModelError(
             f"{system.name}: a guess is given beside all positions; leave it out, or give q0 by"
@@ -357,6 +358,7 @@ def start_velocity(
     Raises:
         ModelError: no motion of the loops has these velocities.
     """
+    v0 = system.plain_names(v0, VELOCITIES)
     if not system.is_closed:
         return np.array(system.velocity(v0))
     p = [system.parameter_values(parameters)] if system.parameters else []

@@ -7,7 +7,7 @@ import hashlib
 import math
 import os
 import pickle
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -25,6 +25,7 @@ from mbs.assembly.model_function import require_system
 from mbs.assembly.parts import WireSource
 from mbs.assembly.system import Packed, content_of, packed, unpacked
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
+from mbs.assembly.variable_names import POSITIONS, VELOCITIES
 from mbs.components.custom import OneWay, Signal
 from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.files import read_sealed, write_sealed
@@ -873,8 +874,8 @@ def start_positions(
         return q0, v0
     if isinstance(q0, State) and v0 is None:
         v0 = q0.v
-    positions = _by_name(system, "q0", positions_of(q0))
-    velocities = _by_name(system, "v0", v0)
+    positions = _by_name(system, "q0", positions_of(q0), POSITIONS)
+    velocities = _by_name(system, "v0", v0, VELOCITIES)
     for one in motions:
         position, speed, _ = (float(value) for value in one.laws.call([DM(begin), DM(z0), DM(p)]))
         if one.position is not None:
@@ -884,12 +885,13 @@ def start_positions(
     return positions, velocities
 
 
-def _by_name(system: System, what: str, given: Values) -> dict[str, float]:
+def _by_name(system: System, what: str, given: Values, kinds: Collection[str]) -> dict[str, float]:
     if not isinstance(given, Mapping | None):
         raise ModelError(
             f"{system.name}: {what} is given as a sequence, beside motion; give a dict of names"
         )
-    return dict(given or {})
+    found: dict[str, float] = system.plain_names(given or {}, kinds)
+    return found
 
 
 def _put(system: System, values: dict[str, float], name: str, value: float, what: str) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mbs.arguments import names_given, values_given
 from mbs.assembly import System
+from mbs.assembly.variable_names import EFFORTS, by_coordinate
 from mbs.errors import ModelError
 from mbs.numbers import has_boolean, numbers_given
 from mbs.text import did_you_mean, quoted
@@ -135,6 +136,7 @@ def _has_nan(value: SX) -> bool:
 
 def _in_order(system: System, signal: LawArgument, values: Mapping[str, Any]) -> list[Any]:
     """Every element, zero where it is not named."""
+    values = by_coordinate(system.name, values, signal.elements, [signal.name])
     for name in values:
         if name not in signal.elements:
             known = did_you_mean(str(name), signal.elements)
@@ -240,7 +242,7 @@ def effort_function(system: System, tau: Effort) -> Function | None:
     driven = [speed.name for speed in system.speeds if speed.actuated]
     if callable(tau):
         return signal_function(system, signal, tau, driven)
-    given = tau
+    given = system.plain_names(tau, EFFORTS)
     if not isinstance(tau, Mapping):
         array, short = numbers_given(tau), len(system.motors)
         if not isinstance(array, str) and array.ndim and array.size == short != system.nv:

@@ -17,11 +17,9 @@ from mbs.assembly import System
 from mbs.assembly.variable_names import EFFORTS, by_coordinate
 from mbs.errors import ModelError
 from mbs.numbers import has_boolean, numbers_given
-from mbs.text import did_you_mean, quoted
+from mbs.text import did_you_mean, error_text, quoted
 
 Array = NDArray[np.float64]
-
-_LONGEST_REASON = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,11 +161,18 @@ _SYMBOLS = (
 
 
 def untraceable(system: System, what: str, error: Exception) -> ModelError:
-    """What a user's function says when it is called with CasADi symbols."""
+    """Return the error of a user's function that raised one when called with CasADi symbols."""
+    fault = f"raises {error_text(error)}"
+    if not isinstance(error, _OF_SYMBOLS):
+        return ModelError(f"{system.name}: {what} {fault}; correct the function")
     return ModelError(
-        f"{system.name}: {what} could not be traced with CasADi symbols ({_reason(error)}); build"
-        " it from CasADi operations, such as casadi.sin and casadi.if_else"
+        f"{system.name}: {what} could not be traced with CasADi symbols, it {fault}; build it from"
+        " CasADi operations, such as casadi.sin and casadi.if_else"
     )
+
+
+_OF_SYMBOLS = (RuntimeError, TypeError, ValueError, NotImplementedError, AttributeError)
+"""Errors of operations that do not take CasADi symbols, such as math.sin and `if`."""
 
 
 def _column(values: Any) -> SX:
@@ -202,15 +207,6 @@ def _check_inputs(
         ) from None
     except ValueError:  # no signature is known: the call will report it
         return
-
-
-def _reason(error: Exception) -> str:
-    """The first sentence of an error; CasADi adds lists of prototypes and lines of its code."""
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    text = lines[0] if lines else type(error).__name__
-    if text.startswith("Wrong number or type of arguments"):
-        text = "an operation of CasADi was given what it does not take"
-    return text[:_LONGEST_REASON]
 
 
 # Joint efforts that drive a motion, in whatever form the user gives them.

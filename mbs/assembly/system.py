@@ -16,6 +16,7 @@ import casadi
 import numpy as np
 from casadi import DM, SX, Function
 
+from mbs.assembly.degrees import like_degrees
 from mbs.assembly.drive_line import ShaftRow
 from mbs.assembly.inertias import inertia_notes
 from mbs.assembly.khalil_frames import Cut
@@ -136,7 +137,17 @@ class _Unpickler(pickle.Unpickler):
 def report(system: System) -> str:
     """Tree, cut joints, mobility, dropped rows, whether the cut forces are unique, what acts."""
     every = [*_tree(system), *_loops(system), *_parameters(system), *_acting(system)]
-    return "\n".join(every)
+    return "\n".join([*every, *_degrees(system)])
+
+
+def _degrees(system: System) -> list[str]:
+    """Note on guesses that look like degrees; an open system is assembled at its guess."""
+    names = [coordinate.name for coordinate in system.coordinates]
+    given = dict(zip(names, system.configuration, strict=True))
+    if system.closure is not None:
+        given = dict(system.closure.guess)
+    note = like_degrees(system.coordinates, given)
+    return [f"Note: {note}."] if note else []
 
 
 def _tree(system: System) -> list[str]:

@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from mbs.assembly import System
+from mbs.assembly.degrees import like_degrees
 from mbs.assembly.open_system import open_system
 from mbs.assembly.parts import guesses_of_unknowns
 from mbs.assembly.variable_names import GUESSES
 from mbs.components import Mechanism
-from mbs.errors import AssemblyError
+from mbs.errors import AssemblyError, Unclosable
 from mbs.loops.analysis import analyse
 from mbs.numbers import numbers_given
 from mbs.recursions.part_checks import check_parts
@@ -38,10 +39,19 @@ def assemble(
     guess = _plain_guess(system, guess)
     chosen = _choose(system, active)
     if system.cuts or system.couplings or any(p.element.binds for p in system.parts):
-        return analyse(system, guess, chosen)
+        return _analysed(system, guess, chosen)
     known = [coordinate.name for coordinate in system.coordinates]
     start = {name: value for name, value in guess.items() if name in known}
     return replace(system, configuration=tuple(system.position(start)), _cache={})
+
+
+def _analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...]) -> System:
+    """Return the system with closed loops; errors have a note on guesses in degrees."""
+    try:
+        return analyse(system, guess, chosen)
+    except Unclosable as error:
+        note = like_degrees(system.coordinates, guess)
+        raise (Unclosable(f"{error}; {note}") if note else error) from None
 
 
 def _choose(system: System, active: Sequence[str]) -> tuple[int, ...]:

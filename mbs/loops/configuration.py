@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 import numpy as np
 
 from mbs.assembly import System
+from mbs.assembly.degrees import like_degrees
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tree import quaternion_slices
 from mbs.assembly.validity import plain_fault
@@ -94,7 +95,12 @@ def solve(
         if guess:
             raise ModelError(f"{system.name}: guess and branch both choose the branch; give one")
         return configuration_on(system, given, branch, parameters)
-    return _closed(system, fixed_positions(system, given), guess or {}, parameters)
+    fixed = fixed_positions(system, given)
+    try:
+        return _closed(system, fixed, guess or {}, parameters)
+    except Unclosable as error:
+        note = like_degrees(system.coordinates, {**(guess or {}), **fixed})
+        raise (Unclosable(f"{error}; {note}") if note else error) from None
 
 
 def _closed(

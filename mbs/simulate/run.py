@@ -21,11 +21,12 @@ from numpy.typing import NDArray
 
 from mbs.arguments import MadeOnce, names_given, values_given
 from mbs.assembly import System
+from mbs.assembly.degrees import like_degrees
 from mbs.assembly.model_function import require_system
 from mbs.assembly.parts import WireSource
 from mbs.assembly.system import Packed, content_of, packed, unpacked
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
-from mbs.assembly.variable_names import POSITIONS, VELOCITIES
+from mbs.assembly.variable_names import GUESSES, POSITIONS, VELOCITIES
 from mbs.components.custom import OneWay, Signal
 from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.files import read_sealed, write_sealed
@@ -1131,6 +1132,7 @@ def _result(
     stop: Stop,
     columns: _Columns,
     allowed: Tolerances,
+    note: str,
 ) -> Result:
     times, x = np.concatenate([leg.times for leg in legs]), np.vstack([leg.x for leg in legs])
     nq, n, np_own = system.nq, system.nq + system.nv, len(system.parameters)
@@ -1153,8 +1155,11 @@ def _result(
     events = list_events(system, contact, happened)
     stopped = None if stop is None or stop.time is None else (stop.time, str(stop))
     info: dict[str, object] = {"tolerance": allowed.common}
+    notes = [note] if note else []
     if small := small_motions(system, x[:, :nq], allowed):
-        info["note"] = f"less than 100 tolerances: {', '.join(small)}; ask for a smaller tolerance"
+        notes.append(f"less than 100 tolerances: {', '.join(small)}; ask for a smaller tolerance")
+    if notes:
+        info["note"] = ". ".join(notes)
     return Result(
         times,
         values,
@@ -1315,6 +1320,7 @@ class Simulator(MadeOnce):
             require_state_of(system, q0)
             begin, modes = q0.time, np.array(q0.modes)
             devices = dict(q0.z) if devices is None else devices
+        note = _degrees_given(system, q0, guess)
         z = device_states(system, devices)
         placed = start_positions(system, motions, q0, speeds, z, own, begin)
         x0 = np.concatenate([*_started(system, *placed, p, guess), z])
@@ -1339,9 +1345,9 @@ class Simulator(MadeOnce):
             H = _first_bias(system, x0, self._inputs, _own(system, p))
             legs[0] = replace(legs[0], driven=tuple(m.velocity for m in motions), first_bias=H)
         if isinstance(stop, Interrupted):  # rows may take long where laws do
-            stop.compute = partial(_result, system, legs, p, stop, self._columns, allowed)
+            stop.compute = partial(_result, system, legs, p, stop, self._columns, allowed, note)
             raise stop
-        result = _result(system, legs, p, stop, self._columns, allowed)
+        result = _result(system, legs, p, stop, self._columns, allowed, note)
         if stop is not None:
             stop.result = result
             raise stop
@@ -1433,6 +1439,21 @@ def _simulator_of(*state: Any) -> Simulator:
     made = Simulator(system, [one.name for one in given], outputs, method=method)
     made._effort, made._inputs, made._motions = effort, inputs, list(motions)
     return made
+
+
+def _degrees_given(system: System, q0: Start, guess: Guess) -> str:
+    """Return a note on starts and guesses that look like degrees; those of a state do not."""
+    if isinstance(q0, State | Result):
+        return ""
+    given: dict[str, float] = {}
+    if not isinstance(guess, State | None):
+        given.update(system.plain_names(guess, GUESSES))
+    if isinstance(q0, Mapping):
+        given.update(system.plain_names(q0, POSITIONS))
+    elif q0 is not None:
+        names = (coordinate.name for coordinate in system.coordinates)
+        given.update(zip(names, system.position(q0), strict=True))
+    return like_degrees(system.coordinates, given)
 
 
 def _started(
@@ -1528,8 +1549,8 @@ def run(
         tolerance: error of the motion to be expected [rad, m, rad/s or m/s]. A step may err by a
             twenty-fifth of it, and by a thousandth relative to large coordinates. Or a dict of
             tolerances by unit, such as "rad" and "m/s", and by name, such as "j1.q"; "others" is
-            for the other states. Positions that move by less than 100 tolerances are named in
-            `result.info["note"]`.
+            for the other states. `result.info["note"]` names positions that move by less than 100
+            tolerances, and starts that look like degrees.
         max_step: the longest step of the integration [s]. Error control, the times at which laws
             jump, and short laws limit the steps by default. If a law calls a Callback or an
             external function, whose jumps cannot be found, the default is duration / 1000.

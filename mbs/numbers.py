@@ -42,6 +42,29 @@ def doubles(value: Any) -> NDArray[np.float64] | str:
     return array.astype(float, copy=False)
 
 
+def numbers_given(value: Any) -> NDArray[np.float64] | str:
+    """Return the numbers in a value as `doubles` does, except that True and False are no numbers.
+
+    Args:
+        value: positions, velocities, efforts, parameters or limits that a user gives.
+
+    Returns:
+        array of doubles, or the end of an error message.
+    """
+    if has_boolean(value):
+        return f"is {quoted(value)}; give numbers instead of True or False"
+    return doubles(value)
+
+
+def has_boolean(value: Any) -> bool:
+    """Return whether a value is True or False, or an array or a nested list with one of them."""
+    if isinstance(value, (list, tuple)):
+        return any(map(has_boolean, value))
+    if isinstance(value, np.ndarray):
+        return bool(value.dtype.kind == "b")
+    return isinstance(value, (bool, np.bool_))
+
+
 def on_arrays(function: Function) -> OnArrays:
     """A Function of arrays, for where it is evaluated many times.
 

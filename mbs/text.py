@@ -11,6 +11,7 @@ DISTRIBUTION = "casadi-mbs"
 """Name of the package on an index, where `mbs`, the name of the import, is another project."""
 _LONGEST_QUOTE = 80
 _LONGEST_LIST = 20
+_LONGEST_REASON = 200
 _MOST_COMPARED = 1000
 
 
@@ -101,6 +102,18 @@ _UNSEEN = ("Cc", "Cf", "Cs")
 def one_line(text: str) -> str:
     """The text with a blank for any space or end of a line, without letters that are not seen."""
     return " ".join(seen(" ".join(text.split())).split())
+
+
+def error_text(error: BaseException) -> str:
+    """Return the type and the first line of an error, such as "KeyError: 'gain'".
+
+    CasADi adds lists of prototypes and lines of its code.
+    """
+    lines = [line for line in map(one_line, str(error).splitlines()) if line]
+    text, kind = lines[0] if lines else "", type(error).__name__
+    if text.startswith("Wrong number or type of arguments"):
+        text = "an operation of CasADi was given what it does not take"
+    return f"{kind}: {text[:_LONGEST_REASON].rstrip('.:')}" if text else kind
 
 
 def seen(text: str) -> str:

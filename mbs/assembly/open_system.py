@@ -266,7 +266,19 @@ def _frames(
     for name, point in mechanism.frames.items():
         link, pose = places[point.owner.name, point.port]
         frames[name] = link, pose @ point.placement.pose(symbols)
+    if mechanism.mount.steps:
+        if OUTER_WORLD in frames:
+            raise AssemblyError(
+                f"{mechanism.name}: the frame or body {OUTER_WORLD!r} has the name of the frame in"
+                " which the mount is given; rename it"
+            )
+        link, pose = frames["base"]
+        frames[OUTER_WORLD] = link, pose @ mechanism.mount.inverse().pose(symbols)
     return frames
+
+
+OUTER_WORLD = "outer_world"
+"""Name of the frame in which gravity and the mount of the base are given."""
 
 
 def _shapes(

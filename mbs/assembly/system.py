@@ -7,7 +7,7 @@ import math
 import pickle
 import sys
 import threading
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from types import FunctionType
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ import casadi
 import numpy as np
 from casadi import DM, SX, Function
 
+from mbs.assembly.degrees import like_degrees
 from mbs.assembly.drive_line import ShaftRow
 from mbs.assembly.inertias import inertia_notes
 from mbs.assembly.khalil_frames import Cut
@@ -34,12 +35,13 @@ from mbs.assembly.tables import (
     link_rows,
 )
 from mbs.assembly.tree import Tree, position_rate
+from mbs.assembly.variable_names import EFFORTS, GUESSES, VELOCITIES, by_coordinate
 from mbs.components import Component
 from mbs.components.bodies import RigidBody
 from mbs.errors import MbsError, ModelError
 from mbs.expressions import Parameter, out_of_bounds
 from mbs.files import PathLike
-from mbs.numbers import doubles
+from mbs.numbers import numbers_given
 from mbs.spatial import Pose
 from mbs.text import did_you_mean, listed, quoted, without_values
 
@@ -135,7 +137,17 @@ class _Unpickler(pickle.Unpickler):
 def report(system: System) -> str:
     """Tree, cut joints, mobility, dropped rows, whether the cut forces are unique, what acts."""
     every = [*_tree(system), *_loops(system), *_parameters(system), *_acting(system)]
-    return "\n".join(every)
+    return "\n".join([*every, *_degrees(system)])
+
+
+def _degrees(system: System) -> list[str]:
+    """Note on guesses that look like degrees; an open system is assembled at its guess."""
+    names = [coordinate.name for coordinate in system.coordinates]
+    given = dict(zip(names, system.configuration, strict=True))
+    if system.closure is not None:
+        given = dict(system.closure.guess)
+    note = like_degrees(system.coordinates, given)
+    return [f"Note: {note}."] if note else []
 
 
 def _tree(system: System) -> list[str]:
@@ -561,18 +573,38 @@ class System:
     def position(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
         """Positions q from values by coordinate name, the others as in the assembled configuration.
 
+        Names of variables of FMUs, such as j1.q, are accepted in place of j1.
+
         Raises:
             ModelError: a name is unknown, or a sequence has the wrong length.
         """
-        return self._fill(values, self.coordinates, list(self.configuration), "position")
+        start, given = list(self.configuration), self.plain_names(values, GUESSES)
+        return self._fill(given, self.coordinates, start, "position")
 
     def velocity(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
         """Velocities v from values by name, the others zero; errors as for `position`."""
-        return self._fill(values, self.speeds, [0.0] * self.nv, "velocity")
+        given = self.plain_names(values, VELOCITIES)
+        return self._fill(given, self.speeds, [0.0] * self.nv, "velocity")
 
     def effort(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
         """Joint efforts tau from values by name, the others zero; errors as for `position`."""
-        return self._fill(values, self.speeds, [0.0] * self.nv, "effort")
+        given = self.plain_names(values, EFFORTS)
+        return self._fill(given, self.speeds, [0.0] * self.nv, "effort")
+
+    def plain_names(self, values: Any, kinds: Collection[str]) -> Any:
+        """Return values by coordinate name, such as j1, for names such as j1.q.
+
+        Args:
+            values: values by name; anything else is returned as it is.
+            kinds: ends of names that are accepted, such as ("q",).
+
+        Raises:
+            ModelError: a value is given by both names, or the name is of another quantity.
+        """
+        if not isinstance(values, Mapping):
+            return values
+        rows = (*self.coordinates, *self.cut_coordinates, *self.speeds)
+        return by_coordinate(self.name, values, {row.name for row in rows}, kinds)
 
     def _fill(
         self,
@@ -608,7 +640,7 @@ class System:
     def _numbers(self, values: Any, what: str) -> list[float]:
         if isinstance(values, (list, tuple)):  # numpy makes no array of several (1, 1) of CasADi
             values = [float(x) if isinstance(x, DM) and x.numel() == 1 else x for x in values]
-        array = doubles(values)
+        array = numbers_given(values)
         if isinstance(array, str):
             raise ModelError(f"{self.name}: the {what} {array}")
         if not np.isfinite(array).all():

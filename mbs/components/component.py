@@ -121,6 +121,13 @@ class Placement:
         """The placement with further steps at its end."""
         return Placement(self.steps + steps)
 
+    def inverse(self) -> Placement:
+        """The placement of where the chain starts, seen from where it ends.
+
+        The steps are translations and rotations.
+        """
+        return Placement(tuple(_inverse(step) for step in reversed(self.steps)))
+
     def expressions(self) -> Iterator[Expression]:
         """Every scalar in the placement."""
         for step in self.steps:
@@ -132,6 +139,17 @@ class Placement:
     def scoped(self, prefix: str) -> Placement:
         """The placement with its parameters put in the scope of a nested mechanism."""
         return Placement(tuple(_scoped(step, prefix) for step in self.steps))
+
+
+def _inverse(step: Step) -> Step:
+    """Inverse of a translation or a rotation."""
+    if isinstance(step, Translation):
+        return Translation(*(operation("negate", value) for value in (step.x, step.y, step.z)))
+    if isinstance(step, ElementaryRotation):
+        return ElementaryRotation(step.axis, operation("negate", step.angle))
+    assert isinstance(step, FixedRotation)
+    a, b, c = zip(*step.rows, strict=True)
+    return FixedRotation((a, b, c))
 
 
 def _scoped(step: Step, prefix: str) -> Step:

@@ -24,7 +24,7 @@ from mbs.components.shapes import Shape
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, out_of_bounds, to_float, to_sx
 from mbs.spatial import cross, vector, zeros
-from mbs.text import did_you_mean, quoted
+from mbs.text import did_you_mean, error_text, quoted
 
 _LAWS = ("regularised", "bristle")
 _OUTPUTS = {"normal_force": "N", "friction_force": "N", "depth": "m", "slip": "m/s"}
@@ -787,7 +787,7 @@ class HeightFieldContact(Contact):
         except Exception as error:
             raise DescriptionError(
                 f"{self.name}: height cannot be written with CasADi symbols"
-                f" ({type(error).__name__}); give a function of (x, y) made of CasADi operations"
+                f" ({error_text(error)}); give a function of (x, y) made of CasADi operations"
             ) from error
         if value.shape != (1, 1):
             raise DescriptionError(

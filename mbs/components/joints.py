@@ -21,6 +21,7 @@ from mbs.components.component import Component, Point, SymbolTable, in_plane, un
 from mbs.components.custom import Flange
 from mbs.errors import DescriptionError
 from mbs.expressions import Number, Scalar, expression, to_float
+from mbs.numbers import has_boolean
 from mbs.spatial import Pose, align_z
 from mbs.text import quoted
 
@@ -201,12 +202,14 @@ def motor_range(where: str, quantity: str, given: Any) -> Range | None:
 
 
 def _both(given: Any) -> Range:
-    largest = math.nan if isinstance(given, bool) else _pair((given, given))[0]
+    largest = _pair((given, given))[0]
     return -largest, largest
 
 
 def _pair(pair: Any) -> Range:
     """Two numbers, NaN where there are not two."""
+    if has_boolean(pair):
+        return math.nan, math.nan
     try:
         low, high = (float(value) for value in pair)
     except (TypeError, ValueError):

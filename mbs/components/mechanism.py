@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from mbs.arguments import names_given, values_given
 from mbs.components.bodies import Mount, RigidBody, World, three
-from mbs.components.component import Component, Point, Rotation, in_rotated_axes
+from mbs.components.component import Component, Placement, Point, in_rotated_axes
 from mbs.components.couplings import Coupling
 from mbs.components.custom import Custom, Flange, Signal
 from mbs.components.drives import flange_pair
@@ -18,6 +18,7 @@ from mbs.components.forces import Force
 from mbs.components.joints import Joint
 from mbs.components.locking import lock
 from mbs.components.motion_joint import MotionJoint
+from mbs.components.mounting import Mounting, mount_of
 from mbs.components.notes import Note
 from mbs.components.sensors import Sensor
 from mbs.components.shapes import Shape
@@ -135,6 +136,7 @@ _ATTRIBUTES: Mapping[str, type] = MappingProxyType(
         **dict.fromkeys(("guess", "numbered", "components", "frames", "values"), dict),
         **dict.fromkeys(("cuts", "notes", "connections", "shafts", "wires", "shapes"), list),
         **{"world": World, "keep_order": bool, "_ports": set, "_counted": int},
+        "mount": Placement,
     }
 )
 """Attributes of a mechanism, and what each of them is."""
@@ -151,7 +153,9 @@ class Mechanism:
         name: of the mechanism.
         gravity: gravity acceleration in the world frame [m/s^2].
         mount: rotation of the base relative to the axes in which gravity is given, such as
-            ("x", "pi") for a robot that hangs from the ceiling. Poses stay relative to the base.
+            ("x", "pi") for a robot that hangs from the ceiling; or {"position": (0, 0, 2.5),
+            "rotation": ("x", "pi")}. Poses stay relative to the base. The frame "outer_world" is
+            the one in which gravity and the mount are given.
         parameters: values of the symbols that the components use.
         source: where the data come from, for catalogue entries and files.
         keep_order: number the links in the order in which the joints were added, as a table of
@@ -164,6 +168,7 @@ class Mechanism:
         shapes: what its bodies look like, and where on them.
         values: number or Parameter of each symbol that has a value here. Units, descriptions and
             bounds of the Parameter replace those of the components.
+        mount: position and rotation of the base in the frame "outer_world".
     """
 
     def __init__(
@@ -174,7 +179,7 @@ class Mechanism:
         source: str = "",
         keep_order: bool = False,
         guess: Mapping[str, float] | None = None,
-        mount: Rotation | None = None,
+        mount: Mounting | None = None,
     ) -> None:
         self.name = Component(name).name
         self.source = source
@@ -193,6 +198,7 @@ class Mechanism:
         self.frames: dict[str, Point] = {}
         self.shapes: list[tuple[Point, Shape]] = []
         self.values: dict[str, Parameter | float] = {}
+        self.mount = Placement()
         given = values_given(f"{self.name}: parameters", parameters, '"L1": 0.3', DescriptionError)
         for symbol, value in given.items():
             self.values[symbol] = Parameter(symbol, value)
@@ -230,16 +236,18 @@ class Mechanism:
         return self.world.gravity
 
     def change_gravity(
-        self, gravity: Sequence[Scalar] | None = None, mount: Rotation | None = None
+        self, gravity: Sequence[Scalar] | None = None, mount: Mounting | None = None
     ) -> None:
-        """Change the gravity acceleration, or rotate the base in it.
+        """Change the gravity acceleration, or place the base in it.
 
         Args:
-            gravity: in the axes of the world [m/s^2]; unchanged if left out.
-            mount: rotation of the base relative to the axes of the world; none if left out.
+            gravity: in the axes of the outer world [m/s^2], where the base is not rotated but by
+                this mount; unchanged if left out.
+            mount: rotation of the base relative to the axes of the outer world, or a dict with its
+                "position" and "rotation"; none if left out.
 
         Raises:
-            DescriptionError: these are no vector and no rotation, or forces of the file compensate
+            DescriptionError: these are no vector and no mount, or forces of the file compensate
                 its own gravity.
         """
         where = f"{self.name}, gravity"
@@ -250,9 +258,15 @@ class Mechanism:
                     " change the gravity in the file"
                 )
         vector = self.world.gravity if gravity is None else three(gravity, where)
+        placed = self.mount if gravity is None else Placement()
         if mount is not None:
-            vector = in_rotated_axes(tuple(map(expression, vector)), mount, f"{self.name}, mount")
+            place = f"{self.name}, mount"
+            steps, rotation = mount_of(mount, place)
+            placed = placed.then(*steps)
+            if rotation is not None:
+                vector = in_rotated_axes(tuple(map(expression, vector)), rotation, place)
         object.__setattr__(self.world, "gravity", tuple(vector))
+        self.mount = placed
 
     @overload
     def add(self, component: C) -> C: ...
@@ -465,7 +479,7 @@ class Mechanism:
                 f"{self.name}: guess is {quoted(guess)}; give a dict of names to positions"
             )
         names = names_given(f"{self.name}: active", active, "j1", DescriptionError)
-        return assemble(self, {**self.guess, **(guess or {})}, names)
+        return assemble(self, guess or {}, names)
 
     def _require_use(self, component: Component) -> None:
         """Refuse a component that no equation would know."""
@@ -584,8 +598,9 @@ class Mechanism:
                 yield from parameters_of(value)
         points = [point for pair in self.connections for point in pair]
         points += [point for point, _ in self.shapes]
-        for point in (*points, *self.frames.values()):
-            for value in point.placement.expressions():
+        placements = [point.placement for point in (*points, *self.frames.values())]
+        for placement in (*placements, self.mount):
+            for value in placement.expressions():
                 yield from parameters_of(value)
 
     def _point(self, point: Point | RigidBody) -> Point:

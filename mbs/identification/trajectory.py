@@ -28,6 +28,7 @@ from mbs.identification.record import FARTHEST_TURN
 from mbs.identification.regressors import Column, regressor
 from mbs.models.geometry import transform
 from mbs.models.inverse_dynamics import inverse_dynamics
+from mbs.numbers import has_boolean
 from mbs.result import Result
 from mbs.text import did_you_mean, quoted
 
@@ -426,7 +427,8 @@ def _pair(system: System, quantity: str, value: Range, name: str) -> tuple[float
         return -np.inf, np.inf
     ends = np.asarray(value, dtype=float).ravel()
     lower, upper = (-ends[0], ends[0]) if ends.size == 1 else (ends[0], ends[-1])
-    if ends.size > 2 or not lower < upper or not np.isfinite(ends).all():
+    finite = np.isfinite(ends).all() and not has_boolean(value)
+    if ends.size > 2 or not lower < upper or not finite:
         raise ModelError(
             f"{system.name}: the limit of the {quantity} of {name} is {quoted(value)}; give a"
             " positive number, or finite (lower, upper) with lower < upper, or None"

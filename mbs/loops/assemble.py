@@ -6,11 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from mbs.assembly import System
+from mbs.assembly.degrees import like_degrees
 from mbs.assembly.open_system import open_system
 from mbs.assembly.parts import guesses_of_unknowns
+from mbs.assembly.variable_names import GUESSES
 from mbs.components import Mechanism
-from mbs.errors import AssemblyError
+from mbs.errors import AssemblyError, Unclosable
 from mbs.loops.analysis import analyse
+from mbs.numbers import numbers_given
 from mbs.recursions.part_checks import check_parts
 from mbs.text import did_you_mean
 
@@ -22,23 +25,33 @@ def assemble(
 
     Args:
         mechanism: components and connections.
-        guess: approximate positions by coordinate name, where loops are closed near to.
+        guess: approximate positions by coordinate name, where loops are closed near to. They
+            replace those of the mechanism.
         active: velocities that are to be independent where there are loops.
 
     Raises:
         AssemblyError: the components do not form a mechanism, or a guess names no coordinate.
         Unclosable: no configuration closes the loops.
     """
-    guess = {**guesses_of_unknowns(mechanism), **guess}
+    guess = _laid_over(guesses_of_unknowns(mechanism), mechanism.guess, guess)
     system = open_system(mechanism, (*guess, *active))
     check_parts(system)
-    _check_guess(system, guess)
+    guess = _plain_guess(system, guess)
     chosen = _choose(system, active)
     if system.cuts or system.couplings or any(p.element.binds for p in system.parts):
-        return analyse(system, guess, chosen)
+        return _analysed(system, guess, chosen)
     known = [coordinate.name for coordinate in system.coordinates]
     start = {name: value for name, value in guess.items() if name in known}
     return replace(system, configuration=tuple(system.position(start)), _cache={})
+
+
+def _analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...]) -> System:
+    """Return the system with closed loops; errors have a note on guesses in degrees."""
+    try:
+        return analyse(system, guess, chosen)
+    except Unclosable as error:
+        note = like_degrees(system.coordinates, guess)
+        raise (Unclosable(f"{error}; {note}") if note else error) from None
 
 
 def _choose(system: System, active: Sequence[str]) -> tuple[int, ...]:
@@ -58,11 +71,37 @@ def _choose(system: System, active: Sequence[str]) -> tuple[int, ...]:
     return tuple(dict.fromkeys(names.index(name) for name in active))
 
 
-def _check_guess(system: System, guess: Mapping[str, float]) -> None:
+def _laid_over(*guesses: Mapping[str, float]) -> dict[str, float]:
+    """Return guesses in which a later one replaces earlier ones of the same coordinate."""
+    found: dict[str, float] = {}
+    for guess in guesses:
+        later = {_base(name) for name in guess}
+        found = {name: value for name, value in found.items() if _base(name) not in later}
+        found |= guess
+    return found
+
+
+def _base(name: str) -> str:
+    """Return the name of the coordinate in the name of a variable, such as j1 in j1.q."""
+    base, _, kind = str(name).rpartition(".")
+    return base if kind in GUESSES else str(name)
+
+
+def _plain_guess(system: System, guess: Mapping[str, float]) -> dict[str, float]:
+    """Return a guess by names of coordinates, such as j1 for j1.q.
+
+    Raises:
+        AssemblyError: a name is no coordinate, or a value is no number.
+    """
     known = [c.name for c in (*system.coordinates, *system.cut_coordinates)]
-    for name in guess:
+    found: dict[str, float] = system.plain_names(guess, GUESSES)
+    for name, value in found.items():
         if name not in known:
             raise AssemblyError(
                 f"{system.name}: the guess names {name!r}, which is no coordinate;"
                 f" {did_you_mean(name, known)}"
             )
+        number = numbers_given(value)
+        if isinstance(number, str):
+            raise AssemblyError(f"{system.name}: the guess of {name} {number}")
+    return found

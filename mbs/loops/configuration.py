@@ -7,8 +7,10 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 import numpy as np
 
 from mbs.assembly import System
+from mbs.assembly.degrees import like_degrees
 from mbs.assembly.model_function import require_system
 from mbs.assembly.validity import plain_fault
+from mbs.assembly.variable_names import GUESSES, POSITIONS, VELOCITIES
 from mbs.errors import LoopError, ModelError, Unclosable
 from mbs.loops.closing import (
     OPEN,
@@ -81,8 +83,8 @@ def solve(
         ModelError: a name is unknown, or a value is not finite; or guess and branch are given.
     """
     require_system(system)
-    given: Values = positions_of(q_active)
-    guess = positions_of(guess)
+    given: Values = system.plain_names(positions_of(q_active), POSITIONS)
+    guess = system.plain_names(positions_of(guess), GUESSES)
     if not isinstance(guess, Mapping | None):
         raise ModelError(
             f"{system.name}: guess is {quoted(guess)}; give a dict of coordinate names to values"
@@ -91,7 +93,12 @@ def solve(
         if guess:
             raise ModelError(f"{system.name}: guess and branch both choose the branch; give one")
         return configuration_on(system, given, branch, parameters)
-    return _closed(system, fixed_positions(system, given), guess or {}, parameters)
+    fixed = fixed_positions(system, given)
+    try:
+        return _closed(system, fixed, guess or {}, parameters)
+    except Unclosable as error:
+        note = like_degrees(system.coordinates, {**(guess or {}), **fixed})
+        raise (Unclosable(f"{error}; {note}") if note else error) from None
 
 
 def _closed(
@@ -317,7 +324,7 @@ def start_position(
     guess: Guess = None,
 ) -> Vector:
     """(nq,) the positions of `start`."""
-    given: Values = positions_of(q0)
+    given: Values = system.plain_names(positions_of(q0), POSITIONS)
     if guess is not None and not isinstance(given, Mapping | None):
         raise ModelError(
             f"{system.name}: a guess is given beside all positions; leave it out, or give q0 by"
@@ -346,6 +353,7 @@ def start_velocity(
     Raises:
         ModelError: no motion of the loops has these velocities.
     """
+    v0 = system.plain_names(v0, VELOCITIES)
     if not system.is_closed:
         return np.array(system.velocity(v0))
     p = [system.parameter_values(parameters)] if system.parameters else []

@@ -23,6 +23,7 @@ from mbs.loops.closing import (
 )
 from mbs.loops.closure import facing, square_closure
 from mbs.loops.plan import Stage, plan
+from mbs.numbers import has_boolean
 from mbs.text import did_you_mean, quoted
 
 # Positions as a user gives them: by name, or in the order of the independent joints.
@@ -45,18 +46,25 @@ def fixed_positions(system: System, values: Given) -> dict[str, float]:
     names = independent_names(system)
     if values is None or isinstance(values, Mapping):
         return dict(values or {})
-    try:
-        given = [float(x) for x in values]
-    except (TypeError, ValueError):
+    given = _numbers(values)
+    if given is None:
         raise ModelError(
             f"{system.name}: q_active is {quoted(values)}; give numbers for {', '.join(names)}"
-        ) from None
+        )
     if len(given) != len(names):
         raise ModelError(
             f"{system.name}: q_active has {len(given)} values, the independent joints are"
             f" {len(names)}: {', '.join(names)}"
         )
     return dict(zip(names, given, strict=True))
+
+
+def _numbers(values: Any) -> list[float] | None:
+    """Return the elements of a sequence as numbers; None if one is no number."""
+    try:
+        return None if has_boolean(values) else [float(x) for x in values]
+    except (TypeError, ValueError):
+        return None
 
 
 def independent_positions(system: System, values: Given) -> list[float]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.tree import norm_rows, position_rate
+from mbs.assembly.variable_names import POSITIONS
 from mbs.components.custom import RelativeMotion
 from mbs.errors import ModelError, Unclosable
 from mbs.loops.closure import closure_rows
@@ -351,7 +352,8 @@ class Standing:
         system = self.system
         p = np.array(system.parameter_values(begin.parameters), dtype=float)
         q, names = np.array(system.position(begin.q0)), [c.name for c in system.coordinates]
-        given = (begin.q0 or {}) if begin.q0 is None or isinstance(begin.q0, Mapping) else names
+        q0 = system.plain_names({} if begin.q0 is None else begin.q0, POSITIONS)
+        given = q0 if isinstance(q0, Mapping) else names
         free = [k for k, name in enumerate(names) if name not in given]
         function = _touching(self)
 

@@ -1,7 +1,7 @@
 """Machine code: the C compiler, cached libraries, compiled Functions and the C run-time."""
 
 from mbs.native.batch import Batch, batch
-from mbs.native.compiled import c_source, compiled
+from mbs.native.compiled import c_source, compiled, link_flags
 from mbs.native.compiler import (
     Compiler,
     cached_library,
@@ -20,4 +20,5 @@ __all__ = [
     "compiled",
     "compiler_found",
     "find_compiler",
+    "link_flags",
 ]

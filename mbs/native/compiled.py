@@ -46,7 +46,8 @@ def compiled(
     slower.
 
     CasADi's own C text of a Function that calls the result lacks this code, and ends the process
-    that loads it. Generate C of Functions that call the given Function instead.
+    that loads it unless it is linked with `link_flags`. For other computers, generate C of
+    Functions that call the given Function instead.
 
     Args:
         function: any Function without free symbols.
@@ -85,11 +86,12 @@ def compiled(
         result: Any = with_array_calls(casadi.Function(function), None, like)
     else:
         code = casadi.external(function.name(), str(library))
-        _compiled_names.add(function.name())
+        _libraries.setdefault(function.name(), set()).add(library)
         plain = functools.partial(compiled, derivatives=0)
         result = with_array_calls(code, library, like, plain)
     again = functools.partial(compiled, derivatives=derivatives, fast=fast, loops=loops)
     result._source = (again, (function,))
+    result._library = library
     return result  # type: ignore[no-any-return]
 
 
@@ -348,9 +350,9 @@ def _machine_code_in(function: casadi.Function) -> list[str]:
     ]
 
 
-_compiled_names: set[str] = set()
-"""Names of the Functions that `compiled` returned in this process; users may link other external
-functions themselves."""
+_libraries: dict[str, set[Path]] = {}
+"""Libraries of the Functions that `compiled` returned in this process, by name of the Function.
+Users may link other external functions themselves."""
 _DERIVED = re.compile(r"^((jac|fwd\d+|adj\d+)_)*")
 """Prefixes of the names of derivatives."""
 
@@ -360,14 +362,55 @@ def _require_equations(function: casadi.Function) -> None:
 
     C text would refer to symbols of a library that nothing loads, which ends the process.
     """
-    called = _machine_code_in(function)
-    names = [name for name in called if _DERIVED.sub("", name) in _compiled_names]
+    names = [name for name in _machine_code_in(function) if _base(name) in _libraries]
     if names:
         raise ModelError(
             f"{function.name()}: it calls {', '.join(names)}, which is machine code of this"
             " process, so that it cannot be written as C; make it from the Function that was given"
-            " to mbs.native.compiled"
+            " to mbs.native.compiled, or use CasADi's generate and mbs.native.link_flags"
         )
+
+
+def _base(name: str) -> str:
+    """Name of the Function in the name of a derivative, such as idm in adj1_idm."""
+    return _DERIVED.sub("", name)
+
+
+def link_flags(*functions: casadi.Function) -> list[str]:
+    """Return the flags that link C code from CasADi's `generate` with compiled Functions.
+
+    The library of the C code works on this computer only. Options of CasADi that compile a
+    Function are `{"jit": True, "compiler": "shell", "jit_options": {"linker_flags": flags}}`.
+
+    Args:
+        *functions: Functions that call compiled Functions, and compiled Functions themselves.
+
+    Returns:
+        paths of libraries, for the call of the compiler that links. Empty if nothing is compiled.
+
+    Raises:
+        ModelError: the argument is no Function, or two compiled Functions have the same name.
+    """
+    own: dict[str, set[Path]] = {}
+    called: list[str] = []
+    for function in functions:
+        if not isinstance(function, casadi.Function):
+            raise ModelError(f"link_flags: {quoted(function)} is no Function; give Functions")
+        called += [_base(name) for name in _machine_code_in(function)]
+        library = getattr(function, "_library", None)
+        if library is not None:
+            called.append(function.name())
+            own.setdefault(function.name(), set()).add(library)
+    found = dict[str, None]()
+    for name in dict.fromkeys(called):
+        libraries = own.get(name) or _libraries.get(name, set())
+        if len(libraries) > 1:
+            raise ModelError(
+                f"link_flags: there are {len(libraries)} compiled Functions with the name {name};"
+                " give the one that is called too, or compile Functions with different names"
+            )
+        found |= dict.fromkeys(map(str, libraries))
+    return list(found)
 
 
 def unwritten(source: str) -> str:

@@ -11,8 +11,8 @@ from typing import Any
 
 from mbs.arguments import values_given
 from mbs.components import Mechanism
-from mbs.components.component import Rotation
 from mbs.components.locking import Base, fix_root, free_root
+from mbs.components.mounting import Mounting
 from mbs.errors import DescriptionError
 from mbs.expressions import Scalar
 from mbs.formats import from_dict, read_mjcf, read_par, read_sdf, read_toml, read_urdf, to_mechanism
@@ -47,7 +47,7 @@ def load(
     xacro: Mapping[str, object] | None = None,
     packages: Mapping[str, str | Path] | None = None,
     gravity: Sequence[Scalar] | None = None,
-    mount: Rotation | None = None,
+    mount: Mounting | None = None,
 ) -> Mechanism:
     """A mechanism from the catalogue, a dict of the TOML schema, or a file.
 
@@ -70,8 +70,10 @@ def load(
         packages: folders of the packages that a xacro file or `package://` names.
         gravity: gravity acceleration in the world frame [m/s^2] in place of that of the file.
         mount: rotation of the base in the world, such as ("x", "pi") for a robot that hangs from
-            the ceiling. Gravity is rotated into the axes of the base; poses, and the coordinates of
-            a free root, stay relative to the base.
+            the ceiling, or {"position": (0, 0, 2.5), "rotation": ("x", "pi")}. Gravity is rotated
+            into the axes of the base; poses, and the coordinates of a free root, stay relative to
+            the base. The frame "outer_world" is the world: `mbs.models.transform(system, "tool",
+            "outer_world")` is a pose in it.
 
     Raises:
         DescriptionError: the name or the suffix is unknown, the description is impossible, a

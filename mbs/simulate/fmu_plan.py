@@ -23,7 +23,7 @@ from mbs.simulate.fmu_variables import (
     set_values,
     writer,
 )
-from mbs.text import did_you_mean, quoted
+from mbs.text import did_you_mean, error_text, quoted
 
 # Values of the variables of an FMU that a user gives.
 
@@ -281,8 +281,8 @@ def _of_function(name: str, function: Callable[[float], float]) -> Track:
             found = float(function(time))
         except Exception as error:
             raise ModelError(
-                f"input {name}: no number at time {time:g} s ({error}); give a function of time"
-                " that returns one"
+                f"input {name}: no number at time {time:g} s ({error_text(error)}); give a"
+                " function of time that returns one"
             ) from error
         if not np.isfinite(found):
             raise ModelError(

@@ -7,7 +7,7 @@ import hashlib
 import math
 import os
 import pickle
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -21,10 +21,12 @@ from numpy.typing import NDArray
 
 from mbs.arguments import MadeOnce, names_given, values_given
 from mbs.assembly import System
+from mbs.assembly.degrees import like_degrees
 from mbs.assembly.model_function import require_system
 from mbs.assembly.parts import WireSource
 from mbs.assembly.system import Packed, content_of, packed, unpacked
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
+from mbs.assembly.variable_names import GUESSES, POSITIONS, VELOCITIES
 from mbs.components.custom import OneWay, Signal
 from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.files import read_sealed, write_sealed
@@ -59,7 +61,7 @@ from mbs.models.state.tree import FullState, full_state
 from mbs.models.symbols import part_equations
 from mbs.native import compiled
 from mbs.native.compiler import cache_dir
-from mbs.numbers import OnArrays, doubles, on_arrays
+from mbs.numbers import OnArrays, has_boolean, numbers_given, on_arrays
 from mbs.progress import progress
 from mbs.recursions.parts import part_event_names
 from mbs.result import (
@@ -285,7 +287,7 @@ def device_states(system: System, z0: Mapping[str, float] | Sequence[float] | No
 
 
 def _numbers(system: System, what: str, values: Any) -> list[float]:
-    array = doubles(values)
+    array = numbers_given(values)
     if isinstance(array, str) or not np.isfinite(array).all() or array.ndim == 0:
         raise ModelError(f"{system.name}: {what} is {quoted(values)}; give finite numbers")
     return [float(value) for value in array.ravel()]
@@ -873,8 +875,8 @@ def start_positions(
         return q0, v0
     if isinstance(q0, State) and v0 is None:
         v0 = q0.v
-    positions = _by_name(system, "q0", positions_of(q0))
-    velocities = _by_name(system, "v0", v0)
+    positions = _by_name(system, "q0", positions_of(q0), POSITIONS)
+    velocities = _by_name(system, "v0", v0, VELOCITIES)
     for one in motions:
         position, speed, _ = (float(value) for value in one.laws.call([DM(begin), DM(z0), DM(p)]))
         if one.position is not None:
@@ -884,12 +886,13 @@ def start_positions(
     return positions, velocities
 
 
-def _by_name(system: System, what: str, given: Values) -> dict[str, float]:
+def _by_name(system: System, what: str, given: Values, kinds: Collection[str]) -> dict[str, float]:
     if not isinstance(given, Mapping | None):
         raise ModelError(
             f"{system.name}: {what} is given as a sequence, beside motion; give a dict of names"
         )
-    return dict(given or {})
+    found: dict[str, float] = system.plain_names(given or {}, kinds)
+    return found
 
 
 def _put(system: System, values: dict[str, float], name: str, value: float, what: str) -> None:
@@ -970,7 +973,7 @@ def _value(system: System, name: str, law: Any, t: SX) -> SX:
         except Exception as error:
             raise untraceable(system, f"the motion of {name}", error) from error
     try:
-        value = SX(given)
+        value = SX(0, 0) if has_boolean(given) else SX(given)
     except Exception:
         value = SX(0, 0)
     constant = not casadi.symvar(value)
@@ -1129,6 +1132,7 @@ def _result(
     stop: Stop,
     columns: _Columns,
     allowed: Tolerances,
+    note: str,
 ) -> Result:
     times, x = np.concatenate([leg.times for leg in legs]), np.vstack([leg.x for leg in legs])
     nq, n, np_own = system.nq, system.nq + system.nv, len(system.parameters)
@@ -1151,8 +1155,11 @@ def _result(
     events = list_events(system, contact, happened)
     stopped = None if stop is None or stop.time is None else (stop.time, str(stop))
     info: dict[str, object] = {"tolerance": allowed.common}
+    notes = [note] if note else []
     if small := small_motions(system, x[:, :nq], allowed):
-        info["note"] = f"less than 100 tolerances: {', '.join(small)}; ask for a smaller tolerance"
+        notes.append(f"less than 100 tolerances: {', '.join(small)}; ask for a smaller tolerance")
+    if notes:
+        info["note"] = ". ".join(notes)
     return Result(
         times,
         values,
@@ -1313,6 +1320,7 @@ class Simulator(MadeOnce):
             require_state_of(system, q0)
             begin, modes = q0.time, np.array(q0.modes)
             devices = dict(q0.z) if devices is None else devices
+        note = _degrees_given(system, q0, guess)
         z = device_states(system, devices)
         placed = start_positions(system, motions, q0, speeds, z, own, begin)
         x0 = np.concatenate([*_started(system, *placed, p, guess), z])
@@ -1337,9 +1345,9 @@ class Simulator(MadeOnce):
             H = _first_bias(system, x0, self._inputs, _own(system, p))
             legs[0] = replace(legs[0], driven=tuple(m.velocity for m in motions), first_bias=H)
         if isinstance(stop, Interrupted):  # rows may take long where laws do
-            stop.compute = partial(_result, system, legs, p, stop, self._columns, allowed)
+            stop.compute = partial(_result, system, legs, p, stop, self._columns, allowed, note)
             raise stop
-        result = _result(system, legs, p, stop, self._columns, allowed)
+        result = _result(system, legs, p, stop, self._columns, allowed, note)
         if stop is not None:
             stop.result = result
             raise stop
@@ -1431,6 +1439,21 @@ def _simulator_of(*state: Any) -> Simulator:
     made = Simulator(system, [one.name for one in given], outputs, method=method)
     made._effort, made._inputs, made._motions = effort, inputs, list(motions)
     return made
+
+
+def _degrees_given(system: System, q0: Start, guess: Guess) -> str:
+    """Return a note on starts and guesses that look like degrees; those of a state do not."""
+    if isinstance(q0, State | Result):
+        return ""
+    given: dict[str, float] = {}
+    if not isinstance(guess, State | None):
+        given.update(system.plain_names(guess, GUESSES))
+    if isinstance(q0, Mapping):
+        given.update(system.plain_names(q0, POSITIONS))
+    elif q0 is not None:
+        names = (coordinate.name for coordinate in system.coordinates)
+        given.update(zip(names, system.position(q0), strict=True))
+    return like_degrees(system.coordinates, given)
 
 
 def _started(
@@ -1526,8 +1549,9 @@ def run(
         tolerance: error of the motion to be expected [rad, m, rad/s or m/s]. A step may err by a
             twenty-fifth of it, and by a thousandth relative to large coordinates. Or a dict of
             tolerances by unit, such as "rad" and "m/s", and by name, such as "j1.q"; "others" is
-            for the other states. A pair has an absolute and a relative tolerance. Positions that
-            move by less than 100 tolerances are named in `result.info["note"]`.
+            for the other states. A pair has an absolute and a relative tolerance.
+            `result.info["note"]` names positions that move by less than 100 tolerances, and starts
+            that look like degrees.
         max_step: the longest step of the integration [s]. Error control, the times at which laws
             jump, and short laws limit the steps by default. If a law calls a Callback or an
             external function, whose jumps cannot be found, the default is duration / 1000.

@@ -27,13 +27,13 @@ from mbs.assembly import System
 from mbs.assembly.system import packed, unpacked
 from mbs.errors import ExportError, Interrupted, MbsError, ModelError, SolverError
 from mbs.files import check_archive, path_of, write_text
-from mbs.numbers import doubles
+from mbs.numbers import numbers_given
 from mbs.progress import progress
 from mbs.result import Result, State, optional_module, state_of
 from mbs.simulate.fmu import fmu
 from mbs.simulate.fmu_variables import numbers_of
 from mbs.simulate.run import run, simulator_of
-from mbs.text import did_you_mean, quoted
+from mbs.text import did_you_mean, error_text, quoted
 
 # The cases of a parameter study, and the folder that keeps their results.
 
@@ -76,7 +76,7 @@ def _combinations(grid: Mapping[str, Iterable[float]]) -> Iterable[Case]:
 
 
 def _number(name: str, value: object) -> float:
-    array = doubles(value)
+    array = numbers_given(value)
     if isinstance(array, str):
         raise ModelError(f"sweep: {name} {array}")
     if array.size != 1:
@@ -449,8 +449,8 @@ def _measure(result: Result, measures: Measures | None, case: int) -> Iterator[t
             yield name, float(measure(result))
         except Exception as error:
             raise ModelError(
-                f"sweep: measure {name!r} gives no number of case {case} ({error}); give a function"
-                " of a Result that returns one"
+                f"sweep: measure {name!r} gives no number of case {case} ({error_text(error)});"
+                " give a function of a Result that returns one"
             ) from error
 
 
@@ -577,11 +577,7 @@ class _Task:
         except MbsError as error:
             return Answer(None, str(error))
         except Exception as error:
-            return Answer(None, _say(error))
-
-
-def _say(error: BaseException) -> str:
-    return f"{type(error).__name__}: {error}"
+            return Answer(None, error_text(error))
 
 
 @dataclass(frozen=True, slots=True)
@@ -787,4 +783,4 @@ def _answer(future: Future[Answer]) -> Answer:
     except BrokenExecutor:
         raise
     except Exception as error:  # lost in transit, such as a worker of a cluster
-        return Answer(None, _say(error))
+        return Answer(None, error_text(error))

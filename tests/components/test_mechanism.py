@@ -9,6 +9,7 @@ import mbs.models
 from mbs.components import Body, Box, Coupling, Fixed, PointMass, Revolute
 from mbs.errors import AssemblyError, DescriptionError, ModelError
 from mbs.expressions import Parameter
+from mbs.models.geometry import terminal_frame
 
 
 @pytest.fixture
@@ -380,6 +381,72 @@ def _matrix(rotation):
 def test_a_symbolic_mount():
     m = mbs.Mechanism("m", gravity=(0, 0, "-G"), mount=("x", "A"))
     assert [str(g) for g in m.gravity] == ["0", "sin(A)*-G", "cos(A)*-G"]
+
+
+HUNG = {"position": (0.1, 0.2, 2.5), "rotation": [("x", "pi"), ("z", 0.3)]}
+
+
+def hung():
+    """The pose (4, 4) of the base in the world."""
+    c, s = np.cos(0.3), np.sin(0.3)
+    T = np.eye(4)
+    T[:3, :3] = np.diag([1.0, -1.0, -1.0]) @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    T[:3, 3] = HUNG["position"]
+    return T
+
+
+def pose(system, q, *frames):
+    return mbs.models.transform(system, *frames)(q).full()
+
+
+@pytest.mark.parametrize("robot", ["puma560", "five_bar"])
+def test_a_mount_has_a_position(robot):
+    system = mbs.load(robot, mount=HUNG).assemble()
+    q = np.array(system.configuration)
+    tool = terminal_frame(system)
+    plain = mbs.load(robot, mount=HUNG["rotation"]).assemble()
+    assert terminal_frame(plain) == tool
+    in_base = pose(plain, q, tool)
+    np.testing.assert_allclose(pose(system, q, tool), in_base, atol=1e-15)
+    np.testing.assert_allclose(pose(system, q, tool, "outer_world"), hung() @ in_base, atol=1e-14)
+    np.testing.assert_allclose(pose(system, q, "base", "outer_world"), hung(), atol=1e-15)
+    expected = weight_efforts(mbs.load(robot, mount=HUNG["rotation"]), q)
+    np.testing.assert_allclose(weight_efforts(mbs.load(robot, mount=HUNG), q), expected)
+    again = mbs.load(robot)
+    again.change_gravity(mount={"position": HUNG["position"]})
+    again.change_gravity(mount=HUNG["rotation"])
+    twice = again.assemble()
+    np.testing.assert_allclose(pose(twice, q, "base", "outer_world"), hung(), atol=1e-15)
+    matrix = mbs.load(robot, mount={**HUNG, "rotation": hung()[:3, :3]}).assemble()
+    np.testing.assert_allclose(pose(matrix, q, "base", "outer_world"), hung(), atol=1e-15)
+
+
+def test_the_position_of_a_mount_may_have_symbols():
+    m = mbs.load("planar_2r", mount={"position": (0, 0, "H")}, parameters={"H": 1.5})
+    T = mbs.models.transform(m.assemble(), "base", "outer_world")
+    assert T([0, 0], 2.5).full()[2, 3] == 2.5
+
+
+@pytest.mark.parametrize(
+    ("mount", "message"),
+    [
+        ({}, r"planar_2r, mount is {}; give a rotation, or a dict with 'position'"),
+        ({"place": (0, 0, 1)}, "planar_2r, mount is .*; give a rotation, or a dict"),
+        ({"position": 3}, "planar_2r, mount, position: 3 has not three values"),
+        ({"position": (0, 0, np.inf)}, "planar_2r, mount, position, z: inf is not a finite number"),
+        ({"rotation": ("w", 1)}, "planar_2r, mount: rotation axis 'w' is not"),
+    ],
+)
+def test_impossible_mounts(mount, message):
+    with pytest.raises(DescriptionError, match=message):
+        mbs.load("planar_2r", mount=mount)
+
+
+def test_a_frame_with_the_name_of_the_outer_world_raises():
+    m = mbs.load("planar_2r", mount={"position": (0, 0, 1)})
+    m.add_frame("outer_world", next(iter(m.bodies())))
+    with pytest.raises(AssemblyError, match=r"outer_world.*rename it"):
+        m.assemble()
 
 
 def test_gravity_of_a_file_that_compensates_it_stays(tmp_path):

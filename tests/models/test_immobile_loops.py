@@ -11,6 +11,7 @@ from support.immobile_loops import A, B, C, triangle
 import mbs
 import mbs.models
 from mbs import identification
+from mbs.components import Revolute
 from mbs.models import dae
 from mbs.native import batch, compiled
 
@@ -241,6 +242,26 @@ def test_batches_and_machine_code(name):
         for ours, theirs in zip(results, expected, strict=True):
             for one in np.asarray(ours):
                 close(one.reshape(theirs.shape), theirs)
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_a_structure_without_motion_has_an_fmu(fmi, kind, tmp_path):
+    """Both bars of a triangle keep their angles; the effort on the ground is that of a run."""
+    m = mbs.Mechanism("truss", gravity=(0, -9.81, 0))
+    a, b = (m.add(mbs.components.Box(n, length=1, width=0.05, mass=1)) for n in "ab")
+    m.connect(m.world, Revolute("j1"), a.left)
+    m.connect(a.right, Revolute("j2"), b.left)
+    m.connect(m.world.at(1.2), Revolute("j3"), b.right)
+    system = m.assemble(guess={"j1": 0.9, "j2": -1.8})
+    assert system.closure.mobility == 0
+    path = mbs.export.fmu(system, tmp_path / "truss.fmu", fmi=fmi)
+    imported = mbs.simulate.fmu(path, 0.1, kind=kind, quiet=True)
+    result = mbs.simulate.run(system, 0.1)
+    for name, angle in {"j1": acos(0.6), "j2": -2 * acos(0.6)}.items():
+        close(imported[f"{name}.q"], np.full(len(imported.time), angle))
+        close(result[f"{name}.q"], np.full(len(result.time), angle))
+        close(imported[f"{name}.a"], np.zeros(len(imported.time)))
 
 
 @both

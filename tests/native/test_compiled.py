@@ -184,7 +184,7 @@ def test_machine_code_is_not_written_as_c(tmp_path, monkeypatch, write):
     plain = ca.Function("problem", [x, p], [ca.sumsqr(example()(x, p)[0])])
     assert "example_incref" not in mbs.native.c_source(plain)
     # C of an external function that the user made may be linked by the user
-    monkeypatch.setitem(compiled.__globals__, "_compiled_names", set())
+    monkeypatch.setitem(compiled.__globals__, "_libraries", {})
     assert "example_incref" in mbs.native.c_source(problem)
 
 

@@ -476,3 +476,33 @@ def test_a_law_that_needs_numbers_is_refused():
             ModelError, match=r"finite numbers|float\(q\[0\]\).*make NaN of symbols"
         ):
             mbs.simulate.run(system, 0.1, tau=law, quiet=True)
+
+
+def empty(*_):
+    raise ValueError
+
+
+ORDINARY = [
+    (lambda *_: [1 / 0, 0], ZeroDivisionError, "raises ZeroDivisionError: division by zero;"),
+    (lambda *_: [{}["gain"], 0], KeyError, "raises KeyError: 'gain'; correct the function"),
+    (lambda *_: [[1.0][3], 0], IndexError, "raises IndexError: list index out of range;"),
+    (
+        lambda t, *_: [None + t, 0],
+        TypeError,
+        "could not be traced with CasADi symbols, it raises TypeError: unsupported operand",
+    ),
+    (empty, ValueError, "could not be traced with CasADi symbols, it raises ValueError; build"),
+]
+
+
+@pytest.mark.parametrize(("law", "kind", "text"), ORDINARY)
+def test_an_error_of_python_in_a_law_keeps_its_type_and_text(law, kind, text):
+    arm = mbs.robots.planar_2r().assemble()
+    with pytest.raises(ModelError) as caught:
+        mbs.simulate.run(arm, 0.1, tau=law)
+    assert f"planar_2r: tau(t, q, v) {text}" in str(caught.value)
+    assert type(caught.value.__cause__) is kind
+    with pytest.raises(ModelError) as caught:
+        mbs.simulate.run(arm, 0.1, motion={"q1.q": law})
+    assert f"planar_2r: the motion of q1.q {text}" in str(caught.value)
+    assert type(caught.value.__cause__) is kind

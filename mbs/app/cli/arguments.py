@@ -30,6 +30,25 @@ Parameters = Annotated[
         show_default=False,
     ),
 ]
+Gravity = Annotated[
+    str,
+    typer.Option(
+        "--gravity",
+        metavar="X,Y,Z",
+        help="Gravity acceleration in the world in m/s2, such as 0,0,-1.62.",
+        show_default=False,
+    ),
+]
+Mount = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--mount",
+        metavar="NAME=VALUE",
+        help="Mount of the base in the world: x=pi rotates it about x, position=0,0,2.5 places it;"
+        " may be repeated.",
+        show_default=False,
+    ),
+]
 Json = Annotated[
     bool, typer.Option("--json", help="Print JSON on the standard output, and nothing else there.")
 ]

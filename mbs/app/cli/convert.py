@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mbs.app.cli.arguments import Parameters, Robot, examples
+from mbs.app.cli.arguments import Gravity, Mount, Parameters, Robot, examples
 from mbs.app.cli.loading import mechanism, numbers
 from mbs.app.cli.printing import note
 from mbs.errors import DescriptionError, ExportError
@@ -41,6 +41,8 @@ def convert(
     ],
     *,
     parameter: Parameters = None,
+    gravity: Gravity = "",
+    mount: Mount = None,
 ) -> None:
     """Convert a robot to a .par, .toml, .urdf, .sdf or .xml (MJCF) file.
 
@@ -53,13 +55,14 @@ def convert(
         raise ExportError(
             f"{target}: files of this kind are not written; {did_you_mean(suffix, _WRITTEN)}"
         )
-    table = _table(source, parameter) if suffix in _TABLES else None
+    is_plain = suffix in _TABLES and not gravity and not mount
+    table = _table(source, parameter) if is_plain else None
     left_out = ""
     if suffix == ".xml":
         from mbs.export import mjcf
         from mbs.export.robot_files import shapes_left_out
 
-        assembled = mechanism(source, parameter).assemble()
+        assembled = mechanism(source, parameter, gravity, mount).assemble()
         left_out = shapes_left_out(assembled)
         mjcf(assembled, target)
     elif table is not None:
@@ -71,7 +74,7 @@ def convert(
         from mbs.export.robot_files import shapes_left_out
         from mbs.files import write_bytes
 
-        assembled = mechanism(source, parameter).assemble()
+        assembled = mechanism(source, parameter, gravity, mount).assemble()
         left_out = shapes_left_out(assembled)
         writers = {
             ".par": exporting.par,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mbs.app.cli import completion
-from mbs.app.cli.arguments import Json, Parameters, Robot, examples
+from mbs.app.cli.arguments import Gravity, Json, Mount, Parameters, Robot, examples
 from mbs.app.cli.loading import system
 from mbs.app.cli.model import Options, count_data
 from mbs.app.cli.printing import PrintedTable, note, print_json, print_tables
@@ -55,6 +55,8 @@ def count(
     ] = True,
     option: Options = None,
     parameter: Parameters = None,
+    gravity: Gravity = "",
+    mount: Mount = None,
     json: Json = False,
 ) -> None:
     """Count the operations of models, before the optimizer and after it.
@@ -65,7 +67,7 @@ def count(
     from mbs.app.tasks.equations import EVERY_PASS, counts
     from mbs.app.tasks.simulation import assignments
 
-    assembled = system(robot, parameter)
+    assembled = system(robot, parameter, gravity, mount)
     options = assignments(option or (), "--option")
     keys = key or _offer(assembled, every)
     counted = counts(assembled, keys, EVERY_PASS if optimise else (), options)

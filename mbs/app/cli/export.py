@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from mbs.app.cli import completion
-from mbs.app.cli.arguments import Parameters, Robot, examples, help_of
+from mbs.app.cli.arguments import Gravity, Mount, Parameters, Robot, examples, help_of
 from mbs.app.cli.group import Commands
 from mbs.app.cli.loading import configuration, system
 from mbs.app.cli.places import require_places
@@ -75,12 +75,14 @@ def export_c(
     *,
     model: Model = None,
     parameter: Parameters = None,
+    gravity: Gravity = "",
+    mount: Mount = None,
 ) -> None:
     """Export models as C source with a header, CMakeLists.txt and an example."""
     from mbs.app.tasks import exporting
     from mbs.export import c_library
 
-    assembled, keys = system(robot, parameter), model or exporting.MODELS
+    assembled, keys = system(robot, parameter, gravity, mount), model or exporting.MODELS
     if target.suffix.lower() == ".zip":
         _write(target, exporting.c_library(assembled, keys))
         return
@@ -156,6 +158,8 @@ def export_fmu(
     tolerance: Tolerance = "1e-8",
     max_step: MaxStep = "",
     parameter: Parameters = None,
+    gravity: Gravity = "",
+    mount: Mount = None,
 ) -> None:
     """Export an FMU for Model Exchange and Co-Simulation; it needs a C compiler.
 
@@ -178,21 +182,35 @@ def export_fmu(
         max_step=max_step,
     )
     require_places(target)
-    _write(target, exporting.fmu(system(robot, parameter), settings))
+    _write(target, exporting.fmu(system(robot, parameter, gravity, mount), settings))
 
 
-def export_par(robot: Robot, target: Target, *, parameter: Parameters = None) -> None:
+def export_par(
+    robot: Robot,
+    target: Target,
+    *,
+    parameter: Parameters = None,
+    gravity: Gravity = "",
+    mount: Mount = None,
+) -> None:
     """Export the assembled robot as a SYMORO file; link j is frame j."""
     from mbs.app.tasks import exporting
 
-    _write(target, exporting.par(system(robot, parameter)))
+    _write(target, exporting.par(system(robot, parameter, gravity, mount)))
 
 
-def export_toml(robot: Robot, target: Target, *, parameter: Parameters = None) -> None:
+def export_toml(
+    robot: Robot,
+    target: Target,
+    *,
+    parameter: Parameters = None,
+    gravity: Gravity = "",
+    mount: Mount = None,
+) -> None:
     """Export the assembled robot as a table of frames in TOML; link j is frame j."""
     from mbs.app.tasks import exporting
 
-    _write(target, exporting.toml(system(robot, parameter)))
+    _write(target, exporting.toml(system(robot, parameter, gravity, mount)))
 
 
 Q = Annotated[

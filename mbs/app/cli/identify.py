@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mbs.app.cli.arguments import Json, Output, Parameters, Robot, examples
+from mbs.app.cli.arguments import Gravity, Json, Mount, Output, Parameters, Robot, examples
 from mbs.app.cli.loading import system
 from mbs.app.cli.places import require_places
 from mbs.app.cli.printing import note, print_json
@@ -83,6 +83,8 @@ def identify(
     offsets: Offsets = False,
     residuals: Residuals = None,
     parameter: Parameters = None,
+    gravity: Gravity = "",
+    mount: Mount = None,
     output: Output = None,
     json: Json = False,
 ) -> None:
@@ -105,7 +107,7 @@ def identify(
         offsets=offsets,
     )
     content = _content(record, LARGEST)
-    found = task.identify(system(robot, parameter), content, settings)
+    found = task.identify(system(robot, parameter, gravity, mount), content, settings)
     for path, text in ((output, found.csv), (residuals, found.residuals_csv)):
         if path is not None:
             write_text(text(), path)

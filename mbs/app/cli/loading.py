@@ -15,19 +15,29 @@ _MOST_NOTES = 8
 """Notes of a file that are said; some files have hundreds."""
 
 
-def mechanism(robot: str, parameters: Sequence[str] | None = None) -> Mechanism:
+def mechanism(
+    robot: str,
+    parameters: Sequence[str] | None = None,
+    gravity: str = "",
+    mount: Sequence[str] | None = None,
+) -> Mechanism:
     """The description of a robot; notes of its reader go to the standard error.
 
     Args:
         robot: name in the catalogue, or a file.
         parameters: NAME=VALUE for some of its symbols.
+        gravity: "X,Y,Z" in the world; that of the robot if empty.
+        mount: steps of the mount, such as "x=pi" and "position=0,0,2.5".
 
     Raises:
-        DescriptionError: there is no such robot or symbol, or the file is malformed.
+        DescriptionError: there is no such robot or symbol, the file is malformed, or the gravity or
+            the mount is none.
     """
+    from mbs.app.tasks.mounting import mounting_of
     from mbs.robots import load
 
-    loaded = load(robot, numbers(parameters, "--parameter"))
+    mounting = mounting_of(gravity, mount or (), names=("--gravity", "--mount"))
+    loaded = load(robot, numbers(parameters, "--parameter"), **mounting)
     for one in loaded.notes[:_MOST_NOTES]:
         note(f"{robot}: {one}")
     if len(loaded.notes) > _MOST_NOTES:
@@ -35,14 +45,19 @@ def mechanism(robot: str, parameters: Sequence[str] | None = None) -> Mechanism:
     return loaded
 
 
-def system(robot: str, parameters: Sequence[str] | None = None) -> System:
+def system(
+    robot: str,
+    parameters: Sequence[str] | None = None,
+    gravity: str = "",
+    mount: Sequence[str] | None = None,
+) -> System:
     """The assembled robot; arguments and errors as for `mechanism`.
 
     Raises:
         AssemblyError: its components do not form a mechanism.
         Unclosable: its loops cannot be closed.
     """
-    described = mechanism(robot, parameters)
+    described = mechanism(robot, parameters, gravity, mount)
     known = len(described.notes)
     assembled = described.assemble()
     for one in described.notes[known:][:_MOST_NOTES]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mbs.app.cli import completion
-from mbs.app.cli.arguments import Json, Output, Parameters, Robot, examples
+from mbs.app.cli.arguments import Gravity, Json, Mount, Output, Parameters, Robot, examples
 from mbs.app.cli.loading import system
 from mbs.app.cli.printing import note, print_json
 
@@ -73,11 +73,15 @@ def model(
     option: Options = None,
     optimise: Optimise = True,
     parameter: Parameters = None,
+    gravity: Gravity = "",
+    mount: Mount = None,
     output: Output = None,
     json: Json = False,
 ) -> None:
     """Write a model as source text, its operations counted on the standard error."""
-    written = equations_of(system(robot, parameter), key, option, language, optimise)
+    written = equations_of(
+        system(robot, parameter, gravity, mount), key, option, language, optimise
+    )
     if output is not None:
         from mbs.files import write_text
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-from mbs.app.cli.arguments import Json, Parameters, Robot, examples
+from mbs.app.cli.arguments import Gravity, Json, Mount, Parameters, Robot, examples
 from mbs.app.cli.description import DRIVE, GEOMETRY, TEN, described
 from mbs.app.cli.loading import system
 from mbs.app.cli.printing import PrintedTable, number, print_json, print_tables
@@ -19,13 +19,20 @@ EXAMPLES = examples(
 )
 
 
-def show(robot: Robot, *, parameter: Parameters = None, json: Json = False) -> None:
+def show(
+    robot: Robot,
+    *,
+    parameter: Parameters = None,
+    gravity: Gravity = "",
+    mount: Mount = None,
+    json: Json = False,
+) -> None:
     """Show a robot: frames, inertial parameters, coordinates, loops, symbols and the report.
 
     Frames have Khalil's parameters and inertial parameters are about the origins of these frames,
     in SI units and radians.
     """
-    data = described(system(robot, parameter))
+    data = described(system(robot, parameter, gravity, mount))
     if json:
         print_json(data)
         return

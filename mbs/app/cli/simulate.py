@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mbs.app.cli.arguments import Json, Parameters, Robot, examples, output
+from mbs.app.cli.arguments import Gravity, Json, Mount, Parameters, Robot, examples, output
 from mbs.app.cli.loading import system
 from mbs.app.cli.places import require_places
 from mbs.app.cli.printing import PrintedTable, note, number, print_json, print_tables
@@ -24,6 +24,7 @@ EXAMPLES = examples(
     "mbs simulate stewart_platform --duration 1 --film motion.html",
     "mbs simulate planar_2r --tau 'q1=20*(1 - q1.q) - 5*q1.v' --output - | head -3",
     "mbs simulate my_robot.toml --parameter L2=0.3 --duration 10 --step 0.001 --json",
+    "mbs simulate puma560 --mount x=pi --gravity 0,0,-1.62",
 )
 
 Names = list[str] | None
@@ -121,6 +122,8 @@ def simulate(
     method: Method = "dopri5",
     max_step: MaxStep = "",
     parameter: Parameters = None,
+    gravity: Gravity = "",
+    mount: Mount = None,
     output: Output = None,
     plot: Plot = None,
     film: Film = None,
@@ -138,7 +141,7 @@ def simulate(
     file = None if to_screen else output
     require_places(file, plot, film)
     laws = assigned(q0=q0, v0=v0, tau=tau, input=input_, motion=motion)
-    assembled = system(robot, parameter)
+    assembled = system(robot, parameter, gravity, mount)
     settings = task.SimulationSettings(
         duration=duration,
         step=step,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mbs.app.cli.arguments import Json, Output, Parameters, Robot, examples
+from mbs.app.cli.arguments import Gravity, Json, Mount, Output, Parameters, Robot, examples
 from mbs.app.cli.loading import system
 from mbs.app.cli.places import require_places
 from mbs.app.cli.printing import note, print_json
@@ -56,6 +56,8 @@ def sweep(
     max_step: MaxStep = "",
     folder: Folder = None,
     parameter: Parameters = None,
+    gravity: Gravity = "",
+    mount: Mount = None,
     output: Output = None,
     json: Json = False,
 ) -> None:
@@ -78,7 +80,7 @@ def sweep(
         max_step=max_step,
         **laws,
     )
-    table = sweeping.sweep(system(robot, parameter), grid, settings, folder=folder)
+    table = sweeping.sweep(system(robot, parameter, gravity, mount), grid, settings, folder=folder)
     if output is not None:
         from mbs.files import write_text
 

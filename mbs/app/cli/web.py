@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from mbs.app.cli import completion
-from mbs.app.cli.arguments import examples
+from mbs.app.cli.arguments import Gravity, Mount, examples
 
 EXAMPLES = examples("mbs app", "mbs app rx90", "mbs app my_robot.toml --port 8080 --no-browser")
 
@@ -29,6 +29,8 @@ def app(
             metavar="PORT", min=1, max=65535, help="A free one when left out.", show_default=False
         ),
     ] = None,
+    gravity: Gravity = "",
+    mount: Mount = None,
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Whether to open the page.")
     ] = True,
@@ -40,4 +42,4 @@ def app(
     """
     from mbs.app.web.server import serve
 
-    serve(port=port, robot=robot, open_browser=browser)
+    serve(port=port, robot=robot, open_browser=browser, gravity=gravity, mount=mount or ())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,14 @@ _DAY = 86400.0
 _NAMES = ("127.0.0.1", "localhost", "[::1]")
 
 
-def serve(port: int | None = None, robot: str | None = None, open_browser: bool = True) -> None:
+def serve(
+    port: int | None = None,
+    robot: str | None = None,
+    open_browser: bool = True,
+    *,
+    gravity: str = "",
+    mount: Sequence[str] = (),
+) -> None:
     """Show the app in a browser until the process is interrupted.
 
     The server listens on the loopback address and answers requests that name it so; anything
@@ -35,6 +42,8 @@ def serve(port: int | None = None, robot: str | None = None, open_browser: bool 
         port: a free one when left out.
         robot: a name of the catalogue, or a file, that new visitors find; the RX90 when left out.
         open_browser: whether to open the browser of this machine at the page.
+        gravity: of that robot in the world, "X,Y,Z" [m/s^2]; its own if empty.
+        mount: steps of the mount of that robot, such as "x=pi" and "position=0,0,2.5".
 
     Raises:
         MbsError: NiceGUI is not installed, the robot cannot be read, or the port is taken.
@@ -46,7 +55,7 @@ def serve(port: int | None = None, robot: str | None = None, open_browser: bool 
     from mbs.app.web.page import page_of
     from mbs.app.web.style import serve_assets
 
-    first = robot_document(robot or "rx90")
+    first = robot_document(robot or "rx90", gravity, mount)
     number = free_port(port)
     serve_assets()
     app.storage.max_tab_storage_age = _DAY
@@ -102,12 +111,30 @@ def _host(text: str) -> str:
     return name.lower() if colon and port.isdecimal() else text.lower()
 
 
-def robot_document(robot: str) -> Document:
+def robot_document(robot: str, gravity: str = "", mount: Sequence[str] = ()) -> Document:
     """The document of a robot by its name in the catalogue, or in a file.
 
+    Args:
+        robot: name or path.
+        gravity: "X,Y,Z" in place of the gravity of the robot [m/s^2].
+        mount: steps of its mount.
+
     Raises:
-        MbsError: there is none, or it is malformed.
+        MbsError: there is no such robot, it is malformed, or the gravity or the mount is none.
     """
+    from mbs.app.tasks.mounting import mounting_of
+    from mbs.app.web.document.tables import GRAVITY_ROWS, MOUNT_ROW, Cell
+
+    given = mounting_of(gravity, mount, names=("--gravity", "--mount"))
+    document = _document(robot)
+    for row, text in zip(GRAVITY_ROWS, given.get("gravity", ()), strict=False):
+        document = document.changed(Cell("general", row, "value"), text)
+    if mount:
+        document = document.changed(Cell("general", MOUNT_ROW, "value"), "; ".join(mount))
+    return document
+
+
+def _document(robot: str) -> Document:
     from mbs.app.web.document.document import Document
     from mbs.robots import catalogue
 

@@ -204,8 +204,9 @@ class TablePanel:
             with ui.element("div").classes("app-locked") as self._locked:
                 self._reason = ui.label()
                 ui.label(
-                    "The tables show the links that it was assembled into; only values of symbols"
-                    " can be changed. Robot ▸ Make it a table of frames lets you change all."
+                    "The tables show the links that it was assembled into; only values of symbols,"
+                    " gravity and the mount can be changed. Robot ▸ Make it a table of frames lets"
+                    " you change all."
                 )
             for sheet in SHEETS:
                 self._panes[sheet] = ui.element("div").classes("app-sheet")
@@ -277,7 +278,7 @@ class TablePanel:
                 "columnDefs": columns(sheet, removable=not self._is_locked),
                 "rowData": self._rows(document, sheet, document.problems),
                 "defaultColDef": {
-                    "editable": document.origin is None or sheet == "symbols",
+                    "editable": document.origin is None or sheet in ("symbols", "general"),
                     "cellDataType": "text",
                     "sortable": False,
                     "resizable": True,

@@ -347,7 +347,7 @@ def structure(model: FmuModel) -> ModelStructure:
     reset = [k for k, known in found.jumping.items() if dict(known) != {k: "constant"}]
     running.update({k: {k: "constant"} for k in shown})
     starting = dict(found.running)
-    if model.slots:
+    if model.charted:
         reset = list(model.derived.values())
         running |= _by_joints(model, running)
         running = {ref: _through_all(model, known) for ref, known in running.items()}

@@ -19,6 +19,7 @@ from mbs.closed_forms.arm_search import Nearest
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry.self_motions import Family
 from mbs.models.inverse_geometry.target import Target
+from mbs.numbers import has_boolean
 from mbs.text import did_you_mean, quoted
 
 # Joint limits, and the whole turns by which a configuration may be wound within them.
@@ -157,7 +158,7 @@ def _replacing(system: System, given: object) -> Given:
 
 def _pair(system: System, name: str, pair: object) -> tuple[float, float]:
     try:
-        low, high = (float(x) for x in pair)  # type: ignore[attr-defined]
+        low, high = (math.nan if has_boolean(x) else float(x) for x in pair)  # type: ignore[attr-defined]
     except (TypeError, ValueError):
         low = high = math.nan
     if not low <= high:

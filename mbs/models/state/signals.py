@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from mbs.arguments import names_given, values_given
 from mbs.assembly import System
+from mbs.assembly.variable_names import EFFORTS, by_coordinate
 from mbs.errors import ModelError
-from mbs.numbers import doubles
-from mbs.text import did_you_mean, quoted
+from mbs.numbers import has_boolean, numbers_given
+from mbs.text import did_you_mean, error_text, quoted
 
 Array = NDArray[np.float64]
-
-_LONGEST_REASON = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +105,7 @@ def _trace(
     if by_name:
         values = _in_order(system, signal, values)
     try:
-        result = _column(values)
+        result = None if has_boolean(values) else _column(values)
     except Exception:
         result = None
     if result is None or (not casadi.symvar(result) and not casadi.evalf(result).is_regular()):
@@ -135,6 +134,7 @@ def _has_nan(value: SX) -> bool:
 
 def _in_order(system: System, signal: LawArgument, values: Mapping[str, Any]) -> list[Any]:
     """Every element, zero where it is not named."""
+    values = by_coordinate(system.name, values, signal.elements, [signal.name])
     for name in values:
         if name not in signal.elements:
             known = did_you_mean(str(name), signal.elements)
@@ -161,11 +161,18 @@ _SYMBOLS = (
 
 
 def untraceable(system: System, what: str, error: Exception) -> ModelError:
-    """What a user's function says when it is called with CasADi symbols."""
+    """Return the error of a user's function that raised one when called with CasADi symbols."""
+    fault = f"raises {error_text(error)}"
+    if not isinstance(error, _OF_SYMBOLS):
+        return ModelError(f"{system.name}: {what} {fault}; correct the function")
     return ModelError(
-        f"{system.name}: {what} could not be traced with CasADi symbols ({_reason(error)}); build"
-        " it from CasADi operations, such as casadi.sin and casadi.if_else"
+        f"{system.name}: {what} could not be traced with CasADi symbols, it {fault}; build it from"
+        " CasADi operations, such as casadi.sin and casadi.if_else"
     )
+
+
+_OF_SYMBOLS = (RuntimeError, TypeError, ValueError, NotImplementedError, AttributeError)
+"""Errors of operations that do not take CasADi symbols, such as math.sin and `if`."""
 
 
 def _column(values: Any) -> SX:
@@ -202,15 +209,6 @@ def _check_inputs(
         return
 
 
-def _reason(error: Exception) -> str:
-    """The first sentence of an error; CasADi adds lists of prototypes and lines of its code."""
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    text = lines[0] if lines else type(error).__name__
-    if text.startswith("Wrong number or type of arguments"):
-        text = "an operation of CasADi was given what it does not take"
-    return text[:_LONGEST_REASON]
-
-
 # Joint efforts that drive a motion, in whatever form the user gives them.
 
 
@@ -240,9 +238,9 @@ def effort_function(system: System, tau: Effort) -> Function | None:
     driven = [speed.name for speed in system.speeds if speed.actuated]
     if callable(tau):
         return signal_function(system, signal, tau, driven)
-    given = tau
+    given = system.plain_names(tau, EFFORTS)
     if not isinstance(tau, Mapping):
-        array, short = doubles(tau), len(system.motors)
+        array, short = numbers_given(tau), len(system.motors)
         if not isinstance(array, str) and array.ndim and array.size == short != system.nv:
             motors = (names[k] for k in system.motors)
             given = dict(zip(motors, array.ravel().tolist(), strict=True))
@@ -378,7 +376,7 @@ def by_name(
             raise ModelError(
                 f"{system.name}: {what} names {quoted(given)}; {did_you_mean(str(given), known)}"
             )
-        number = doubles(value)
+        number = numbers_given(value)
         if isinstance(number, str) or number.size != 1 or not np.isfinite(number).all():
             raise ModelError(
                 f"{system.name}: {what} gives {quoted(value)} for {name}; give a finite number"

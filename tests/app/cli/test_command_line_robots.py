@@ -100,3 +100,38 @@ def test_models_of_a_robot_are_those_that_it_has(command) -> None:
     frame = next(option for option in jacobian["options"] if option["name"] == "frame")
     assert frame["default"] == 2
     assert "jacobian" in command("models").out
+
+
+HUNG = ("--gravity", "0,0,-1.62", "--mount", "x=pi", "--mount", "position=0,0,2.5")
+
+
+def test_gravity_and_mount_of_a_robot(command, tmp_path) -> None:
+    shown = json.loads(command("show", "rx90", *HUNG, "--json").out)
+    assert [float(x) for x in shown["gravity"]] == pytest.approx([0, 0, 1.62], abs=1e-15)
+    words = ("rx90", "--duration", "0.1", "--json")
+    moved = json.loads(command("simulate", *words, *HUNG).out)
+    system = mbs.load("rx90", gravity=(0, 0, 1.62)).assemble()
+    result = mbs.simulate.run(system, 0.1)
+    assert moved["columns"]["q2.q"][-1] == pytest.approx(result["q2.q"][-1], abs=1e-9)
+    assert command("convert", "rx90", "hung.toml", *HUNG).code == 0
+    assert [float(str(x)) for x in mbs.load(tmp_path / "hung.toml").gravity] == pytest.approx(
+        [0, 0, 1.62], abs=1e-15
+    )
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("model", "planar_2r", "gravity"),
+        ("count", "planar_2r", "gravity"),
+        ("export", "toml", "planar_2r", "a.toml"),
+        ("export", "par", "planar_2r", "a.par"),
+        ("sweep", "planar_2r", "--over", "q1.q=0,1", "--duration", "0.1"),
+    ],
+    ids=lambda words: " ".join(words[:2]),
+)
+def test_commands_take_gravity_and_mount(command, words) -> None:
+    assert command(*words, "--mount", "x=pi").code == 0
+    answer = command(*words, "--gravity", "9.81")
+    assert answer.code == 1
+    assert "--gravity: '9.81' has not three values; write them as 0,0,-9.81" in answer.err

@@ -8,6 +8,7 @@ import pytest
 import mbs
 from mbs.app.web.document.document import Document
 from mbs.app.web.document.tables import COLUMNS, Cell, scalar, written
+from mbs.app.web.server import robot_document
 from mbs.errors import DescriptionError, MbsError
 from mbs.formats import from_dict
 from mbs.robots import catalogue
@@ -255,3 +256,42 @@ def test_functions_of_a_document_have_the_symbols_as_inputs():
     assert isinstance(function, casadi.Function)
     assert function.name_in() == ["q", "p"]
     assert float(function([0, 0], [0.7])[0, 3]) == pytest.approx(0.7)
+
+
+def gravity_of(document):
+    tree = document.system().tree
+    return [float(tree.gravity[k]) for k in range(3)]
+
+
+@pytest.mark.parametrize("name", ["panda", "stewart_platform"])
+def test_gravity_and_the_mount_are_cells(name):
+    """Also of a mechanism that no table of frames says."""
+    document = changed(Document.of_name(name), "general", 3, "value", "-1.62")
+    assert gravity_of(document) == pytest.approx([0, 0, -1.62])
+    document = changed(document, "general", 5, "value", "x=pi/2; position=0,0,2.5")
+    assert document.problems == ()
+    assert gravity_of(document) == pytest.approx([0, -1.62, 0], abs=1e-15)
+    T = mbs.models.transform(document.system(), "base", "outer_world")
+    assert T(document.system().configuration).full()[2] == pytest.approx([0, 1, 0, 2.5])
+    if document.is_table:
+        saved = Document.of_upload(document.toml().encode(), ".toml")
+        assert gravity_of(saved) == pytest.approx([0, -1.62, 0], abs=1e-15)
+    (problem,) = changed(document, "general", 5, "value", "x").problems
+    assert problem[:3] == ("general", 5, "value")
+    assert "mount: 'x' is no step of a mount" in problem.sentence
+    plain = changed(document, "general", 5, "value", "")
+    assert gravity_of(plain) == pytest.approx([0, 0, -1.62])
+
+
+def test_symbols_of_a_mount_have_rows():
+    document = changed(Document.of_name("panda"), "general", 5, "value", "y=tilt")
+    assert "tilt" in document.symbols
+
+
+def test_the_first_robot_of_the_page_has_gravity_and_mount():
+    document = robot_document("panda", "0,0,-1.62", ["x=pi/2", "z=pi"])
+    texts = document.tables.general
+    assert (*texts[1:4], texts[5]) == ("0", "0", "-1.62", "x=pi/2; z=pi")
+    assert gravity_of(document) == pytest.approx([0, 1.62, 0], abs=1e-15)
+    with pytest.raises(MbsError, match="--mount: 'x' is no step"):
+        robot_document("panda", mount=["x"])

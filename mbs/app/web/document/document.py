@@ -15,16 +15,20 @@ from mbs.app.web.document import rows as document_rows
 from mbs.app.web.document.reading import read_upload, shown_tables, table_of
 from mbs.app.web.document.tables import (
     COLUMNS,
+    GRAVITY_ROWS,
     LONGEST_CELL,
+    MOUNT_ROW,
     Cell,
     CellProblem,
     Tables,
     Texts,
+    mount,
     number,
     place_of,
     reader_of,
     require_cell,
     robot_table,
+    scalar,
     tables_of,
 )
 from mbs.assembly import System
@@ -224,6 +228,9 @@ class Document:
             DescriptionError: there is no such cell, or it cannot be changed.
         """
         if self.origin is not None:
+            if cell.sheet == "general" and cell.row in (*GRAVITY_ROWS, MOUNT_ROW):
+                require_cell(self.tables, cell)
+                return replace(self, tables=self.tables.changed(cell, text[: LONGEST_CELL + 1]))
             if cell.sheet != "symbols" or not 0 <= cell.row < len(self.symbols):
                 raise DescriptionError(f"this cell cannot be changed: {self.origin.reason}")
             values = {**dict(self.tables.values), self.symbols[cell.row]: text}
@@ -282,12 +289,26 @@ class Document:
             MbsError: something is wrong in a cell.
         """
         if self.origin is None:
-            return to_mechanism(self.table())
+            mechanism = to_mechanism(self.table())
+            mechanism.mount = self.tables.mount()
+            return mechanism
         mechanism = self.origin.mechanism()
+        self._change_gravity(mechanism)
         for name, text in self.tables.values:
             if text.strip():
                 mechanism.values[name] = Parameter(name, number(text, f"symbol {name}"))
         return mechanism
+
+    def _change_gravity(self, mechanism: Mechanism) -> None:
+        """Give a mechanism the gravity and the mount of the cells, if they are other ones."""
+        cells = [Cell("general", k, "value") for k in GRAVITY_ROWS]
+        texts = [self.tables.text(cell) for cell in cells]
+        gravity = None
+        if texts != [str(value) for value in mechanism.world.gravity]:
+            gravity = [scalar(text, place_of(*c)) for c, text in zip(cells, texts, strict=True)]
+        mounted = mount(self.tables.general[MOUNT_ROW], "mount")
+        if gravity is not None or mounted:
+            mechanism.change_gravity(gravity, mounted or None)
 
     def system(self) -> System:
         """The assembled mechanism; the same System for equal documents.
@@ -342,7 +363,7 @@ def _of_mechanism(mechanism: Mechanism, origin: DocumentOrigin) -> Document:
     values = tuple(
         (p.name, "" if p.default is None else f"{p.default!r}") for p in mechanism.parameters()
     )
-    general = (mechanism.name, *map(str, mechanism.world.gravity), mechanism.source)
+    general = (mechanism.name, *map(str, mechanism.world.gravity), mechanism.source, "")
     tables = Tables((), (), general=general, values=values)
     return Document(tables, replace(origin, reason=reason))
 
@@ -384,4 +405,10 @@ def _value_problems(document: Document) -> list[CellProblem]:
                 number(text, f"symbol {name}")
         except MbsError as error:
             problems.append(CellProblem("symbols", row, "value", str(error)))
+    for row in (*GRAVITY_ROWS, MOUNT_ROW):
+        cell = Cell("general", row, "value")
+        try:
+            reader_of(*cell)(document.tables.text(cell), place_of(*cell))
+        except MbsError as error:
+            problems.append(CellProblem(*cell, str(error)))
     return problems

@@ -97,5 +97,5 @@ def _without(rows: tuple[Texts, ...], row: int) -> tuple[Texts, ...]:
 
 def blank() -> Tables:
     """A robot of one revolute joint."""
-    empty = Tables((), (), general=("robot", "0", "0", "-9.81", ""))
+    empty = Tables((), (), general=("robot", "0", "0", "-9.81", "", ""))
     return with_frame(empty)

@@ -8,8 +8,11 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from mbs.app.tasks.mounting import mounting_of
 from mbs.components import Rotor
-from mbs.errors import DescriptionError, ExpressionError
+from mbs.components.component import Placement, in_rotated_axes
+from mbs.components.mounting import mount_of
+from mbs.errors import DescriptionError, ExpressionError, MbsError
 from mbs.expressions import Expression, Number, Scalar, expression, parameters_of
 from mbs.expressions import number as number_of
 from mbs.formats import CutRow, FrameRow, RobotTable
@@ -51,8 +54,10 @@ COLUMNS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 """The columns that can be changed, by sheet."""
 
-GENERAL_ROWS = ("name", "gravity x", "gravity y", "gravity z", "source")
-"""What the rows of the sheet "general" hold."""
+GENERAL_ROWS = ("name", "gravity x", "gravity y", "gravity z", "source", "mount")
+"""What the rows of the sheet "general" hold: the mount is steps such as x=pi; position=0,0,2.5."""
+GRAVITY_ROWS, MOUNT_ROW = range(1, 4), 5
+"""Rows of the sheet "general" with gravity and with the mount."""
 
 ACTUATED: Mapping[str, bool | None] = MappingProxyType({"": None, "yes": True, "no": False})
 CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = MappingProxyType(
@@ -207,9 +212,24 @@ def reader_of(sheet: str, row: int, column: str) -> Callable[[str, str], Any]:
         return span
     if column == "guess" or sheet == "symbols":
         return lambda text, where: number(text, where) if text.strip() else None
+    if sheet == "general" and row == MOUNT_ROW:
+        return mount
     if column == "name" or (sheet == "general" and GENERAL_ROWS[row] in ("name", "source")):
         return _short
     return scalar
+
+
+def mount(text: str, where: str) -> dict[str, Any]:
+    """The mount that a text is, in the form of `mbs.load`; empty if there is none.
+
+    Raises:
+        DescriptionError: it is no mount.
+    """
+    steps = [step for step in _short(text, where).split(";") if step.strip()]
+    found: dict[str, Any] = mounting_of(mount=steps).get("mount", {})
+    if found:
+        mount_of(found, where)
+    return found
 
 
 def _short(text: str, where: str) -> str:
@@ -245,7 +265,7 @@ class Tables:
         geometry: a row for each frame, in the order of `GEOMETRY_COLUMNS`.
         inertia: a row for each frame, in the order of `INERTIA_COLUMNS`.
         loops: a row for each loop, in the order of `LOOP_COLUMNS`.
-        general: name, gravity and source, in the order of `GENERAL_ROWS`.
+        general: name, gravity, source and mount, in the order of `GENERAL_ROWS`.
         values: of symbols, by name; those of symbols that no cell uses are kept as well.
         attached: for each frame a rotor, and whether its inertia is that of several bodies.
         guess: further positions near which loops are closed, by the names of coordinates.
@@ -255,7 +275,7 @@ class Tables:
     geometry: tuple[Texts, ...]
     inertia: tuple[Texts, ...]
     loops: tuple[Texts, ...] = ()
-    general: Texts = ("robot", "0", "0", "-9.81", "")
+    general: Texts = ("robot", "0", "0", "-9.81", "", "")
     values: Named = ()
     attached: tuple[tuple[Rotor | None, bool], ...] = ()
     guess: tuple[tuple[str, float], ...] = ()
@@ -317,6 +337,15 @@ class Tables:
         for rotor, _ in self.attached:
             yield from () if rotor is None else map(expression, (rotor.inertia, rotor.ratio))
         yield from map(_expression, self.general[1:4])
+        yield from self.mount().expressions()
+
+    def mount(self) -> Placement:
+        """Pose of the base in the world; none while its cell is wrong."""
+        try:
+            given = mount(self.general[MOUNT_ROW], "mount")
+        except MbsError:
+            return Placement()
+        return Placement(mount_of(given, "mount")[0] if given else ())
 
 
 def tables_of(table: RobotTable) -> Tables:
@@ -332,7 +361,7 @@ def tables_of(table: RobotTable) -> Tables:
         ),
         inertia=tuple((*(written(getattr(b, s)) for s in BODY_SCALARS), b.name) for b in rows),
         loops=tuple((str(loop.cut[0]), str(loop.cut[1]), loop.joint) for loop in table.loops),
-        general=(table.name, *map(written, table.gravity), table.source),
+        general=(table.name, *map(written, table.gravity), table.source, ""),
         values=tuple((name, written(value)) for name, value in table.parameters.items()),
         attached=tuple((b.rotor, b.grouped) for b in rows),
         guess=tuple((name, value) for name, value in table.guess.items() if name not in names),
@@ -366,12 +395,19 @@ def robot_table(tables: Tables) -> RobotTable:
         frames=tuple(frames),
         bodies=tuple(bodies),
         loops=tuple(_loop(tables, read, k) for k in range(len(tables.loops))),
-        gravity=tuple(general[1:4]),
+        gravity=_rotated(general[1:4], general[5]),
         parameters={name: value for name, value in values.items() if value is not None},
         source=general[4],
         guess=guess,
         extras=dict(tables.extras),
     )
+
+
+def _rotated(gravity: Sequence[Scalar], mounted: Mapping[str, Any]) -> tuple[Scalar, ...]:
+    """Gravity in the axes of the mounted base."""
+    rotation = mounted.get("rotation")
+    vector = tuple(map(expression, gravity))
+    return vector if rotation is None else in_rotated_axes(vector, rotation, "mount")
 
 
 def _read(cell: Cell, text: str) -> Any:

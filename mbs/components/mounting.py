@@ -1,0 +1,37 @@
+"""Where the base of a mechanism is mounted in the world: its position and its rotation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from mbs.components.bodies import three
+from mbs.components.component import Rotation, Step, displacement
+from mbs.errors import DescriptionError
+from mbs.text import quoted
+
+Mounting = Rotation | Mapping[str, Any]
+"""Rotation of a base, or a dict with its "position" (x, y, z) [m] and its "rotation"."""
+
+
+def mount_of(mount: Any, where: str) -> tuple[tuple[Step, ...], Rotation | None]:
+    """Return the steps from the world to a mounted base, and the rotation among them.
+
+    Args:
+        mount: rotation, or a dict with "position" and "rotation", of which one may be left out.
+        where: names the mount in messages.
+
+    Raises:
+        DescriptionError: the dict has other entries, or values that are no position or rotation.
+    """
+    if not isinstance(mount, Mapping):
+        return displacement(where, 0.0, 0.0, 0.0, mount), mount
+    known = ("position", "rotation")
+    if not mount or not set(mount) <= set(known):
+        raise DescriptionError(
+            f"{where} is {quoted(dict(mount))}; give a rotation, or a dict with"
+            " 'position': (x, y, z) and 'rotation': ('x', 'pi')"
+        )
+    x, y, z = three(mount.get("position", (0.0, 0.0, 0.0)), f"{where}, position")
+    rotation = mount.get("rotation")
+    return displacement(where, x, y, z, rotation), rotation

@@ -24,7 +24,7 @@ from mbs.models.inverse_geometry.target import (
     distinct,
     multiplicity,
     reduction,
-    spread_of,
+    highest_between,
 )
 from mbs.models.inverse_geometry.whole_robot import ClosedConfiguration, close, why_searched
 
@@ -89,7 +89,6 @@ def roots(
             root,
             label=found[k].label,
             branches=found[k].branches,
-            spread=found[k].spread,
             undecided=found[k].undecided,
         )
         if not settled:
@@ -152,9 +151,9 @@ def _merge(target: Target, gathered: Gathered) -> list[ChainRoot]:
         best = min(group, key=lambda k: (not gathered.labels[k], float(residual[k])))
         label = next((gathered.labels[k] for k in group if gathered.labels[k]), "")
         branches = frozenset(gathered.labels[k] for k in group) - {""}
-        spread, highest = spread_of(target, gathered.q[group])
-        undecided = highest > ONE * max(1.0, target.arm.length)
-        root = ChainRoot(gathered.q[best], label, 1, None, branches, False, spread, undecided)
+        own = gathered.q[[best, *(k for k in group if residual[k] < target.decided and k != best)]]
+        undecided = highest_between(target, own) > ONE * max(1.0, target.arm.length)
+        root = ChainRoot(gathered.q[best], label, 1, branches=branches, undecided=undecided)
         found.append(root)
     return found
 
@@ -226,9 +225,7 @@ def _merged_again(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
         if met or root.at_most:
             most = max(1, len(met)) if closed_form else MOST_ROOTS
             root = replace(root, multiplicity=min(root.multiplicity, most))
-        spread = max(found[k].spread for k in group)
-        undecided = any(found[k].undecided for k in group)
-        root = replace(root, spread=spread, undecided=undecided)
+        root = replace(root, undecided=any(found[k].undecided for k in group))
         result.append(root)
     return result
 
@@ -328,11 +325,11 @@ def named(
     chain, arm = question.chain, question.target.arm
     key = ("anatomy", *chain.key, question.p.tobytes())
     has: Anatomy = chain.system.cached(key, lambda: anatomy(arm))
-    meeting = np.array([root.multiplicity != 1 or root.undecided for root in found], dtype=bool)
+    meeting = np.array([root.multiplicity != 1 for root in found], dtype=bool)
     names = labels(arm, has, np.array([root.q for root in found]).reshape(-1, arm.size), meeting)
-    # a branch that has but signs keeps them; rounding decides the signs of an undecided solution
+    # a branch that has but signs keeps them
     names = [
-        name if root.undecided else root.label if root.label in branches else name or root.label
+        root.label if root.label in branches else name or root.label
         for name, root in zip(names, found, strict=True)
     ]
     seen = dict[str, int]()

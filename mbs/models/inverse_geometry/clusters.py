@@ -25,8 +25,9 @@ valley bends little within 40 degrees."""
 _HALVINGS = 3  # of a path: its highest point is known to some percent from seven points
 _SLOPE = 1.05
 """Part of the residual of a point in a valley up to which a path from it to a solution rises."""
-_APART = 1e-6
-"""Distance [rad or arm lengths] of copies up to which they may be one simple root."""
+_KNOWN = 1e-2
+"""Distance [rad or arm lengths] to which a simple root is known at least, by `ONE` over the
+smallest singular value."""
 _TWICE = 1e-5
 """Second smallest singular value below which two singular configurations are near: a decade above
 the one at which rounding of the pose moves solutions along both."""
@@ -40,7 +41,7 @@ def separated(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
     A solution is marked as undecided
 
     - if the highest residual on the path to another solution is between `ONE` and `TWO`,
-    - if copies of it are farther from each other than rounding of a simple root,
+    - if rounding of the pose moves it by more than a hundredth of a radian,
     - if its own residual is above `ONE`, so that no configuration may have exactly this pose,
     - if two singular configurations are near it.
 
@@ -58,7 +59,9 @@ def separated(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
             own[k] = np.max(target.residual(root.family.chain_samples), initial=own[k])
     singular = s[:, -1] < NEARLY_SINGULAR
     undecided = (own > ONE * scale) | (singular & (_second(s) < _TWICE))
-    undecided |= [root.undecided or _is_uncounted(root) for root in found]
+    undecided |= [root.undecided for root in found]
+    simple = np.array([root.family is None and root.multiplicity == 1 for root in found])
+    undecided |= simple & (s[:, -1] * _KNOWN < ONE)
     undecided |= _nearly_moves(target, found, x, s[:, -1] < SINGULAR)
     first, second, begin, end = _pairs(target, found, x, singular)
     height = heights(target, begin, end, TWO * scale, own[first], own[second])
@@ -70,11 +73,6 @@ def separated(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
         _one([found[k] for k in members], own[members], bool(np.any(undecided[members])), target)
         for members in (np.flatnonzero(group == g) for g in np.unique(group))
     ]
-
-
-def _is_uncounted(root: ChainRoot) -> bool:
-    """Whether copies far from each other were merged, but no several roots were counted."""
-    return root.multiplicity == 1 and root.spread > _APART
 
 
 def _nearly_moves(

@@ -22,7 +22,6 @@ class ChainRoot:
         family: the self-motion that it stands for.
         branches: of a closed form that meet in it.
         at_most: whether the multiplicity is an upper bound.
-        spread: largest distance of copies that were merged into it [rad or arm lengths].
         undecided: whether double precision does not decide that it is one solution of its own.
     """
 
@@ -32,5 +31,4 @@ class ChainRoot:
     family: Family | None = None
     branches: frozenset[str] = frozenset()
     at_most: bool = False
-    spread: float = 0.0
     undecided: bool = False

@@ -197,15 +197,13 @@ def distinct(target: Target, q: Array, apart_from: Sequence[object] = ()) -> lis
     return [list(map(int, np.flatnonzero(group == g))) for g in np.unique(group)]
 
 
-def spread_of(target: Target, q: Array) -> tuple[float, float]:
-    """Largest distance of copies (m, n) from the first, and largest residual half way to it."""
-    if len(q) == 1:
-        return 0.0, 0.0
+def highest_between(target: Target, q: Array) -> float:
+    """Largest residual half way from the first to other copies (m, n) of a solution."""
     x = q / target.unit
-    apart = np.max(np.abs(target.wrapped(x[1:] - x[0])), axis=1)
-    far = x[1:][apart > _SAME]
-    highest = middles(target, np.broadcast_to(x[0], far.shape), far)[1] if len(far) else np.zeros(1)
-    return float(np.max(apart)), float(np.max(highest))
+    far = x[1:][np.max(np.abs(target.wrapped(x[1:] - x[0])), axis=1) > _SAME]
+    if not len(far):
+        return 0.0
+    return float(np.max(middles(target, np.broadcast_to(x[0], far.shape), far)[1]))
 
 
 def middles(target: Target, x: Array, other: Array) -> tuple[Array, Array]:

@@ -14,9 +14,18 @@ from mbs.closed_forms.arm_search import Nearest, nearest
 from mbs.models.inverse_geometry.branches import Anatomy, anatomy, labels
 from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.gathering import Gathered
+from mbs.models.inverse_geometry.root import MOST_ROOTS, ChainRoot
 from mbs.models.inverse_geometry.self_motions import Family, connected, curve, family, freedoms
 from mbs.models.inverse_geometry.solutions import RobotSolution, Solutions, Wishes, unreachable
-from mbs.models.inverse_geometry.target import SINGULAR, Target, distinct, multiplicity, reduction
+from mbs.models.inverse_geometry.target import (
+    ONE,
+    SINGULAR,
+    Target,
+    distinct,
+    multiplicity,
+    reduction,
+    highest_between,
+)
 from mbs.models.inverse_geometry.whole_robot import ClosedConfiguration, close, why_searched
 
 # The distinct solutions of a pose, how often each counts, and the self-motions among them.
@@ -30,31 +39,9 @@ _ONE_ROOT = 1e-6
 """Distance [rad or arm lengths] from the middle of meeting roots up to which they count as one; a
 solution that is farther from it stands for itself, however little the forward model tells it
 from its neighbour."""
-_MOST_ROOTS = 16  # of six joints; fewer joints have fewer
-_EXACT = 0.02
+_EXACT = 0.06
 """Part of the tolerance of solutions, 2e-14 of the length, that rounding leaves: a singular root at
 which no others meet, and that misses by more, is not certain to be isolated."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ChainRoot:
-    """A solution of the chain.
-
-    Attributes:
-        q: (n,) configuration [rad or m].
-        label: of the branch it comes from, "" where it comes from none.
-        multiplicity: how many roots meet in it, 0 on a self-motion.
-        family: the self-motion that it stands for.
-        branches: of a closed form that meet in it.
-        at_most: whether the multiplicity is an upper bound.
-    """
-
-    q: Array
-    label: str
-    multiplicity: int
-    family: Family | None = None
-    branches: frozenset[str] = frozenset()
-    at_most: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +85,12 @@ def roots(
         if key not in known:
             known[key] = _examine(target, found[k], chain)
         root, settled = known[key]
-        found[k] = replace(root, label=found[k].label, branches=found[k].branches)
+        found[k] = replace(
+            root,
+            label=found[k].label,
+            branches=found[k].branches,
+            undecided=found[k].undecided,
+        )
         if not settled:
             unsettled.append(k)
         dropped |= _on(target, found, k, [m for m in singular if m > k])
@@ -159,7 +151,10 @@ def _merge(target: Target, gathered: Gathered) -> list[ChainRoot]:
         best = min(group, key=lambda k: (not gathered.labels[k], float(residual[k])))
         label = next((gathered.labels[k] for k in group if gathered.labels[k]), "")
         branches = frozenset(gathered.labels[k] for k in group) - {""}
-        found.append(ChainRoot(gathered.q[best], label, 1, branches=branches))
+        own = gathered.q[[best, *(k for k in group if residual[k] < target.decided and k != best)]]
+        undecided = highest_between(target, own) > ONE * max(1.0, target.arm.length)
+        root = ChainRoot(gathered.q[best], label, 1, branches=branches, undecided=undecided)
+        found.append(root)
     return found
 
 
@@ -195,24 +190,16 @@ def _nearly_moving(target: Target, root: ChainRoot, chain: ChainIndices) -> Chai
 def _isolate(target: Target, root: ChainRoot) -> tuple[ChainRoot, bool]:
     """With its multiplicity, moved to where its roots meet, and whether it stays there."""
     q, count = root.q, 1
-    inexact = float(target.residual(q)) >= _EXACT * target.tolerance
     for _ in range(_REFINEMENTS):
         count, better, exact = multiplicity(reduction(target, q))
         if not exact:
             return replace(root, multiplicity=count, at_most=True), False
         moved = float(np.max(np.abs(target.wrapped((better - q) / target.unit))))
-        if count > 1 and not inexact and _distance(target, better, root.q) > _ONE_ROOT:
-            return replace(root, multiplicity=1), True
         q = better
         if moved < _SETTLED:
             settled = count > 1 or float(target.residual(q)) < _EXACT * target.tolerance
             return replace(root, q=q, multiplicity=count), settled
     return replace(root, q=q, multiplicity=count), False
-
-
-def _distance(target: Target, q: Array, other: Array) -> float:
-    """The largest difference of a joint [rad or arm lengths]."""
-    return float(np.max(np.abs(target.wrapped((q - other) / target.unit))))
 
 
 def _on(target: Target, found: list[ChainRoot], k: int, others: list[int]) -> set[int]:
@@ -236,8 +223,9 @@ def _merged_again(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
     for group in distinct(target, q, [root.label for root in found]):
         root, met = found[group[0]], frozenset[str]().union(*(found[k].branches for k in group))
         if met or root.at_most:
-            most = max(1, len(met)) if closed_form else _MOST_ROOTS
+            most = max(1, len(met)) if closed_form else MOST_ROOTS
             root = replace(root, multiplicity=min(root.multiplicity, most))
+        root = replace(root, undecided=any(found[k].undecided for k in group))
         result.append(root)
     return result
 
@@ -315,6 +303,7 @@ def _drafts(question: Question, found: list[ChainRoot]) -> list[RobotSolution]:
             float(sigma[k]),
             root.multiplicity,
             root.family,
+            root.undecided,
         )
         for k, root in enumerate(found)
         for configuration in question.closed(q[k])
@@ -336,7 +325,8 @@ def named(
     chain, arm = question.chain, question.target.arm
     key = ("anatomy", *chain.key, question.p.tobytes())
     has: Anatomy = chain.system.cached(key, lambda: anatomy(arm))
-    names = labels(arm, has, np.array([root.q for root in found]).reshape(-1, arm.size))
+    meeting = np.array([root.multiplicity != 1 for root in found], dtype=bool)
+    names = labels(arm, has, np.array([root.q for root in found]).reshape(-1, arm.size), meeting)
     # a branch that has but signs keeps them
     names = [
         root.label if root.label in branches else name or root.label

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Arm, Array
 from mbs.closed_forms.sequence import StepSequence
@@ -22,6 +23,9 @@ transforms leave 1e-15 of rounding, descriptions with twelve digits 1e-12."""
 _UNDECIDED = 1e-9
 """Indicator of a branch, lengths in those of the arm, at which two branches meet: its sign is
 rounding there and names neither."""
+_MEETING = 1e-5
+"""The same where roots meet: rounding of a pose by 2e-14 moves a double root by 2e-7, and solutions
+up to 1e-6 apart are one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +57,9 @@ def anatomy(arm: Arm) -> Anatomy:
     return Anatomy(bool(shoulder), elbow, True)
 
 
-def labels(arm: Arm, has: Anatomy, q: Array) -> list[str]:
+def labels(
+    arm: Arm, has: Anatomy, q: Array, meeting: NDArray[np.bool_] | None = None
+) -> list[str]:
     """The names of configurations' branches, such as "shoulder right, elbow up, no flip".
 
     A name is left out where the configuration stands between two branches; an arm without a
@@ -63,6 +69,7 @@ def labels(arm: Arm, has: Anatomy, q: Array) -> list[str]:
         arm: its joints.
         has: what it has of shoulder, elbow and wrist.
         q: (m, n) configurations [rad or m].
+        meeting: (m,) whether roots meet in each, none of them by default.
     """
     if not has.wrist:
         return [""] * len(q)
@@ -72,24 +79,26 @@ def labels(arm: Arm, has: Anatomy, q: Array) -> list[str]:
     right = _dot(a[0], np.cross(a[1], reach)) / arm.length
     bend = _dot(a[1], np.cross(reach, p[2] - p[1])) / arm.length**2
     turn = _dot(np.cross(a[3], a[5]), a[4])
-    return [_label(has, *three) for three in zip(right, bend, turn, strict=True)]
+    met = np.zeros(len(q), dtype=bool) if meeting is None else meeting
+    zero = np.where(met, _MEETING, _UNDECIDED)
+    return [_label(has, *four) for four in zip(right, bend, turn, zero, strict=True)]
 
 
-def _label(has: Anatomy, right: float, bend: float, turn: float) -> str:
+def _label(has: Anatomy, right: float, bend: float, turn: float, zero: float) -> str:
     names = []
-    if has.shoulder and abs(right) > _UNDECIDED:
+    if has.shoulder and abs(right) > zero:
         names.append("shoulder right" if right > 0 else "shoulder left")
     if has.elbow:
-        names.append(_elbow(bend, right))
-    if abs(turn) > _UNDECIDED:
+        names.append(_elbow(bend, right, zero))
+    if abs(turn) > zero:
         names.append("no flip" if turn > 0 else "flip")
     return ", ".join(name for name in names if name)
 
 
-def _elbow(bend: float, right: float) -> str:
-    if abs(bend) <= _UNDECIDED:
+def _elbow(bend: float, right: float, zero: float) -> str:
+    if abs(bend) <= zero:
         return "elbow straight"
-    if abs(right) <= _UNDECIDED:
+    if abs(right) <= zero:
         return ""
     return "elbow up" if bend * right > 0 else "elbow down"
 

@@ -62,12 +62,15 @@ class Gathered:
         method: that gave them.
         doubtful: whether further ones may be missing, because the pose is next to a degenerate
             one of the method.
+        near: (k, n) configurations that miss the pose by little and that Newton's method did not
+            improve to solutions: starts of a search along a valley.
     """
 
     q: Array
     labels: tuple[str, ...]
     method: str
     doubtful: bool
+    near: Array | None = None
 
 
 def gather(
@@ -117,7 +120,7 @@ def gather_further(chain: FrameChain, target: Target, gathered: Gathered, p: Arr
 def joined(gathered: Gathered, more: Gathered) -> Gathered:
     """What was gathered, and more; certain from now on."""
     q, labels = np.concatenate([gathered.q, more.q]), gathered.labels + more.labels
-    return Gathered(q, labels, gathered.method, False)
+    return Gathered(q, labels, gathered.method, False, gathered.near)
 
 
 # Solutions at the far end of a valley: next to a singular configuration in which an arm could move
@@ -138,11 +141,13 @@ _CROSSINGS = 8  # of false position: along a sine the digits double with each
 
 def along_valleys(target: Target, gathered: Gathered) -> Gathered:
     """What was gathered, and the solutions along the motions that singular ones nearly allow."""
-    if not len(gathered.q) or target.arm.size != 6:
+    if target.arm.size != 6:
         return gathered
-    s = target.singular_values(gathered.q)
+    s = target.singular_values(gathered.q) if len(gathered.q) else np.zeros((0, 6))
     singular, twice = s[:, -1] < SINGULAR, s[:, -2] < SINGULAR
-    found = _far_ends(target, gathered.q[singular] / target.unit) if np.any(singular) else []
+    starts = [gathered.q[singular], np.zeros((0, 6)) if gathered.near is None else gathered.near]
+    start = np.concatenate(starts) / target.unit
+    found = _far_ends(target, start) if len(start) else []
     if np.any(twice):
         found += _around(target, gathered.q[twice] / target.unit)
     if not found:
@@ -160,16 +165,35 @@ def _far_ends(target: Target, start: Array) -> list[Array]:
     scale, found = max(1.0, target.arm.length), list[Array]()
     for _ in range(_STEPS_ALONG):
         ahead = _valley_at(target, valley.x + _ALONG * valley.along).like(valley)
-        # a self-motion is described as such; where a valley ends, its walls are steep
-        going = (ahead.residual < _NEARLY_MOVES * scale) & (ahead.residual > target.tolerance)
+        # where a valley ends, its walls are steep
+        going = ahead.residual < _NEARLY_MOVES * scale
         going &= np.linalg.norm(ahead.x - valley.x, axis=1) < 2 * _ALONG
-        crossed = going & (ahead.height * valley.height < 0) & (valley.residual > target.tolerance)
+        crossed = going & (ahead.height * valley.height < 0) & (valley.residual > target.decided)
         if np.any(crossed):
             found.append(_crossing(target, valley.of(crossed), ahead.of(crossed)))
         valley = ahead.of(going)
         if not len(valley.x):
             break
     return found
+
+
+_REACH = 5  # steps along a valley, one radian
+
+
+def along_valley(target: Target, start: Array) -> Array:
+    """(m,) highest residuals within a radian along the valleys through singular x, (m, 6).
+
+    The lower one of both directions counts.
+    """
+    here = _valley_at(target, start)._replace(x=start)
+    highest = []
+    for side in (here, here._replace(along=-here.along)):
+        valley, most = side, np.zeros(len(start))
+        for _ in range(_REACH):
+            valley = _valley_at(target, valley.x + _ALONG * valley.along).like(valley)
+            most = np.maximum(most, valley.residual)
+        highest.append(most)
+    return np.minimum(*highest)
 
 
 _FREE = 0.3
@@ -356,9 +380,11 @@ def _polish(target: Target, gathered: Gathered) -> Gathered:
     # and Newton's steps go astray along a valley
     exact = own <= EXACT * max(1.0, target.arm.length)
     q = np.where(exact[:, None], gathered.q, better.q)
-    solved = np.flatnonzero(exact | (better.residual < target.tolerance))
+    reached = exact | (better.residual < target.tolerance)
+    solved = np.flatnonzero(reached)
     labels = tuple(gathered.labels[k] for k in solved)
-    return Gathered(q[solved], labels, gathered.method, gathered.doubtful)
+    near = gathered.q[~reached & (own < _NEARLY_MOVES * max(1.0, target.arm.length))]
+    return Gathered(q[solved], labels, gathered.method, gathered.doubtful, near)
 
 
 def general_ready(chain: FrameChain, p: Array) -> General | None:

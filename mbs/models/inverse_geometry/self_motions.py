@@ -294,6 +294,11 @@ class Family:
         motion = self._motion
         return np.array([motion.whole(q) for q in motion.curve.x * motion.target.unit])
 
+    @property
+    def chain_samples(self) -> Array:
+        """(k, n) configurations of the chain along it [rad or m], turns unwrapped."""
+        return self._motion.curve.x * self._motion.target.unit
+
     def at(self, value: float) -> Array:
         """The configuration q (nq,) whose free joint is at a value [rad or m].
 

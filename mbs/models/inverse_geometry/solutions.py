@@ -191,6 +191,8 @@ class Solution:
             one of a self-motion; an upper bound where two singular configurations meet.
         within_limits: whether every joint is within its limits.
         family: the self-motion that it stands for, or None.
+        undecided: whether double precision does not decide whether it is one solution, several or
+            none; rounding of the pose may change the list there.
     """
 
     q: Array
@@ -201,6 +203,7 @@ class Solution:
     within_limits: bool
     _windings: Callable[[], Array] = field(repr=False)
     family: Family | None = None
+    undecided: bool = False
 
     @property
     def windings(self) -> Array:
@@ -324,6 +327,11 @@ class Solutions(Sequence[Solution]):
         if isinstance(self.solutions, RegularSolutions):
             return self.solutions.q.copy()
         return np.array([s.q for s in self.solutions]).reshape(len(self), len(self.names))
+
+    @property
+    def undecided(self) -> bool:
+        """Whether some solution is undecided: rounding of the pose may change the list."""
+        return any(s.undecided for s in self.solutions)
 
     def closest(self, q: Sequence[float] | Array) -> Solution:
         """The solution nearest a configuration (nq,) [rad or m], wound as limits allow.
@@ -487,6 +495,7 @@ class RobotSolution:
     sigma_min: float
     multiplicity: int
     family: Family | None = None
+    undecided: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -544,4 +553,5 @@ class Wishes:
             bool(within[0]),
             partial(self.bounds.windings, q, self.near),
             draft.family,
+            draft.undecided,
         )

@@ -14,7 +14,6 @@ from mbs.closed_forms.arm import Array
 from mbs.closed_forms.arm_search import nearest
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.answer import (
-    ChainRoot,
     Examined,
     Question,
     answer,
@@ -24,6 +23,7 @@ from mbs.models.inverse_geometry.answer import (
 )
 from mbs.models.inverse_geometry.branches import branch_labels
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
+from mbs.models.inverse_geometry.clusters import separated
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, require_method, sequence_of
 from mbs.models.inverse_geometry.gathering import (
     METHODS,
@@ -35,6 +35,7 @@ from mbs.models.inverse_geometry.gathering import (
 )
 from mbs.models.inverse_geometry.kernel import PoseKernel, kernel_of
 from mbs.models.inverse_geometry.redundancy import LockedSamples, Redundant, samples_of
+from mbs.models.inverse_geometry.root import ChainRoot
 from mbs.models.inverse_geometry.solutions import (
     Given,
     RegularSolutions,
@@ -312,12 +313,12 @@ def solved(
     examined: Examined = {}
     found = roots(target, gathered, question.chain_indices, examined)
     if gathered.method == "search":
-        return found, gathered.method
+        return separated(target, found), gathered.method
     # where an arm moves, a search gives points of what is known already
     more = new_among(target, found, by_search(target))
     if len(more.q):
         found = roots(target, joined(gathered, more), question.chain_indices, examined)
-    return found, gathered.method
+    return separated(target, found), gathered.method
 
 
 def _joined(asked: list[_Asked], samples: LockedSamples, near: Array | None) -> Solutions:

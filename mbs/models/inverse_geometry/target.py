@@ -24,6 +24,13 @@ from mbs.numbers import NONZERO
 SOLVED = 1e-12
 """Largest residual of a solution, of max(1 m, the arm's length)."""
 
+ONE, TWO = 2e-14, 2e-13
+"""Residuals, of max(1 m, the arm's length), between which it is undecided whether two solutions
+are one. The residual at the highest point of a path between two solutions changes by no more than
+the pose does. Rounding of a pose by a hundred units in the last place changes it by 2e-14."""
+DECIDED = 6e-14
+"""Residual in the middle of `ONE` and `TWO`: below it two solutions are listed as one."""
+
 NEARLY_SINGULAR = 1e-4
 """Smallest singular value, lengths divided by the arm's length, below which a solution next to the
 one found may be missing: two roots lie about as far apart as it is large. The general method was
@@ -63,6 +70,11 @@ class Target:
     def tolerance(self) -> float:
         """Largest residual of a solution."""
         return SOLVED * max(1.0, self.arm.length)
+
+    @property
+    def decided(self) -> float:
+        """Residual on the path between two solutions below which they are listed as one."""
+        return DECIDED * max(1.0, self.arm.length)
 
     def residual(self, q: Array) -> Array:
         """(...) largest element of pose(q) - T at configurations q, (..., n)."""
@@ -167,15 +179,14 @@ def distinct(target: Target, q: Array, apart_from: Sequence[object] = ()) -> lis
     first, second = np.nonzero(np.triu(apart < _CLOSE, 1))
     if not len(first):  # each is close to itself alone
         return [[k] for k in range(len(q))]
-    limit = _FLOOR * max(1.0, target.arm.length)
+    limit = target.decided
     own = target.residual(q)
     limits = np.maximum(limit, _WORSE * np.maximum(own[first], own[second]))
     joined = apart[first, second] < _SAME
     i, j = first[~joined], second[~joined]
-    joined[~joined] = half_way(target, x[i], x[j]) < limits[~joined]
+    joined[~joined] = middles(target, x[i], x[j])[1] < limits[~joined]
     branch = list(apart_from) or [None] * len(q)
     both = np.array([bool(branch[i] and branch[j]) for i, j in zip(first, second, strict=True)])
-    joined &= ~both | (apart[first, second] < _SPLIT)
     # of two branches first; then copies go to what is nearest, and join no two branches
     group, told = np.arange(len(q)), np.array([bool(name) for name in branch])
     order = np.lexsort((apart[first, second], ~both))
@@ -186,8 +197,17 @@ def distinct(target: Target, q: Array, apart_from: Sequence[object] = ()) -> lis
     return [list(map(int, np.flatnonzero(group == g))) for g in np.unique(group)]
 
 
-def half_way(target: Target, x: Array, other: Array) -> Array:
-    """(m,) residuals half way between configurations x and others, (m, n), see `Target`.
+def highest_between(target: Target, q: Array) -> float:
+    """Largest residual half way from the first to other copies (m, n) of a solution."""
+    x = q / target.unit
+    far = x[1:][np.max(np.abs(target.wrapped(x[1:] - x[0])), axis=1) > _SAME]
+    if not len(far):
+        return 0.0
+    return float(np.max(middles(target, np.broadcast_to(x[0], far.shape), far)[1]))
+
+
+def middles(target: Target, x: Array, other: Array) -> tuple[Array, Array]:
+    """Configurations (m, n) half way between x and others, (m, n), and their residuals (m,).
 
     The configuration half way is moved across the line between the two, for the valley that joins
     copies of a root may bend.
@@ -195,10 +215,37 @@ def half_way(target: Target, x: Array, other: Array) -> Array:
     difference = target.wrapped(other - x)
     middle = x + 0.5 * difference
     best = target.residual(middle * target.unit)
-    along = difference / np.linalg.norm(difference, axis=1, keepdims=True)
+    along = difference / np.maximum(np.linalg.norm(difference, axis=1, keepdims=True), NONZERO)
     held, values = along[:, None, :], np.sum(along * middle, axis=1, keepdims=True)
     moved = target.corrected(middle, held, values, _ACROSS)
-    return np.fmin(best, target.residual(moved * target.unit))
+    for point in (moved, _steep(target, middle, held, values)):
+        after = target.residual(point * target.unit)
+        better = after < best
+        middle, best = np.where(better[:, None], point, middle), np.where(better, after, best)
+    return middle, best
+
+
+_FLAT = 1e-5
+"""Singular values, of the largest, along which a point is not moved: next to two singular
+configurations Newton's steps along the second one are endless."""
+
+
+def _steep(target: Target, x: Array, held: Array, values: Array) -> Array:
+    """Points (m, n) moved to the pose along all directions but those of small singular values.
+
+    Args:
+        target: the pose.
+        x: (m, n) the points.
+        held: (m, 1, n) a further linear equation of each.
+        values: (m, 1) its right sides.
+    """
+    for _ in range(_ACROSS + 1):
+        e, J = target.excess(x)
+        further = (held @ x[..., None])[..., 0] - values
+        inverse = np.linalg.pinv(np.concatenate([J, held], axis=1), rcond=_FLAT)
+        step = (inverse @ np.concatenate([e, further], axis=1)[..., None])[..., 0]
+        x = x - np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
+    return x
 
 
 # How many roots meet in a solution: the equations near it, reduced to the directions left free.
@@ -216,8 +263,8 @@ def half_way(target: Target, x: Array, other: Array) -> Array:
 SINGULAR = 2e-6
 """Singular values below it count as zero: two roots that lie 1e-6 apart are one double root."""
 
-_MEETING = 1e-14
-"""Terms of g, free of units, that are negligible: a tenth of what a solution may miss by."""
+_MEETING = DECIDED
+"""Terms of g, free of units, that are negligible."""
 # h [rad or arm lengths] at which g is fitted, each a fourth or fifth of the one before: the first
 # within which Newton's method converges and a polynomial of degree 8 is g but for rounding
 _RADII = (0.05, 0.012, 3e-3, 7e-4, 1.5e-4, 3e-5, 6e-6)

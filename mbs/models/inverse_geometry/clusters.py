@@ -1,0 +1,190 @@
+"""Solutions that double precision does not tell apart are listed once, or marked."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbs.closed_forms.arm import Array
+from mbs.models.inverse_geometry.gathering import along_valley
+from mbs.models.inverse_geometry.root import MOST_ROOTS, ChainRoot
+from mbs.models.inverse_geometry.target import (
+    NEARLY_SINGULAR,
+    ONE,
+    SINGULAR,
+    TWO,
+    Target,
+    middles,
+)
+
+_FAR = 0.7
+"""Largest difference of a joint [rad or arm lengths] of two solutions whose path is examined: a
+valley bends little within 40 degrees."""
+_HALVINGS = 3  # of a path: its highest point is known to some percent from seven points
+_SLOPE = 1.05
+"""Part of the residual of a point in a valley up to which a path from it to a solution rises."""
+_KNOWN = 1e-2
+"""Distance [rad or arm lengths] to which a simple root is known at least, by `ONE` over the
+smallest singular value."""
+_TWICE = 1e-5
+"""Second smallest singular value below which two singular configurations are near: a decade above
+the one at which rounding of the pose moves solutions along both."""
+
+
+def separated(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
+    """Return the solutions, each component of the nearly solved configurations once.
+
+    Two solutions are one if a path joins them on which the residual stays below `DECIDED` or the
+    residual of the worse of the two. This highest residual changes by no more than the pose does.
+    A solution is marked as undecided
+
+    - if the highest residual on the path to another solution is between `ONE` and `TWO`,
+    - if rounding of the pose moves it by more than a hundredth of a radian,
+    - if its own residual is above `ONE`, so that no configuration may have exactly this pose,
+    - if two singular configurations are near it.
+
+    Args:
+        target: the pose.
+        found: solutions and self-motions.
+    """
+    if not found:
+        return found
+    q = np.array([root.q for root in found])
+    x, scale = q / target.unit, max(1.0, target.arm.length)
+    s, own = target.singular_values(q), target.residual(q)
+    for k, root in enumerate(found):
+        if root.family is not None:
+            own[k] = np.max(target.residual(root.family.chain_samples), initial=own[k])
+    singular = s[:, -1] < NEARLY_SINGULAR
+    undecided = (own > ONE * scale) | (singular & (_second(s) < _TWICE))
+    undecided |= [root.undecided for root in found]
+    simple = np.array([root.family is None and root.multiplicity == 1 for root in found])
+    undecided |= simple & (s[:, -1] * _KNOWN < ONE)
+    undecided |= _nearly_moves(target, found, x, s[:, -1] < SINGULAR)
+    first, second, begin, end = _pairs(target, found, x, singular)
+    height = heights(target, begin, end, TWO * scale, own[first], own[second])
+    open_ = (height > ONE * scale) & (height < TWO * scale)
+    undecided[first[open_]] = undecided[second[open_]] = True
+    limit = np.maximum(target.decided, _SLOPE * np.maximum(own[first], own[second]))
+    group = _components(len(found), first[height < limit], second[height < limit])
+    return [
+        _one([found[k] for k in members], own[members], bool(np.any(undecided[members])), target)
+        for members in (np.flatnonzero(group == g) for g in np.unique(group))
+    ]
+
+
+def _nearly_moves(
+    target: Target, found: list[ChainRoot], x: Array, singular: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """(m,) which singular solutions an arm can nearly leave while its frame stays.
+
+    No self-motion was found there, but the residual stays below `TWO` up to a distance of one
+    radian.
+    """
+    nearly = singular & np.array([root.family is None for root in found], dtype=bool)
+    rows = np.flatnonzero(nearly)
+    if not len(rows) or x.shape[1] != 6:
+        return np.zeros_like(nearly)
+    nearly[rows] = along_valley(target, x[rows]) < TWO * max(1.0, target.arm.length)
+    return nearly
+
+
+def _second(s: Array) -> Array:
+    """The second smallest singular values, infinite for one joint."""
+    return s[:, -2] if s.shape[1] > 1 else np.full(len(s), np.inf)
+
+
+def _pairs(
+    target: Target, found: list[ChainRoot], x: Array, singular: NDArray[np.bool_]
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Array, Array]:
+    """Pairs of solutions that a valley may join: indices, and the two ends of the path.
+
+    A path to a self-motion ends at its nearest sample.
+    """
+    samples = [
+        x[k][None] if root.family is None else root.family.chain_samples / target.unit
+        for k, root in enumerate(found)
+    ]
+    pairs = list[tuple[int, int]]()
+    ends = list[tuple[Array, Array]]()
+    for i in np.flatnonzero(singular):
+        for j in np.flatnonzero(singular[:i]):
+            away = target.wrapped(samples[i][:, None] - samples[j])
+            apart = np.max(np.abs(away), axis=2)
+            a, b = np.unravel_index(np.argmin(apart), apart.shape)
+            if apart[a, b] < _FAR:
+                pairs.append((int(j), int(i)))
+                ends.append((samples[j][b], samples[i][a]))
+    first, second = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
+    points = np.array(ends).reshape(-1, 2, x.shape[1])
+    return first, second, points[:, 0], points[:, 1]
+
+
+def heights(
+    target: Target, x: Array, other: Array, most: float, own: Array, others: Array
+) -> Array:
+    """Return the highest residuals (m,) on paths between configurations x and others, (m, n).
+
+    The points of a path are found by halving: a point half way is moved across the line that joins
+    its neighbours to where the residual is least. Paths that rise above a limit are not refined.
+
+    Args:
+        target: the pose.
+        x: (m, n) configurations, see `Target`.
+        other: (m, n) configurations.
+        most: residual above which two configurations are not joined.
+        own: (m,) residuals of x.
+        others: (m,) residuals of the others.
+    """
+    highest = np.zeros(len(x))
+    if not len(x):
+        return highest
+    points = np.stack([x, x + target.wrapped(other - x)], axis=1)
+    limit = np.maximum(most, _SLOPE * np.maximum(own, others))
+    for _ in range(_HALVINGS):
+        rows = np.flatnonzero(highest < limit)
+        if not len(rows):
+            break
+        a, b = points[rows, :-1], points[rows, 1:]
+        middle, residual = middles(target, a.reshape(-1, a.shape[-1]), b.reshape(-1, a.shape[-1]))
+        highest[rows] = np.maximum(highest[rows], np.max(residual.reshape(a.shape[:2]), axis=1))
+        finer = np.empty((len(x), 2 * points.shape[1] - 1, points.shape[2]))
+        finer[:, ::2] = points
+        finer[:, 1::2] = 0.5 * (points[:, :-1] + points[:, 1:])
+        finer[rows, 1::2] = middle.reshape(a.shape)
+        points = finer
+    return highest
+
+
+def _components(
+    count: int, first: NDArray[np.intp], second: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """(count,) the least index of the component of each point, from pairs that are joined."""
+    group = np.arange(count)
+    for i, j in zip(first, second, strict=True):
+        a, b = sorted((group[i], group[j]))
+        group[group == b] = a
+    return group
+
+
+def _one(members: list[ChainRoot], residual: Array, undecided: bool, target: Target) -> ChainRoot:
+    """The solution that stands for members of a component."""
+    if len(members) == 1:
+        return replace(members[0], undecided=undecided)
+    best = min(range(len(members)), key=lambda k: (members[k].family is None, residual[k]))
+    root = members[best]
+    branches = frozenset[str]().union(*(member.branches for member in members))
+    label = next((member.label for member in members if member.label), "")
+    if root.family is None:
+        counts = [
+            member.multiplicity
+            for member, miss in zip(members, residual, strict=True)
+            if miss <= target.decided
+        ]
+        # a root in which several meet counts all of them
+        roots = max(counts, default=1) if max(counts, default=1) > 1 else max(1, len(counts))
+        most = max(1, len(branches)) if branches else MOST_ROOTS
+        root = replace(root, multiplicity=min(roots, most), at_most=len(members) > 1)
+    return replace(root, label=label, branches=branches, undecided=undecided)

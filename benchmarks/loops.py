@@ -4,6 +4,7 @@
     python benchmarks/loops.py --build          # seconds to build N = 1, 10, 40 windows
     python benchmarks/loops.py --calls          # what a user's call costs beside the integration
     python benchmarks/loops.py --growth         # to the first step, N = 10 .. 160, nothing cached
+    python benchmarks/loops.py --windows        # a run of 10 s, N = 10 .. 320
     python benchmarks/loops.py --long           # 1000 s of a four-bar
 
 A time is the shortest of several runs of the integration alone, of models that are built already;
@@ -43,6 +44,9 @@ GROWTH = (10, 20, 40, 80, 160)
 """Windows of which `--growth` takes the time."""
 STUDY = 10
 """Cases of a sweep, each with its own start and file."""
+WINDOWS = (10, 20, 40, 80, 160, 320)
+"""Windows of which `--windows` takes the time."""
+WINDOWS_HEAD = ["mechanism", "run of 10 s, ms", "ms for a window"]
 GROWTH_HEAD = ["mechanism", "assembly", "equations, C text", "compiler", "together", "s", "MB"]
 Array = np.ndarray[Any, Any]
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
@@ -97,6 +101,8 @@ def main() -> None:
         os.environ["MBS_CACHE_DIR"] = folder  # so that compiling is measured
         if arguments.growth:
             text = growth_table()
+        elif arguments.windows:
+            text = windows_table(arguments.rounds)
         elif arguments.build:
             text = build_table()
         elif arguments.calls:
@@ -280,6 +286,20 @@ def growth_table() -> str:
     return _table(GROWTH_HEAD, lines)
 
 
+def windows_table(rounds: int, duration: float = 10.0, tolerance: float = 1e-4) -> str:
+    """Milliseconds of the processor for a call of `run` through singular configurations."""
+    lines = []
+    for count in WINDOWS:
+        system, spent = n_four_bar(count).assemble(), list[float]()
+        for _ in range(rounds + 1):  # the first call compiles
+            start = time.process_time()
+            mbs.simulate.run(system, duration, v0={"a0": -1.0}, tolerance=tolerance, quiet=True)
+            spent.append(1e3 * (time.process_time() - start))
+        best = min(spent[1:])
+        lines.append([f"N = {count}", f"{best:.1f}", f"{best / count:.2f}"])
+    return _table(WINDOWS_HEAD, lines)
+
+
 def long_run(seconds: float = 1000.0, tolerance: float = 1e-9) -> str:
     """A four-bar for a long time, through the singular configurations: what drifts, in a table."""
     case = CASES["n1"]
@@ -321,6 +341,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--build", action="store_true", help="time building alone")
     parser.add_argument("--calls", action="store_true", help="time a user's calls")
     parser.add_argument("--growth", action="store_true", help="time the way to the first step")
+    parser.add_argument("--windows", action="store_true", help="time runs of many windows")
     parser.add_argument("--long", action="store_true", help="1000 s of a four-bar")
     parser.add_argument("--output", help="Markdown file to write")
     return parser.parse_args()

@@ -225,7 +225,7 @@ def _load(path: Path, has_events: bool, has_passage: bool) -> ctypes.CDLL:
         types["mbs_watch"] = (ctypes.c_int, [handle, ctypes.c_int, ctypes.c_int])
         types["mbs_event"] = (None, [handle, pointer, pointer])
     if has_passage:
-        types["mbs_pass"] = (ctypes.c_int, [handle, ctypes.POINTER(ctypes.c_int), real])
+        types["mbs_pass"] = (ctypes.c_int, [handle, *2 * [pointer], real])
         types["mbs_leaves"] = (ctypes.c_int, [handle, pointer, pointer])
     for name, (result, arguments) in types.items():
         function = getattr(library, name)
@@ -246,8 +246,7 @@ def _opened(library: ctypes.CDLL, problem: IntegrationProblem) -> Iterator[ctype
         if driver and indicators is not None:
             full = library.mbs_watch(driver, indicators.numel_out(0), problem.modes) != 0
         if driver and not full and (through := problem.equations.passage) is not None:
-            sizes = (ctypes.c_int * len(through.size))(*through.size)
-            full = library.mbs_pass(driver, sizes, through.typical) != 0
+            full = _pass(library, driver, through)
         if driver and problem.sizes is not None:
             library.mbs_sizes(driver, *map(_pointer, problem.sizes))
         if driver and len(ends):
@@ -259,7 +258,25 @@ def _opened(library: ctypes.CDLL, problem: IntegrationProblem) -> Iterator[ctype
         library.mbs_close(driver)
 
 
-def _pointer(array: Array) -> int:
+def _pass(library: ctypes.CDLL, driver: ctypes.c_void_p, through: Passage) -> bool:
+    """Whether no memory is left for steps through singular configurations."""
+    sizes = (ctypes.c_int * len(through.size))(*through.size)
+    matrices = [(through.rows, number) for number in (1, 2, 5)] + [(through.forces, 0)]
+    places = [_places(function.sparsity_out(number)) for function, number in matrices]
+    pointers = (ctypes.c_void_p * len(places))(
+        *(None if x is None else _pointer(x) for x in places)
+    )
+    return bool(library.mbs_pass(driver, sizes, pointers, through.typical))
+
+
+def _places(pattern: casadi.Sparsity) -> npt.NDArray[np.intc] | None:
+    """Where a matrix has elements, as passage.h takes it; None if it has all of them."""
+    if pattern.is_dense():
+        return None
+    return np.array([*pattern.colind(), *pattern.row()], dtype=np.intc)
+
+
+def _pointer(array: npt.NDArray[Any]) -> int:
     return array.ctypes.data
 
 

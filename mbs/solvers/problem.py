@@ -267,11 +267,17 @@ def equations(
 
 
 def _passage(given: Passage, txp: list[casadi.MX]) -> Passage:
-    """The same under the names that the driver calls."""
+    """The same under the names that the driver calls; matrices alone may be sparse."""
+
+    def vectors_dense(name: str, function: casadi.Function) -> casadi.Function:
+        values = function.call(txp)
+        dense = [value if value.shape[1] > 1 else casadi.densify(value) for value in values]
+        return casadi.Function(name, txp, dense)
+
     return replace(
         given,
-        rows=_dense("mbs_rows", txp, *given.rows.call(txp)),
-        forces=_dense("mbs_forces", txp, *given.forces.call(txp)),
+        rows=vectors_dense("mbs_rows", given.rows),
+        forces=vectors_dense("mbs_forces", given.forces),
         regularity=_dense("mbs_regularity", txp, *given.regularity.call(txp)),
     )
 

@@ -176,13 +176,14 @@ static int regularity(void *user, double t, const double *x, double *value) {
     return call(user, mbs_regularity, t, x, value, NULL);
 }
 
-/* Before mbs_begin; size as passage_size. 1: out of memory. */
-EXPORT int mbs_pass(driver *d, const int *size, double typical) {
+/* Before mbs_begin; size as passage_size, the four patterns as passage_patterns. 1: out of memory. */
+EXPORT int mbs_pass(driver *d, const int *size, const int *const *given, double typical) {
     passage_size z = {size[0], size[1], size[2], size[3], size[4], size[5], size[6]};
+    passage_patterns patterns = {given[0], given[1], given[2], given[3]};
     passage_model model = {rows, forces, regularity, typical};
     d->passage_memory = calloc((size_t)PASSAGE_MEMORY(d->solver.n), sizeof(double));
     if (!d->passage_memory) return 1;
-    d->passage = passage_new(&d->solver, &z, &model, d->passage_memory);
+    d->passage = passage_new(&d->solver, &z, &patterns, &model, d->passage_memory);
     return d->passage == NULL;
 }
 

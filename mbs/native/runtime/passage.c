@@ -26,7 +26,6 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
 /* Rows beyond which the fill of pivots costs more than they tell: the last pivot is nearer to the
  * smallest singular value than the smallest of pivots in order, by a factor of two. */
 #define MANY 32
-#define LIGHT 1e-6 /* part of rows that count less; smaller ones would come behind dependent rows */
 #define LAST_MOVE 1e-9  /* after a move this small the next one is rounding */
 /* Part of the velocities, or of what they make of a step, by which a state may differ from where the
  * velocities and accelerations of the stages lead. What error control lets pass is a hundredth of it;
@@ -67,9 +66,18 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
 /* offsets in memory */
 enum { SIGMA, LARGEST, REGULARITY, RISE, SEEN, SEEN_TIME, BASED, BASE_TIME, BASE };
 
+/* Sets of rows, a bit for each. */
 typedef unsigned long long mask;
 #define BITS 64
 #define WORDS(n) (((n) + BITS - 1) / BITS)
+
+/* Where a matrix has elements, by columns: those of column k from start[k] on, before start[k + 1],
+ * are in the rows row[], in rising order. The same by rows: element from[] of the first order is in
+ * column column[]. */
+typedef struct {
+    int columns, rows, *start, *row;
+    int *begin, *column, *from;
+} pattern;
 
 /* A (n, m) = Q R by reflections, each of the rows alone in which its column has elements: rows of
  * loops touch few joints. */
@@ -82,11 +90,16 @@ typedef struct {
     double *size;        /* squares of what is left of columns, in that order, */
     mask *where;         /* and the rows in which they may have elements, WORDS(n) for each */
     int *last;           /* the last column that may have an element in a row, in their order */
+    mask *touched;       /* by columns of A: the rows in which one may have had elements; */
+    int *upper, *uppers; /* the rows of R in which it has some but the last, and how many they are */
+    int height, columns; /* of A as it was filled last; elements outside touched are zero. height is 0
+                            where they need not be */
 } factors;
 
 /* Rows and forces at a point, and the tangents there. */
 typedef struct {
     passage_rows rows;
+    double *inertia;      /* elements of M */
     double *M, *f, *rate; /* M is replaced by its Cholesky factor L */
     int *end;             /* of the columns of L, the row behind their last element */
     factors qr;           /* of L^-1 J' */
@@ -103,6 +116,8 @@ struct passage {
     passage_model model;
     double *memory, *block;
     int *numbers;
+    pattern slope, J, N, M;
+    int *J_from; /* where nq is nv: the elements of slope that are those of J */
     frame base, here;
     factors other; /* of matrices that last for one solution */
     double *C;            /* (d, nq) coordinates of positions */
@@ -135,6 +150,40 @@ static void lower(const double *L, const int *end, int n, double *b) {
     }
 }
 
+static mask bit(int row) { return (mask)1 << row % BITS; }
+
+/* The first row of a set from a row on; n if there is none. */
+static int next_row(const mask *set, int row, int n) {
+    int word = row / BITS;
+    mask bits;
+    if (row >= n) return n;
+    bits = set[word] & ~(mask)0 << row % BITS;
+    while (!bits) {
+        if (++word >= WORDS(n)) return n;
+        bits = set[word];
+    }
+    row = word * BITS;
+#ifdef __GNUC__
+    return row + __builtin_ctzll(bits);
+#else
+    while (!(bits & 1)) bits >>= 1, row++;
+    return row;
+#endif
+}
+
+/* The same as lower for b with elements in a set of rows, which grows. */
+static void lower_among(const double *L, const int *end, int n, mask *set, double *b) {
+    int i, k;
+    for (k = next_row(set, 0, n); k < n; k = next_row(set, k + 1, n)) {
+        if (b[k] == 0.0) continue;
+        b[k] /= L[k * n + k];
+        for (i = k + 1; i < end[k]; i++) {
+            b[i] -= L[k * n + i] * b[k];
+            set[i / BITS] |= bit(i);
+        }
+    }
+}
+
 static void lower_transposed(const double *L, const int *end, int n, double *b) {
     int i, k;
     for (k = n - 1; k >= 0; k--) {
@@ -144,7 +193,7 @@ static void lower_transposed(const double *L, const int *end, int n, double *b) 
     }
 }
 
-/* M (n, n) = L L', and where its columns end; 1 where a pivot is too small. */
+/* M (n, n) = L L', and where its columns end; before, a bound of that. 1 where a pivot is too small. */
 static int cholesky(double *M, int *end, int n) {
     double largest = 0.0;
     int i, j, k;
@@ -153,52 +202,73 @@ static int cholesky(double *M, int *end, int n) {
         double *column = M + k * n;
         if (!(column[k] > MASSLESS * largest)) return 1;
         column[k] = sqrt(column[k]);
-        for (end[k] = n; end[k] > k + 1 && column[end[k] - 1] == 0.0; end[k]--) continue;
+        for (; end[k] > k + 1 && column[end[k] - 1] == 0.0; end[k]--) continue;
         for (i = k + 1; i < end[k]; i++) column[i] /= column[k];
-        for (j = k + 1; j < end[k]; j++)
-            for (i = j; i < end[k] && column[j] != 0.0; i++) M[j * n + i] -= column[i] * column[j];
+        for (j = k + 1; j < end[k]; j++) {
+            if (column[j] == 0.0) continue;
+            for (i = j; i < end[k]; i++) M[j * n + i] -= column[i] * column[j];
+            if (end[j] < end[k]) end[j] = end[k];
+        }
     }
     return 0;
 }
 
 static int rows_at(passage *g, double t, const double *x, const passage_rows *rows) {
-    const passage_size *z = &g->size;
-    int j, nv = z->nv;
+    int j, nv = g->size.nv;
     if (g->model.rows(g->s->user, t, x, rows)) return 1;
-    if (z->nq > nv) return 0;
+    if (g->size.nq > nv) return 0;
     memset(rows->bend, 0, sizeof(double) * (size_t)nv);
-    for (j = 0; j < nv; j++)
-        memcpy(rows->J + j * z->speeds, rows->slope + j * z->positions,
-               sizeof(double) * (size_t)z->speeds);
+    for (j = 0; j < g->J.start[nv]; j++) rows->J[j] = rows->slope[g->J_from[j]];
     return 0;
 }
 
 static int evaluate(passage *g, frame *p, double t, const double *x) {
     void *user = g->s->user;
-    if (rows_at(g, t, x, &p->rows) || g->model.forces(user, t, x, p->M, p->f, p->rate))
+    if (rows_at(g, t, x, &p->rows) || g->model.forces(user, t, x, p->inertia, p->f, p->rate))
         return 1;
     p->rank = (int)fmin(*p->rows.rank, fmin(g->size.nv, g->size.speeds));
     p->more = 0.0;
-    return !stepper_all_finite(p->M, g->size.nv * g->size.nv) ||
+    return !stepper_all_finite(p->inertia, g->M.start[g->size.nv]) ||
            !stepper_all_finite(p->f, g->size.nv);
+}
+
+/* M in place of L, and bounds of where its columns end. */
+static void place_mass(const passage *g, frame *p) {
+    int n = g->size.nv, i, k;
+    for (k = 0; k < n; k++) {
+        double *column = p->M + k * n;
+        int first = g->M.start[k], after = g->M.start[k + 1];
+        for (i = k; i < p->end[k]; i++) column[i] = 0.0;
+        p->end[k] = k + 1;
+        for (i = first; i < after; i++) {
+            if (g->M.row[i] < k) continue;
+            column[g->M.row[i]] = p->inertia[i];
+            p->end[k] = g->M.row[i] + 1;
+        }
+    }
 }
 
 /* L of M; of M + more J' J where links without mass leave M singular: on the rows it moves alike. */
 static int factor_mass(passage *g, frame *p) {
     int n = g->size.nv, m = g->size.speeds, i, j, k;
-    double *copy = g->G, mass = 0.0, length = 0.0;
-    memcpy(copy, p->M, sizeof(double) * (size_t)(n * n));
+    double *square = g->G, mass = 0.0, length = 0.0;
+    place_mass(g, p);
     if (!cholesky(p->M, p->end, n)) return 0;
-    for (k = 0; k < n; k++) mass += copy[k * n + k];
-    for (k = 0; k < n * m; k++) length += p->rows.J[k] * p->rows.J[k];
+    place_mass(g, p);
+    for (k = 0; k < n; k++) mass += p->M[k * n + k];
+    for (k = 0; k < g->J.start[n]; k++) length += p->rows.J[k] * p->rows.J[k];
     if (!(length > 0.0) || !(mass > 0.0)) return 1;
     p->more = mass / length;
-    for (j = 0; j < n; j++)
-        for (i = 0; i < n; i++) {
-            double sum = 0.0;
-            for (k = 0; k < m; k++) sum += p->rows.J[i * m + k] * p->rows.J[j * m + k];
-            p->M[j * n + i] = copy[j * n + i] + p->more * sum;
-        }
+    memset(square, 0, sizeof(double) * (size_t)(n * n));
+    for (k = 0; k < m; k++)
+        for (j = g->J.begin[k]; j < g->J.begin[k + 1]; j++)
+            for (i = j; i < g->J.begin[k + 1]; i++)
+                square[g->J.column[j] * n + g->J.column[i]] +=
+                    p->rows.J[g->J.from[i]] * p->rows.J[g->J.from[j]];
+    for (j = 0; j < n; j++) {
+        for (i = j; i < n; i++) p->M[j * n + i] += p->more * square[j * n + i];
+        p->end[j] = n;
+    }
     return cholesky(p->M, p->end, n);
 }
 
@@ -215,20 +285,50 @@ static void reflect(const factors *f, int n, int k, double *b) {
     for (i = 1; i < count; i++) b[rows[i]] -= sum * tail[i];
 }
 
+/* A (n, m) becomes zero, and its columns are to be filled by put. */
+static void begin_columns(factors *f, int n, int m) {
+    int known = f->height == n && f->columns >= m ? m : 0, words = WORDS(n), i, j;
+    for (j = 0; j < known; j++) {
+        mask *touched = f->touched + j * words;
+        for (i = next_row(touched, 0, n); i < n; i = next_row(touched, i + 1, n)) f->A[j * n + i] = 0.0;
+    }
+    if (!known) memset(f->A, 0, sizeof *f->A * (size_t)(n * m));
+    memset(f->touched, 0, sizeof *f->touched * (size_t)(m * words));
+    f->columns = known ? f->columns : m;
+    f->height = n;
+}
+
+static void put(factors *f, int n, int i, int j, double value) {
+    f->A[j * n + i] = value;
+    f->touched[j * WORDS(n) + i / BITS] |= bit(i);
+}
+
+/* A was filled in another way. */
+static void look_for_columns(factors *f, int n, int m) {
+    int i, j;
+    memset(f->touched, 0, sizeof *f->touched * (size_t)(m * WORDS(n)));
+    for (j = 0; j < m; j++)
+        for (i = 0; i < n; i++)
+            if (f->A[j * n + i] != 0.0) f->touched[j * WORDS(n) + i / BITS] |= bit(i);
+    f->height = 0;
+}
+
 /* Where the column at place k has elements, and its length. */
 static void look_at(factors *f, int n, int k) {
     const double *column = f->A + f->order[k] * n;
+    const mask *touched = f->touched + f->order[k] * WORDS(n);
     mask *where = f->where + k * WORDS(n);
     double size = 0.0;
     int i;
     memset(where, 0, sizeof(mask) * (size_t)WORDS(n));
-    for (i = 0; i < n; i++) {
+    for (i = next_row(touched, 0, n); i < n; i = next_row(touched, i + 1, n)) {
         if (column[i] == 0.0) continue;
-        where[i / BITS] |= (mask)1 << i % BITS;
+        where[i / BITS] |= bit(i);
         f->last[i] = k;
         size += column[i] * column[i];
     }
     f->size[k] = size;
+    f->uppers[f->order[k]] = 0;
 }
 
 /* The columns at places k and j change them. */
@@ -250,15 +350,13 @@ static void make_reflection(factors *f, int n, int k, int many) {
     double *column = f->A + f->order[k] * n, *tail = f->tails + k * n;
     mask *where = f->where + k * WORDS(n);
     int *rows = f->moved + k * n, count = 0, first, i;
-    if (!many) where[f->row[k] / BITS] |= (mask)1 << f->row[k] % BITS;
-    for (i = k; i < n; i++) {
-        int row = f->row[i];
-        if (where[row / BITS] >> row % BITS & 1) rows[count++] = row;
-    }
+    if (!many) where[f->row[k] / BITS] |= bit(f->row[k]);
+    for (i = next_row(where, 0, n); i < n; i = next_row(where, i + 1, n)) rows[count++] = i;
     if (count == 0) rows[count++] = f->row[k];
     for (i = 0; i < count; i++) tail[i] = column[rows[i]];
     f->weight[k] = dense_reflection(tail, count);
     column[rows[0]] = tail[0];
+    f->touched[f->order[k] * WORDS(n) + rows[0] / BITS] |= bit(rows[0]);
     f->count[k] = count;
     for (first = k; f->row[first] != rows[0]; first++) continue;
     for (; first > k; first--) f->row[first] = f->row[first - 1];
@@ -268,15 +366,16 @@ static void make_reflection(factors *f, int n, int k, int many) {
 /* The column at place j after reflection k: where they meet its rows may have elements now, but
  * row k is done. What is left of it is summed where somebody asks for it. */
 static void reflect_column(factors *f, int n, int k, int j, int sums) {
-    int i, words = WORDS(n), done = f->row[k];
-    mask *where = f->where + j * words;
+    int i, words = WORDS(n), done = f->row[k], own = f->order[j];
+    mask *touched = f->touched + own * words, *where = f->where + j * words;
     const mask *other = f->where + k * words;
-    double *column = f->A + f->order[j] * n;
+    double *column = f->A + own * n;
     for (i = 0; i < words && !(where[i] & other[i]); i++) continue;
     if (i == words) return;
     reflect(f, n, k, column);
-    for (i = 0; i < words; i++) where[i] |= other[i];
-    where[done / BITS] &= ~((mask)1 << done % BITS);
+    for (i = 0; i < words; i++) where[i] |= other[i], touched[i] |= where[i];
+    where[done / BITS] &= ~bit(done);
+    f->upper[own * n + f->uppers[own]++] = done;
     if (!sums) return;
     for (f->size[j] = 0.0, i = k + 1; i < n; i++)
         f->size[j] += column[f->row[i]] * column[f->row[i]];
@@ -323,7 +422,8 @@ static void forward(const factors *f, int n, int rank, const double *b, double *
     for (k = 0; k < rank; k++) {
         const double *column = f->A + f->order[k] * n;
         double sum = b[f->order[k]];
-        for (i = 0; i < k; i++) sum -= column[f->row[i]] * y[f->row[i]];
+        const int *upper = f->upper + f->order[k] * n;
+        for (i = 0; i < f->uppers[f->order[k]]; i++) sum -= column[upper[i]] * y[upper[i]];
         y[f->row[k]] = sum / column[f->row[k]];
     }
 }
@@ -341,10 +441,12 @@ static void reflect_back(const factors *f, int n, int rank, double *y) {
 /* L^-1 J' = Q R, as many columns as the rank. */
 static void factor_rows(passage *g, frame *p) {
     int n = g->size.nv, m = g->size.speeds, i, j;
-    double *A = p->qr.A;
+    factors *f = &p->qr;
+    begin_columns(f, n, m);
     for (j = 0; j < m; j++) {
-        for (i = 0; i < n; i++) A[j * n + i] = p->rows.J[i * m + j];
-        lower(p->M, p->end, n, A + j * n);
+        for (i = g->J.begin[j]; i < g->J.begin[j + 1]; i++)
+            put(f, n, g->J.column[i], j, p->rows.J[g->J.from[i]]);
+        lower_among(p->M, p->end, n, f->touched + j * WORDS(n), f->A + j * n);
     }
     factorize(&p->qr, n, m, p->rank, 0.0);
     p->sigma = p->rank ? HUGE_VAL : 1.0;
@@ -354,7 +456,9 @@ static void factor_rows(passage *g, frame *p) {
 /* The shortest y (n,) with A' y = b, A (n, m), on its rows that are not nearly dependent. */
 static void shortest(passage *g, int n, int m, const double *b, double least, double *y) {
     factors *f = &g->other;
-    int rank = factorize(f, n, m, n < m ? n : m, least), k;
+    int rank, k;
+    look_for_columns(f, n, m);
+    rank = factorize(f, n, m, n < m ? n : m, least);
     memset(y, 0, sizeof(double) * (size_t)n);
     for (k = 0; k < rank; k++) /* what is empty determines nothing */
         if (pivot_of(f, n, k) == 0.0) rank = k;
@@ -396,10 +500,11 @@ static void particular(const passage *g, const frame *p, double *v) {
 
 /* Element i of N v. */
 static double rate_of(const passage *g, const passage_rows *rows, int i, const double *v) {
-    int nq = g->size.nq, nv = g->size.nv, j;
     double rate = 0.0;
-    if (nq == nv) return v[i];
-    for (j = 0; j < nv; j++) rate += rows->N[j * nq + i] * v[j];
+    int j;
+    if (g->size.nq == g->size.nv) return v[i];
+    for (j = g->N.begin[i]; j < g->N.begin[i + 1]; j++)
+        rate += rows->N[g->N.from[j]] * v[g->N.column[j]];
     return rate;
 }
 
@@ -456,31 +561,33 @@ static int coordinates_of_base(passage *g) {
     int nq = g->size.nq, nv = g->size.nv, i, j, k, d = nv - p->rank;
     double *S = g->G, *B = g->K; /* (nv, nv), (nv, d) */
     g->d = d;
-    for (k = 0; k < d; k++)
+    for (k = 0; k < d; k++) {
+        double *column = B + k * nv; /* M T = L L' T */
+        memset(column, 0, sizeof(double) * (size_t)nv);
         for (i = 0; i < nv; i++) {
-            double sum = 0.0; /* M T = L L' T */
-            B[k * nv + i] = 0.0;
-            for (j = i; j < nv; j++) sum += p->M[i * nv + j] * p->T[k * nv + j];
-            g->y[i] = sum;
-            for (j = 0; j <= i; j++) B[k * nv + i] += p->M[j * nv + i] * g->y[j];
+            double sum = 0.0;
+            for (j = i; j < p->end[i]; j++) sum += p->M[i * nv + j] * p->T[k * nv + j];
+            for (j = i; j < p->end[i]; j++) column[j] += p->M[i * nv + j] * sum;
         }
+    }
     if (nq == nv) {
         for (k = 0; k < d; k++)
             for (i = 0; i < nq; i++) g->C[i * d + k] = B[k * nv + i];
         return 0;
     }
     for (i = 0; i < nv; i++)
-        for (j = 0; j < nv; j++) {
-            S[j * nv + i] = 0.0;
-            for (k = 0; k < nq; k++)
-                S[j * nv + i] += p->rows.N[i * nq + k] * p->rows.N[j * nq + k];
-        }
+        for (j = 0; j < nv; j++) S[j * nv + i] = 0.0;
+    for (k = 0; k < nq; k++)
+        for (i = g->N.begin[k]; i < g->N.begin[k + 1]; i++)
+            for (j = g->N.begin[k]; j < g->N.begin[k + 1]; j++)
+                S[g->N.column[j] * nv + g->N.column[i]] +=
+                    p->rows.N[g->N.from[i]] * p->rows.N[g->N.from[j]];
     if (solve(S, nv, B, d)) return 1;
     for (k = 0; k < d; k++)
         for (i = 0; i < nq; i++) {
             g->C[i * d + k] = 0.0;
-            for (j = 0; j < nv; j++)
-                g->C[i * d + k] += p->rows.N[j * nq + i] * B[k * nv + j];
+            for (j = g->N.begin[i]; j < g->N.begin[i + 1]; j++)
+                g->C[i * d + k] += p->rows.N[g->N.from[j]] * B[k * nv + g->N.column[j]];
         }
     return 0;
 }
@@ -506,15 +613,30 @@ static int newton_step(passage *g, int rows, double *r) {
     return 0;
 }
 
+/* The rows below the first ones of a square matrix whose transposed first rows are factorized: Z, the
+ * directions along the first rows (d, n), and S (d, d) the last rows D (d, n) along them. */
+static void border(const factors *f, int n, int d, const double *D, double *Z, double *S) {
+    int m = n - d, i, j, k;
+    memset(Z, 0, sizeof(double) * (size_t)(n * d));
+    for (k = 0; k < d; k++) {
+        Z[k * n + f->row[m + k]] = 1.0;
+        reflect_back(f, n, m, Z + k * n);
+        for (j = 0; j < d; j++)
+            for (S[k * d + j] = 0.0, i = 0; i < n; i++) S[k * d + j] += D[j * n + i] * Z[k * n + i];
+    }
+}
+
 /* The same where there are as many rows as positions: onto the rows of the loops, which touch few
- * joints each, then along them by the last rows of K, those of xi, which touch all. */
-static int sparse_newton_step(passage *g, double *r) {
+ * joints each, then along them by the rows D (d, nq), those of xi, which touch all. */
+static int sparse_newton_step(passage *g, const double *slopes, const double *D, double *r) {
     factors *f = &g->other;
     int n = g->size.nq, d = g->d, m = n - d, i, j, k;
-    double *A = f->A, *step = g->y, *along = g->K + n * n, *S = g->G;
+    double *step = g->y, *along = g->K + n * n, *S = g->G;
     double least = HUGE_VAL, most = 0.0;
+    begin_columns(f, n, m);
     for (j = 0; j < m; j++)
-        for (i = 0; i < n; i++) A[j * n + i] = g->K[i * n + j];
+        for (i = g->slope.begin[j]; i < g->slope.begin[j + 1]; i++)
+            put(f, n, g->slope.column[i], j, slopes[g->slope.from[i]]);
     factorize(f, n, m, m, 0.0);
     for (k = 0; k < m; k++) {
         least = fmin(least, pivot_of(f, n, k));
@@ -524,16 +646,9 @@ static int sparse_newton_step(passage *g, double *r) {
     memset(step, 0, sizeof(double) * (size_t)n);
     forward(f, n, m, r, step);
     reflect_back(f, n, m, step);
-    memset(along, 0, sizeof(double) * (size_t)(n * d));
-    for (k = 0; k < d; k++) {
-        double *Z = along + k * n;
-        Z[f->row[m + k]] = 1.0;
-        reflect_back(f, n, m, Z);
-        for (i = 0; i < n; i++) r[m + k] -= g->K[i * n + m + k] * step[i];
-        for (j = 0; j < d; j++)
-            for (S[k * d + j] = 0.0, i = 0; i < n; i++)
-                S[k * d + j] += g->K[i * n + m + j] * Z[i];
-    }
+    border(f, n, d, D, along, S);
+    for (k = 0; k < d; k++)
+        for (i = 0; i < n; i++) r[m + k] -= D[k * n + i] * step[i];
     if (solve(S, d, r + m, 1)) return 1;
     for (k = 0; k < d; k++)
         for (i = 0; i < n; i++) step[i] += along[k * n + i] * r[m + k];
@@ -553,20 +668,25 @@ static int onto_rows(passage *g, double t, const double *xi, double *x, double *
         if (rows_at(g, t, x, &p->rows)) return 1;
         memcpy(r, p->rows.position, sizeof(double) * (size_t)m);
         for (i = first; i < after; i++) r[i] -= g->base.rows.position[i];
-        for (j = 0; j < nq; j++)
-            memcpy(K + j * rows, p->rows.slope + j * m, sizeof(double) * (size_t)m);
+        if (rows != nq) {
+            memset(K, 0, sizeof(double) * (size_t)(rows * nq));
+            for (j = 0; j < nq; j++)
+                for (i = g->slope.start[j]; i < g->slope.start[j + 1]; i++)
+                    K[j * rows + g->slope.row[i]] = p->rows.slope[i];
+        }
         for (k = 0; k < d; k++) { /* rows of about unit length */
             double size = 0.0, off = -xi[k];
             for (j = 0; j < nq; j++) size += g->C[j * d + k] * g->C[j * d + k];
             size = sqrt(size);
             for (j = 0; j < nq; j++) {
-                K[j * rows + m + k] = g->C[j * d + k] / size;
+                K[rows == nq ? k * nq + j : j * rows + m + k] = g->C[j * d + k] / size;
                 off += g->C[j * d + k] * (x[j] - q0[j]);
             }
             r[m + k] = off / size;
         }
         if (rows < nq || !stepper_all_finite(r, rows)) return 1;
-        if (rows == nq ? sparse_newton_step(g, r) : newton_step(g, rows, r)) return 1;
+        if (rows == nq ? sparse_newton_step(g, p->rows.slope, K, r) : newton_step(g, rows, r))
+            return 1;
         for (k = 0; k < nq; k++) {
             x[k] -= r[k];
             move = fmax(move, fabs(r[k]));
@@ -661,8 +781,8 @@ static int lift(passage *g, double t, const double *y, double *x, double *xdot, 
         return STEPPER_SINGULAR;
     for (i = 0; i < nv; i++) {
         double sum = p->f[i];
-        for (j = 0; j < g->size.speeds && p->more > 0.0; j++)
-            sum += p->more * p->rows.J[i * g->size.speeds + j] * p->rows.c[j];
+        for (j = g->J.start[i]; j < g->J.start[i + 1] && p->more > 0.0; j++)
+            sum += p->more * p->rows.J[j] * p->rows.c[g->J.row[j]];
         a[i] = sum;
     }
     lower(p->M, p->end, nv, a);
@@ -863,7 +983,7 @@ static void error_of(const passage *g, double h, double *error) {
         if (nq == nv)
             error[i] += move;
         else
-            for (j = 0; j < nq; j++) error[j] += N[i * nq + j] * move;
+            for (j = g->N.start[i]; j < g->N.start[i + 1]; j++) error[g->N.row[j]] += N[j] * move;
     }
     memcpy(error + nq + nv, e + 2 * d, sizeof(double) * (size_t)nz);
 }
@@ -882,42 +1002,148 @@ static void cubic(const passage *g, const double *x, const double *y, double h, 
     }
 }
 
-/* The rows of velocities that the base chose, and those of the coordinates: square, singular where
- * the rows are dependent; transposed where asked for. */
-static void square(const passage *g, const passage_rows *rows, int transposed, double *K) {
-    int nq = g->size.nq, nv = g->size.nv, m = g->size.speeds, i, j, k;
-    for (j = 0; j < nv; j++)
-        for (k = 0; k < nv; k++) {
+/* The rows of the coordinates for velocities, C N (d, nv). */
+static void coordinate_rows(const passage *g, const passage_rows *rows, double *D) {
+    int nq = g->size.nq, nv = g->size.nv, d = g->d, i, j, k;
+    for (k = 0; k < d; k++)
+        for (j = 0; j < nv; j++) {
             double value = 0.0;
-            if (k < g->base.rank)
-                value = rows->J[j * m + g->base.qr.order[k]];
-            else if (nq == nv)
-                value = g->C[j * g->d + k - g->base.rank];
+            if (nq == nv)
+                value = g->C[j * d + k];
             else
-                for (i = 0; i < nq; i++)
-                    value += g->C[i * g->d + k - g->base.rank] * rows->N[j * nq + i];
-            K[transposed ? k * nv + j : j * nv + k] = value;
+                for (i = g->N.start[j]; i < g->N.start[j + 1]; i++)
+                    value += g->C[g->N.row[i] * d + k] * rows->N[i];
+            D[k * nv + j] = value;
         }
 }
 
+/* The rows of velocities that the base chose, and those of the coordinates: square, singular where
+ * the rows are dependent; transposed where asked for. */
+static void square(const passage *g, const passage_rows *rows, int transposed, double *K) {
+    int nv = g->size.nv, rank = g->base.rank, j, k;
+    double *D = g->G;
+    coordinate_rows(g, rows, D);
+    memset(K, 0, sizeof(double) * (size_t)(nv * nv));
+    for (k = 0; k < rank; k++) {
+        int row = g->base.qr.order[k];
+        for (j = g->J.begin[row]; j < g->J.begin[row + 1]; j++) {
+            int column = g->J.column[j];
+            K[transposed ? k * nv + column : column * nv + k] = rows->J[g->J.from[j]];
+        }
+    }
+    for (k = rank; k < nv; k++)
+        for (j = 0; j < nv; j++)
+            K[transposed ? k * nv + j : j * nv + k] = D[(k - rank) * nv + j];
+}
+
+/* 1 or -1: whether an odd number of exchanges makes it. */
+static int parity(const int *order, int n, int *seen) {
+    int sign = 1, i, j;
+    for (i = 0; i < n; i++) seen[i] = 0;
+    for (i = 0; i < n; i++)
+        for (j = order[i]; !seen[i] && j != i; j = order[j]) seen[j] = 1, sign = -sign;
+    return sign;
+}
+
+/* The same matrix by factors of the many rows that touch few joints: g->other, Z and S of border. */
+static void factor_square(passage *g, const passage_rows *rows, double *Z, double *S) {
+    factors *f = &g->other;
+    int n = g->size.nv, rank = g->base.rank, i, k;
+    double *D = Z + n * g->d;
+    begin_columns(f, n, rank);
+    for (k = 0; k < rank; k++) {
+        int row = g->base.qr.order[k];
+        for (i = g->J.begin[row]; i < g->J.begin[row + 1]; i++)
+            put(f, n, g->J.column[i], k, rows->J[g->J.from[i]]);
+    }
+    factorize(f, n, rank, rank, 0.0);
+    coordinate_rows(g, rows, D);
+    border(f, n, g->d, D, Z, S);
+}
+
+/* The sign of its determinant: each reflection changes it. */
+static int sign_of_square(passage *g, const passage_rows *rows) {
+    factors *f = &g->other;
+    int n = g->size.nv, rank = g->base.rank, sign, k;
+    double *S = g->G;
+    factor_square(g, rows, g->K, S);
+    sign = parity(f->row, n, f->last) * parity(f->order, rank, f->last);
+    for (k = 0; k < rank; k++) {
+        double pivot = f->A[f->order[k] * n + f->row[k]];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        if ((pivot < 0.0) != (f->weight[k] != 0.0)) sign = -sign;
+    }
+    return sign * eliminate(S, g->d, NULL, 0);
+}
+
+/* y = K^-1 y, or with K transposed, for that matrix K; 1 if it is singular. */
+static int solve_square(passage *g, const passage_rows *rows, int transposed, double *y) {
+    factors *f = &g->other;
+    int n = g->size.nv, rank = g->base.rank, d = g->d, i, k;
+    double *Z = g->K, *D = Z + n * d, *z = D + n * d, *S = g->G;
+    factor_square(g, rows, Z, S);
+    memset(z, 0, sizeof(double) * (size_t)n);
+    for (k = 0; k < rank; k++)
+        if (pivot_of(f, n, k) == 0.0) return 1;
+    if (!transposed) { /* onto the first rows, then along them */
+        forward(f, n, rank, y, z);
+        reflect_back(f, n, rank, z);
+        for (k = 0; k < d; k++)
+            for (i = 0; i < n; i++) y[rank + k] -= D[k * n + i] * z[i];
+        if (solve(S, d, y + rank, 1)) return 1;
+        for (k = 0; k < d; k++)
+            for (i = 0; i < n; i++) z[i] += Z[k * n + i] * y[rank + k];
+        memcpy(y, z, sizeof(double) * (size_t)n);
+        return 0;
+    }
+    for (k = 0; k < d; k++) { /* the last rows first, which alone move what is along the others */
+        double sum = 0.0;
+        for (i = 0; i < n; i++) sum += Z[k * n + i] * y[i];
+        z[k] = sum;
+    }
+    for (k = 0; k < d; k++) /* S transposed */
+        for (i = 0; i < k; i++) {
+            double kept = S[k * d + i];
+            S[k * d + i] = S[i * d + k];
+            S[i * d + k] = kept;
+        }
+    if (solve(S, d, z, 1)) return 1;
+    for (k = 0; k < d; k++)
+        for (i = 0; i < n; i++) y[i] -= D[k * n + i] * z[k];
+    for (k = 0; k < rank; k++) reflect(f, n, k, y);
+    for (k = rank - 1; k >= 0; k--) {
+        int own = f->order[k];
+        const double *column = f->A + own * n;
+        z[d + own] = y[f->row[k]] / column[f->row[k]];
+        for (i = 0; i < f->uppers[own]; i++)
+            y[f->upper[own * n + i]] -= column[f->upper[own * n + i]] * z[d + own];
+    }
+    memcpy(y, z + d, sizeof(double) * (size_t)rank);
+    memcpy(y + rank, z, sizeof(double) * (size_t)d);
+    return 0;
+}
+
 /* The side of the singular configuration on which a point is, by the sign of a determinant. */
-static int side_of(const passage *g, const passage_rows *rows) {
-    int n = g->size.nv, rank = g->base.rank, j, k;
+static int side_of(passage *g, const passage_rows *rows) {
+    if (g->base.rank > MANY) return sign_of_square(g, rows);
     square(g, rows, 0, g->K);
-    for (j = 0; j < n && rank > MANY; j++) /* rows that touch all joints are to be the last pivots */
-        for (k = rank; k < n; k++) g->K[j * n + k] *= LIGHT;
-    return eliminate(g->K, n, NULL, 0);
+    return eliminate(g->K, g->size.nv, NULL, 0);
 }
 
 /* How far the rows are from holding where they are dependent: what of them no move of the positions
  * changes there, zero where branches of motion meet. */
-static double gap_of(const passage *g, const passage_rows *rows) {
-    int n = g->size.nv, first = g->size.speeds - g->size.anchors, i, pass;
+static double gap_of(passage *g, const passage_rows *rows) {
+    int n = g->size.nv, first = g->size.speeds - g->size.anchors, i, pass, status;
     double *y = g->y, most = 0.0, sum = 0.0;
     for (i = 0; i < n; i++) y[i] = 1.0;
     for (pass = 0; pass < 2; pass++) { /* towards the null vectors on the right and on the left */
-        square(g, rows, pass, g->K);
-        if (solve(g->K, n, y, 1)) return 0.0;
+        if (g->base.rank > MANY) {
+            status = solve_square(g, rows, pass, y);
+        } else {
+            square(g, rows, pass, g->K);
+            status = solve(g->K, n, y, 1);
+        }
+        if (status) return 0.0;
         for (most = 0.0, i = 0; i < n; i++) most = fmax(most, fabs(y[i]));
         for (i = 0; i < n; i++) y[i] /= most;
     }
@@ -941,7 +1167,7 @@ static int jumps(passage *g, double t, const double *x, double h, const double *
     if (g->base.rank == 0 || g->singular) return 0;
     for (j = 0; j < nv; j++) { /* |v| in the metric of M = L L' */
         double sum = 0.0;
-        for (i = j; i < nv; i++) sum += g->here.M[j * nv + i] * v[i];
+        for (i = j; i < g->here.end[j]; i++) sum += g->here.M[j * nv + i] * v[i];
         speed += sum * sum;
     }
     if (rows_at(g, t, x, &g->here.rows)) return 0;
@@ -1163,15 +1389,20 @@ int passage_singular(passage *g, double t, const double *x) {
 int passage_place(passage *g, double t, double *x, const int *loose, int count) {
     int m = g->size.positions, first = g->size.speeds - g->size.anchors, i, j, pass;
     double worst = HUGE_VAL, move = HUGE_VAL, *A = g->other.A, *r = g->r;
+    g->other.height = 0;
     for (pass = 0; pass <= PLACING; pass++) {
         if (rows_at(g, t, x, &g->here.rows)) return 1;
         for (worst = 0.0, j = 0; j < m; j++) {
             int free = j >= first && j < g->size.speeds; /* what stops and friction lock is there */
             r[j] = free ? 0.0 : -g->here.rows.position[j];
             worst = fmax(worst, fabs(r[j]));
-            for (i = 0; i < count; i++)
-                A[j * count + i] = free ? 0.0 : g->here.rows.slope[loose[i] * m + j];
+            memset(A + j * count, 0, sizeof(double) * (size_t)count);
         }
+        for (i = 0; i < count; i++)
+            for (j = g->slope.start[loose[i]]; j < g->slope.start[loose[i] + 1]; j++) {
+                int row = g->slope.row[j], free = row >= first && row < g->size.speeds;
+                if (!free) A[row * count + i] = g->here.rows.slope[j];
+            }
         if (!isfinite(worst) || !stepper_all_finite(A, m * count)) return 1;
         if (move < LAST_MOVE || pass == PLACING) break;
         shortest(g, count, m, r, SETTLED, g->y);
@@ -1190,10 +1421,10 @@ int passage_velocities(passage *g, double t, double *x, const int *kept, int cou
     for (j = 0; j < m + count; j++) {
         int anchored = j >= m - g->size.anchors && j < m;
         r[j] = j < m ? g->here.rows.b[j] : v[kept[j - m]];
-        for (i = 0; i < nv; i++) {
-            double value = j < m ? g->here.rows.J[i * m + j] : i == kept[j - m];
-            A[j * nv + i] = anchored ? 0.0 : value;
-        }
+        memset(A + j * nv, 0, sizeof(double) * (size_t)nv);
+        for (i = j < m ? g->J.begin[j] : 0; j < m && i < g->J.begin[j + 1] && !anchored; i++)
+            A[j * nv + g->J.column[i]] = g->here.rows.J[g->J.from[i]];
+        if (j >= m) A[j * nv + kept[j - m]] = 1.0;
     }
     if (!stepper_all_finite(A, (m + count) * nv)) return 1;
     shortest(g, nv, m + count, r, DEPENDENT, y);
@@ -1201,7 +1432,8 @@ int passage_velocities(passage *g, double t, double *x, const int *kept, int cou
     for (j = 0; j < m + count; j++) {
         double off = j < m ? -r[j] : y[kept[j - m]] - r[j];
         if (j >= m - g->size.anchors && j < m) continue;
-        for (i = 0; i < nv && j < m; i++) off += g->here.rows.J[i * m + j] * y[i];
+        for (i = j < m ? g->J.begin[j] : 0; j < m && i < g->J.begin[j + 1]; i++)
+            off += g->here.rows.J[g->J.from[i]] * y[g->J.column[i]];
         miss = fmax(miss, fabs(off));
         if (j >= m) speed = fmax(speed, fabs(r[j]));
     }
@@ -1285,6 +1517,7 @@ static void lay_factors(factors *f, size_t n, size_t m, double *block, size_t *u
     f->tails = take(block, used, n * n);
     f->size = take(block, used, m);
     f->where = take(block, used, m * WORDS(n));
+    f->touched = take(block, used, m * WORDS(n));
 }
 
 static int *lay_numbers(factors *f, size_t n, size_t m, int *numbers) {
@@ -1293,7 +1526,9 @@ static int *lay_numbers(factors *f, size_t n, size_t m, int *numbers) {
     f->count = f->row + n;
     f->last = f->count + n;
     f->moved = f->last + n;
-    return f->moved + n * n;
+    f->uppers = f->moved + n * n;
+    f->upper = f->uppers + m;
+    return f->upper + n * m;
 }
 
 static void lay_frame(frame *p, const passage_size *z, double *block, size_t *used) {
@@ -1306,6 +1541,7 @@ static void lay_frame(frame *p, const passage_size *z, double *block, size_t *us
     p->rows.N = take(block, used, nq * nv);
     p->rows.bend = take(block, used, nq);
     p->rows.rank = take(block, used, 1);
+    p->inertia = take(block, used, nv * nv);
     p->M = take(block, used, nv * nv);
     p->end = take(block, used, nv);
     p->f = take(block, used, nv);
@@ -1345,8 +1581,66 @@ static size_t lay(passage *g, double *block) {
     return used;
 }
 
-passage *passage_new(stepper *s, const passage_size *size, const passage_model *model,
-                     double *memory) {
+/* The pattern of a matrix (rows, columns); given as start, then row, or NULL for all elements. 1: no
+ * memory is left. */
+static int make_pattern(pattern *p, int rows, int columns, const int *given) {
+    int count = given ? given[columns] : rows * columns, j, k;
+    size_t size = 2 * (size_t)count + (size_t)columns + (size_t)rows + 2;
+    p->rows = rows;
+    p->columns = columns;
+    p->start = calloc(size + (size_t)count, sizeof *p->start);
+    if (!p->start) return 1;
+    p->row = p->start + columns + 1;
+    p->begin = p->row + count;
+    p->column = p->begin + rows + 1;
+    p->from = p->column + count;
+    for (k = 0; k <= columns; k++) p->start[k] = given ? given[k] : k * rows;
+    for (k = 0; k < count; k++) p->row[k] = given ? given[columns + 1 + k] : k % rows;
+    for (k = 0; k < count; k++) p->begin[p->row[k] + 1]++;
+    for (k = 0; k < rows; k++) p->begin[k + 1] += p->begin[k];
+    for (j = 0; j < columns; j++)
+        for (k = p->start[j]; k < p->start[j + 1]; k++) {
+            int to = p->begin[p->row[k]]++;
+            p->column[to] = j;
+            p->from[to] = k;
+        }
+    for (k = rows; k > 0; k--) p->begin[k] = p->begin[k - 1];
+    p->begin[0] = 0;
+    return 0;
+}
+
+/* The first rows of slope are those of J. 1: no memory is left. */
+static int pattern_of_slopes(passage *g) {
+    const pattern *all = &g->slope;
+    int columns = all->columns, count = all->start[columns], status, j, k, n = 0;
+    int *given = calloc((size_t)(columns + 1 + count), sizeof *given);
+    g->J_from = calloc((size_t)count + 1, sizeof *g->J_from);
+    for (j = 0; j < columns && given && g->J_from; j++) {
+        for (k = all->start[j]; k < all->start[j + 1]; k++) {
+            if (all->row[k] >= g->size.speeds) continue;
+            given[columns + 1 + n] = all->row[k];
+            g->J_from[n++] = k;
+        }
+        given[j + 1] = n;
+    }
+    status = !given || !g->J_from || make_pattern(&g->J, g->size.speeds, columns, given);
+    free(given);
+    return status;
+}
+
+static int make_patterns(passage *g, const passage_patterns *given) {
+    static const passage_patterns dense = {NULL, NULL, NULL, NULL};
+    const passage_size *z = &g->size;
+    if (!given) given = &dense;
+    if (make_pattern(&g->slope, z->positions, z->nq, given->slope)) return 1;
+    if (make_pattern(&g->M, z->nv, z->nv, given->M)) return 1;
+    if (z->nq == z->nv) return pattern_of_slopes(g);
+    return make_pattern(&g->J, z->speeds, z->nv, given->J) ||
+           make_pattern(&g->N, z->nq, z->nv, given->N);
+}
+
+passage *passage_new(stepper *s, const passage_size *size, const passage_patterns *patterns,
+                     const passage_model *model, double *memory) {
     static const stepper_method hybrid = {open, attempt, keep, close, interpolate, opening};
     passage *g = calloc(1, sizeof *g);
     size_t nq = (size_t)size->nq, nv = (size_t)size->nv, m = (size_t)size->speeds;
@@ -1358,14 +1652,19 @@ passage *passage_new(stepper *s, const passage_size *size, const passage_model *
     g->model = *model;
     g->memory = memory;
     g->block = calloc(lay(g, NULL), sizeof *g->block);
-    g->numbers = calloc(2 * (m + nv * (nv + 3)) + rows + nq * (nq + 3) + 1, sizeof *g->numbers);
-    if (!g->block || !g->numbers) {
+    g->numbers = calloc(2 * (2 * m + nv * (nv + m + 3)) + 2 * rows + nq * (nq + rows + 3) + 1,
+                        sizeof *g->numbers);
+    if (!g->block || !g->numbers || make_patterns(g, patterns)) {
         passage_free(g);
         return NULL;
     }
     lay(g, g->block);
     next = lay_numbers(&g->here.qr, nv, m, lay_numbers(&g->base.qr, nv, m, g->numbers));
     lay_numbers(&g->other, nq, rows, next);
+    g->here.qr.height = g->base.qr.height = size->nv; /* the block is zero */
+    g->here.qr.columns = g->base.qr.columns = size->speeds;
+    g->other.height = size->nq;
+    g->other.columns = (int)rows;
     g->inner = s->method;
     s->method = &hybrid;
     s->passage = g;
@@ -1377,5 +1676,10 @@ void passage_free(passage *g) {
     if (!g) return;
     free(g->block);
     free(g->numbers);
+    free(g->slope.start);
+    free(g->J.start);
+    free(g->N.start);
+    free(g->M.start);
+    free(g->J_from);
     free(g);
 }

@@ -39,6 +39,13 @@ typedef struct {
 /* position (positions,) and its slopes by q (positions, nq); J (speeds, nv), b and c with J v = b
  * and J a = c; N (nq, nv) and bend (nq,) with q' = N v and q'' = N a + bend; the rank of J. Where nq
  * is nv the model leaves out J, which are the slopes, N, the unit matrix, and bend, which is zero. */
+/* Where matrices have elements: for each column, and behind the last one, the place of its first element;
+ * then the rows of all elements, column by column and rising. NULL: everywhere. The model writes the
+ * elements alone, in this order. */
+typedef struct {
+    const int *slope, *J, *N, *M;
+} passage_patterns;
+
 typedef struct {
     double *position, *slope, *J, *b, *c, *N, *bend, *rank;
 } passage_rows;
@@ -59,9 +66,9 @@ typedef struct {
 
 typedef struct passage passage;
 
-/* NULL: no memory is left. After the init of the method, which it wraps. */
-passage *passage_new(stepper *s, const passage_size *size, const passage_model *model,
-                     double *memory);
+/* NULL: no memory is left. patterns may be NULL: all matrices are dense. After the init of the method, which it wraps. */
+passage *passage_new(stepper *s, const passage_size *size, const passage_patterns *patterns,
+                     const passage_model *model, double *memory);
 void passage_free(passage *g);
 
 /* Before stepper_start. */

@@ -42,7 +42,11 @@ def near_singular(name, kind, seed):
     if name == "general_6r":
         # of one kind only: where the determinant of the Jacobian changes its sign
         return _singular(name, q, rng, 2) + away[0] * np.eye(6)[2]
-    kinds = KINDS[kind]
+    return _moved(name, system, q, KINDS[kind], away, rng)
+
+
+def _moved(name, system, q, kinds, away, rng):
+    """A configuration moved to the distances `away` (3,) from singular ones."""
     if "wrist" in kinds:
         q[4] = away[0]
     if "elbow" in kinds:
@@ -101,3 +105,20 @@ def told_apart(name, T, q, other):
         x = x + (np.linalg.pinv(J, rcond=1e-10) @ gap[..., None])[..., 0]
         least = np.minimum(least, arm.residual(T, x))
     return float(np.max(least))
+
+
+def at_distance(name, kind, seed, distance):
+    """A configuration (6,) at 1 to 10 times a distance from singular ones of a kind [rad]."""
+    rng = np.random.default_rng((11, seed, *f"{name} {kind}".encode()))
+    system, q = robot(name), rng.uniform(-2.5, 2.5, 6)
+    away = distance * rng.uniform(1, 10, 3) * rng.choice((-1, 1), 3)
+    if name == "general_6r":
+        return _singular(name, q, rng, 2) + away[0] * np.eye(6)[2]
+    return _moved(name, system, q, KINDS[kind], away, rng)
+
+
+def units_away(T, count, rng):
+    """T (4, 4) with elements moved by -count, 0 or count units in the last place."""
+    moved = T.copy()
+    moved[:3] += rng.integers(-1, 2, (3, 4)) * count * np.spacing(np.abs(T[:3]))
+    return moved

@@ -22,9 +22,9 @@ from mbs.models.inverse_geometry.target import (
     SINGULAR,
     Target,
     distinct,
+    highest_between,
     multiplicity,
     reduction,
-    highest_between,
 )
 from mbs.models.inverse_geometry.whole_robot import ClosedConfiguration, close, why_searched
 
@@ -327,17 +327,17 @@ def named(
     has: Anatomy = chain.system.cached(key, lambda: anatomy(arm))
     meeting = np.array([root.multiplicity != 1 for root in found], dtype=bool)
     names = labels(arm, has, np.array([root.q for root in found]).reshape(-1, arm.size), meeting)
-    # a branch that has but signs keeps them
+    # a branch that has but signs keeps them; signs name nothing where branches have other names
     names = [
-        root.label if root.label in branches else name or root.label
+        root.label if root.label in branches or not (name or branches) else name
         for name, root in zip(names, found, strict=True)
     ]
     seen = dict[str, int]()
     result = []
-    for k, (root, name) in enumerate(zip(found, names, strict=True)):
+    for root, name in zip(found, names, strict=True):
         seen[name] = seen.get(name, 0) + 1
         again = f"{name} ({seen[name]})" if name and names.count(name) > 1 else name
-        result.append(replace(root, label=again or str(k + 1)))
+        result.append(replace(root, label=again or str(seen[name])))
     return result
 
 

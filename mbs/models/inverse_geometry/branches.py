@@ -57,9 +57,7 @@ def anatomy(arm: Arm) -> Anatomy:
     return Anatomy(bool(shoulder), elbow, True)
 
 
-def labels(
-    arm: Arm, has: Anatomy, q: Array, meeting: NDArray[np.bool_] | None = None
-) -> list[str]:
+def labels(arm: Arm, has: Anatomy, q: Array, meeting: NDArray[np.bool_] | None = None) -> list[str]:
     """The names of configurations' branches, such as "shoulder right, elbow up, no flip".
 
     A name is left out where the configuration stands between two branches; an arm without a

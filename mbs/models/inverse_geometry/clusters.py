@@ -83,7 +83,8 @@ def _nearly_moves(
     No self-motion was found there, but the residual stays below `TWO` up to a distance of one
     radian.
     """
-    nearly = singular & np.array([root.family is None for root in found], dtype=bool)
+    alone = np.array([root.family is None for root in found], dtype=bool)
+    nearly: NDArray[np.bool_] = np.logical_and(singular, alone)
     rows = np.flatnonzero(nearly)
     if not len(rows) or x.shape[1] != 6:
         return np.zeros_like(nearly)
@@ -158,9 +159,7 @@ def heights(
     return highest
 
 
-def _components(
-    count: int, first: NDArray[np.intp], second: NDArray[np.intp]
-) -> NDArray[np.intp]:
+def _components(count: int, first: NDArray[np.intp], second: NDArray[np.intp]) -> NDArray[np.intp]:
     """(count,) the least index of the component of each point, from pairs that are joined."""
     group = np.arange(count)
     for i, j in zip(first, second, strict=True):

@@ -177,6 +177,30 @@ def _far_ends(target: Target, start: Array) -> list[Array]:
     return found
 
 
+_FEW_ENDS = 4
+
+
+def beside(target: Target, x: Array) -> Gathered:
+    """Solutions along the valleys that begin at a self-motion, of which x, (k, 6), are samples.
+
+    Another motion of the arm crosses the self-motion, nearly, where the second smallest singular
+    value has a minimum.
+    """
+    found, q = list[Array](), np.zeros((0, x.shape[1]))
+    if x.shape[1] == 6 and len(x) > 2:
+        _, s, Vt = np.linalg.svd(target.excess(x)[1])
+        inner = s[1:-1, 4]
+        lowest = 1 + np.flatnonzero((inner < s[:-2, 4]) & (inner <= s[2:, 4]))
+        lowest = lowest[np.argsort(s[lowest, 4], kind="stable")][:_FEW_ENDS]
+        steps = _ALONG * Vt[lowest, 4]
+        if len(lowest):
+            found = _far_ends(target, np.concatenate([x[lowest] + steps, x[lowest] - steps]))
+    if found:
+        q = wrapped(target.arm, np.concatenate(found) * target.unit)
+        q = q[target.residual(q) < target.tolerance]
+    return Gathered(q, ("",) * len(q), "", False)
+
+
 _REACH = 5  # steps along a valley, one radian
 
 

@@ -370,6 +370,7 @@ class Solutions(Sequence[Solution]):
         s = self.solutions[k]
         roots = "any" if s.family else str(s.multiplicity)
         note = s.branch if s.family is None else f"{s.branch} ({s.family})".strip()
+        note += ", undecided" if s.undecided else ""
         return (
             str(k),
             *(f"{x:.4f}" for x in s.q),

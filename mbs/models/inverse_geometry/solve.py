@@ -23,11 +23,12 @@ from mbs.models.inverse_geometry.answer import (
 )
 from mbs.models.inverse_geometry.branches import branch_labels
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
-from mbs.models.inverse_geometry.clusters import separated
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, require_method, sequence_of
+from mbs.models.inverse_geometry.clusters import separated
 from mbs.models.inverse_geometry.gathering import (
     METHODS,
     Gathered,
+    beside,
     by_search,
     gather,
     gather_further,
@@ -312,6 +313,12 @@ def solved(
     gathered = gather_further(chain, target, gathered, p)
     examined: Examined = {}
     found = roots(target, gathered, question.chain_indices, examined)
+    for root in found:
+        if root.family is not None and root.family.dimension == 1:
+            samples = root.family.chain_samples / target.unit
+            gathered = joined(gathered, new_among(target, found, beside(target, samples)))
+    if any(root.family is not None for root in found):
+        found = roots(target, gathered, question.chain_indices, examined)
     if gathered.method == "search":
         return separated(target, found), gathered.method
     # where an arm moves, a search gives points of what is known already

@@ -9,7 +9,7 @@ import pytest
 from support.change_points import rod
 
 import mbs
-from mbs.components import Revolute
+from mbs.components import Revolute, Spherical
 from mbs.errors import SolverError
 from mbs.models.state import tree
 from mbs.solvers import problem
@@ -17,8 +17,8 @@ from mbs.solvers import problem
 INTEGRATE = importlib.import_module("mbs.solvers.integrate")
 
 
-def windows(count, longer=0.0):
-    """Square windows in a row, the coupler in the middle longer."""
+def windows(count, longer=0.0, balls=False):
+    """Square windows in a row, the coupler in the middle longer; on balls at one end."""
     m = mbs.Mechanism("windows", gravity=(0, -9.81, 0))
     uprights = [m.add(rod(f"u{k}", 1.0)) for k in range(count + 1)]
     for k, upright in enumerate(uprights):
@@ -26,11 +26,13 @@ def windows(count, longer=0.0):
     for k in range(count):
         length = 1.0 + longer * (k == count // 2)
         coupler, closing = m.add(rod(f"c{k}", length)), Revolute(f"e{k}", axis="z")
-        m.connect(uprights[k].at(1), Revolute(f"b{k}", axis="z", actuated=False), coupler)
+        hinge = Spherical(f"b{k}") if balls else Revolute(f"b{k}", axis="z", actuated=False)
+        m.connect(uprights[k].at(1), hinge, coupler)
         m.connect(coupler.at(length), closing, uprights[k + 1].at(1))
         m.cut(closing)
     m.guess.update({f"a{k}": np.pi / 2 for k in range(count + 1)})
-    m.guess.update({f"b{k}": -np.pi / 2 for k in range(count)})
+    if not balls:
+        m.guess.update({f"b{k}": -np.pi / 2 for k in range(count)})
     return m.assemble(active=["a0"])
 
 
@@ -38,7 +40,8 @@ def motion(system, duration=3.0, tolerance=1e-8):
     return mbs.simulate.run(system, duration, v0={"a0": -4.0}, tolerance=tolerance, quiet=True)
 
 
-def test_sparse_matrices_give_the_bits_of_dense_ones(monkeypatch):
+@pytest.mark.parametrize(("count", "balls"), [(20, False), (4, True)])
+def test_sparse_matrices_give_the_bits_of_dense_ones(monkeypatch, count, balls):
     given, patterns = INTEGRATE._places, []
 
     def seen(pattern):
@@ -46,11 +49,11 @@ def test_sparse_matrices_give_the_bits_of_dense_ones(monkeypatch):
         return patterns[-1]
 
     monkeypatch.setattr(INTEGRATE, "_places", seen)
-    sparse = motion(windows(20), 1.0)
+    sparse = motion(windows(count, balls=balls), 1.0)
     assert sum(pattern is not None for pattern in patterns) >= 2  # slopes and inertia
     patterns.clear()
     monkeypatch.setattr(tree, "_LARGE", 10**9)
-    dense = motion(windows(20), 1.0)
+    dense = motion(windows(count, balls=balls), 1.0)
     assert all(pattern is None for pattern in patterns)
     assert np.array_equal(sparse.values, dense.values)
     energy = sparse["kinetic_energy"] + sparse["potential_energy"]

@@ -152,34 +152,31 @@ static void lower(const double *L, const int *end, int n, double *b) {
 
 static mask bit(int row) { return (mask)1 << row % BITS; }
 
-/* The first row of a set from a row on; n if there is none. */
-static int next_row(const mask *set, int row, int n) {
-    int word = row / BITS;
-    mask bits;
-    if (row >= n) return n;
-    bits = set[word] & ~(mask)0 << row % BITS;
-    while (!bits) {
-        if (++word >= WORDS(n)) return n;
-        bits = set[word];
-    }
-    row = word * BITS;
+/* The lowest row of a word of a set. */
+static int lowest(mask bits) {
 #ifdef __GNUC__
-    return row + __builtin_ctzll(bits);
+    return __builtin_ctzll(bits);
 #else
-    while (!(bits & 1)) bits >>= 1, row++;
+    int row = 0;
+    for (; !(bits & 1); bits >>= 1) row++;
     return row;
 #endif
 }
 
 /* The same as lower for b with elements in a set of rows, which grows. */
 static void lower_among(const double *L, const int *end, int n, mask *set, double *b) {
-    int i, k;
-    for (k = next_row(set, 0, n); k < n; k = next_row(set, k + 1, n)) {
-        if (b[k] == 0.0) continue;
-        b[k] /= L[k * n + k];
-        for (i = k + 1; i < end[k]; i++) {
-            b[i] -= L[k * n + i] * b[k];
-            set[i / BITS] |= bit(i);
+    int word, i, k;
+    for (word = 0; word < WORDS(n); word++) {
+        mask done = 0, bits;
+        while ((bits = set[word] & ~done) != 0) {
+            k = word * BITS + lowest(bits);
+            done |= bit(k);
+            if (b[k] == 0.0) continue;
+            b[k] /= L[k * n + k];
+            for (i = k + 1; i < end[k]; i++) {
+                b[i] -= L[k * n + i] * b[k];
+                set[i / BITS] |= bit(i);
+            }
         }
     }
 }
@@ -287,13 +284,16 @@ static void reflect(const factors *f, int n, int k, double *b) {
 
 /* A (n, m) becomes zero, and its columns are to be filled by put. */
 static void begin_columns(factors *f, int n, int m) {
-    int known = f->height == n && f->columns >= m ? m : 0, words = WORDS(n), i, j;
-    for (j = 0; j < known; j++) {
-        mask *touched = f->touched + j * words;
-        for (i = next_row(touched, 0, n); i < n; i = next_row(touched, i + 1, n)) f->A[j * n + i] = 0.0;
+    int known = f->height == n && f->columns >= m ? m : 0, words = WORDS(n), j, word;
+    for (j = 0; j < known; j++)
+        for (word = 0; word < words; word++) {
+            mask *bits = f->touched + j * words + word;
+            for (; *bits; *bits &= *bits - 1) f->A[j * n + word * BITS + lowest(*bits)] = 0.0;
+        }
+    if (!known) {
+        memset(f->A, 0, sizeof *f->A * (size_t)(n * m));
+        memset(f->touched, 0, sizeof *f->touched * (size_t)(m * words));
     }
-    if (!known) memset(f->A, 0, sizeof *f->A * (size_t)(n * m));
-    memset(f->touched, 0, sizeof *f->touched * (size_t)(m * words));
     f->columns = known ? f->columns : m;
     f->height = n;
 }
@@ -319,13 +319,16 @@ static void look_at(factors *f, int n, int k) {
     const mask *touched = f->touched + f->order[k] * WORDS(n);
     mask *where = f->where + k * WORDS(n);
     double size = 0.0;
-    int i;
-    memset(where, 0, sizeof(mask) * (size_t)WORDS(n));
-    for (i = next_row(touched, 0, n); i < n; i = next_row(touched, i + 1, n)) {
-        if (column[i] == 0.0) continue;
-        where[i / BITS] |= bit(i);
-        f->last[i] = k;
-        size += column[i] * column[i];
+    int word, i;
+    for (word = 0; word < WORDS(n); word++) {
+        mask bits = touched[word];
+        for (where[word] = 0; bits; bits &= bits - 1) {
+            i = word * BITS + lowest(bits);
+            if (column[i] == 0.0) continue;
+            where[word] |= bit(i);
+            f->last[i] = k;
+            size += column[i] * column[i];
+        }
     }
     f->size[k] = size;
     f->uppers[f->order[k]] = 0;
@@ -349,9 +352,12 @@ static void exchange(factors *f, int n, int k, int j) {
 static void make_reflection(factors *f, int n, int k, int many) {
     double *column = f->A + f->order[k] * n, *tail = f->tails + k * n;
     mask *where = f->where + k * WORDS(n);
-    int *rows = f->moved + k * n, count = 0, first, i;
+    int *rows = f->moved + k * n, count = 0, first, word, i;
     if (!many) where[f->row[k] / BITS] |= bit(f->row[k]);
-    for (i = next_row(where, 0, n); i < n; i = next_row(where, i + 1, n)) rows[count++] = i;
+    for (word = 0; word < WORDS(n); word++) {
+        mask bits = where[word];
+        for (; bits; bits &= bits - 1) rows[count++] = word * BITS + lowest(bits);
+    }
     if (count == 0) rows[count++] = f->row[k];
     for (i = 0; i < count; i++) tail[i] = column[rows[i]];
     f->weight[k] = dense_reflection(tail, count);

@@ -194,6 +194,12 @@ def _loops(system: System) -> list[str]:
                 f" {_count(len(loop.rows), 'row')} {'is' if kept == 1 else 'are'} independent."
             )
             continue
+        if loop.closing == "balance":
+            lines.append(
+                f"The balance of forces gives {listed(loop.joints)}, which move no mass: {kept} of"
+                f" {_count(len(loop.rows), 'row')} {'is' if kept == 1 else 'are'} independent."
+            )
+            continue
         lines.append(
             f"1 loop cut at {loop.name} ({loop.closing}), through {', '.join(loop.joints)}:"
             f" {kept} of {len(loop.rows)} rows are independent."
@@ -318,6 +324,8 @@ class System:
         numbered: the body of each frame of the table that it was made from, by the number there;
             empty where these are the numbers of the links.
         shapes: what the links and the base look like.
+        balanced: coordinates that move no mass and that the balance of forces determines: index in
+            q, index in v, and a typical stiffness [N/m or N m/rad].
     """
 
     name: str
@@ -347,6 +355,7 @@ class System:
     described: tuple[Component, ...] = ()
     numbered: Mapping[int, str] = field(default_factory=dict)
     shapes: tuple[ShapeRow, ...] = ()
+    balanced: tuple[tuple[int, int, float], ...] = ()
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:

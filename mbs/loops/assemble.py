@@ -13,6 +13,7 @@ from mbs.assembly.variable_names import GUESSES
 from mbs.components import Mechanism
 from mbs.errors import AssemblyError, Unclosable
 from mbs.loops.analysis import analyse
+from mbs.loops.balance import with_balance
 from mbs.numbers import numbers_given
 from mbs.recursions.part_checks import check_parts
 from mbs.text import did_you_mean
@@ -38,7 +39,9 @@ def assemble(
     check_parts(system)
     guess = _plain_guess(system, guess)
     chosen = _choose(system, active)
-    if system.cuts or system.couplings or any(p.element.binds for p in system.parts):
+    system = with_balance(system, mechanism)
+    bound = system.cuts or system.couplings or any(p.element.binds for p in system.parts)
+    if bound or system.balanced:
         return _analysed(system, guess, chosen)
     known = [coordinate.name for coordinate in system.coordinates]
     start = {name: value for name, value in guess.items() if name in known}

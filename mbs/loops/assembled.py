@@ -217,11 +217,12 @@ def rest_positions(system: System, p: Vector) -> dict[int, float]:
 
 
 def _unknowns(system: System) -> set[int]:
-    """Indices of the coordinates that are unknowns of components."""
+    """Indices of the coordinates that are unknowns of components, or massless nodes."""
     names = {
         f"{part.name}.{name}" for part in system.parts for name in part.element.names_of("unknown")
     }
-    return {k for k, coordinate in enumerate(system.coordinates) if coordinate.name in names}
+    found = {k for k, coordinate in enumerate(system.coordinates) if coordinate.name in names}
+    return found | {position for position, _, _ in system.balanced}
 
 
 def _stages(

@@ -22,6 +22,7 @@ from mbs.components import Fixed, RollingDisc
 from mbs.components.constraints import SLIPS
 from mbs.components.custom import Row
 from mbs.errors import ModelError
+from mbs.loops.balance import balance_rows
 from mbs.recursions.parts import PartsAt, part_rows
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose, cross
@@ -221,6 +222,7 @@ def _equations(system: System) -> _Equations:
             loops.append((coupling.name, [("coordinate", Row(value, unit))]))
         parts = PartsAt(system, q)
         loops += part_rows(parts)
+        loops += balance_rows(system, q)
         for part in system.parts:
             if part.element.has("positive"):
                 cosines.extend(SX(x) for x in part.element.positive(parts.at(part)).values())

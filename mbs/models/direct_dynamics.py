@@ -15,6 +15,7 @@ from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tree import normalised
 from mbs.errors import ModelError
 from mbs.loops.analysis import rows_at
+from mbs.loops.balance import require_no_balance
 from mbs.loops.velocity import closure_jacobian, constraint_jacobian, kept_rows
 from mbs.models.actuation import effort_input
 from mbs.models.constrained_accelerations import constrained_accelerations
@@ -223,7 +224,8 @@ def require_inertia(system: System) -> None:
             name = system.speeds[system.active[loose]].name
             raise ModelError(
                 f"{system.name}: {name} can move without moving any inertia, so its acceleration"
-                " is not determined; give mass to what it carries, or a rotor inertia Ia"
+                " is not determined; give mass to what it carries, or a rotor inertia Ia; a mass of"
+                " zero needs springs, and no damper, friction or motor"
             )
         return True
 
@@ -311,6 +313,7 @@ def _numbers(system: System, prescribed: Sequence[str]) -> tuple[int, ...]:
                 f" {did_you_mean(str(name), names)}"
             )
     numbers = tuple(names.index(name) for name in prescribed)
+    require_no_balance(system, "the motion", velocities=numbers)
     if len(set(numbers)) < len(numbers):
         raise ModelError(f"{system.name}: a velocity is prescribed twice; name each once")
     if not are_independent(system, numbers):

@@ -11,6 +11,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import ConfigurationCheck, Named, model_function, require_system
 from mbs.errors import ModelError
 from mbs.loops.accuracy import DIFFERENTIABLE
+from mbs.loops.balance import require_no_balance
 from mbs.loops.examine import DETERMINED
 from mbs.loops.reduction import Reduction, reduction
 from mbs.recursions.composite_body import velocity_antecedents
@@ -168,6 +169,7 @@ def surroundings(system: System, f_ext: bool = False, moves: bool = False) -> Su
     gravity, inputs = system.tree.gravity, list[tuple[str, SX]]()
     base, external = resting_base(gravity), dict[int, Wrench]()
     if f_ext:
+        require_no_balance(system, "f_ext", velocities=range(system.nv))
         wrenches = SX.sym("f_ext", 6, len(system.bodies))
         external = wrenches_on_links(system, wrenches)
         inputs.append(("f_ext", wrenches))

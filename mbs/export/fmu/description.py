@@ -531,8 +531,7 @@ class FmuModel:
     @property
     def charted(self) -> bool:
         """Whether integrators outside pass singular configurations: charts.h."""
-        optional = self.jumps is None or self.jumps.optional
-        return self.tree is not None and self.tree.passes and optional
+        return self.tree is not None and self.tree.passes
 
     @property
     def slots(self) -> tuple[FmuState, ...]:

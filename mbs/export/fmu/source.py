@@ -470,10 +470,12 @@ def source(model: FmuModel, *, adjoint: bool) -> tuple[str, Work]:
 
 def _tree_sizes(model: FmuModel, tree: TreeState) -> str:
     sizes = ", ".join(map(str, tree.passage.size))
+    alone = model.charted and (model.jumps is None or model.jumps.optional)
     return (
         f"#define MODEL_TREE {tree.start.numel_out(0)} /* its states */\n"
         f"#define MODEL_TREE_INSIDE {int(model.solver != 'rk4')} /* co-simulation has them */\n"
         f"#define MODEL_TREE_OUTSIDE {int(model.charted)} /* model exchange has charts of them */\n"
+        f"#define MODEL_CHARTS_ALONE {int(alone)} /* and needs no events */\n"
         f"#define MODEL_PASSAGE {{{sizes}}}\n"
         f"#define N_HELD {len(tree.independent)}\n"
         f"#define MODEL_REGULARITY {tree.passage.typical!r}\n"

@@ -12,6 +12,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.tree import Frame, normalised
 from mbs.errors import ModelError
+from mbs.loops.balance import require_no_balance
 from mbs.loops.reduction import reduction
 from mbs.models.contacts import contacts_of, require_undriven
 from mbs.models.direct_dynamics import hybrid_dynamics
@@ -76,6 +77,7 @@ def frames_of(system: System, drive: DriveInputs) -> tuple[Frame, ...]:
     _require_once(system, "wrenches", drive.wrenches)
     frames = tuple(system.frame(name) for name in drive.wrenches)
     for name, (link, _) in zip(drive.wrenches, frames, strict=True):
+        require_no_balance(system, f"the wrench on {name}", links=[link])
         if link < 0:
             raise ModelError(
                 f"{system.name}: frame {quoted(name)} is fixed to the base, where a wrench moves"

@@ -16,6 +16,7 @@ from mbs.arguments import names_given, values_given
 from mbs.assembly import System
 from mbs.assembly.variable_names import EFFORTS, by_coordinate
 from mbs.errors import ModelError
+from mbs.loops.balance import require_no_balance
 from mbs.numbers import has_boolean, numbers_given
 from mbs.text import did_you_mean, error_text, quoted
 
@@ -79,6 +80,9 @@ def signal_function(
         )
     if driven is not None and not by_name:
         _require_driven(system, signal, values, driven)
+    if driven is not None:
+        acting = [k for k in range(size) if not casadi.densify(values)[k].is_zero()]
+        require_no_balance(system, signal.name, velocities=acting)
     inputs = [t, q, v, system.p]
     result = Function(signal.name, inputs, [casadi.densify(values)], {"allow_free": True})
     if result.has_free():

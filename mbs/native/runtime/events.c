@@ -66,6 +66,7 @@ void events_init(events *e, stepper *solver, int count, const events_model *mode
 
 int events_pending(const events *e) { return e->memory[PENDING] > 0.0; }
 const double *events_fired(const events *e) { return fired(e); }
+const double *events_due(const events *e) { return due(e); }
 const double *events_armed(const events *e) { return armed(e); }
 const double *events_seen(const events *e) { return left(e); }
 
@@ -146,6 +147,11 @@ int events_found(events *e, const double *x, const double *offset) {
         if (due(e)[k] > 0.0) e->memory[PENDING] = 1.0;
     }
     return STEPPER_OK;
+}
+
+void events_overshoot(events *e, const double *value) {
+    int k;
+    for (k = 0; k < e->count; k++) overshot(e)[k] = fmax(0.0, -value[k]);
 }
 
 static int returned(const events *e) {

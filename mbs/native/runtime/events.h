@@ -84,9 +84,13 @@ int events_settle(events *e, double *x, double limit);
  * jump leaves where it is, but does not fall any more, waits: it was overshot. */
 int events_found(events *e, const double *x, const double *offset);
 
-/* Which indicators asked for jumps at the last event: 0 or 1 for each; which of them can fire; and
- * their values when they were last looked at. */
+/* The state of the pending event was moved to where the indicators have these values. */
+void events_overshoot(events *e, const double *value);
+
+/* Which indicators asked for jumps at the last event: 0 or 1 for each; which of them ask for the
+ * pending one; which can fire; and their values when they were last looked at. */
 const double *events_fired(const events *e);
+const double *events_due(const events *e);
 const double *events_armed(const events *e);
 const double *events_seen(const events *e);
 

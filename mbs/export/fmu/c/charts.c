@@ -115,6 +115,17 @@ core_status charts_refresh(core *c) {
     return CORE_OK;
 }
 
+void charts_back(core *c, double time) {
+    static const passage_size size = MODEL_PASSAGE;
+    double *X = c->m.tree, *slope = c->m.slope;
+    int i;
+    for (i = 0; i < NT; i++) X[i] -= time * slope[i];
+    for (i = 0; i < size.nq && size.nq == size.nv; i++) {
+        X[i] += 0.5 * time * time * slope[size.nq + i];
+        slope[i] -= time * slope[size.nq + i];
+    }
+}
+
 /* The motion is followed from here. */
 static void follow_from_here(core *c) {
     core_charts *m = &c->m.charts;
@@ -227,13 +238,45 @@ core_status charts_completed(core *c, int *event) {
     return CORE_OK;
 }
 
+/* The jumps of events move the state of the tree, from which the next steps begin. */
+static core_status settle_tree(core *c, int *jumped) {
+#if NK > 0 && !MODEL_CHARTS_ALONE
+    core_charts *m = &c->m.charts;
+    core_status status = core_refresh(c);
+    *jumped = 0;
+    if (!status) status = core_settle(c, jumped);
+    if (status || !c->m.stale) return status;
+    if (m->tangent) {
+        m->time = c->m.time;
+        memcpy(m->X, c->m.tree, sizeof m->X);
+        memset(m->slope, 0, sizeof m->slope);
+        status = choose(c, 1.0);
+    } else {
+        joints_are_states(c);
+    }
+    if (!status) status = core_refresh(c);
+    if (!status) follow_from_here(c);
+    return status;
+#else
+    (void)c;
+    *jumped = 0;
+    return CORE_OK;
+#endif
+}
+
 core_status charts_update(core *c, int *changed) {
     core_charts *m = &c->m.charts;
     double before[NX + 1];
     core_status status;
+    int jumped;
     *changed = m->loose;
-    if (m->loose) return begin(c);
-    if (m->settled) return CORE_OK;
+    if (m->loose) {
+        status = begin(c);
+        if (status) return status;
+    }
+    status = settle_tree(c, &jumped);
+    *changed = *changed || jumped;
+    if (status || m->settled) return status;
     memcpy(before, c->m.values + SLOTS, sizeof before);
     status = core_refresh(c);
     if (status) return status;

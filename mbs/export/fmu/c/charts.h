@@ -19,6 +19,9 @@ core_status charts_start(core *c);
 /* Derivatives, outputs, joints and dependents of the states. */
 core_status charts_refresh(core *c);
 
+/* The state of the tree goes back along its motion by this time [s]. */
+void charts_back(core *c, double time);
+
 /* In event mode something of the joints is about to be set: they are to be the states again. */
 core_status charts_set(core *c);
 

@@ -318,10 +318,10 @@ core_status core_exit_initialization(core *c) {
 #ifdef MODEL_TREE
     if (c->m.cosimulation && ON_TREE(c) && !c->m.singular) status = core_start_tree(c);
 #endif
-    if (!status) status = core_start_events(c);
 #if MODEL_TREE_OUTSIDE
     if (!status && !c->m.cosimulation) status = charts_start(c);
 #endif
+    if (!status) status = core_start_events(c);
     if (!status && !ON_TREE(c)) status = guard_restart(c);
     if (status) return status;
     if (!c->m.cosimulation || c->event_mode) {

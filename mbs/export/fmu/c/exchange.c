@@ -55,7 +55,8 @@ core_status core_completed_step(core *c, int *event) {
         return CORE_ERROR;
     if (!NZ && !NK) return CORE_OK;
 #if MODEL_TREE_OUTSIDE
-    status = charts_completed(c, event);
+    status = core_arm_indicators(c);
+    if (!status) status = charts_completed(c, event);
 #else
     status = core_arm_indicators(c);
     if (!status) status = core_accept_configuration(c, c->m.values + STATES, c->m.values + DEPENDENTS);

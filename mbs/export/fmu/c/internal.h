@@ -50,6 +50,11 @@ void core_end_inputs(core *c);
 int core_init_solver(core *c); /* 1: no memory is left */
 void core_prepare_solver(core *c);
 
+#if MODEL_TREE_OUTSIDE
+/* Whether events are those of the tree or of the states of the joints. */
+void core_take_states(core *c, int tree);
+#endif
+
 #ifdef MODEL_TREE
 /* The tree: its first state, also where the loops are in a singular configuration, z beside it; the states and dependents of the model from it; derivatives and
  * outputs there. */

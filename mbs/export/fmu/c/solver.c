@@ -111,6 +111,13 @@ static int init_tree(core *c) {
     return c->passage == NULL;
 }
 
+#if MODEL_TREE_OUTSIDE
+void core_take_states(core *c, int tree) {
+    c->solver.n = tree ? NT : NX;
+    c->solver.project = tree ? tree_project : NULL;
+}
+#endif
+
 core_status core_start_tree(core *c) {
     double t = c->m.time;
     passage_start(c->passage);

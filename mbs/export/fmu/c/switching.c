@@ -10,9 +10,12 @@
 #include <math.h>
 #include <string.h>
 
+#include "charts.h"
 #include "closure.h"
 #include "guard.h"
 #include "message.h"
+
+#define PASSES 4 /* from a contact at rest each leaves a quarter of the distance */
 
 /* Events that rounding of a time this long [s] cannot distinguish count as standing still. */
 #define CHATTER_SPAN 1e3
@@ -25,8 +28,17 @@
 #define ENDS_AT_HAND 1
 #endif
 
+/* What events are looked for in: an integrator outside has the joints as its states, or the tree. */
+#if MODEL_TREE_OUTSIDE
+#define EVENTS_ON_TREE(c) ((c)->m.cosimulation ? MODEL_TREE_INSIDE : (c)->m.charts.tangent)
+#define TAKE_STATES(c, tree) core_take_states(c, tree)
+#else
+#define EVENTS_ON_TREE(c) ON_TREE(c)
+#define TAKE_STATES(c, tree) ((void)0)
+#endif
+
 #ifdef MODEL_TREE
-#define SHOW_TREE(c) (ON_TREE(c) ? core_show_tree(c) : (void)0)
+#define SHOW_TREE(c) (EVENTS_ON_TREE(c) ? core_show_tree(c) : (void)0)
 #define LEAVE_START(c) ((c)->m.singular = 0)
 #else
 #define LEAVE_START(c) ((void)0)
@@ -70,7 +82,7 @@ static core_status step_failed(core *c, int status) {
 /* What moves: the coordinates of the tree, or the states. */
 static double *moving(core *c) {
 #ifdef MODEL_TREE
-    if (ON_TREE(c)) return c->m.tree;
+    if (EVENTS_ON_TREE(c)) return c->m.tree;
 #endif
     return c->m.values + STATES;
 }
@@ -79,7 +91,7 @@ static double *moving(core *c) {
  * the last step may not be known any more. */
 static core_status tighten(core *c) {
 #ifdef MODEL_TREE
-    if (!ON_TREE(c) || !c->m.loose) return CORE_OK;
+    if (!EVENTS_ON_TREE(c) || !c->m.loose || !c->m.cosimulation) return CORE_OK;
     passage_forget(c->passage);
     if (c->solver.project(c, c->m.time, c->m.tree))
         return step_failed(c, STEPPER_PROJECTION_FAILED);
@@ -104,7 +116,7 @@ void core_restart(core *c) {
 /* The states follow what has changed; at_hand: the dependents are known. */
 static core_status accept(core *c, int at_hand) {
 #ifdef MODEL_TREE
-    if (ON_TREE(c)) {
+    if (EVENTS_ON_TREE(c)) {
         core_show_tree(c);
         return CORE_OK;
     }
@@ -117,7 +129,7 @@ core_status core_step(core *c, double limit) {
     core_status status = tighten(c);
     int stopped;
     LEAVE_START(c);
-    if (!status && !ON_TREE(c) && !c->m.watched.on) status = guard_restart(c);
+    if (!status && !EVENTS_ON_TREE(c) && !c->m.watched.on) status = guard_restart(c);
     if (status) return status;
 #if NK > 0
     c->events.near_at = NAN; /* the state may be another one */
@@ -128,7 +140,7 @@ core_status core_step(core *c, double limit) {
     c->m.time = stepper_time(&c->solver);
     c->m.stale = 1;
     status = stopped ? step_failed(c, stopped) : accept(c, ENDS_AT_HAND);
-    return status || ON_TREE(c) ? status : guard_pass(c);
+    return status || EVENTS_ON_TREE(c) ? status : guard_pass(c);
 }
 
 #if NK > 0
@@ -141,7 +153,7 @@ core_status core_step(core *c, double limit) {
 
 /* The arguments of a function of events; dependents of the states alone have to be found. */
 static int place(core *c, const double *t, const double *x) {
-    if (!ON_TREE(c) && closure_solve(&c->loops, x, c->z)) return 1;
+    if (!EVENTS_ON_TREE(c) && closure_solve(&c->loops, x, c->z)) return 1;
     core_point(c, t, x, c->z);
     return 0;
 }
@@ -150,7 +162,7 @@ static int indicators(void *user, double t, const double *x, double *g) {
     core *c = user;
     if (place(c, &t, x)) return 1;
     c->res[0] = g;
-    return CALL(ON_TREE(c), indicators);
+    return CALL(EVENTS_ON_TREE(c), indicators);
 }
 
 /* Right after the indicators at the same place: the dependent coordinates are there. */
@@ -161,13 +173,11 @@ static int rates(void *user, double t, const double *x, double *rise) {
     core_input_rates(c, t, du);
     c->arg[5] = du;
     c->res[0] = rise;
-    return CALL(ON_TREE(c), rates);
+    return CALL(EVENTS_ON_TREE(c), rates);
 }
 
-/* Integrators outside that have charts need no events of contacts, which stay positive. */
-#if MODEL_TREE_OUTSIDE
-#define MODEL_CHARTS_ALONE 1
-#else
+/* Where an integrator outside has charts and needs no events, indicators stay positive. */
+#ifndef MODEL_CHARTS_ALONE
 #define MODEL_CHARTS_ALONE 0
 #endif
 
@@ -176,7 +186,7 @@ static int approaches(void *user, double t, const double *x, double *near) {
     core *c = user;
     if (place(c, &t, x)) return 1;
     c->res[0] = near;
-    return CALL(ON_TREE(c), approaches);
+    return CALL(EVENTS_ON_TREE(c), approaches);
 }
 #define APPROACHES approaches
 #else
@@ -190,7 +200,7 @@ static int jump(void *user, double t, double *x, const double *fired) {
     c->arg[5] = fired;
     c->res[0] = next;
     c->res[1] = modes;
-    if (CALL(ON_TREE(c), jump) || !stepper_all_finite(modes, NM)) return 1;
+    if (CALL(EVENTS_ON_TREE(c), jump) || !stepper_all_finite(modes, NM)) return 1;
     memcpy(x, next, (size_t)c->solver.n * sizeof *x);
     memcpy(c->m.values + MODES, modes, NM * sizeof *modes);
     return 0;
@@ -222,7 +232,9 @@ core_status core_first_modes(core *c) {
 /* Where the integrator is outside, the solver only knows what time it is. */
 static void synchronize(core *c) {
     core_prepare_solver(c);
-    if (!c->m.cosimulation) stepper_start(&c->solver, c->m.time);
+    if (c->m.cosimulation) return;
+    TAKE_STATES(c, EVENTS_ON_TREE(c));
+    stepper_start(&c->solver, c->m.time);
 }
 
 /* Offsets of those that cannot fire yet. */
@@ -238,6 +250,7 @@ core_status core_start_events(core *c) {
     if (MODEL_CHARTS_ALONE && !c->m.cosimulation) return CORE_OK;
     synchronize(c);
     status = events_start(&c->events, moving(c));
+    if (!c->m.cosimulation) TAKE_STATES(c, 1);
     if (status) return step_failed(c, status);
     if (!c->m.cosimulation) set_offsets(c);
     return CORE_OK;
@@ -252,18 +265,56 @@ static int find(core *c) {
     return events_found(&c->events, moving(c), c->m.offset);
 }
 
-core_status core_settle(core *c, int *changed) {
+#if MODEL_TREE_OUTSIDE
+/* An integrator outside finds events a little late. Where tangent coordinates are its states, the state
+ * goes back along its motion to where the first of the pending indicators was zero, so that bounces
+ * that follow each other do not lead further and further beyond a limit. */
+static core_status go_back(core *c) {
+    double value[NK], rise[NK], X[NT], slope[NT];
+    int pass, k, first = -1;
+    if (indicators(c, c->m.time, c->m.tree, value)) return step_failed(c, EVENTS_INDICATORS_FAILED);
+    for (pass = 0; pass < PASSES; pass++) {
+        double back = 0.0, beyond;
+        if (rates(c, c->m.time, c->m.tree, rise)) return step_failed(c, EVENTS_INDICATORS_FAILED);
+        for (k = 0; k < NK; k++)
+            if (events_due(&c->events)[k] > 0.0 && value[k] < 0.0 && rise[k] < 0.0 &&
+                value[k] / rise[k] > back)
+                back = value[k] / rise[k], first = k;
+        if (!(back > 0.0)) break;
+        beyond = -value[first];
+        memcpy(X, c->m.tree, sizeof X);
+        memcpy(slope, c->m.slope, sizeof slope);
+        do { /* less where it would not fall yet, or be further before the limit than beyond it */
+            memcpy(c->m.tree, X, sizeof X);
+            memcpy(c->m.slope, slope, sizeof slope);
+            charts_back(c, back);
+            if (indicators(c, c->m.time, c->m.tree, value) || rates(c, c->m.time, c->m.tree, rise))
+                return step_failed(c, EVENTS_INDICATORS_FAILED);
+            back *= 0.5;
+        } while (value[first] > beyond || rise[first] >= 0.0);
+    }
+    events_overshoot(&c->events, value);
+    return CORE_OK;
+}
+#endif
+
+static core_status settle(core *c, int *changed) {
     double *x = moving(c), before[MOST(NX, NT) + 1];
-    size_t size = (size_t)c->solver.n * sizeof *x;
+    size_t size;
     int status = tighten(c);
     if (status) return status;
     status = find(c);
     if (status) return step_failed(c, status);
     if (!core_pending(c)) return CORE_OK;
+#if MODEL_TREE_OUTSIDE
+    if (!c->m.cosimulation && EVENTS_ON_TREE(c)) status = (int)go_back(c);
+    if (status) return (core_status)status;
+#endif
+    size = (size_t)c->solver.n * sizeof *x;
     memcpy(before, x, size);
     LEAVE_START(c);
 #ifdef MODEL_TREE
-    if (ON_TREE(c)) passage_forget(c->passage); /* a chart ends where modes change */
+    if (EVENTS_ON_TREE(c)) passage_forget(c->passage); /* a chart ends where modes change */
 #endif
     status = events_settle(&c->events, x, fmax(c->m.time, CHATTER_SPAN));
     c->m.stale = 1;
@@ -274,10 +325,16 @@ core_status core_settle(core *c, int *changed) {
     return accept(c, 0);
 }
 
+core_status core_settle(core *c, int *changed) {
+    core_status status = settle(c, changed);
+    if (!c->m.cosimulation) TAKE_STATES(c, 1); /* as the passage has them */
+    return status;
+}
+
 core_status core_show_indicators(core *c) {
     double *shown = c->m.values + INDICATORS;
     core_status status = core_refresh(c);
-    int k, tree = ON_TREE(c) && !(c->m.mode & (INSTANTIATED | INITIALIZATION));
+    int k, tree = EVENTS_ON_TREE(c) && !(c->m.mode & (INSTANTIATED | INITIALIZATION));
     if (status) return status;
     if (MODEL_CHARTS_ALONE && !c->m.cosimulation) {
         for (k = 0; k < NK; k++) shown[k] = 1.0;

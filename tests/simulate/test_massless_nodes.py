@@ -1,0 +1,192 @@
+"""Nodes without mass between springs follow from the balance of forces."""
+
+import pickle
+
+import casadi
+import numpy as np
+import pytest
+
+import mbs
+from mbs.components import (
+    Cartesian,
+    CoulombFriction,
+    Custom,
+    Damper,
+    ForceInput,
+    PointMass,
+    Prismatic,
+    Revolute,
+    Spring,
+    custom,
+)
+from mbs.errors import ModelError, SolverError
+
+K1, K2, MASS = 300.0, 600.0, 2.0
+SERIES = K1 * K2 / (K1 + K2)
+
+
+def chain(*elements, node=0.0, parameters=None):
+    """A mass on two springs in series, with a node of no mass between them."""
+    m = mbs.Mechanism("chain", parameters=parameters)
+    knot, body = m.add(PointMass("node", mass=node)), m.add(PointMass("body", mass=MASS))
+    m.connect(m.world, Prismatic("n", axis="x"), knot)
+    m.connect(m.world, Prismatic("x", axis="x"), body)
+    k1 = "K1" if parameters else K1
+    m.add(Spring("s1", m.world.at(-1), knot.at(), stiffness=k1, length=1.0))
+    m.add(Spring("s2", knot.at(), body.at(), stiffness=K2, length=1.0))
+    for element in elements:
+        m.add(element(m, knot))
+    return m
+
+
+def assembled(*elements, **given):
+    return chain(*elements, **given).assemble(guess={"x": 1.0})
+
+
+def test_springs_in_series_oscillate_as_one_spring():
+    system = assembled()
+    assert [system.speeds[k].name for k in system.active] == ["x"]
+    assert "The balance of forces gives n, which move no mass" in system.report()
+    result = mbs.simulate.run(system, 2.0, q0={"x": 1.1}, tolerance=1e-10)
+    exact = 0.1 * np.cos(np.sqrt(SERIES / MASS) * result.time)
+    np.testing.assert_allclose(result["x.q"], 1 + exact, atol=1e-10)
+    np.testing.assert_allclose(result["n.q"], exact * K2 / (K1 + K2), atol=1e-10)
+    assert np.ptp(result["kinetic_energy"] + result["potential_energy"]) < 1e-8
+
+
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_an_fmu_of_springs_in_series(kind, tmp_path):
+    path = mbs.export.fmu(assembled(), tmp_path / "chain.fmu")
+    result = mbs.simulate.fmu(path, 2.0, start={"x": 1.1}, kind=kind, tolerance=1e-9, quiet=True)
+    exact = 1 + 0.1 * np.cos(np.sqrt(SERIES / MASS) * result.time)
+    np.testing.assert_allclose(result["x.q"], exact, atol=1e-6)
+
+
+def test_models_of_springs_in_series():
+    system = assembled()
+    q = mbs.loops.solve(system, {"x": 1.1})
+    np.testing.assert_allclose(q, [0.1 * K2 / (K1 + K2), 1.1], atol=1e-13)
+    a = mbs.models.direct_dynamics(system)(q, 0, 0)
+    assert float(a) == pytest.approx(-SERIES * 0.1 / MASS)
+    whole = mbs.models.direct_dynamics(system, coordinates="tree")(q, [0, 0], [0, 0])
+    np.testing.assert_allclose(whole[0].full().ravel()[1], float(a))
+    np.testing.assert_allclose(whole[1].full(), 0, atol=1e-12)  # no force through the row
+    assert float(mbs.models.inverse_dynamics(system)(q, 0, 0)) == pytest.approx(SERIES * 0.1)
+    A = mbs.models.linearise(system).at(q0={"x": 1.0}).A
+    np.testing.assert_allclose(A, [[0, 1], [-SERIES / MASS, 0]], atol=1e-9)
+    again = pickle.loads(pickle.dumps(system))
+    assert float(mbs.models.direct_dynamics(again)(q, 0, 0)) == pytest.approx(float(a))
+
+
+def test_a_stiffness_may_be_a_parameter():
+    system = assembled(parameters={"K1": K1})
+    result = mbs.simulate.run(system, 1.0, q0={"x": 1.1}, parameters={"K1": 100.0})
+    w = np.sqrt(100 * K2 / (100 + K2) / MASS)
+    np.testing.assert_allclose(result["x.q"], 1 + 0.1 * np.cos(w * result.time), atol=1e-7)
+
+
+class Hardening(Custom):
+    """A spring of force k x + c x^3 on a coordinate."""
+
+    at = custom.coordinate()
+    k = custom.parameter("N/m", 100.0)
+    c = custom.parameter("N/m3", 5e4)
+
+    def energy(self, at):
+        return at.k * at.at.q**2 / 2 + at.c * at.at.q**4 / 4
+
+
+def test_a_nonlinear_spring():
+    """The force of the node's own spring is that of the spring to the mass."""
+    m = mbs.Mechanism("hardening")
+    knot, body = m.add(PointMass("node", mass=0)), m.add(PointMass("body", mass=MASS))
+    m.connect(m.world, Prismatic("n", axis="x"), knot)
+    m.connect(m.world, Prismatic("x", axis="x"), body)
+    m.add(Hardening("h", at="n"))
+    m.add(Spring("s2", knot.at(), body.at(), stiffness=K2, length=1.0))
+    system = m.assemble(guess={"x": 1.0})
+    result = mbs.simulate.run(system, 1.0, q0={"x": 1.2}, tolerance=1e-9)
+    n, x = result["n.q"], result["x.q"] - 1
+    assert n.max() > 0.05
+    np.testing.assert_allclose(100 * n + 5e4 * n**3, K2 * (x - n), atol=1e-8)
+    np.testing.assert_allclose(MASS * result["x.a"], -K2 * (x - n), atol=1e-7)
+    assert np.ptp(result["kinetic_energy"] + result["potential_energy"]) < 1e-6
+
+
+def knotted(mass):
+    """Three springs from the ground to a knot, from which a mass hangs on a fourth one."""
+    m = mbs.Mechanism("knotted", gravity=(0, -9.81, 0))
+    knot, body = m.add(PointMass("knot", mass=mass)), m.add(PointMass("body", mass=1.5))
+    m.connect(m.world, Cartesian("k"), knot)
+    m.connect(m.world, Cartesian("b"), body)
+    for k, place in enumerate([(-0.5, 0.3, 0.1), (0.6, 0.4, 0.0), (0.0, 0.5, -0.5)]):
+        spring = Spring(f"s{k}", m.world.at(*place), knot.at(), stiffness=200 + 20 * k, length=0.3)
+        m.add(spring)
+    m.add(Spring("hang", knot.at(), body.at(), stiffness=150.0, length=0.4))
+    return m
+
+
+def test_a_knot_of_springs_in_space_is_as_one_of_little_mass():
+    start = {"b.x": 0.1, "b.y": -0.6, "b.z": 0.05}
+    system = knotted(0.0).assemble(guess=start)
+    named = dict(zip((c.name for c in system.coordinates), system.configuration, strict=True))
+    assert {name: named[name] for name in start} == pytest.approx(start, abs=1e-12)
+    result = mbs.simulate.run(system, 1.0, tolerance=1e-8)
+    small = knotted(1e-6).assemble()
+    q0 = {c.name: float(result[f"{c.name}.q"][0]) for c in system.coordinates}
+    other = mbs.simulate.run(small, 1.0, q0=q0, tolerance=1e-6, method="rodas")
+    for c in system.coordinates:
+        np.testing.assert_allclose(result[f"{c.name}.q"], other[f"{c.name}.q"], atol=2e-6)
+
+
+def test_a_node_that_rotates():
+    """Two torsion springs in series: a joint with a spring on a massless frame, then a pendulum."""
+    m = mbs.Mechanism("shaft", gravity=(0, 0, 0))
+    hub, body = m.add(PointMass("hub", mass=0)), m.add(PointMass("body", mass=1.0))
+    m.connect(m.world, Revolute("a", axis="z", stiffness=2.0), hub)
+    m.connect(hub, Revolute("b", axis="z", stiffness=4.0), body.at(-1))
+    system = m.assemble()
+    assert system.closure is None  # the hub carries the body: no coordinate is without inertia
+
+
+@pytest.mark.parametrize(
+    "load",
+    [
+        lambda m, knot: Damper("d", m.world.at(-1), knot.at(), damping=5.0),
+        lambda m, knot: ForceInput("push", knot.at()),
+    ],
+    ids=["damper", "input"],
+)
+def test_other_forces_on_a_massless_node_raise(load):
+    """Its velocity would have to be solved for."""
+    system = assembled(load)
+    with pytest.raises(ModelError, match=r"n can move without .* needs springs, and no damper"):
+        mbs.simulate.run(system, 0.1, q0={"x": 1.1})
+
+
+def test_friction_on_a_massless_node_raises():
+    system = assembled(lambda m, knot: CoulombFriction("f", joint="n", sliding=1.0))
+    assert system.closure is None
+    with pytest.raises(SolverError):
+        mbs.simulate.run(system, 0.1, q0={"x": 1.1})
+
+
+def test_efforts_motions_and_wrenches_on_a_massless_node_raise(tmp_path):
+    system, text = assembled(), "acts on n, which moves no mass.*give it a mass"
+    with pytest.raises(ModelError, match=f"tau {text}"):
+        mbs.simulate.run(system, 0.1, tau=lambda t, q, v: {"n": casadi.sin(t)})
+    with pytest.raises(ModelError, match=r"n.*has no motor"):
+        mbs.simulate.run(system, 0.1, tau={"n": 1.0})
+    with pytest.raises(ModelError, match=f"the motion {text}"):
+        mbs.simulate.run(system, 0.1, motion={"n.q": 0.1})
+    with pytest.raises(ModelError, match=f"f_ext {text}"):
+        mbs.models.inverse_dynamics(system, f_ext=True)
+    with pytest.raises(ModelError, match=f"the wrench on node {text}"):
+        mbs.export.fmu(system, tmp_path / "chain.fmu", inputs=["node.wrench"])
+    assert mbs.simulate.run(system, 0.1, tau={"x": 1.0})["x.v"][-1] > 0
+
+
+def test_mechanisms_without_any_mass_stay_open():
+    m = mbs.Mechanism("frames")
+    m.connect(m.world, Prismatic("n", axis="x", stiffness=10.0), m.add(PointMass("node", mass=0)))
+    assert m.assemble().closure is None

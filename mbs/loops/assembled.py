@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from casadi import Function
@@ -12,33 +11,11 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.components.joints import Motion
 from mbs.errors import Unclosable
-from mbs.loops.closing import CLOSED, Closing, candidates, difference
-from mbs.loops.configuration import closed_configuration, unwound
+from mbs.loops.closing import Closing
+from mbs.loops.configuration import closed_configuration
+from mbs.loops.nearest import Assembled, closes, nearest_configuration, unwound
 
 Vector = NDArray[np.float64]
-
-_FEW = 24
-"""Free positions up to which other configurations are searched: a search costs a start each, and
-larger mechanisms are assembled near their guesses."""
-_NEAR = 0.5
-"""Distance of a configuration from its start below which no other one is searched [rad, or sizes of
-the mechanism]: branches that are nearer to each other meet there."""
-_EQUAL = 1e-6
-"""Difference of distances that are equal: configurations are closed to 1e-12, and branches of
-symmetric mechanisms are equally near up to rounding."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Assembled:
-    """A closed configuration.
-
-    Attributes:
-        q: (nq,) positions [rad or m].
-        others: further configurations with the same locked positions.
-    """
-
-    q: Vector
-    others: tuple[Vector, ...] = ()
 
 
 def assembled_configuration(system: System, guess: Mapping[str, float], p: Vector) -> Assembled:
@@ -70,7 +47,7 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
     names = [coordinate.name for coordinate in system.coordinates]
     known = {name: value for name, value in guess.items() if name in names}
     given = np.array(system.position(known))
-    if _closes(Closing(system, p), given):
+    if closes(Closing(system, p), given):
         return Assembled(given)
     rest = rest_positions(system, p)
     start = np.array(system.position({**{names[k]: x for k, x in rest.items()}, **known}))
@@ -78,7 +55,7 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
     guessed = {k for k, name in enumerate(names) if name in known} - unknown
     for locked in _stages(system, unknown, guessed, set(rest)):
         closing = Closing(system, p, tuple(sorted(locked)))
-        found = _nearest(closing, start, guessed)
+        found = nearest_configuration(closing, start, sorted(guessed))
         if found is not None:
             return found
     motors = tuple(k for k, c in enumerate(system.coordinates) if c.actuated)
@@ -126,59 +103,3 @@ def _stages(
     for number, locked in enumerate(stages):
         if locked not in stages[:number]:
             yield locked
-
-
-def _nearest(closing: Closing, start: Vector, guessed: set[int]) -> Assembled | None:
-    """The closed configuration nearest to the start; None if none is found."""
-    system, free = closing.system, closing.free
-    if not free:
-        return Assembled(start) if _closes(closing, start) else None
-    first = closing.nearest(start)
-    if first.is_closed:
-        q = unwound(closing, first.q, start)
-        if len(free) > _FEW or _distance(closing, q, start, range(system.nq)) < _NEAR:
-            return Assembled(q)
-    elif len(free) > _FEW:
-        return None
-    found = [q] if first.is_closed else []
-    for other in candidates(closing, start):
-        if not any(np.abs(difference(system, other, one)).max() < _EQUAL for one in found):
-            found.append(other)
-    if not found:
-        return None
-    best = found[0]
-    for other in found[1:]:
-        if _is_nearer(closing, other, best, start, guessed):
-            best = other
-    others = [q for q in found if np.abs(difference(system, q, best)).max() > _EQUAL]
-    return Assembled(best, tuple(others))
-
-
-def _closes(closing: Closing, q: Vector) -> bool:
-    """Whether a configuration closes the loops as it is."""
-    return closing.openness(q) <= CLOSED and closing.faces(q)
-
-
-def _distance(closing: Closing, q: Vector, start: Vector, indices: range | list[int]) -> float:
-    """Largest difference of positions from the start [rad, or sizes of the mechanism]."""
-    lengths = [c.unit.startswith("m") for c in closing.system.coordinates]
-    scales = np.where(lengths, closing.size, 1.0)
-    moves = np.abs(difference(closing.system, q, start)) / scales
-    return float(np.max(moves[list(indices)], initial=0.0))
-
-
-def _is_nearer(
-    closing: Closing, q: Vector, other: Vector, start: Vector, guessed: set[int]
-) -> bool:
-    """Whether a configuration is nearer to the start than another one.
-
-    Guessed positions are compared first, then all positions; of two configurations that are equally
-    near, the one with the larger first position is nearer.
-    """
-    for indices in (sorted(guessed), list(range(closing.system.nq))):
-        gap = _distance(closing, q, start, indices) - _distance(closing, other, start, indices)
-        if abs(gap) > _EQUAL:
-            return gap < 0
-    moves = difference(closing.system, q, other)
-    apart = np.flatnonzero(np.abs(moves) > _EQUAL)
-    return bool(len(apart) and moves[apart[0]] > 0)

@@ -143,11 +143,15 @@ class Closing:
         system: with loops, not necessarily analysed.
         p: (np,) values of its parameters.
         locked: positions that must not change.
+        kept: indices of the rows that count; None for all rows.
+        axes: indices of the cosines that count; None for all.
     """
 
     system: System
     p: Vector
     locked: tuple[int, ...] = ()
+    kept: tuple[int, ...] | None = None
+    axes: tuple[int, ...] | None = None
 
     @property
     def free(self) -> list[int]:
@@ -158,6 +162,8 @@ class Closing:
     def rows(self, q: Vector) -> tuple[Vector, Vector]:
         """Residual (m,) and its derivative by the free positions (m, n)."""
         r, J = self._functions().equations(q, self.p)
+        if self.kept is not None:
+            r, J = r[list(self.kept)], J[list(self.kept)]
         return r.ravel(), J[:, self.free] if self.locked else J
 
     def _sparse_rows(self, q: Vector, free: Sequence[int]) -> tuple[Vector, Entries]:
@@ -180,7 +186,8 @@ class Closing:
     @property
     def sizes(self) -> Vector:
         """(m,) what the rows are measured by: the size of the mechanism for lengths [m], or 1."""
-        return self._sizes[1].ravel()
+        sizes = self._sizes[1].ravel()
+        return sizes if self.kept is None else sizes[list(self.kept)]
 
     @property
     def _sizes(self) -> list[Vector]:
@@ -202,13 +209,19 @@ class Closing:
 
         def residual(x: Vector) -> tuple[Vector, Vector | Entries]:
             at = _replace(start, free, x)
-            return self.rows(at) if len(free) < MANY else self._sparse_rows(at, free)
+            dense = len(free) < MANY or self.kept is not None
+            return self.rows(at) if dense else self._sparse_rows(at, free)
 
         def values(x: Vector) -> Vector:
-            return self._functions().values(_replace(start, free, x), self.p)[0].ravel()
+            r = self._functions().values(_replace(start, free, x), self.p)[0].ravel()
+            return r if self.kept is None else r[list(self.kept)]
 
         tolerance = TOLERANCE * self.sizes
-        compiled = self._functions().newton.near(start, self.p, free, tolerance)
+        compiled = (
+            None
+            if self.kept is not None
+            else self._functions().newton.near(start, self.p, free, tolerance)
+        )
         if compiled is not None:
             found, root = compiled
             return Closed(found, root.residual, root.converged and self.faces(found))
@@ -240,7 +253,8 @@ class Closing:
 
     def faces(self, q: Vector) -> bool:
         """Whether no axis of a closing joint is opposed at q (nq,)."""
-        return bool(np.all(self._functions().facing(q, self.p)[0] > 0))
+        cosines = self._functions().facing(q, self.p)[0]
+        return bool(np.all((cosines if self.axes is None else cosines[list(self.axes)]) > 0))
 
     def gap(self, q: Vector) -> str:
         """Which joint stays open most at q, in words and figures."""

@@ -22,6 +22,7 @@ from mbs.loops.closing import (
     unwound,
 )
 from mbs.loops.function import configuration_on, fixed_positions, independent_names
+from mbs.loops.nearest import Target, nearest_configuration
 from mbs.loops.velocity import closure_jacobian
 from mbs.result import Result, State, positions_of, state_of, velocities_of
 from mbs.solvers.least_squares import smallest_solution
@@ -40,9 +41,6 @@ Guess = Mapping[str, float] | State | Result | None
 _RESTARTS = 60
 _SEED = 20260101
 _LARGEST_ANGLE = np.pi
-_GUESSES = 16
-_NEAR = 0.3
-"""Distance from a guess [rad or m] within which the first configuration found is taken."""
 
 
 def solve(
@@ -185,29 +183,12 @@ def _with_positions(q: Vector, target: Vector, indices: Sequence[int]) -> Vector
 def _guessed_configuration(closing: Closing, start: Vector, named: list[int]) -> Vector:
     """The configuration whose named positions are nearest to those of `start`, (nq,).
 
-    Newton's method may end far from its start: then starts that differ in the positions without a
-    guess are tried as well, and the nearest configuration is taken.
+    The search is that of `mbs.loops.assembled`.
     """
-    rng = np.random.default_rng(_SEED)
-    others = [k for k in closing.free if k not in named]
-    lengths = np.array([c.unit.startswith("m") for c in closing.system.coordinates])
-    scales = np.where(lengths, max(closing.size, 1.0), 1.0)
-    found: list[tuple[float, Vector]] = []
-    for _ in range(_GUESSES):
-        trial = start.copy()
-        if found:
-            reach = _LARGEST_ANGLE * scales[others]
-            trial[others] += rng.uniform(-reach, reach, len(others))
-        closed = closing.nearest(trial)
-        if not closed.is_closed and found:
-            continue
-        q = unwound(closing, closed.q, start) if closed.is_closed else None
-        q = closed_configuration(closing, start) if q is None else q
-        far = float(np.max(np.abs(q[named] - start[named]) / scales[named], initial=0.0))
-        found.append((far, q))
-        if far < _NEAR:
-            break
-    return min(found, key=lambda pair: pair[0])[1]
+    found = nearest_configuration(closing, Target.at(closing, start, named))
+    if found is not None:
+        return found.q
+    return unwound(closing, closed_configuration(closing, start), start)
 
 
 def closed_configuration(closing: Closing, start: Vector, restarts: int = _RESTARTS) -> Vector:

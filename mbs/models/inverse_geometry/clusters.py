@@ -25,6 +25,9 @@ valley bends little within 40 degrees."""
 _HALVINGS = 3  # of a path: its highest point is known to some percent from seven points
 _SLOPE = 1.05
 """Part of the residual of a point in a valley up to which a path from it to a solution rises."""
+_FEW = 4  # minima of a singular value along a self-motion that are examined
+_SECTIONS, _GOLDEN = 24, 0.618
+"""Steps of golden section, which leave a hundred thousandth of a step along a self-motion."""
 _KNOWN = 1e-2
 """Distance [rad or arm lengths] to which a simple root is known at least, by `ONE` over the
 smallest singular value."""
@@ -57,6 +60,7 @@ def separated(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
     for k, root in enumerate(found):
         if root.family is not None:
             own[k] = np.max(target.residual(root.family.chain_samples), initial=own[k])
+            s[k, -2:] = np.minimum(s[k, -2:], _least_second(target, root.family.chain_samples))
     singular = s[:, -1] < NEARLY_SINGULAR
     undecided = (own > ONE * scale) | (singular & (_second(s) < _TWICE))
     undecided |= [root.undecided for root in found]
@@ -90,6 +94,26 @@ def _nearly_moves(
         return np.zeros_like(nearly)
     nearly[rows] = along_valley(target, x[rows]) < TWO * max(1.0, target.arm.length)
     return nearly
+
+
+def _least_second(target: Target, q: Array) -> float:
+    """Least second smallest singular value along a self-motion, of which q, (k, n), are samples.
+
+    It vanishes where another motion crosses the self-motion.
+    """
+    if q.shape[1] < 2 or len(q) < 3:
+        return np.inf
+    second = target.singular_values(q)[:, -2]
+    inner = np.arange(1, len(q) - 1)
+    lowest = inner[(second[1:-1] <= second[:-2]) & (second[1:-1] <= second[2:])]
+    lowest = lowest[np.argsort(second[lowest], kind="stable")][:_FEW]
+    low, high = q[lowest - 1], q[lowest + 1]
+    for _ in range(_SECTIONS):
+        a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        left = (target.singular_values(a)[:, -2] < target.singular_values(b)[:, -2])[:, None]
+        low, high = np.where(left, low, a), np.where(left, b, high)
+    middle = target.singular_values(0.5 * (low + high))[:, -2]
+    return float(min(np.min(second), np.min(middle, initial=np.inf)))
 
 
 def _second(s: Array) -> Array:

@@ -1,0 +1,383 @@
+"""Search for the closed configuration that is nearest to a guess."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from casadi import SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.tree import quaternion_slices
+from mbs.loops.closing import CLOSED, Closing, candidates, difference, unwound
+from mbs.loops.closure import facing, position_rows
+from mbs.loops.cut_positions import cut_positions
+from mbs.solvers.rank import rank
+
+Vector = NDArray[np.float64]
+
+_FEW = 24
+"""Free positions up to which other configurations of all loops together are searched: a search
+takes sixty starts. Larger mechanisms are searched block by block."""
+_NEAR = 0.1
+"""Distance of a configuration from its start below which no other one is searched [rad, or sizes of
+the mechanism]: branches that are nearer to each other meet there."""
+EQUAL = 1e-6
+"""Difference of distances that are equal: configurations are closed to 1e-12, and branches of
+symmetric mechanisms are equally near up to rounding."""
+_LOOPS = 3  # that one block may have
+_MOST = 400
+"""Configurations of blocks that are tried: some ten blocks of which each has several."""
+_FLAT = 1e-6
+"""Singular values, of the largest, that count as zero: configurations are closed to 1e-12."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Assembled:
+    """A closed configuration.
+
+    Attributes:
+        q: (nq,) positions [rad or m].
+        others: further configurations with the same locked positions.
+    """
+
+    q: Vector
+    others: tuple[Vector, ...] = ()
+
+
+def nearest_configuration(closing: Closing, target: Target) -> Assembled | None:
+    """Return the closed configuration that is nearest to a target, None if none is found.
+
+    Guessed positions are compared first, then all positions, by the largest difference. Lengths are
+    divided by the size of the mechanism. If two configurations are at the same distance, the first
+    position that differs decides, in the order of the description: the larger value is taken.
+    Mechanisms with many free positions are searched block by block. A block is the least number of
+    loops that determine their positions, once the blocks before it are closed. There positions of
+    joints that are cut do not count.
+
+    Args:
+        closing: the rows, and the positions that must not change.
+        target: first guess of all positions.
+    """
+    start = target.start
+    if not closing.free:
+        return Assembled(start) if closes(closing, start) else None
+    first = closing.nearest(start)
+    q = unwound(closing, first.q, start) if first.is_closed else None
+    many = len(closing.free) > _FEW
+    own = range(closing.system.nq) if many else None
+    if q is not None and target.distances(closing, q, own)[1] < _NEAR:
+        return Assembled(q)
+    if many:
+        reached = _by_blocks(closing, target, q)
+        return None if reached is None else Assembled(reached)
+    found = [] if q is None else [q]
+    for other in candidates(closing, start):
+        if not any(np.abs(difference(closing.system, other, x)).max() < EQUAL for x in found):
+            found.append(other)
+    return nearest_found(closing, found, target) if found else None
+
+
+def nearest_found(closing: Closing, found: list[Vector], target: Target) -> Assembled:
+    """Return the nearest of some configurations to a target, and the others."""
+    best = nearest_of(closing, found, target)[0]
+    others = [x for x in found if np.abs(difference(closing.system, x, best)).max() > EQUAL]
+    return Assembled(best, tuple(others))
+
+
+def closes(closing: Closing, q: Vector) -> bool:
+    """Whether a configuration closes the loops as it is."""
+    return closing.openness(q) <= CLOSED and closing.faces(q)
+
+
+def nearest_of(
+    closing: Closing, found: list[Vector], target: Target, own: Sequence[int] | None = None
+) -> list[Vector]:
+    """Return configurations in the order of their distance from the target.
+
+    Args:
+        closing: the loops.
+        found: (nq,) configurations.
+        target: the positions that configurations are compared with.
+        own: see `Target.distances`.
+    """
+    left, ordered = list(found), list[Vector]()
+    while left:
+        best = left[0]
+        for other in left[1:]:
+            if _is_nearer(closing, other, best, target, own):
+                best = other
+        ordered.append(best)
+        left = [q for q in left if q is not best]
+    return ordered
+
+
+def _is_nearer(
+    closing: Closing, q: Vector, other: Vector, target: Target, own: Sequence[int] | None
+) -> bool:
+    """Whether the configuration q is nearer to the target than the configuration `other`.
+
+    Guessed positions are compared first, then all positions. If both are equally near, the first
+    position that differs decides, in the order of the description: the larger value is nearer.
+    """
+    distances, others = (target.distances(closing, one, own) for one in (q, other))
+    for distance, least in zip(distances, others, strict=True):
+        if abs(distance - least) > EQUAL:
+            return distance < least
+    system = closing.system
+    order = {row.name: number for number, row in enumerate(system.joints)}
+    moves = difference(system, q, other)
+    apart = [k for k in range(system.nq) if abs(moves[k]) > EQUAL]
+    first = min(apart, key=lambda k: order.get(system.coordinates[k].joint, k), default=None)
+    return first is not None and bool(moves[first] > 0)
+
+
+# Comparison of configurations with the guess.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """Positions of all joints that an assembled configuration is to be near to.
+
+    All positions are q, then the positions of joints that are cut. Therefore the comparison does
+    not depend on the joint of a loop that is cut.
+
+    Attributes:
+        system: its loops need not be closed yet.
+        p: (np,) parameters.
+        start: (nq,) positions.
+        cut: (c,) positions of `system.cut_coordinates`.
+        guessed: indices of the guessed positions among all positions.
+    """
+
+    system: System
+    p: Vector
+    start: Vector
+    cut: Vector
+    guessed: tuple[int, ...]
+
+    @staticmethod
+    def at(closing: Closing, start: Vector, guessed: Sequence[int]) -> Target:
+        """The target of a start, and indices in q of its guessed positions."""
+        cut = [float(row.name.endswith(".qw")) for row in closing.system.cut_coordinates]
+        return Target(closing.system, closing.p, start, np.array(cut), tuple(guessed))
+
+    @staticmethod
+    def of(system: System, p: Vector, start: Vector, guess: Mapping[str, float]) -> Target:
+        """The target of a start and a guess by coordinate name."""
+        rows = system.cut_coordinates
+        cut = [guess.get(row.name, float(row.name.endswith(".qw"))) for row in rows]
+        names = [row.name for row in (*system.coordinates, *rows)]
+        guessed = tuple(k for k, name in enumerate(names) if name in guess)
+        return Target(system, p, start, np.array(cut, dtype=float), guessed)
+
+    @property
+    def guessed_cuts(self) -> list[int]:
+        """Indices of guessed positions in `system.cut_coordinates`."""
+        return [k - self.system.nq for k in self.guessed if k >= self.system.nq]
+
+    def cut_moves(self, q: Vector) -> Vector:
+        """(c,) differences of positions of cut joints from the target [rad, m or 1]."""
+        rows = self.system.cut_coordinates
+        found = np.array(cut_positions(self.system)(q, self.p)).ravel()
+        moves = found - self.cut
+        turns = np.array([row.unit == "rad" for row in rows], dtype=bool)
+        moves[turns] = np.remainder(moves[turns] + np.pi, 2 * np.pi) - np.pi
+        for k, row in enumerate(rows):
+            if row.name.endswith(".qw"):
+                part = slice(k, k + 4)
+                moves[part] = min(moves[part], found[part] + self.cut[part], key=_largest)
+        return moves
+
+    def meets_cuts(self, q: Vector) -> bool:
+        """Whether guessed positions of cut joints have their values."""
+        guessed = self.guessed_cuts
+        return not guessed or _largest(self.cut_moves(q)[guessed]) < EQUAL
+
+    def distances(
+        self, closing: Closing, q: Vector, own: Sequence[int] | None = None
+    ) -> tuple[float, float]:
+        """Largest move of a guessed position and of any [rad, or sizes of the mechanism].
+
+        Args:
+            closing: the loops.
+            q: (nq,) configuration.
+            own: indices in q of the positions that count; all positions, also of joints that are
+                cut, if left out.
+        """
+        rows, moves = [*self.system.coordinates], difference(self.system, q, self.start)
+        if own is None:
+            rows += self.system.cut_coordinates
+            moves = np.concatenate([moves, self.cut_moves(q)])
+        lengths = [row.unit.startswith("m") for row in rows]
+        moves = np.abs(moves) / np.where(lengths, closing.size, 1.0)
+        count = range(len(rows)) if own is None else own
+        guessed = sorted(set(self.guessed) & set(count))
+        return _largest(moves[guessed]), _largest(moves[list(count)])
+
+
+def _largest(values: Vector) -> float:
+    return float(np.max(np.abs(values), initial=0.0))
+
+
+# Mechanisms with many free positions, block by block.
+
+
+def _by_blocks(closing: Closing, target: Target, q: Vector | None) -> Vector | None:
+    """The closed configuration that is nearest to a target in one block after the other.
+
+    Args:
+        closing: the rows, and the positions that must not change.
+        target: first guess.
+        q: (nq,) a closed configuration; None if Newton's method found none.
+    """
+    start, held, at = target.start, closing, target.start
+    if q is not None:
+        more = _independent(closing, q, set(target.guessed))
+        held = replace(closing, locked=tuple(sorted({*closing.locked, *more})))
+        at = start.copy()
+        at[list(held.locked)] = q[list(held.locked)]
+    blocks = _blocks(held, at if q is None else q)
+    if blocks is None:
+        return q
+    tried = 0
+    stack = [(0, at)]
+    while stack and tried < _MOST:
+        number, reached = stack.pop()
+        tried += 1
+        if number == len(blocks):
+            whole = closing.nearest(reached)
+            if whole.is_closed:
+                return unwound(closing, whole.q, start)
+            continue
+        own = blocks[number]
+        options = _options(own, reached)
+        ordered = nearest_of(closing, options, target, own.free)
+        stack += [(number + 1, option) for option in reversed(ordered)]
+    return q
+
+
+def _options(block: Closing, start: Vector) -> list[Vector]:
+    """Configurations that close a block; the first is near enough, or others are searched too."""
+    first = block.nearest(start)
+    found = [unwound(block, first.q, start)] if first.is_closed else []
+    near = Target.at(block, start, ())
+    if found and near.distances(block, found[0], block.free)[1] < _NEAR:
+        return found
+    for other in candidates(block, start):
+        if not any(np.abs(difference(block.system, other, q)).max() < EQUAL for q in found):
+            found.append(other)
+    return found
+
+
+def _independent(closing: Closing, q: Vector, guessed: set[int]) -> list[int]:
+    """Free positions that determine the others at q: guessed ones before others, where possible."""
+    J = closing.rows(q)[1] / closing.sizes[:, None]
+    lengths = [closing.system.coordinates[k].unit.startswith("m") for k in closing.free]
+    J = J * np.where(lengths, closing.size, 1.0)
+    left = list(range(len(closing.free)))
+    full, taken = rank(J, _FLAT), list[int]()
+    order = sorted(left, key=lambda k: (closing.free[k] not in guessed, k))
+    for k in order:
+        if len(left) == full:
+            break
+        others = [m for m in left if m != k]
+        if rank(J[:, others], _FLAT) == full:
+            left, taken = others, [*taken, closing.free[k]]
+    return taken
+
+
+def _blocks(closing: Closing, q: Vector) -> list[Closing] | None:
+    """The loops in blocks that determine their positions in turn; None if there is one block only.
+
+    Args:
+        closing: the rows, and the positions that must not change.
+        q: (nq,) configuration at which ranks are measured.
+    """
+    groups = _row_groups(closing.system)
+    J = replace(closing, locked=()).rows(q)[1] / closing.sizes[:, None]
+    depends = {
+        name: set(np.flatnonzero(np.any(J[rows] != 0, axis=0)).tolist()) & set(closing.free)
+        for name, rows in groups.items()
+    }
+    known, waiting, found = set[int](), list(groups), list[Closing]()
+    while waiting:
+        names = _next_block(J, groups, depends, known, waiting)
+        free = set[int]().union(*(depends[name] for name in names)) - known
+        waiting = [name for name in waiting if name not in names]
+        known |= free
+        if not free:
+            continue
+        rows = sorted(row for name in names for row in groups[name])
+        locked = tuple(k for k in range(closing.system.nq) if k not in free)
+        axes = _axes_of(closing.system, known | set(closing.locked), free)
+        found.append(Closing(closing.system, closing.p, locked, tuple(rows), axes))
+    return found if len(found) > 1 else None
+
+
+def _row_groups(system: System) -> dict[str, list[int]]:
+    """Indices of the rows of each loop, coupling and component, and of each quaternion's norm."""
+    groups = dict[str, list[int]]()
+    rows = position_rows(system)
+    for k, (name, *_) in enumerate(rows):
+        groups.setdefault(name, []).append(k)
+    for k, part in enumerate(quaternion_slices(system.tree)):
+        groups[f"norm of {part.start}"] = [len(rows) + k]
+    return groups
+
+
+def _next_block(
+    J: Vector,
+    groups: dict[str, list[int]],
+    depends: dict[str, set[int]],
+    known: set[int],
+    waiting: list[str],
+) -> list[str]:
+    """The least connected groups of rows that determine their unknown positions; else all left."""
+    paths = [[name] for name in waiting]
+    for _ in range(_LOOPS):
+        for names in paths:
+            unknown = sorted(set[int]().union(*(depends[name] for name in names)) - known)
+            rows = [row for name in names for row in groups[name]]
+            if rank(J[np.ix_(rows, unknown)], _FLAT) == len(unknown):
+                return names
+        paths = [
+            [*names, other]
+            for names in paths
+            for other in waiting
+            if other not in names
+            and (set[int]().union(*(depends[name] for name in names)) & depends[other]) - known
+        ]
+    return list(_connected(depends, known, waiting))
+
+
+def _connected(depends: dict[str, set[int]], known: set[int], waiting: list[str]) -> Iterator[str]:
+    """The groups of rows that share unknown positions with the first one."""
+    reached, names = set(depends[waiting[0]]) - known, {waiting[0]}
+    grown = True
+    while grown:
+        grown = False
+        for name in waiting:
+            if name not in names and reached & depends[name]:
+                names.add(name)
+                reached |= depends[name] - known
+                grown = True
+    yield from (name for name in waiting if name in names)
+
+
+def _axes_of(system: System, known: set[int], free: set[int]) -> tuple[int, ...]:
+    """The cosines that must be positive and that depend on positions of a block and known ones."""
+
+    def build() -> list[set[int]]:
+        q = SX.sym("q", system.nq)
+        pattern = Function("facing", [q, system.p], [facing(system, q)]).jac_sparsity(0, 0)
+        rows, columns = pattern.get_triplet()
+        found = [set[int]() for _ in range(pattern.size1())]
+        for row, column in zip(rows, columns, strict=True):
+            found[row].add(column)
+        return found
+
+    depends: list[set[int]] = system.cached("axes of loops", build)
+    return tuple(k for k, own in enumerate(depends) if own & free and own <= known)

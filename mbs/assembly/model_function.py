@@ -112,7 +112,7 @@ class ConfigurationCheck:
 
     rows: Callable[[System, SX], list[ValidityRow]]
     refuse: Callable[[System, Any, Any], None]
-    verify: Callable[[System, list[str], Any, dict[str, DM], Sequence[DM]], None] | None = None
+    verify: Callable[[System, list[str], Any, dict[str, Any], Sequence[DM]], None] | None = None
 
 
 _SAME_UNIT = {unit: unit for unit in EFFORT_UNIT}
@@ -418,8 +418,7 @@ class ModelFunction(Function):
         def evaluate(values: Mapping[str, DM]) -> list[DM]:
             return list(Function.call(self, [*values.values()]))
 
-        given = {name: DM(value) for name, value in inputs.items()}
-        check.verify(self._system, self.name_out(), evaluate, given, every)
+        check.verify(self._system, self.name_out(), evaluate, inputs, every)
 
     def _require_numbers(self, outputs: Any) -> None:
         every = outputs if isinstance(outputs, tuple) else (outputs,)

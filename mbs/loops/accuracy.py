@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import casadi
 import numpy as np
@@ -26,6 +27,9 @@ is tested. At a sine of 0.05 it changes second derivatives by 1e-11 of squared s
 _MOVE = 1e-12
 """Move of a position for a test [rad, or m in sizes of the mechanism]: exact derivatives change by
 about this part."""
+_NO_SYMBOLS = DM(0, 1)
+_PLANE = 2
+"""Dimensions of an array with columns."""
 _TRIALS, _SEED = 3, 20261128
 _NEWTON = 3
 """Newton steps onto the loops after a move: they converge quadratically."""
@@ -41,7 +45,7 @@ def require_accurate(
     system: System,
     names: Sequence[str],
     evaluate: Evaluate,
-    inputs: Mapping[str, DM],
+    inputs: Mapping[str, Any],
     outputs: Sequence[DM],
 ) -> None:
     """Raise an error if second derivatives depend on the last digits of the positions.
@@ -54,31 +58,29 @@ def require_accurate(
         system: with closed loops.
         names: names of the outputs; "A" and derivatives by positions, "_dq", are tested.
         evaluate: returns the outputs at other inputs.
-        inputs: numeric values of the inputs; one or several columns.
+        inputs: numeric values of the inputs, q and p as DM; one or several columns.
         outputs: values at these inputs.
 
     Raises:
         SingularPosture: the derivatives have no accuracy at these velocities.
     """
-    q, p = inputs["q"].full(), inputs.get("p", DM(0, 1)).full()
-    count = q.shape[1]
     tested = [k for k, name in enumerate(names) if name == "A" or "_dq" in name]
-    if len(q) != system.nq or p.shape[1] not in (1, count):
-        return
-    p = np.broadcast_to(p, (len(p), count))
+    q, v, p = _point(system, inputs)
+    count = q.shape[1]
     health = configuration_health(system)
-    leads = [float(health(q[:, k], p[:, k])[1]) for k in range(count)]
+    leads = (health if count == 1 else health.map(count)).call([DM(q), DM(p)])[1].nonzeros()
     near = [k for k in range(count) if leads[k] < _ROUNDED]
     if not near or not tested:
         return
-    floors = _floors(system, names, inputs, outputs, tested, count)
-    rng, sizes = np.random.default_rng(_SEED), _sizes(system, p[:, near[0]])
+    numbers = {name: DM(value) for name, value in inputs.items()}
+    floors = _floors(system, names, v, outputs, tested)
+    rng, units = np.random.default_rng(_SEED), _units(system, p[:, near[0]])
     for _ in range(_TRIALS):
         moved = q.copy()
         for k in near:
-            start = q[:, k] + _MOVE * sizes * rng.uniform(-1, 1, system.nq)
+            start = q[:, k] + _MOVE * units * rng.uniform(-1, 1, system.nq)
             moved[:, k] = _closed(system, start, p[:, k])
-        others = evaluate({**inputs, "q": DM(moved)})
+        others = evaluate({**numbers, "q": DM(moved)})
         for k, number in [(k, number) for k in near for number in tested]:
             found, other = (_column(x[number], k, count) for x in (outputs, others))
             allowed = _ROUNDING * np.max(np.abs(found), axis=1) + floors[number][k]
@@ -106,14 +108,13 @@ def _column(value: DM, k: int, count: int) -> Array:
 def _floors(
     system: System,
     names: Sequence[str],
-    inputs: Mapping[str, DM],
+    v: Array,
     outputs: Sequence[DM],
     tested: Sequence[int],
-    count: int,
 ) -> dict[int, list[Array]]:
     """Effects of rounding that are allowed in each row of an output, for each column of inputs."""
     units = scales(system).columns([system.speeds[k].unit for k in system.active])
-    v = np.broadcast_to(inputs["v_a"].full(), (len(units), count))
+    count = v.shape[1]
     squares = np.max((v / units[:, None]) ** 2, axis=0, initial=0.0)
     masses = [k for k, name in enumerate(names) if name.startswith("dtau") and "_da" in name]
 
@@ -133,9 +134,31 @@ def _floors(
     }
 
 
-def _sizes(system: System, p: Array) -> Array:
+def _point(system: System, inputs: Mapping[str, Any]) -> list[Array]:
+    """(nq, n), (m, n) and (np, n) values of q, v and p, as many columns of all."""
+    sizes = {"q": system.nq, "v_a": len(system.active), "p": len(system.parameters)}
+    found = [_columns(inputs.get(name, _NO_SYMBOLS), size) for name, size in sizes.items()]
+    count = max(values.shape[1] for values in found)
+    return [
+        values if values.shape == (size, count) else np.broadcast_to(values, (size, count))
+        for values, size in zip(found, sizes.values(), strict=True)
+    ]
+
+
+def _columns(value: Any, size: int) -> Array:
+    """(size, n) values of an input; one number stands for all elements."""
+    full = np.asarray(value.full() if isinstance(value, DM) else value, dtype=float)
+    if full.ndim < _PLANE:
+        return full.reshape(-1, 1)
+    return full.T if full.shape[0] != size and full.shape == (1, size) else full
+
+
+def _units(system: System, p: Array) -> Array:
     """Sizes of positions [rad or m]."""
-    size = float(Function("size", [system.p], [mechanism_size(system)])(p))
+    function: Function = system.cached(
+        "mechanism size of p", lambda: Function("size", [system.p], [mechanism_size(system)])
+    )
+    size = float(function(p))
     units = [coordinate.unit for coordinate in system.coordinates]
     return np.array([size if unit.startswith("m") else 1.0 for unit in units])
 
@@ -143,7 +166,7 @@ def _sizes(system: System, p: Array) -> Array:
 def _closed(system: System, q: Array, p: Array) -> Array:
     """The configuration nearest to q that closes the loops."""
     for _ in range(_NEWTON):
-        rows, slopes = (x.full() for x in _closure(system)(q, p))
+        rows, slopes = (x.full() for x in _closure(system).call([DM(q), DM(p)]))
         if rows.size:
             q = q - np.linalg.lstsq(slopes, rows.ravel(), rcond=_DEPENDENT)[0]
     return q

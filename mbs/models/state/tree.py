@@ -342,8 +342,7 @@ def _without_passages(system: System, point: tuple[SX, SX, SX, SX]) -> Passage:
 
 _LARGE = 100
 """Elements of an output beyond which its zeros are not written one by one: a line of C each, of
-which compilers need more than proportional time. Steps through singular configurations skip
-them."""
+which compilers need more than proportional time. Steps in tangent coordinates skip them."""
 
 
 def _mostly_dense(name: str, inputs: Sequence[SX], outputs: Sequence[SX]) -> Function:

@@ -12,11 +12,15 @@ from mbs.components import (
     CoulombFriction,
     Custom,
     Damper,
+    FixedFlange,
     ForceInput,
     PointMass,
     Prismatic,
     Revolute,
+    ShaftInertia,
+    ShaftSpringDamperSeries,
     Spring,
+    SpringDamperSeries,
     custom,
 )
 from mbs.errors import ModelError, SolverError
@@ -184,6 +188,35 @@ def test_efforts_motions_and_wrenches_on_a_massless_node_raise(tmp_path):
     with pytest.raises(ModelError, match=f"the wrench on node {text}"):
         mbs.export.fmu(system, tmp_path / "chain.fmu", inputs=["node.wrench"])
     assert mbs.simulate.run(system, 0.1, tau={"x": 1.0})["x.v"][-1] > 0
+
+
+@pytest.mark.parametrize("kind", ["points", "shafts"])
+def test_a_node_between_a_spring_and_a_damper_with_a_parallel_spring(kind):
+    """The node moves as one of little mass; its velocity follows from the balance of forces."""
+    k, c, K = 600.0, 20.0, 300.0
+    m = mbs.Mechanism("solid")
+    if kind == "points":
+        body = m.add(PointMass("body", mass=MASS))
+        m.connect(m.world, Prismatic("x", axis="x"), body)
+        m.add(
+            SpringDamperSeries("s", m.world, body, stiffness=k, damping=c, length=1.0, parallel=K)
+        )
+        start, state, offset = {"x": 1.1}, "s.elongation", 1.0
+    else:
+        wheel = ShaftInertia("x", MASS)
+        solid = ShaftSpringDamperSeries("s", stiffness=k, damping=c, parallel=K)
+        m.connect(solid.flange_a, wheel.flange_a)
+        m.connect(solid.flange_b, FixedFlange("ground").flange)
+        start, state, offset = {"x": 0.1}, "s.twist", 0.0
+    result = mbs.simulate.run(m.assemble(), 2.0, q0=start, tolerance=1e-10)
+    # m times acceleration of x = -k (x - z), c times rate of z = k (x - z) - K z, from rest
+    A = np.array([[0, 1, 0], [-k / MASS, 0, k / MASS], [k / c, 0, -(k + K) / c]])
+    eigenvalues, vectors = np.linalg.eig(A)
+    weights = np.linalg.solve(vectors, [0.1, 0.0, 0.0])
+    modes = weights * np.exp(np.outer(result.time, eigenvalues))
+    exact = np.real(modes @ vectors.T)
+    np.testing.assert_allclose(result["x.q"] - offset, exact[:, 0], atol=1e-8)
+    np.testing.assert_allclose(result[state], exact[:, 2], atol=1e-8)
 
 
 def test_mechanisms_without_any_mass_stay_open():

@@ -173,10 +173,12 @@ def _is_nearer(
 ) -> bool:
     """Whether a configuration is nearer to the start than another one.
 
-    Guessed positions are compared first, then all positions; of two configurations that are equally
-    near, the one with the larger first position is nearer.
+    Guessed positions are compared first, then all positions, then those of massless nodes, which
+    move less than the others; of two configurations that are equally near, the one with the larger
+    first position is nearer.
     """
-    for indices in (sorted(guessed), list(range(closing.system.nq))):
+    nodes = [position for position, _, _ in closing.system.balanced]
+    for indices in (sorted(guessed), list(range(closing.system.nq)), nodes):
         gap = _distance(closing, q, start, indices) - _distance(closing, other, start, indices)
         if abs(gap) > _EQUAL:
             return gap < 0

@@ -143,6 +143,25 @@ def test_a_knot_of_springs_in_space_is_as_one_of_little_mass():
         np.testing.assert_allclose(result[f"{c.name}.q"], other[f"{c.name}.q"], atol=2e-6)
 
 
+def test_a_node_on_a_link_of_a_loop_keeps_its_guess():
+    """Its spring balances the other one on either side of the point where it begins."""
+    m = mbs.robots.four_bar()
+    bar = next(iter(m.bodies()))
+    node, tip = m.add(PointMass("node", mass=0)), m.add(PointMass("tip", mass=0.2))
+    m.connect(bar, Prismatic("n", axis="x"), node)
+    m.connect(bar, Prismatic("x", axis="x"), tip)
+    m.add(Spring("s1", bar, node, stiffness=3000.0, length=0.1))
+    m.add(Spring("s2", node, tip, stiffness=5000.0, length=0.1))
+    system = m.assemble(guess={"n": 0.1, "x": 0.2})
+    named = dict(zip((c.name for c in system.coordinates), system.configuration, strict=True))
+    assert named["n"] == pytest.approx(0.1, abs=1e-9)
+    result = mbs.simulate.run(system, 1.0, q0={"j1": 0.3, "x": 0.21}, tolerance=1e-9)
+    n, x = result["n.q"], result["x.q"]
+    np.testing.assert_allclose(3000 * (n - 0.1), 5000 * (x - n - 0.1), atol=1e-8)
+    energy = result["kinetic_energy"] + result["potential_energy"]
+    assert np.ptp(energy) < 1e-6 * result["kinetic_energy"].max()
+
+
 def test_a_node_that_rotates():
     """Two torsion springs in series: a joint with a spring on a massless frame, then a pendulum."""
     m = mbs.Mechanism("shaft", gravity=(0, 0, 0))

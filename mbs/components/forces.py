@@ -343,8 +343,9 @@ class SpringDamperSeries(ForceElement):
     """A spring in series with a damper between two points, a Maxwell element.
 
     With the distance L of the points and the state z, the elongation of the damper, the tension is
-    T = stiffness (L - length - z), and damping dz/dt = T. A constant distance relaxes within
-    the time damping / stiffness.
+    T = stiffness (L - length - z), and damping dz/dt = T - parallel z. A constant distance relaxes
+    within the time damping / (stiffness + parallel). With a spring parallel to the damper it is the
+    standard linear solid: the node between the springs has no mass.
 
     Source: Haug 1989 for translational springs and dampers.
 
@@ -354,6 +355,7 @@ class SpringDamperSeries(ForceElement):
         damping: of the damper [N s/m].
         length: free length of both together at z = 0 [m].
         elongation: of the damper at the start [m].
+        parallel: stiffness of a spring parallel to the damper [N/m].
     """
 
     a = custom.frame()
@@ -363,22 +365,24 @@ class SpringDamperSeries(ForceElement):
     length = custom.parameter("m", 0.0, min=0)
     elongation = custom.state("m")
     force = custom.output("N")
+    parallel = custom.parameter("N/m", 0.0, min=0)
 
     def rates(self, at: Any) -> Mapping[str, SX]:
         """Of the elongation of the damper."""
-        return {"elongation": self._tension(at) / at.damping}
+        return {"elongation": self._damper_force(at) / at.damping}
 
     def loads(self, at: Any) -> Mapping[str, Load]:
         """The tension of both, each point towards the other."""
         return custom.pull(at.a, at.b, self._tension(at))
 
     def energy(self, at: Any) -> SX:
-        """What the spring stores."""
-        return SX(0.5 * at.stiffness * self._stretch(at) ** 2)
+        """Energy in the springs."""
+        stored = at.stiffness * self._stretch(at) ** 2 + at.parallel * at.elongation**2
+        return SX(0.5 * stored)
 
     def dissipation(self, at: Any) -> SX:
         """What the damper takes."""
-        return SX(self._tension(at) ** 2 / at.damping)
+        return SX(self._damper_force(at) ** 2 / at.damping)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """The tension."""
@@ -389,6 +393,10 @@ class SpringDamperSeries(ForceElement):
 
     def _tension(self, at: Any) -> SX:
         return SX(at.stiffness * self._stretch(at))
+
+    def _damper_force(self, at: Any) -> SX:
+        """Tension less the force of the parallel spring, from the balance at the node."""
+        return SX(self._tension(at) - at.parallel * at.elongation)
 
 
 # Bushings: elastic mounts between two frames.

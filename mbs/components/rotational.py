@@ -90,31 +90,37 @@ class ShaftSpringDamperSeries(_BetweenShafts):
     """A spring in series with a damper between two shafts, a Maxwell element.
 
     With the twist x = angle_a - angle_b and the state z, the part of it in the damper, the torque
-    from a to b is T = stiffness (x - z), and damping dz/dt = T. A constant twist relaxes within
-    the time damping / stiffness.
+    from a to b is T = stiffness (x - z), and damping dz/dt = T - parallel z. A constant twist
+    relaxes within the time damping / (stiffness + parallel).
 
     Source: Haug 1989 for springs and dampers in shafts.
 
     Attributes:
         stiffness: of the spring [N m/rad].
         damping: of the damper [N m s/rad].
+        parallel: stiffness of a spring parallel to the damper [N m/rad].
     """
 
     stiffness = custom.parameter("N.m/rad", positive=True)
     damping = custom.parameter("N.m.s/rad", positive=True)
     twist = custom.state("rad")
+    parallel = custom.parameter("N.m/rad", 0.0, min=0)
 
     def rates(self, at: Any) -> Mapping[str, SX]:
         """Of the part of the twist that is in the damper."""
-        return {"twist": self._torque(at) / at.damping}
+        return {"twist": self._damper_torque(at) / at.damping}
 
     def energy(self, at: Any) -> SX:
-        """What the spring stores."""
-        return SX(0.5 * at.stiffness * self._stretch(at) ** 2)
+        """Energy in the springs."""
+        return SX(0.5 * (at.stiffness * self._stretch(at) ** 2 + at.parallel * at.twist**2))
 
     def dissipation(self, at: Any) -> SX:
         """What the damper takes."""
-        return SX(self._torque(at) ** 2 / at.damping)
+        return SX(self._damper_torque(at) ** 2 / at.damping)
+
+    def _damper_torque(self, at: Any) -> SX:
+        """Torque less that of the parallel spring, from the balance between the springs."""
+        return SX(self._torque(at) - at.parallel * at.twist)
 
     def _stretch(self, at: Any) -> SX:
         return SX(at.flange_a.angle - at.flange_b.angle - at.twist)

@@ -119,8 +119,9 @@ def _is_nearer(
 ) -> bool:
     """Whether the configuration q is nearer to the target than the configuration `other`.
 
-    Guessed positions are compared first, then all positions. If both are equally near, the first
-    position that differs decides, in the order of the description: the larger value is nearer.
+    Guessed positions are compared first, then all positions, then those of massless nodes, which
+    move less than the others. If both are equally near, the first position that differs decides, in
+    the order of the description: the larger value is nearer.
     """
     distances, others = (target.distances(closing, one, own) for one in (q, other))
     for distance, least in zip(distances, others, strict=True):
@@ -198,8 +199,10 @@ class Target:
 
     def distances(
         self, closing: Closing, q: Vector, own: Sequence[int] | None = None
-    ) -> tuple[float, float]:
-        """Largest move of a guessed position and of any [rad, or sizes of the mechanism].
+    ) -> tuple[float, float, float]:
+        """Largest move of a guessed position, of any, and of a massless node.
+
+        They are in rad, or in sizes of the mechanism.
 
         Args:
             closing: the loops.
@@ -215,7 +218,8 @@ class Target:
         moves = np.abs(moves) / np.where(lengths, closing.size, 1.0)
         count = range(len(rows)) if own is None else own
         guessed = sorted(set(self.guessed) & set(count))
-        return _largest(moves[guessed]), _largest(moves[list(count)])
+        nodes = [k for k, _, _ in self.system.balanced if k in count]
+        return _largest(moves[guessed]), _largest(moves[list(count)]), _largest(moves[nodes])
 
 
 def _largest(values: Vector) -> float:

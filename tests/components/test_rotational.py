@@ -345,4 +345,4 @@ def test_every_number_may_be_a_symbol():
     tau = np.array(numbers(*given))
     assert np.all(tau != 0)
     np.testing.assert_allclose(symbols(*given), tau, rtol=1e-12)
-    assert symbols.numel_in("p") == 2 + 4 + 7 + 2 + 2
+    assert symbols.numel_in("p") == 2 + 4 + 7 + 3 + 2

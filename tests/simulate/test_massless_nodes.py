@@ -12,11 +12,15 @@ from mbs.components import (
     CoulombFriction,
     Custom,
     Damper,
+    FixedFlange,
     ForceInput,
     PointMass,
     Prismatic,
     Revolute,
+    ShaftInertia,
+    ShaftSpringDamperSeries,
     Spring,
+    SpringDamperSeries,
     custom,
 )
 from mbs.errors import ModelError, SolverError
@@ -139,6 +143,25 @@ def test_a_knot_of_springs_in_space_is_as_one_of_little_mass():
         np.testing.assert_allclose(result[f"{c.name}.q"], other[f"{c.name}.q"], atol=2e-6)
 
 
+def test_a_node_on_a_link_of_a_loop_keeps_its_guess():
+    """Its spring balances the other one on either side of the point where it begins."""
+    m = mbs.robots.four_bar()
+    bar = next(iter(m.bodies()))
+    node, tip = m.add(PointMass("node", mass=0)), m.add(PointMass("tip", mass=0.2))
+    m.connect(bar, Prismatic("n", axis="x"), node)
+    m.connect(bar, Prismatic("x", axis="x"), tip)
+    m.add(Spring("s1", bar, node, stiffness=3000.0, length=0.1))
+    m.add(Spring("s2", node, tip, stiffness=5000.0, length=0.1))
+    system = m.assemble(guess={"n": 0.1, "x": 0.2})
+    named = dict(zip((c.name for c in system.coordinates), system.configuration, strict=True))
+    assert named["n"] == pytest.approx(0.1, abs=1e-9)
+    result = mbs.simulate.run(system, 1.0, q0={"j1": 0.3, "x": 0.21}, tolerance=1e-9)
+    n, x = result["n.q"], result["x.q"]
+    np.testing.assert_allclose(3000 * (n - 0.1), 5000 * (x - n - 0.1), atol=1e-8)
+    energy = result["kinetic_energy"] + result["potential_energy"]
+    assert np.ptp(energy) < 1e-6 * result["kinetic_energy"].max()
+
+
 def test_a_node_that_rotates():
     """Two torsion springs in series: a joint with a spring on a massless frame, then a pendulum."""
     m = mbs.Mechanism("shaft", gravity=(0, 0, 0))
@@ -184,6 +207,35 @@ def test_efforts_motions_and_wrenches_on_a_massless_node_raise(tmp_path):
     with pytest.raises(ModelError, match=f"the wrench on node {text}"):
         mbs.export.fmu(system, tmp_path / "chain.fmu", inputs=["node.wrench"])
     assert mbs.simulate.run(system, 0.1, tau={"x": 1.0})["x.v"][-1] > 0
+
+
+@pytest.mark.parametrize("kind", ["points", "shafts"])
+def test_a_node_between_a_spring_and_a_damper_with_a_parallel_spring(kind):
+    """The node moves as one of little mass; its velocity follows from the balance of forces."""
+    k, c, K = 600.0, 20.0, 300.0
+    m = mbs.Mechanism("solid")
+    if kind == "points":
+        body = m.add(PointMass("body", mass=MASS))
+        m.connect(m.world, Prismatic("x", axis="x"), body)
+        m.add(
+            SpringDamperSeries("s", m.world, body, stiffness=k, damping=c, length=1.0, parallel=K)
+        )
+        start, state, offset = {"x": 1.1}, "s.elongation", 1.0
+    else:
+        wheel = ShaftInertia("x", MASS)
+        solid = ShaftSpringDamperSeries("s", stiffness=k, damping=c, parallel=K)
+        m.connect(solid.flange_a, wheel.flange_a)
+        m.connect(solid.flange_b, FixedFlange("ground").flange)
+        start, state, offset = {"x": 0.1}, "s.twist", 0.0
+    result = mbs.simulate.run(m.assemble(), 2.0, q0=start, tolerance=1e-10)
+    # m times acceleration of x = -k (x - z), c times rate of z = k (x - z) - K z, from rest
+    A = np.array([[0, 1, 0], [-k / MASS, 0, k / MASS], [k / c, 0, -(k + K) / c]])
+    eigenvalues, vectors = np.linalg.eig(A)
+    weights = np.linalg.solve(vectors, [0.1, 0.0, 0.0])
+    modes = weights * np.exp(np.outer(result.time, eigenvalues))
+    exact = np.real(modes @ vectors.T)
+    np.testing.assert_allclose(result["x.q"] - offset, exact[:, 0], atol=1e-8)
+    np.testing.assert_allclose(result[state], exact[:, 2], atol=1e-8)
 
 
 def test_mechanisms_without_any_mass_stay_open():

@@ -8,6 +8,7 @@ typedef double real;
 #define REAL(number) number
 #define SHARED
 #define real_abs fabs
+#define real_floor floor
 #define real_max fmax
 #define real_min fmin
 #define real_finite isfinite

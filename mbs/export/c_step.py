@@ -124,7 +124,7 @@ static int all_finite(const real *x, int n) {{
 _PRECISION: dict[Real, str] = {
     "double": """\
 #define real_abs fabs
-#define real_floor floor
+#define real_within_half_turn(angle) atan2(sin(angle), cos(angle))
 #define real_max fmax
 #define real_min fmin
 #define real_sqrt sqrt
@@ -134,7 +134,7 @@ _PRECISION: dict[Real, str] = {
     "float": """\
 #define REAL_IS_FLOAT
 #define real_abs fabsf
-#define real_floor floorf
+#define real_within_half_turn(angle) atan2f(sinf(angle), cosf(angle))
 #define real_max fmaxf
 #define real_min fminf
 #define real_sqrt sqrtf

@@ -26,6 +26,7 @@ the mechanism]: branches that are nearer to each other meet there."""
 _EQUAL = 1e-6
 """Difference of distances that are equal: configurations are closed to 1e-12, and branches of
 symmetric mechanisms are equally near up to rounding."""
+_MODES = 64  # configurations of a search, of which the nearest is taken
 _LOOPS = 3  # that one block may have
 _MOST = 400
 """Configurations of blocks that are tried: some ten blocks of which each has several."""
@@ -72,7 +73,7 @@ def nearest_configuration(
         reached = _by_blocks(closing, start, q, set(guessed))
         return None if reached is None else Assembled(reached)
     found = [] if q is None else [q]
-    for other in candidates(closing, start):
+    for other in candidates(closing, start, _MODES):
         if not any(np.abs(difference(closing.system, other, x)).max() < _EQUAL for x in found):
             found.append(other)
     if not found:
@@ -186,7 +187,7 @@ def _options(block: Closing, start: Vector) -> list[Vector]:
     found = [unwound(block, first.q, start)] if first.is_closed else []
     if found and _distance(block, found[0], start, block.free) < _NEAR:
         return found
-    for other in candidates(block, start):
+    for other in candidates(block, start, _MODES):
         if not any(np.abs(difference(block.system, other, q)).max() < _EQUAL for q in found):
             found.append(other)
     return found

@@ -174,8 +174,7 @@ static int any_guessed(const loops *l) {
 /* Difference of two values of a dependent coordinate, of angles up to whole turns [rad or m]. */
 static real difference(int i, real z, real other) {
     real d = z - other;
-    if (MODEL_TURNS[i]) d -= REAL(2.0) * HALF_TURN * real_floor(REAL(0.5) * (d / HALF_TURN + REAL(1.0)));
-    return d;
+    return MODEL_TURNS[i] ? real_within_half_turn(d) : d;
 }
 
 /* Largest distance from the guesses, of guessed coordinates or of all [rad, or sizes of the mechanism]. */

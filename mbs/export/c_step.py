@@ -18,8 +18,15 @@ from mbs.assembly.validity import UNIT
 from mbs.errors import ModelError
 from mbs.export.c_check import NO_FAST_MATH
 from mbs.export.fmu.description import FmuVariable
-from mbs.export.fmu.source import diagonal_blocks, leading_states, steepness
-from mbs.export.fmu.variables import dependents, inputs, outputs, parameters, states
+from mbs.export.fmu.source import diagonal_blocks, leading_states, spans, steepness
+from mbs.export.fmu.variables import (
+    dependents,
+    inputs,
+    loop_size,
+    outputs,
+    parameters,
+    states,
+)
 from mbs.models.state.independent import MinimalState, consistent_start, minimal_state
 from mbs.native.bare_source import NOINLINE, Real, bare_source, literal
 from mbs.text import in_c_comment
@@ -117,6 +124,7 @@ static int all_finite(const real *x, int n) {{
 _PRECISION: dict[Real, str] = {
     "double": """\
 #define real_abs fabs
+#define real_within_half_turn(angle) atan2(sin(angle), cos(angle))
 #define real_max fmax
 #define real_min fmin
 #define real_sqrt sqrt
@@ -126,6 +134,7 @@ _PRECISION: dict[Real, str] = {
     "float": """\
 #define REAL_IS_FLOAT
 #define real_abs fabsf
+#define real_within_half_turn(angle) atan2f(sinf(angle), cosf(angle))
 #define real_max fmaxf
 #define real_min fminf
 #define real_sqrt sqrtf
@@ -361,6 +370,8 @@ def _tables(system: System, state: MinimalState, variables: _Variables, real: Re
         assert state.closure is not None
         made.append(_numbers("MODEL_NOMINAL", (v.nominal for v in joints), real))
         made.append(_places("MODEL_LEADS", leading_states(state.closure)))
+        made.append(_places("MODEL_TURNS", [int(v.unit == "rad") for v in variables.z]))
+        made.append(_numbers("MODEL_SPANS", spans(variables.z, loop_size(system)), real))
     if blocks := diagonal_blocks(state.slopes):
         made += [
             _numbers("MODEL_UNITS", (v.nominal for v in units), real),

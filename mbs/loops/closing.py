@@ -401,6 +401,8 @@ _ROOT_OF_ROUNDING = 1e-6
 """Largest correction of a singular end [rad or sizes]: closing rows give it to 1e-9 to 1e-7."""
 _CANDIDATES, _TRIES = 6, 60
 """Most configurations in an error message, and starts of the search for them."""
+_REACHES = 1.0, 0.3
+"""Parts of half a turn, and of the size, within which random starts are taken in turn."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -744,12 +746,14 @@ def _sign(quaternion: Vector, start: Vector) -> float:
     return 1.0
 
 
-def candidates(closing: Closing, start: Vector) -> list[Vector]:
-    """Closed configurations with the locked positions of the start, nearest first, a few at most.
+def candidates(closing: Closing, start: Vector, most: int = _CANDIDATES) -> list[Vector]:
+    """Closed configurations with the locked positions of the start, nearest first.
 
     Args:
         closing: closure rows and the locked positions.
-        start: (nq,) configuration around which the search starts.
+        start: (nq,) configuration around which the search starts. Every second random start is near
+            it.
+        most: number of configurations at which the search ends.
     """
     rng, free = np.random.default_rng(_SEED), closing.free
     lengths = [closing.system.coordinates[k].unit.startswith("m") for k in free]
@@ -758,18 +762,19 @@ def candidates(closing: Closing, start: Vector) -> list[Vector]:
     found: list[Vector] = []
     for number in range(_TRIES):
         trial = start.copy()
+        reach_of = _REACHES[number % 2]
         if number:
-            trial[free] += reach * rng.uniform(-1, 1, len(free))
-            for part in turning:
-                quaternion = rng.standard_normal(4)
-                trial[part] = quaternion / np.linalg.norm(quaternion)
+            trial[free] += reach_of * reach * rng.uniform(-1, 1, len(free))
+        for part in turning if number and reach_of == 1 else ():
+            quaternion = rng.standard_normal(4)
+            trial[part] = quaternion / np.linalg.norm(quaternion)
         closed = closing.nearest(trial)
         if not closed.is_closed:
             continue
         q = unwound(closing, closed.q, start)
         if all(np.max(np.abs(difference(closing.system, q, one))) > _OTHER for one in found):
             found.append(q)
-        if len(found) == _CANDIDATES:
+        if len(found) == most:
             break
     found.sort(key=lambda q: float(np.max(np.abs(difference(closing.system, q, start)))))
     return found

@@ -27,6 +27,7 @@ the mechanism]: branches that are nearer to each other meet there."""
 EQUAL = 1e-6
 """Difference of distances that are equal: configurations are closed to 1e-12, and branches of
 symmetric mechanisms are equally near up to rounding."""
+_MODES = 64  # configurations of a search, of which the nearest is taken
 _LOOPS = 3  # that one block may have
 _MOST = 400
 """Configurations of blocks that are tried: some ten blocks of which each has several."""
@@ -74,7 +75,7 @@ def nearest_configuration(closing: Closing, target: Target) -> Assembled | None:
         reached = _by_blocks(closing, target, q)
         return None if reached is None else Assembled(reached)
     found = [] if q is None else [q]
-    for other in candidates(closing, start):
+    for other in candidates(closing, start, _MODES):
         if not any(np.abs(difference(closing.system, other, x)).max() < EQUAL for x in found):
             found.append(other)
     return nearest_found(closing, found, target) if found else None
@@ -270,7 +271,7 @@ def _options(block: Closing, start: Vector) -> list[Vector]:
     near = Target.at(block, start, ())
     if found and near.distances(block, found[0], block.free)[1] < _NEAR:
         return found
-    for other in candidates(block, start):
+    for other in candidates(block, start, _MODES):
         if not any(np.abs(difference(block.system, other, q)).max() < EQUAL for q in found):
             found.append(other)
     return found

@@ -10,7 +10,17 @@ from fmu_mechanisms import CASES, imported, simulated
 from support.catalogue_systems import catalogue_system
 
 import mbs
-from mbs.components import Body, Custom, Free, Planar, RollingDisc, custom
+from mbs.components import (
+    Body,
+    Box,
+    Custom,
+    Free,
+    Planar,
+    Prismatic,
+    Revolute,
+    RollingDisc,
+    custom,
+)
 from mbs.errors import ModelError
 
 
@@ -143,3 +153,53 @@ def test_a_coin_rolls_through_where_its_states_determine_nothing(tmp_path):
     for coordinate in system.coordinates:
         name = f"{coordinate.name}.q"
         assert np.abs(found[name] - wanted[name]).max() < 1e-7
+
+
+def slider_crank():
+    m = mbs.Mechanism("slider_crank", gravity=(0, 0, 0))
+    crank = m.add(Box("crank", length=0.1, width=0.04, density=7850))
+    rod = m.add(Box("rod", length=0.4, width=0.03, density=7850))
+    slider = m.add(Body("slider", 1.0, inertia=(1, 1, 1)))
+    m.connect(m.world, Revolute("main", actuated=True, limits=(-2.0, 4.0)), crank.left)
+    m.connect(crank.right, Revolute("big", limits=(-4.0, 4.0)), rod.left)
+    m.connect(rod.right, Revolute("small"), slider)
+    m.connect(m.world, Prismatic("slide", axis="x", limits=(-0.1, 0.1)), slider)
+    return m
+
+
+@pytest.fixture(scope="module")
+def slider_fmu(tmp_path_factory):
+    system = slider_crank().assemble(guess={"main": 0.3})
+    return system, mbs.export.fmu(system, tmp_path_factory.mktemp("slider") / "slider.fmu")
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_start_is_the_configuration_of_solve(slider_fmu, seed):
+    """The same search in C: distances of angles up to whole turns, lengths by the size."""
+    system, path = slider_fmu
+    rng = np.random.default_rng(seed)
+    given = {"main": float(rng.uniform(-1.5, 3))}
+    guess = {"big": float(rng.uniform(-6, 6)), "slide": float(rng.uniform(-0.6, 0.6))}
+    if seed % 3:
+        del guess["big" if seed % 3 == 1 else "slide"]
+    expected = mbs.loops.solve(system, given, guess=guess)
+    names = [c.name for c in system.coordinates]
+    start = {f"{n}.q": x for n, x in given.items()} | {f"{n}.solved": x for n, x in guess.items()}
+    result = mbs.simulate.fmu(path, 0.001, start=start, step=0.001, quiet=True)
+    found = np.array([result[f"{name}.q"][0] for name in names])
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8)
+
+
+def test_a_start_that_the_loops_cannot_take_is_one_error(tmp_path):
+    m = mbs.Mechanism("short", gravity=(0, 0, 0))
+    crank = m.add(Box("crank", length=0.4, width=0.04, density=7850))
+    rod = m.add(Box("rod", length=0.3, width=0.03, density=7850))
+    slider = m.add(Body("slider", 1.0, inertia=(1, 1, 1)))
+    m.connect(m.world, Revolute("main", actuated=True), crank.left)
+    m.connect(crank.right, Revolute("big"), rod.left)
+    m.connect(rod.right, Revolute("small"), slider)
+    m.connect(m.world, Prismatic("slide", axis="x"), slider)
+    path = mbs.export.fmu(m.assemble(guess={"main": 0.3}), tmp_path / "short.fmu")
+    for start in ({"main.q": 1.5}, {"main.q": 1.5, "big.solved": -2.0}):
+        with pytest.raises(mbs.errors.SolverError, match="loops"):
+            mbs.simulate.fmu(path, 0.001, start=start, step=0.001, quiet=True)

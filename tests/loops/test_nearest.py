@@ -1,4 +1,4 @@
-"""One search for the configuration nearest to a guess: assembly, loops.solve and large mechanisms."""
+"""One search for the configuration nearest to a guess: assembly, solve, large mechanisms."""
 
 import numpy as np
 import pytest
@@ -80,7 +80,7 @@ def test_solve_returns_the_nearest_configuration_for_random_guesses():
     size = Closing(system, closure_parameters(system)).size
     rng = np.random.default_rng(1)
     for _ in range(60):
-        main, big, slide = rng.uniform(-3, 3, 2).tolist() + [float(rng.uniform(-0.6, 0.6))]
+        main, big, slide = [*rng.uniform(-3, 3, 2).tolist(), float(rng.uniform(-0.6, 0.6))]
         q = mbs.loops.solve(system, {"main0": main}, guess={"big0": big, "slide0": slide})
         far = [max(abs(wrapped(b - big)), abs(s - slide) / size) for b, s in modes(main)]
         found = wrapped(q[names.index("big0")] - big), (q[names.index("slide0")] - slide) / size

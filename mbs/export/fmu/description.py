@@ -464,6 +464,8 @@ class FmuModel:
         outputs: y, those that are not states.
         parameters: p, tunable or fixed.
         dependents: z, the coordinates that closed loops determine.
+        loop_size: size of the mechanism, by which distances of displacements from guesses are
+            divided [m].
         rhs: `rhs(t, x, z, u, p) -> (xdot, y)`.
         closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step of z and the largest
             absolute closure row at z; None when there is no z.
@@ -505,6 +507,7 @@ class FmuModel:
     outputs: tuple[FmuVariable, ...] = ()
     parameters: tuple[FmuVariable, ...] = ()
     dependents: tuple[FmuVariable, ...] = ()
+    loop_size: float = 1.0
     closure: casadi.Function | None = None
     slopes: casadi.Function | None = None
     sines: casadi.Function | None = None

@@ -345,6 +345,9 @@ extern const char *const MODEL_NAMES[], *const MODEL_INDICATORS[];
 extern const char MODEL_FIXED[];
 /* 1 for states that the dependents follow from */
 extern const int MODEL_LEADS[];
+/* of the dependents: 1 for angles; what distances are divided by, 1 rad or the size of the loops */
+extern const int MODEL_TURNS[];
+extern const double MODEL_SPANS[];
 {arrays}/* diagonal blocks of the slopes of the closure: the end of each in rows and columns */
 extern const int MODEL_BLOCKS[], MODEL_ROWS[], MODEL_COLUMNS[];
 
@@ -510,7 +513,22 @@ def _sentences(model: FmuModel) -> list[str]:
 def _lead_tables(model: FmuModel) -> list[str]:
     if model.closure is None:
         return []
-    return [_table("const int MODEL_LEADS", map(str, leading_states(model.closure)))]
+    turns = [variable.unit == "rad" for variable in model.dependents]
+    return [
+        _table("const int MODEL_LEADS", map(str, leading_states(model.closure))),
+        _table("const int MODEL_TURNS", (str(int(turn)) for turn in turns)),
+        _numbers("MODEL_SPANS", spans(model.dependents, model.loop_size)),
+    ]
+
+
+def spans(dependents: Sequence[FmuVariable], size: float) -> list[float]:
+    """Units of the distances of dependent coordinates from guesses, as in `mbs.loops.nearest`.
+
+    Args:
+        dependents: the coordinates.
+        size: of the mechanism [m].
+    """
+    return [size if variable.unit.startswith("m") else 1.0 for variable in dependents]
 
 
 def leading_states(closure: casadi.Function) -> list[int]:

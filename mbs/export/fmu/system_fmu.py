@@ -27,7 +27,15 @@ from mbs.export.fmu.interface import (
     terminals,
 )
 from mbs.export.fmu.pack import require_version, require_writable, write_fmu
-from mbs.export.fmu.variables import dependents, inputs, jumps, outputs, parameters, states
+from mbs.export.fmu.variables import (
+    dependents,
+    inputs,
+    jumps,
+    loop_size,
+    outputs,
+    parameters,
+    states,
+)
 from mbs.files import PathLike, path_of
 from mbs.loops.examine import configuration_health, row_independence
 from mbs.models.state.independent import MinimalState, consistent_start, minimal_state
@@ -234,6 +242,7 @@ def fmu_model(
         outputs=y_variables,
         parameters=tuple(parameters(system, wished.fixed)),
         dependents=dependents(system, state, z),
+        loop_size=loop_size(system),
         rhs=state.rhs,
         closure=state.closure,
         slopes=state.slopes,

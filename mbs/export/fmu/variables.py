@@ -12,6 +12,7 @@ from mbs.components.contact import Contact
 from mbs.components.custom import Friction, OneWay
 from mbs.errors import ModelError
 from mbs.export.fmu.description import FmuState, FmuVariable, Jumps, once
+from mbs.loops.closing import Closing, closure_parameters
 from mbs.models.contacts import contacts_of
 from mbs.models.geometry import terminal_frame
 from mbs.models.state.crossings import CONTACTS
@@ -79,6 +80,13 @@ def dependents(
         _position(system.coordinates[k], f"{system.coordinates[k].name}.solved", value)
         for k, value in zip(state.dependents, start, strict=True)
     )
+
+
+def loop_size(system: System) -> float:
+    """The size of the mechanism [m], with the default values of its parameters."""
+    if not system.is_closed:
+        return 1.0
+    return Closing(system, closure_parameters(system)).size
 
 
 def inputs(system: System, state: MinimalState, labels: Sequence[str]) -> Iterator[FmuVariable]:

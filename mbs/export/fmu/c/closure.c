@@ -11,10 +11,12 @@
 #define RESIDUAL REAL(2e-6)
 #define MOVE REAL(3e-4)
 #define NEXT REAL(1e-7)
+#define EQUAL REAL(1e-3) /* difference of distances that are equal, likewise */
 #else
 #define RESIDUAL REAL(1e-12) /* largest closure row, for coordinates of size 1 */
 #define MOVE REAL(1e-9)      /* largest last Newton move: the next one would be its square */
 #define NEXT REAL(1e-15)     /* largest next Newton move, as the last two of them foretell it */
+#define EQUAL REAL(1e-6)     /* difference of distances that are equal [rad, or sizes] */
 #endif
 #define ITERATIONS 30
 #define REACH REAL(0.5) /* largest Newton move, in nominal sizes, that stays on the branch */
@@ -31,8 +33,10 @@
  * Newton steps come to a millionth, and a branch that ends before its end does so anywhere. */
 #define LEFT REAL(1e-4)
 #define TRIALS 64 /* configurations from which a branch is looked for */
-#define RANGE REAL(3.14159265358979) /* of them about the start values, in nominal sizes */
-#define ALIKE REAL(1e-3)             /* weight of the coordinates that were not guessed */
+#define HALF_TURN REAL(3.14159265358979)
+/* Distance from the guesses below which no other configuration is looked for [rad, or sizes of the
+ * mechanism]: branches that are nearer to each other meet there. */
+#define CLOSE REAL(0.5)
 #define UNBOUNDED REAL(HUGE_VAL)
 
 /* Where a Newton iteration stands: largest row before its last move, and that move. */
@@ -167,18 +171,42 @@ static int any_guessed(const loops *l) {
     return 0;
 }
 
-/* How far z is from the guesses and, with little weight, from the start values of the others. */
-static real miss(const loops *l, const real *z) {
-    real far = REAL(0.0), unlike = REAL(0.0);
+/* Difference of two values of a dependent coordinate, of angles up to whole turns [rad or m]. */
+static real difference(int i, real z, real other) {
+    real d = z - other;
+    return MODEL_TURNS[i] ? real_within_half_turn(d) : d;
+}
+
+/* Largest distance from the guesses, of guessed coordinates or of all [rad, or sizes of the mechanism]. */
+static real distance(const loops *l, const real *z, int all) {
+    real far = REAL(0.0);
     int i;
-    for (i = 0; i < NZ; i++) {
-        real d = real_abs(z[i] - l->guess[i]) / MODEL_NOMINAL[DEPENDENTS + i];
-        if (guessed(l, i))
-            far = real_max(far, d);
-        else
-            unlike = real_max(unlike, d);
+    for (i = 0; i < NZ; i++)
+        if (all || guessed(l, i))
+            far = real_max(far, real_abs(difference(i, z[i], l->guess[i])) / MODEL_SPANS[i]);
+    return far;
+}
+
+/* The order of mbs.loops.nearest: by guessed coordinates, by all, then the larger first difference. */
+static int is_nearer(const loops *l, const real *z, const real *other) {
+    int i, all;
+    for (all = 0; all < 2; all++) {
+        real more = distance(l, z, all) - distance(l, other, all);
+        if (real_abs(more) > EQUAL) return more < REAL(0.0);
     }
-    return far + ALIKE * unlike;
+    for (i = 0; i < NZ; i++) {
+        real more = difference(i, z[i], other[i]);
+        if (real_abs(more) > EQUAL) return more > REAL(0.0);
+    }
+    return 0;
+}
+
+/* z with angles within half a turn of the guesses, if that closes the loops: not so across a gear. */
+static void unwind(const loops *l, const real *x, real *z) {
+    real near[NZ];
+    int i;
+    for (i = 0; i < NZ; i++) near[i] = l->guess[i] + difference(i, z[i], l->guess[i]);
+    if (newton(l, x, near, REAL(1e-3)) == CLOSURE_OK) memcpy(z, near, sizeof near);
 }
 
 /* Numbers from -1 to 1, the same in every run. */
@@ -193,34 +221,39 @@ static real scattered(unsigned k, unsigned i) {
     return (real)s / REAL(2147483648.0) - REAL(1.0);
 }
 
-/* Where trial k starts: at the guesses; the other coordinates at the start values, near the configuration
- * that continues them, or anywhere. */
+/* Where trial k starts: at the guesses, the other coordinates at the start values, near the configuration
+ * that continues them, or anywhere; every second trial leaves the guesses too. */
 static void trial_start(const loops *l, int k, const real *near, real *z) {
     int i;
     for (i = 0; i < NZ; i++) {
         z[i] = l->guess[i];
-        if (guessed(l, i)) continue;
-        if (k == 1) z[i] = near[i];
-        if (k > 1)
-            z[i] += RANGE * MODEL_NOMINAL[DEPENDENTS + i] * scattered((unsigned)k, (unsigned)i);
+        if (k == 1 && !guessed(l, i)) z[i] = near[i];
+        if (k > 1 && (k % 2 || !guessed(l, i)))
+            z[i] += (MODEL_TURNS[i] ? HALF_TURN : MODEL_SPANS[i]) * scattered((unsigned)k, (unsigned)i);
     }
 }
 
 /* Of the configuration on the start values' branch and of those that Newton steps reach from other
- * places, the nearest to the guesses: a single guess is enough to choose a branch. */
+ * places, the nearest to the guesses as in mbs.loops.nearest: one guess is enough to choose a branch. */
 static int near_guesses(const loops *l, const real *x, real *z) {
-    real near[NZ], trial[NZ], best = UNBOUNDED;
+    real near[NZ], trial[NZ];
     int k, status = from_start(l, x, near);
     int found = status == CLOSURE_OK || status == CLOSURE_NEARLY;
     if (!found) memcpy(near, MODEL_START + DEPENDENTS, sizeof near);
     memcpy(z, near, sizeof near);
-    if (found) best = miss(l, z);
+    if (status == CLOSURE_OK) unwind(l, x, z);
     for (k = 0; k < TRIALS; k++) {
         trial_start(l, k, near, trial);
-        if (newton(l, x, trial, UNBOUNDED) == CLOSURE_OK && miss(l, trial) < best) {
-            best = miss(l, trial);
+        if (newton(l, x, trial, UNBOUNDED) != CLOSURE_OK) continue;
+        unwind(l, x, trial);
+        if (!found || is_nearer(l, trial, z)) {
             memcpy(z, trial, sizeof trial);
             status = CLOSURE_OK;
+            found = 1;
+        }
+        if (k == 0 && distance(l, trial, 1) < CLOSE) {
+            memcpy(z, trial, sizeof trial);
+            return CLOSURE_OK;
         }
     }
     return status;

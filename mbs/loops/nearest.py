@@ -150,21 +150,23 @@ class Target:
         system: its loops need not be closed yet.
         p: (np,) parameters.
         start: (nq,) positions.
-        cut: (c,) positions of `system.cut_coordinates`.
+        cut: (c,) positions of `system.cut_coordinates`; None if they do not count.
         guessed: indices of the guessed positions among all positions.
     """
 
     system: System
     p: Vector
     start: Vector
-    cut: Vector
+    cut: Vector | None
     guessed: tuple[int, ...]
 
     @staticmethod
     def at(closing: Closing, start: Vector, guessed: Sequence[int]) -> Target:
-        """The target of a start, and indices in q of its guessed positions."""
-        cut = [float(row.name.endswith(".qw")) for row in closing.system.cut_coordinates]
-        return Target(closing.system, closing.p, start, np.array(cut), tuple(guessed))
+        """The target of a start, and indices in q of its guessed positions.
+
+        Positions of joints that are cut do not count, as in the C code of FMUs.
+        """
+        return Target(closing.system, closing.p, start, None, tuple(guessed))
 
     @staticmethod
     def of(system: System, p: Vector, start: Vector, guess: Mapping[str, float]) -> Target:
@@ -182,6 +184,7 @@ class Target:
 
     def cut_moves(self, q: Vector) -> Vector:
         """(c,) differences of positions of cut joints from the target [rad, m or 1]."""
+        assert self.cut is not None
         rows = self.system.cut_coordinates
         found = np.array(cut_positions(self.system)(q, self.p)).ravel()
         moves = found - self.cut
@@ -212,7 +215,7 @@ class Target:
                 cut, if left out.
         """
         rows, moves = [*self.system.coordinates], difference(self.system, q, self.start)
-        if own is None:
+        if own is None and self.cut is not None:
             rows += self.system.cut_coordinates
             moves = np.concatenate([moves, self.cut_moves(q)])
         lengths = [row.unit.startswith("m") for row in rows]

@@ -36,7 +36,7 @@
 #define HALF_TURN REAL(3.14159265358979)
 /* Distance from the guesses below which no other configuration is looked for [rad, or sizes of the
  * mechanism]: branches that are nearer to each other meet there. */
-#define CLOSE REAL(0.5)
+#define CLOSE REAL(0.1)
 #define UNBOUNDED REAL(HUGE_VAL)
 
 /* Where a Newton iteration stands: largest row before its last move, and that move. */
@@ -178,7 +178,7 @@ static real difference(int i, real z, real other) {
 }
 
 /* Largest distance from the guesses, of guessed coordinates or of all [rad, or sizes of the mechanism]. */
-static real distance(const loops *l, const real *z, int all) {
+static real distance_from_guess(const loops *l, const real *z, int all) {
     real far = REAL(0.0);
     int i;
     for (i = 0; i < NZ; i++)
@@ -191,7 +191,7 @@ static real distance(const loops *l, const real *z, int all) {
 static int is_nearer(const loops *l, const real *z, const real *other) {
     int i, all;
     for (all = 0; all < 2; all++) {
-        real more = distance(l, z, all) - distance(l, other, all);
+        real more = distance_from_guess(l, z, all) - distance_from_guess(l, other, all);
         if (real_abs(more) > EQUAL) return more < REAL(0.0);
     }
     for (i = 0; i < NZ; i++) {
@@ -251,7 +251,7 @@ static int near_guesses(const loops *l, const real *x, real *z) {
             status = CLOSURE_OK;
             found = 1;
         }
-        if (k == 0 && distance(l, trial, 1) < CLOSE) {
+        if (k == 0 && distance_from_guess(l, trial, 1) < CLOSE) {
             memcpy(z, trial, sizeof trial);
             return CLOSURE_OK;
         }

@@ -43,7 +43,7 @@ from mbs.models.contacts import (
     require_lasting_rows,
     require_undriven,
 )
-from mbs.models.direct_dynamics import hybrid_dynamics
+from mbs.models.direct_dynamics import hybrid_dynamics, require_inertia
 from mbs.models.inverse_dynamics import bias
 from mbs.models.measurements import measurements
 from mbs.models.state.crossings import GUARD_MODES, guard, hold_sides, ticks_of
@@ -427,8 +427,9 @@ def integrate_legs(
         where = ", ".join(f"{c.name} = {x:.6g}" for c, x in zip(system.coordinates, q, strict=True))
         lost = _lost(system, q, p) if stop.singular and system.is_closed else ""
         cause = stop.__cause__
+        loose = "" if lost or stop.singular else _without_inertia(system)
         stop = SolverError(
-            f"{system.name}: {_with_names(system, stop)}; the configuration is {where}{lost}",
+            f"{system.name}: {_with_names(system, stop)}; the configuration is {where}{lost}{loose}",
             state=stop.state,
             singular=stop.singular,
             time=stop.time,
@@ -441,6 +442,15 @@ def integrate_legs(
 def _own(system: System, p: Array) -> Array:
     """The parameters of the system, without the inputs that are given for a motion."""
     return p[: len(system.parameters)]
+
+
+def _without_inertia(system: System) -> str:
+    """Which velocity moves no inertia, as the end of a sentence; empty if each moves some."""
+    try:
+        require_inertia(system)
+    except ModelError as error:
+        return "; " + str(error).removeprefix(f"{system.name}: ")
+    return ""
 
 
 def _with_names(system: System, stop: SolverError) -> str:

@@ -242,3 +242,14 @@ def test_mechanisms_without_any_mass_stay_open():
     m = mbs.Mechanism("frames")
     m.connect(m.world, Prismatic("n", axis="x", stiffness=10.0), m.add(PointMass("node", mass=0)))
     assert m.assemble().closure is None
+
+
+def test_friction_on_a_node_is_one_error():
+    m = mbs.Mechanism("slip", gravity=(0, 0, 0))
+    node, body = m.add(PointMass("node", mass=0)), m.add(PointMass("body", mass=2))
+    m.connect(m.world, Prismatic("n", axis="x"), node)
+    m.connect(m.world, Prismatic("x", axis="x"), body)
+    m.add(Spring("s", node, body, stiffness=600, length=1))
+    m.add(CoulombFriction("f", "n", sliding=3.0))
+    with pytest.raises(SolverError, match="n can move without moving any inertia.*needs springs"):
+        mbs.simulate.run(m.assemble(guess={"x": 1.0}), 0.1, q0={"x": 1.05}, quiet=True)

@@ -427,9 +427,9 @@ def integrate_legs(
         where = ", ".join(f"{c.name} = {x:.6g}" for c, x in zip(system.coordinates, q, strict=True))
         lost = _lost(system, q, p) if stop.singular and system.is_closed else ""
         cause = stop.__cause__
-        loose = "" if lost or stop.singular else _without_inertia(system)
+        reason = lost if lost or stop.singular else _without_inertia(system)
         stop = SolverError(
-            f"{system.name}: {_with_names(system, stop)}; the configuration is {where}{lost}{loose}",
+            f"{system.name}: {_with_names(system, stop)}; the configuration is {where}{reason}",
             state=stop.state,
             singular=stop.singular,
             time=stop.time,

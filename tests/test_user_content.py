@@ -87,6 +87,15 @@ def fmu_end(tmp_path, **options):
     return [result[f"{name}.q"][-1] for name in ("j1", "j2", "j4")]
 
 
+def gravity_of(mechanism):
+    return [float(value.value) for value in mechanism.world.gravity]
+
+
+TURNED = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]
+MOUNTS = {"list": TURNED, "array": np.array(TURNED), "dict": {"rotation": TURNED}}
+"""A base upside down."""
+
+
 # Forms of content. Each argument has values of the forms that fit it; forms that are left out have
 # a value of this table.
 
@@ -257,9 +266,15 @@ def arguments(tmp_path):
         "`dae(v0=)`": (lambda x: dae_start(q0=Q, v0=x), positions(V)),
         "`dae(tau0=)`": (lambda x: dae_start(tau0=x), positions({"j1": 0.3, "j2": 0, "j4": 0})),
         "`Mechanism(gravity=)`": (
-            lambda x: [float(v.value) for v in mbs.Mechanism("m", gravity=x).world.gravity],
+            lambda x: gravity_of(mbs.Mechanism("m", gravity=x)),
             {"list": [0, 0, -1], "array": np.array([0, 0, -1.0])},
         ),
+        "`Mechanism(mount=)`": (lambda x: gravity_of(mbs.Mechanism("m", mount=x)), MOUNTS),
+        "`load(gravity=)`": (
+            lambda x: gravity_of(mbs.load(TABLE, gravity=x)),
+            {"list": [0, 0, -1], "array": np.array([0, 0, -1.0])},
+        ),
+        "`load(mount=)`": (lambda x: gravity_of(mbs.load(TABLE, mount=x)), MOUNTS),
         "`Mechanism(name)`": (lambda x: [len(mbs.Mechanism(x).name)], {"text": "name"}),
         "`load(source)`": (
             lambda x: [isinstance(mbs.load(x), mbs.Mechanism)],

@@ -15,7 +15,7 @@ from mbs.errors import Unclosable
 from mbs.loops.closing import Closing, candidates, unwound
 from mbs.loops.configuration import closed_configuration
 from mbs.loops.cut_positions import cut_positions
-from mbs.loops.nearest import Assembled, Target, closes, nearest_configuration, nearest_found
+from mbs.loops.nearest import Assembled, GuessTarget, closes, nearest_configuration, nearest_found
 from mbs.solvers.least_squares import gauss_newton
 
 Vector = NDArray[np.float64]
@@ -53,7 +53,7 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
     given = np.array(system.position(known))
     rest = rest_positions(system, p)
     start = np.array(system.position({**{names[k]: x for k, x in rest.items()}, **known}))
-    target = Target.of(system, p, start, guess)
+    target = GuessTarget.of(system, p, start, guess)
     if closes(Closing(system, p), given) and target.meets_cuts(given):
         return Assembled(given)
     unknown = _unknowns(system)
@@ -72,7 +72,7 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
     return Assembled(unwound(Closing(system, p), q, start))
 
 
-def _with_cuts_met(found: Assembled, target: Target, stages: Iterable[set[int]]) -> Assembled:
+def _with_cuts_met(found: Assembled, target: GuessTarget, stages: Iterable[set[int]]) -> Assembled:
     """The configuration with guessed positions of cut joints, if the others can follow."""
     if target.meets_cuts(found.q):
         return found

@@ -251,6 +251,14 @@ class Closing:
         acting[self._functions().places[1]] = True
         return acting
 
+    @property
+    def bound(self) -> NDArray[np.bool_]:
+        """(nq,) whether a loop depends on each position; norms of quaternions are no loops."""
+        bound = np.zeros(self.system.nq, dtype=bool)
+        rows, columns = self._functions().places
+        bound[columns[rows < len(position_rows(self.system))]] = True
+        return bound
+
     def faces(self, q: Vector) -> bool:
         """Whether no axis of a closing joint is opposed at q (nq,)."""
         cosines = self._functions().facing(q, self.p)[0]
@@ -749,16 +757,23 @@ def _sign(quaternion: Vector, start: Vector) -> float:
 def candidates(closing: Closing, start: Vector, most: int = _CANDIDATES) -> list[Vector]:
     """Closed configurations with the locked positions of the start, nearest first.
 
+    Positions that no loop depends on stay at the start.
+
     Args:
         closing: closure rows and the locked positions.
         start: (nq,) configuration around which the search starts. Every second random start is near
             it.
         most: number of configurations at which the search ends.
     """
-    rng, free = np.random.default_rng(_SEED), closing.free
+    rng, bound = np.random.default_rng(_SEED), closing.bound
+    free = [k for k in closing.free if bound[k]]
     lengths = [closing.system.coordinates[k].unit.startswith("m") for k in free]
     reach = np.where(lengths, closing.size, np.pi)
-    turning = [part for part in quaternion_slices(closing.system.tree) if part.start in free]
+    turning = [
+        part
+        for part in quaternion_slices(closing.system.tree)
+        if set(range(part.start, part.stop)) <= set(free)
+    ]
     found: list[Vector] = []
     for number in range(_TRIES):
         trial = start.copy()

@@ -22,7 +22,7 @@ from mbs.loops.closing import (
     unwound,
 )
 from mbs.loops.function import configuration_on, fixed_positions, independent_names
-from mbs.loops.nearest import Target, nearest_configuration
+from mbs.loops.nearest import GuessTarget, nearest_configuration
 from mbs.loops.velocity import closure_jacobian
 from mbs.result import Result, State, positions_of, state_of, velocities_of
 from mbs.solvers.least_squares import smallest_solution
@@ -185,7 +185,7 @@ def _guessed_configuration(closing: Closing, start: Vector, named: list[int]) ->
 
     The search is that of `mbs.loops.assembled`.
     """
-    found = nearest_configuration(closing, Target.at(closing, start, named))
+    found = nearest_configuration(closing, GuessTarget.at(closing, start, named))
     if found is not None:
         return found.q
     return unwound(closing, closed_configuration(closing, start), start)

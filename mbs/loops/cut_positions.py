@@ -29,10 +29,13 @@ def cut_positions(system: System) -> Function:
             if not cut.welded:
                 pose = relative_pose(system.tree, q, *cut.frames)
                 for number, freedom in enumerate(joint.freedoms):
-                    ball = freedom.motion is Motion.SPHERICAL
-                    found.append(
-                        unit_quaternion(pose.R) if ball else cut_position(cut, number, pose)
-                    )
+                    match freedom.motion:
+                        case Motion.FREE:
+                            found += [pose.p, unit_quaternion(pose.R)]
+                        case Motion.SPHERICAL:
+                            found.append(unit_quaternion(pose.R))
+                        case _:
+                            found.append(cut_position(cut, number, pose))
         outputs = [casadi.densify(casadi.vertcat(*found))]
         return Function("cut_positions", [q, system.p], outputs, ["q", "p"], ["c"])
 

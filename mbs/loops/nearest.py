@@ -48,7 +48,7 @@ class Assembled:
     others: tuple[Vector, ...] = ()
 
 
-def nearest_configuration(closing: Closing, target: Target) -> Assembled | None:
+def nearest_configuration(closing: Closing, target: GuessTarget) -> Assembled | None:
     """Return the closed configuration that is nearest to a target, None if none is found.
 
     Guessed positions are compared first, then all positions, by the largest difference. Lengths are
@@ -74,14 +74,32 @@ def nearest_configuration(closing: Closing, target: Target) -> Assembled | None:
     if many:
         reached = _by_blocks(closing, target, q)
         return None if reached is None else Assembled(reached)
+    held, at = _held(closing, target, q)
     found = [] if q is None else [q]
-    for other in candidates(closing, start, _MODES):
+    for other in candidates(held, at, _MODES):
         if not any(np.abs(difference(closing.system, other, x)).max() < EQUAL for x in found):
             found.append(other)
     return nearest_found(closing, found, target) if found else None
 
 
-def nearest_found(closing: Closing, found: list[Vector], target: Target) -> Assembled:
+def _held(closing: Closing, target: GuessTarget, q: Vector | None) -> tuple[Closing, Vector]:
+    """The loops with independent positions locked as at q, and the start with these positions.
+
+    Args:
+        closing: the rows, and the positions that must not change.
+        target: first guess.
+        q: (nq,) a closed configuration; None if Newton's method found none: nothing is locked then.
+    """
+    if q is None:
+        return closing, target.start
+    more = _independent(closing, q, set(target.guessed))
+    held = replace(closing, locked=tuple(sorted({*closing.locked, *more})))
+    at = target.start.copy()
+    at[list(held.locked)] = q[list(held.locked)]
+    return held, at
+
+
+def nearest_found(closing: Closing, found: list[Vector], target: GuessTarget) -> Assembled:
     """Return the nearest of some configurations to a target, and the others."""
     best = nearest_of(closing, found, target)[0]
     others = [x for x in found if np.abs(difference(closing.system, x, best)).max() > EQUAL]
@@ -94,7 +112,7 @@ def closes(closing: Closing, q: Vector) -> bool:
 
 
 def nearest_of(
-    closing: Closing, found: list[Vector], target: Target, own: Sequence[int] | None = None
+    closing: Closing, found: list[Vector], target: GuessTarget, own: Sequence[int] | None = None
 ) -> list[Vector]:
     """Return configurations in the order of their distance from the target.
 
@@ -102,7 +120,7 @@ def nearest_of(
         closing: the loops.
         found: (nq,) configurations.
         target: the positions that configurations are compared with.
-        own: see `Target.distances`.
+        own: see `GuessTarget.distances`.
     """
     left, ordered = list(found), list[Vector]()
     while left:
@@ -116,7 +134,7 @@ def nearest_of(
 
 
 def _is_nearer(
-    closing: Closing, q: Vector, other: Vector, target: Target, own: Sequence[int] | None
+    closing: Closing, q: Vector, other: Vector, target: GuessTarget, own: Sequence[int] | None
 ) -> bool:
     """Whether the configuration q is nearer to the target than the configuration `other`.
 
@@ -140,7 +158,7 @@ def _is_nearer(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Target:
+class GuessTarget:
     """Positions of all joints that an assembled configuration is to be near to.
 
     All positions are q, then the positions of joints that are cut. Therefore the comparison does
@@ -161,21 +179,21 @@ class Target:
     guessed: tuple[int, ...]
 
     @staticmethod
-    def at(closing: Closing, start: Vector, guessed: Sequence[int]) -> Target:
+    def at(closing: Closing, start: Vector, guessed: Sequence[int]) -> GuessTarget:
         """The target of a start, and indices in q of its guessed positions.
 
         Positions of joints that are cut do not count, as in the C code of FMUs.
         """
-        return Target(closing.system, closing.p, start, None, tuple(guessed))
+        return GuessTarget(closing.system, closing.p, start, None, tuple(guessed))
 
     @staticmethod
-    def of(system: System, p: Vector, start: Vector, guess: Mapping[str, float]) -> Target:
+    def of(system: System, p: Vector, start: Vector, guess: Mapping[str, float]) -> GuessTarget:
         """The target of a start and a guess by coordinate name."""
         rows = system.cut_coordinates
         cut = [guess.get(row.name, float(row.name.endswith(".qw"))) for row in rows]
         names = [row.name for row in (*system.coordinates, *rows)]
         guessed = tuple(k for k, name in enumerate(names) if name in guess)
-        return Target(system, p, start, np.array(cut, dtype=float), guessed)
+        return GuessTarget(system, p, start, np.array(cut, dtype=float), guessed)
 
     @property
     def guessed_cuts(self) -> list[int]:
@@ -233,7 +251,7 @@ def _largest(values: Vector) -> float:
 # Mechanisms with many free positions, block by block.
 
 
-def _by_blocks(closing: Closing, target: Target, q: Vector | None) -> Vector | None:
+def _by_blocks(closing: Closing, target: GuessTarget, q: Vector | None) -> Vector | None:
     """The closed configuration that is nearest to a target in one block after the other.
 
     Args:
@@ -241,12 +259,8 @@ def _by_blocks(closing: Closing, target: Target, q: Vector | None) -> Vector | N
         target: first guess.
         q: (nq,) a closed configuration; None if Newton's method found none.
     """
-    start, held, at = target.start, closing, target.start
-    if q is not None:
-        more = _independent(closing, q, set(target.guessed))
-        held = replace(closing, locked=tuple(sorted({*closing.locked, *more})))
-        at = start.copy()
-        at[list(held.locked)] = q[list(held.locked)]
+    start = target.start
+    held, at = _held(closing, target, q)
     blocks = _blocks(held, at if q is None else q)
     if blocks is None:
         return q
@@ -271,7 +285,7 @@ def _options(block: Closing, start: Vector) -> list[Vector]:
     """Configurations that close a block; the first is near enough, or others are searched too."""
     first = block.nearest(start)
     found = [unwound(block, first.q, start)] if first.is_closed else []
-    near = Target.at(block, start, ())
+    near = GuessTarget.at(block, start, ())
     if found and near.distances(block, found[0], block.free)[1] < _NEAR:
         return found
     for other in candidates(block, start, _MODES):

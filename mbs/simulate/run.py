@@ -1456,7 +1456,7 @@ def _degrees_given(system: System, q0: Start, guess: Guess) -> str:
     if isinstance(q0, State | Result):
         return ""
     given: dict[str, float] = {}
-    if not isinstance(guess, State | None):
+    if isinstance(guess, Mapping):
         given.update(system.plain_names(guess, GUESSES))
     if isinstance(q0, Mapping):
         given.update(system.plain_names(q0, POSITIONS))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.components import Body, Box, Prismatic, Revolute
+from mbs.components import Body, Box, Free, Prismatic, Revolute
 
 
 def slider_crank():
@@ -100,3 +100,12 @@ def test_a_start_where_branches_meet_is_reported():
     system = m.assemble()
     assert system.closure.meets
     assert "branches of motion meet there" in system.report()
+
+
+def test_bodies_that_no_loop_holds_stay_where_they_are():
+    m = slider_crank()
+    m.connect(m.world, Free("ball"), m.add(Body("b", 1.0, inertia=(1, 1, 1))))
+    system = m.assemble(guess={"main": 2.0, "ball.x": 0.3})
+    at = dict(zip((c.name for c in system.coordinates), system.configuration, strict=True))
+    assert [at[f"ball.{k}"] for k in ("x", "y", "z", "qw", "qx")] == [0.3, 0, 0, 1, 0]
+    assert len(system.closure.others) == 1

@@ -72,7 +72,7 @@ def separated(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
     open_ = (height > ONE * scale) & (height < TWO * scale)
     undecided[first[open_]] = undecided[second[open_]] = True
     limit = np.maximum(target.decided, _SLOPE * np.maximum(own[first], own[second]))
-    group = _components(len(found), first[height < limit], second[height < limit])
+    group = _groups(found, first[height < limit], second[height < limit])
     return [
         _one([found[k] for k in members], own[members], bool(np.any(undecided[members])), target)
         for members in (np.flatnonzero(group == g) for g in np.unique(group))
@@ -181,6 +181,35 @@ def heights(
         finer[rows, 1::2] = middle.reshape(a.shape)
         points = finer
     return highest
+
+
+def _groups(
+    found: list[ChainRoot], first: NDArray[np.intp], second: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """(count,) the number of the group of each solution, from pairs that are joined.
+
+    Self-motions that cross each other stay apart; isolated solutions that are joined to several of
+    them belong to the first one.
+    """
+    families = [root.family for root in found]
+    moving = np.array([family is not None for family in families], dtype=bool)
+    both = moving[first] & moving[second]
+    same = [_are_same(found[i], found[j]) for i, j in zip(first[both], second[both], strict=True)]
+    motion = _components(len(found), first[both][same], second[both][same])
+    group = _components(len(found), first, second)
+    for g in np.unique(group):
+        members = np.flatnonzero((group == g) & moving)
+        for other in np.unique(motion[members])[1:]:
+            apart = members[motion[members] == other]
+            group[apart] = apart[0]
+    return group
+
+
+def _are_same(root: ChainRoot, other: ChainRoot) -> bool:
+    """Whether two self-motions are one: each passes through the configuration of the other."""
+    assert root.family is not None
+    assert other.family is not None
+    return bool(root.family.meets(other.q[None])[0] or other.family.meets(root.q[None])[0])
 
 
 def _components(count: int, first: NDArray[np.intp], second: NDArray[np.intp]) -> NDArray[np.intp]:

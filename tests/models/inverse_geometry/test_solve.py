@@ -46,6 +46,16 @@ def nearest_of(system, answer, q):
     return np.min(np.max(np.abs(np.where(turns, np.mod(way + np.pi, 2 * np.pi) - np.pi, way)), 1))
 
 
+def test_crossing_self_motions_are_listed_each():
+    """All joints of a Stanford arm at zero but the last: four self-motions meet there."""
+    q = np.array([0, 0, 0, 0, 0, 0.25])
+    answer = solve(assembled("stanford"), pose("stanford", q))
+    families = [solution.family for solution in answer]
+    assert len(families) == 4
+    assert all(family is not None for family in families)
+    assert any(family.contains(q) for family in families)
+
+
 @settings(max_examples=12, deadline=None, derandomize=True)
 @given(st.sampled_from(sorted(ROBOTS)), st.lists(ANGLES, min_size=6, max_size=6))
 def test_the_answer_contains_the_configuration_that_made_the_pose(name, angles):

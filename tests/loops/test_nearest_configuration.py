@@ -6,7 +6,7 @@ import pytest
 import mbs
 from mbs.components import Body, Box, Prismatic, Revolute
 from mbs.loops.closing import Closing, closure_parameters
-from mbs.loops.nearest import Target, nearest_configuration
+from mbs.loops.nearest import GuessTarget, nearest_configuration
 
 CRANK, ROD = 0.1, 0.4
 GROUND, ROCKER = 1.1, 0.6
@@ -69,7 +69,7 @@ def test_solve_returns_what_assemble_returns(main, side):
     start = np.array(system.position({"main0": main, **guess}))
     closing = Closing(system, closure_parameters(system), (0,))
     named = [k for k, c in enumerate(system.coordinates) if c.name in guess]
-    found = nearest_configuration(closing, Target.at(closing, start, named))
+    found = nearest_configuration(closing, GuessTarget.at(closing, start, named))
     np.testing.assert_array_equal(solved, found.q)
     np.testing.assert_allclose(solved[1:3], assembled.configuration[1:3], rtol=0, atol=1e-9)
 

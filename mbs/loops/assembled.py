@@ -15,10 +15,20 @@ from mbs.errors import Unclosable
 from mbs.loops.closing import Closing, candidates, unwound
 from mbs.loops.configuration import closed_configuration
 from mbs.loops.cut_positions import cut_positions
-from mbs.loops.nearest import Assembled, GuessTarget, closes, nearest_configuration, nearest_found
+from mbs.loops.nearest import (
+    Assembled,
+    GuessTarget,
+    closes,
+    nearest_configuration,
+    nearest_found,
+    nearest_of,
+)
 from mbs.solvers.least_squares import gauss_newton
 
 Vector = NDArray[np.float64]
+
+_FEW_GUESSES = 8
+"""Guessed positions up to which each one is left out in turn: a search for each."""
 
 
 def assembled_configuration(system: System, guess: Mapping[str, float], p: Vector) -> Assembled:
@@ -32,7 +42,8 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
        parameter of a curve;
     2. guessed positions, positions of motors, and joints with a spring; a joint with a spring that
        has no guess is held where the spring has no force;
-    3. smaller sets of these; those without the joints with springs come last.
+    3. if no motor is guessed: all guessed positions except one; the nearest result is taken;
+    4. smaller sets of these; those without the joints with springs come last.
 
     The distance of two configurations is the largest difference of a position. Lengths are divided
     by the size of the mechanism. Positions of joints that are cut count too. If two
@@ -59,11 +70,13 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
     unknown = _unknowns(system)
     guessed = {k for k, name in enumerate(names) if name in known} - unknown
     stages = list(_stages(system, unknown, guessed, set(rest)))
-    for locked in stages:
-        closing = Closing(system, p, tuple(sorted(locked)))
-        found = nearest_configuration(closing, target)
-        if found is not None:
-            return _with_cuts_met(found, target, stages)
+    for group in stages:
+        closings = (Closing(system, p, tuple(sorted(locked))) for locked in group)
+        found = [one for c in closings if (one := nearest_configuration(c, target)) is not None]
+        if found:
+            first = nearest_of(Closing(system, p), [one.q for one in found], target)[0]
+            best = next(one for one in found if one.q is first)
+            return _with_cuts_met(best, target, [locked for group in stages for locked in group])
     motors = tuple(k for k, c in enumerate(system.coordinates) if c.actuated)
     try:
         q = closed_configuration(Closing(system, p, motors), start, restarts=10)
@@ -130,14 +143,24 @@ def _unknowns(system: System) -> set[int]:
 
 def _stages(
     system: System, unknown: set[int], guessed: set[int], rest: set[int]
-) -> Iterator[set[int]]:
-    """Indices of locked positions, fewer in each stage."""
+) -> Iterator[list[set[int]]]:
+    """Indices of locked positions, fewer in each stage; sets of one stage are compared."""
     motors = {k for k, c in enumerate(system.coordinates) if c.actuated}
-    stages = []
+    stages = list[list[set[int]]]()
     if unknown and guessed:
-        stages.append(set(range(system.nq)) - unknown)
-    stages += [guessed | motors | rest, guessed | rest, (guessed & motors) | rest, motors | rest]
-    stages += [rest, guessed, guessed & motors, motors, set()]
-    for number, locked in enumerate(stages):
-        if locked not in stages[:number]:
-            yield locked
+        stages.append([set(range(system.nq)) - unknown])
+    stages += [[guessed | motors | rest], [guessed | rest]]
+    if 1 < len(guessed) <= _FEW_GUESSES and not guessed & motors:
+        stages.append([(guessed - {k}) | rest for k in sorted(guessed)])
+    stages += [
+        [(guessed & motors) | rest],
+        [motors | rest],
+        [rest],
+        [guessed],
+        [guessed & motors],
+        [motors],
+        [set()],
+    ]
+    for number, group in enumerate(stages):
+        if group not in stages[:number]:
+            yield group

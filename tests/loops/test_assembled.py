@@ -109,3 +109,18 @@ def test_bodies_that_no_loop_holds_stay_where_they_are():
     at = dict(zip((c.name for c in system.coordinates), system.configuration, strict=True))
     assert [at[f"ball.{k}"] for k in ("x", "y", "z", "qw", "qx")] == [0.3, 0, 0, 1, 0]
     assert len(system.closure.others) == 1
+
+
+def test_of_two_guesses_that_exclude_each_other_one_is_kept():
+    """The coupler keeps its guess, since the crank is nearer to its own then."""
+    m = mbs.Mechanism("four_bar", gravity=(0, 0, 0))
+    a, b, c = (m.add(Box(n, length=x, mass=1.0)) for n, x in (("a", 0.3), ("b", 0.8), ("c", 0.7)))
+    m.connect(m.world, Revolute("j1"), a.left)
+    m.connect(a.right, Revolute("j2"), b.left)
+    m.connect(b.right, Revolute("j3"), c.right)
+    m.connect(m.world.at(0.9), Revolute("j4"), c.left)
+    system = m.assemble(guess={"j1": 1.0, "j2": -0.5})
+    j1, j2, _ = system.configuration
+    assert j2 == -0.5
+    assert j1 == pytest.approx(1.0702916595, abs=1e-9)
+    assert "Guesses that are not met: j1 = 1." in system.report()

@@ -25,17 +25,14 @@ def like_degrees(coordinates: Iterable[Coordinate], given: object) -> str:
     if not isinstance(given, Mapping):
         return ""
     rows = {coordinate.name: coordinate for coordinate in coordinates}
-    found = [
-        f"{name} = {value:g}"
-        for name, value in given.items()
-        if name in rows and _is_number(value) and _looks_like_degrees(rows[name], float(value))
-    ]
+    numbers = {name: numbers_given(value) for name, value in given.items() if name in rows}
+    angles = {
+        name: float(number.ravel()[0])
+        for name, number in numbers.items()
+        if not isinstance(number, str) and number.size == 1
+    }
+    found = [f"{name} = {x:g}" for name, x in angles.items() if _looks_like_degrees(rows[name], x)]
     return f"{', '.join(found)} rad may be degrees; give radians" if found else ""
-
-
-def _is_number(value: object) -> bool:
-    number = numbers_given(value)
-    return not isinstance(number, str) and number.size == 1
 
 
 def _looks_like_degrees(coordinate: Coordinate, angle: float) -> bool:

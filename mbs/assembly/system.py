@@ -146,7 +146,7 @@ def _degrees(system: System) -> list[str]:
     given = dict(zip(names, system.configuration, strict=True))
     if system.closure is not None:
         given = dict(system.closure.guess)
-    note = like_degrees(system.coordinates, given)
+    note = like_degrees([*system.coordinates, *system.cut_coordinates], given)
     return [f"Note: {note}."] if note else []
 
 
@@ -240,6 +240,7 @@ def _configuration(system: System, closure: Closure) -> list[str]:
 
     lines = [f"Assembled at {shown(system.configuration)}."]
     at = dict(zip((c.name for c in system.coordinates), system.configuration, strict=True))
+    at |= dict(closure.at_cut)
     missed = [(name, x) for name, x in closure.guess if abs(at[name] - x) > _GUESSED]
     if missed:
         guesses = ", ".join(f"{name} = {x:.5g}" for name, x in missed[:_SHOWN_POSITIONS])

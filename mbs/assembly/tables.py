@@ -194,6 +194,7 @@ class Closure:
         gruebler: mobility by the Gruebler-Kutzbach count of rows.
         residual: largest closure residual at the assembled configuration.
         guess: approximate positions by name that the user gave [rad or m].
+        at_cut: positions by name of guessed joints that are cut, as assembled [rad or m].
         others: further configurations with the same locked positions, (nq,) each.
         meets: whether the configuration next to the guess is singular, so that branches of motion
             meet there.
@@ -209,6 +210,7 @@ class Closure:
     gruebler: int
     residual: float
     guess: tuple[tuple[str, float], ...] = ()
+    at_cut: tuple[tuple[str, float], ...] = ()
     others: tuple[tuple[float, ...], ...] = ()
     meets: bool = False
 

@@ -19,6 +19,7 @@ from mbs.components import MotionJoint
 from mbs.loops.assembled import assembled_configuration
 from mbs.loops.closing import Closing, closure_parameters, constraint_sizes, mechanism_size
 from mbs.loops.closure import row_groups
+from mbs.loops.cut_positions import cut_positions
 from mbs.loops.velocity import constraint_jacobian
 from mbs.solvers.rank import dense, independent_rows, null_space_of, rank
 
@@ -81,6 +82,7 @@ def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] 
         varies=_varies(regular, positions, kept),
         gruebler=system.nv - sum(len(rows) + len(slips) for rows, slips in labels),
         guess=tuple((name, float(guess[name])) for name in _names(system) if name in guess),
+        at_cut=_at_cut(system, guess, configuration, p),
         others=tuple(tuple(q.tolist()) for q in assembled.others),
         meets=ranks[0] < generic,
         residual=float(np.max(np.abs(Closing(system, p).rows(configuration)[0]), initial=0.0)),
@@ -97,7 +99,19 @@ def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] 
 
 
 def _names(system: System) -> list[str]:
-    return [coordinate.name for coordinate in system.coordinates]
+    return [row.name for row in (*system.coordinates, *system.cut_coordinates)]
+
+
+def _at_cut(
+    system: System, guess: Mapping[str, float], q: Matrix, p: Matrix
+) -> tuple[tuple[str, float], ...]:
+    """Positions of the guessed joints that are cut, by name."""
+    names = [row.name for row in system.cut_coordinates]
+    if not any(name in guess for name in names):
+        return ()
+    values = np.array(cut_positions(system)(q, p)).ravel()
+    found = zip(names, map(float, values), strict=True)
+    return tuple((name, value) for name, value in found if name in guess)
 
 
 def _measures(system: System, p: Matrix) -> tuple[Matrix, Matrix]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from mbs.assembly import System
 from mbs.assembly.degrees import like_degrees
 from mbs.assembly.open_system import open_system
@@ -16,7 +18,7 @@ from mbs.loops.analysis import analyse
 from mbs.loops.balance import with_balance
 from mbs.numbers import numbers_given
 from mbs.recursions.part_checks import check_parts
-from mbs.text import did_you_mean
+from mbs.text import did_you_mean, quoted
 
 
 def assemble(
@@ -35,6 +37,11 @@ def assemble(
         Unclosable: no configuration closes the loops.
     """
     guess = _laid_over(guesses_of_unknowns(mechanism), mechanism.guess, guess)
+    for name in guess:
+        if not isinstance(name, str):
+            raise AssemblyError(
+                f"{mechanism.name}: the guess names {name!r}, which is no coordinate; give names"
+            )
     system = open_system(mechanism, (*guess, *active))
     check_parts(system)
     guess = _plain_guess(system, guess)
@@ -107,4 +114,9 @@ def _plain_guess(system: System, guess: Mapping[str, float]) -> dict[str, float]
         number = numbers_given(value)
         if isinstance(number, str):
             raise AssemblyError(f"{system.name}: the guess of {name} {number}")
+        if number.size != 1 or not np.isfinite(number).all():
+            raise AssemblyError(
+                f"{system.name}: the guess of {name} is {quoted(value)}; give one finite number"
+            )
+        found[name] = float(number.ravel()[0])
     return found

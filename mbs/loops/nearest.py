@@ -92,7 +92,9 @@ def _held(closing: Closing, target: GuessTarget, q: Vector | None) -> tuple[Clos
     """
     if q is None:
         return closing, target.start
-    more = _independent(closing, q, set(target.guessed))
+    parts = quaternion_slices(closing.system.tree)
+    turning = {k for part in parts for k in range(part.start, part.stop)}
+    more = [k for k in _independent(closing, q, set(target.guessed)) if k not in turning]
     held = replace(closing, locked=tuple(sorted({*closing.locked, *more})))
     at = target.start.copy()
     at[list(held.locked)] = q[list(held.locked)]
@@ -102,7 +104,14 @@ def _held(closing: Closing, target: GuessTarget, q: Vector | None) -> tuple[Clos
 def nearest_found(closing: Closing, found: list[Vector], target: GuessTarget) -> Assembled:
     """Return the nearest of some configurations to a target, and the others."""
     best = nearest_of(closing, found, target)[0]
-    others = [x for x in found if np.abs(difference(closing.system, x, best)).max() > EQUAL]
+    turning = np.zeros(closing.system.nq, dtype=bool)
+    for part in quaternion_slices(closing.system.tree):
+        turning[part] = True
+    others = list[Vector]()
+    for x in found:  # a rod that spins about its line is no other configuration
+        apart = (np.abs(difference(closing.system, x, one))[~turning] for one in (best, *others))
+        if all(np.max(moves, initial=0.0) > EQUAL for moves in apart):
+            others.append(x)
     return Assembled(best, tuple(others))
 
 

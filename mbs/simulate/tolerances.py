@@ -81,6 +81,11 @@ def tolerances_of(system: System, given: Tolerance) -> Tolerances:
     Raises:
         ModelError: a key is no unit and no state of the system, or a number is not positive.
     """
+    if isinstance(given, tuple | list):
+        raise ModelError(
+            f"{system.name}: tolerance is {quoted(given)}; give a number, or pairs of an absolute"
+            ' and a relative tolerance in a dict, such as {"rad": (1e-8, 1e-6)}'
+        )
     if not isinstance(given, Mapping):
         common = positive(given, "tolerance", system.name)
         every = np.full(system.nq + system.nv + len(system.states), common)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.components import Body, Box, Free, Prismatic, Revolute
+from mbs.components import Body, Box, Free, Prismatic, Revolute, Spherical
+from mbs.errors import AssemblyError
 
 
 def slider_crank():
@@ -124,3 +125,48 @@ def test_of_two_guesses_that_exclude_each_other_one_is_kept():
     assert j2 == -0.5
     assert j1 == pytest.approx(1.0702916595, abs=1e-9)
     assert "Guesses that are not met: j1 = 1." in system.report()
+
+
+@pytest.mark.parametrize("guess", [1.5, 2.0, -1.5])
+@pytest.mark.parametrize("cut", [None, "s1", "s2"])
+def test_a_rod_between_balls_does_not_hide_the_nearest_branch(cut, guess):
+    """The rod spins freely about its line; cos j4 = 0.0175 on both branches."""
+    m = mbs.Mechanism("rssr")
+    masses = {"inertia": (0.01, 0.02, 0.02), "mass": 1.0}
+    a, b, c = (
+        m.add(Body(n, com=(x, 0, 0), **masses)) for n, x in (("a", 0.1), ("b", 0.5), ("c", 0.2))
+    )
+    balls = {name: Spherical(name) for name in ("s1", "s2")}
+    m.connect(m.world, Revolute("j1", actuated=True), a)
+    m.connect(a.at(0.2, rotation=("x", 0.4)), balls["s1"], b.at(0, rotation=("y", 0.3)))
+    m.connect(b.at(1), balls["s2"], c.at(0.5))
+    m.connect(m.world.at(0.6, 0.5), Revolute("j4", axis="x"), c.at(0, rotation=("z", 0.3)))
+    if cut:
+        m.cut(balls[cut])
+    system = m.assemble(guess={"j1": 0.3, "j4": guess})
+    at = dict(zip((row.name for row in system.coordinates), system.configuration, strict=True))
+    assert at["j1"] == 0.3
+    assert at["j4"] == pytest.approx(np.copysign(1.5532693796, guess), abs=1e-9)
+    assert len(system.closure.others) == 1
+
+
+@pytest.mark.parametrize(
+    ("guess", "message"),
+    [
+        ({1: 0.3}, "the guess names 1, which is no coordinate"),
+        ({"small": float("nan")}, "the guess of small is nan; give one finite number"),
+        ({"main": [1, 2]}, "the guess of main is [1, 2]; give one finite number"),
+    ],
+)
+def test_other_guesses_are_refused(guess, message):
+    with pytest.raises(AssemblyError) as error:
+        slider_crank().assemble(guess=guess)
+    assert message in str(error.value)
+
+
+def test_a_guess_of_a_cut_joint_that_is_not_met_is_reported():
+    m = slider_crank()
+    m.cut(m.components["small"])
+    system = m.assemble(guess={"main": 0.3, "small": 2.0})
+    assert [row.name for row in system.cut_coordinates] == ["small"]
+    assert "Guesses that are not met: small = 2." in system.report()

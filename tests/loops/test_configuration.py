@@ -8,7 +8,7 @@ from support.catalogue_systems import catalogue_system
 import mbs
 import mbs.models
 from mbs.components import Body, Box, Mechanism, Prismatic, Revolute
-from mbs.errors import ModelError, Unclosable
+from mbs.errors import AssemblyError, ModelError, Unclosable
 from mbs.loops import closure, modes, solve
 from mbs.loops.closing import Closing, closure_parameters
 from mbs.loops.closure import facing
@@ -70,7 +70,7 @@ def test_values_that_are_no_positions():
         solve(system, {"j1": np.nan})
     with pytest.raises(ModelError, match="q_active has 2 values, the independent joints are 1: j1"):
         solve(system, [0.3, 0.4])
-    with pytest.raises(ModelError, match="the position of j2 is nan"):
+    with pytest.raises(AssemblyError, match="the guess of j2 is nan; give one finite number"):
         mbs.load("four_bar").assemble(guess={"j2": np.nan})
 
 

@@ -80,6 +80,7 @@ def test_long_code_is_optimized_less():
 
 
 def test_the_level_of_optimization_can_be_chosen(monkeypatch):
+    monkeypatch.delenv("MBS_ARCHITECTURE", raising=False)
     monkeypatch.setenv("MBS_OPTIMIZE", "0")
     assert chosen_flags(("-O2", "-fPIC")) == ("-O0", "-fPIC")
     monkeypatch.setenv("MBS_OPTIMIZE", "")

@@ -18,7 +18,7 @@ from mbs.assembly.validity import UNIT
 from mbs.errors import ModelError
 from mbs.export.c_check import NO_FAST_MATH
 from mbs.export.fmu.description import FmuVariable
-from mbs.export.fmu.source import diagonal_blocks, leading_states, spans, steepness
+from mbs.export.fmu.source import diagonal_blocks, leading_states, steepness
 from mbs.export.fmu.variables import (
     dependents,
     inputs,
@@ -27,6 +27,7 @@ from mbs.export.fmu.variables import (
     parameters,
     states,
 )
+from mbs.loops.closing import distance_units
 from mbs.models.state.independent import MinimalState, consistent_start, minimal_state
 from mbs.native.bare_source import NOINLINE, Real, bare_source, literal
 from mbs.text import in_c_comment
@@ -371,7 +372,8 @@ def _tables(system: System, state: MinimalState, variables: _Variables, real: Re
         made.append(_numbers("MODEL_NOMINAL", (v.nominal for v in joints), real))
         made.append(_places("MODEL_LEADS", leading_states(state.closure)))
         made.append(_places("MODEL_TURNS", [int(v.unit == "rad") for v in variables.z]))
-        made.append(_numbers("MODEL_SPANS", spans(variables.z, loop_size(system)), real))
+        sizes = distance_units((v.unit for v in variables.z), loop_size(system))
+        made.append(_numbers("MODEL_SPANS", sizes, real))
     if blocks := diagonal_blocks(state.slopes):
         made += [
             _numbers("MODEL_UNITS", (v.nominal for v in units), real),

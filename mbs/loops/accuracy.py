@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.model_function import ConfigurationCheck
 from mbs.errors import SingularPosture
-from mbs.loops.closing import mechanism_size, relative_rows
+from mbs.loops.closing import distance_units, mechanism_size, relative_rows
 from mbs.loops.examine import LEAST_SINE, configuration_health, loop_rows, require_determined
 from mbs.loops.velocity import scales
 
@@ -159,8 +159,7 @@ def _units(system: System, p: Array) -> Array:
         "mechanism size of p", lambda: Function("size", [system.p], [mechanism_size(system)])
     )
     size = float(function(p))
-    units = [coordinate.unit for coordinate in system.coordinates]
-    return np.array([size if unit.startswith("m") else 1.0 for unit in units])
+    return distance_units((coordinate.unit for coordinate in system.coordinates), size)
 
 
 def _closed(system: System, q: Array, p: Array) -> Array:

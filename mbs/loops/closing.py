@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -13,6 +13,7 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
+from mbs.assembly.tables import Coordinate
 from mbs.assembly.tree import norm_rows, quaternion_slices
 from mbs.errors import Unclosable
 from mbs.loops.closure import closure_rows, facing, position_rows, velocity_row_units
@@ -66,6 +67,16 @@ def row_sizes(system: System) -> SX:
     """(m, 1) what each closure row is measured by [m or 1], as a function of p."""
     size = mechanism_size(system)
     return casadi.vertcat(SX(0, 1), *(size if own else SX(1) for own in _lengths(system)))
+
+
+def distance_units(units: Iterable[str], size: float) -> Vector:
+    """(n,) what distances of positions are divided by: 1, of lengths the size of the mechanism [m].
+
+    Args:
+        units: of the positions.
+        size: of the mechanism [m].
+    """
+    return np.array([size if unit.startswith("m") else 1.0 for unit in units])
 
 
 def constraint_sizes(system: System) -> SX:
@@ -357,8 +368,14 @@ def _replace(q: Vector, indices: Sequence[int], values: Vector) -> Vector:
 
 def difference(system: System, q: Vector, other: Vector) -> Vector:
     """(nq,) difference of two configurations: angles up to whole turns, quaternions up to sign."""
-    gap = within_half_turn(system, q - other)
-    for part in quaternion_slices(system.tree):
+    return row_difference(system.coordinates, q, other)
+
+
+def row_difference(rows: Sequence[Coordinate], q: Vector, other: Vector) -> Vector:
+    """(n,) the same of positions of any coordinates, in the tree or at a cut."""
+    gap = _within_half_turn(rows, q - other)
+    for first in [k for k, row in enumerate(rows) if row.kind == "quaternion"][::4]:
+        part = slice(first, first + 4)
         opposite = q[part] + other[part]
         gap[part] = min(q[part] - other[part], opposite, key=lambda x: float(np.abs(x).max()))
     return gap
@@ -366,8 +383,12 @@ def difference(system: System, q: Vector, other: Vector) -> Vector:
 
 def within_half_turn(system: System, q: Vector) -> Vector:
     """(nq,) the positions, or differences of them, with angles within half a turn of zero."""
+    return _within_half_turn(system.coordinates, q)
+
+
+def _within_half_turn(rows: Sequence[Coordinate], q: Vector) -> Vector:
     turned = np.array(q, dtype=float)
-    turns = [coordinate.unit == "rad" for coordinate in system.coordinates]
+    turns = [row.unit == "rad" for row in rows]
     turned[turns] = np.remainder(turned[turns] + np.pi, 2 * np.pi) - np.pi
     return turned
 

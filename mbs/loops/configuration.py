@@ -18,6 +18,7 @@ from mbs.loops.closing import (
     Closing,
     Vector,
     closure_parameters,
+    distance_units,
     follow_configuration,
     unwound,
 )
@@ -155,7 +156,7 @@ def _with_dependent_positions(
     q = _guessed_configuration(closing, target, _indices(system, {*surplus, *guess}))
     given = _indices(system, surplus)
     missed = np.abs(q - target)[given]
-    scales = [closing.size if system.coordinates[k].unit.startswith("m") else 1.0 for k in given]
+    scales = distance_units((system.coordinates[k].unit for k in given), closing.size)
     wrong = [k for k, x in zip(given, missed / scales, strict=True) if x > OPEN]
     if wrong:
         required, found = (

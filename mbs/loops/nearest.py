@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.tree import quaternion_slices
-from mbs.loops.closing import CLOSED, Closing, candidates, difference, unwound
+from mbs.loops.closing import (
+    CLOSED,
+    Closing,
+    candidates,
+    difference,
+    distance_units,
+    row_difference,
+    unwound,
+)
 from mbs.loops.closure import facing, position_rows
 from mbs.loops.cut_positions import cut_positions
 from mbs.solvers.rank import rank
@@ -212,16 +220,8 @@ class GuessTarget:
     def cut_moves(self, q: Vector) -> Vector:
         """(c,) differences of positions of cut joints from the target [rad, m or 1]."""
         assert self.cut is not None
-        rows = self.system.cut_coordinates
         found = np.array(cut_positions(self.system)(q, self.p)).ravel()
-        moves = found - self.cut
-        turns = np.array([row.unit == "rad" for row in rows], dtype=bool)
-        moves[turns] = np.remainder(moves[turns] + np.pi, 2 * np.pi) - np.pi
-        for k, row in enumerate(rows):
-            if row.name.endswith(".qw"):
-                part = slice(k, k + 4)
-                moves[part] = min(moves[part], found[part] + self.cut[part], key=_largest)
-        return moves
+        return row_difference(self.system.cut_coordinates, found, self.cut)
 
     def meets_cuts(self, q: Vector) -> bool:
         """Whether guessed positions of cut joints have their values."""
@@ -245,8 +245,7 @@ class GuessTarget:
         if own is None and self.cut is not None:
             rows += self.system.cut_coordinates
             moves = np.concatenate([moves, self.cut_moves(q)])
-        lengths = [row.unit.startswith("m") for row in rows]
-        moves = np.abs(moves) / np.where(lengths, closing.size, 1.0)
+        moves = np.abs(moves) / distance_units((row.unit for row in rows), closing.size)
         count = range(len(rows)) if own is None else own
         guessed = sorted(set(self.guessed) & set(count))
         nodes = [k for k, _, _ in self.system.balanced if k in count]
@@ -306,8 +305,7 @@ def _options(block: Closing, start: Vector) -> list[Vector]:
 def _independent(closing: Closing, q: Vector, guessed: set[int]) -> list[int]:
     """Free positions that determine the others at q: guessed ones before others, where possible."""
     J = closing.rows(q)[1] / closing.sizes[:, None]
-    lengths = [closing.system.coordinates[k].unit.startswith("m") for k in closing.free]
-    J = J * np.where(lengths, closing.size, 1.0)
+    J = J * distance_units((closing.system.coordinates[k].unit for k in closing.free), closing.size)
     left = list(range(len(closing.free)))
     full, taken = rank(J, _FLAT), list[int]()
     order = sorted(left, key=lambda k: (closing.free[k] not in guessed, k))

@@ -9,6 +9,7 @@ import numpy as np
 
 from mbs.errors import ExportError, ModelError
 from mbs.export.fmu.description import FmuModel, FmuVariable, Jumps
+from mbs.loops.closing import distance_units
 from mbs.loops.examine import LEAST_SINE
 from mbs.models.state.events import MinimalEvents
 from mbs.models.state.tree import TreeState
@@ -513,22 +514,12 @@ def _sentences(model: FmuModel) -> list[str]:
 def _lead_tables(model: FmuModel) -> list[str]:
     if model.closure is None:
         return []
-    turns = [variable.unit == "rad" for variable in model.dependents]
+    units = [variable.unit for variable in model.dependents]
     return [
         _table("const int MODEL_LEADS", map(str, leading_states(model.closure))),
-        _table("const int MODEL_TURNS", (str(int(turn)) for turn in turns)),
-        _numbers("MODEL_SPANS", spans(model.dependents, model.loop_size)),
+        _table("const int MODEL_TURNS", (str(int(unit == "rad")) for unit in units)),
+        _numbers("MODEL_SPANS", distance_units(units, model.loop_size)),
     ]
-
-
-def spans(dependents: Sequence[FmuVariable], size: float) -> list[float]:
-    """Units of the distances of dependent coordinates from guesses, as in `mbs.loops.nearest`.
-
-    Args:
-        dependents: the coordinates.
-        size: of the mechanism [m].
-    """
-    return [size if variable.unit.startswith("m") else 1.0 for variable in dependents]
 
 
 def leading_states(closure: casadi.Function) -> list[int]:

@@ -76,7 +76,6 @@ from mbs.result import (
 from mbs.simulate.arguments import count_steps, positive
 from mbs.simulate.tolerances import Tolerance, Tolerances, small_motions, tolerances_of
 from mbs.solvers import EventMotion, Events, integrate_events
-from mbs.solvers.integrate import is_compilable
 from mbs.solvers.problem import METHODS, IntegrationEvent, Passage, failed
 from mbs.text import did_you_mean, quoted
 
@@ -488,7 +487,7 @@ def _integrate(
 ) -> tuple[list[Leg], Stop]:
     state = equations(system)
     if system.closure is not None and system.closure.varies:
-        if state.passage is None or not is_compilable(state.rhs):
+        if state.passage is None:
             return _with_other_rows(system, equations, x0, times, p, options)
         q, parameters = x0[: system.nq], _own(system, p)
         if float(row_independence(system)(q, parameters)) < _SINGULAR:

@@ -1,42 +1,38 @@
 """Motions of a generated system, advanced in time by compiled code and kept on its constraints."""
 
 import ctypes
-import functools
 import math
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from importlib import resources
-from pathlib import Path
 from typing import Any
 
 import casadi
 import numpy as np
 import numpy.typing as npt
 
+from mbs.core import core_library
 from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.native import cached_library, compiler_found
 from mbs.native.compiled import calls_machine_code, generated, unwritten
 from mbs.native.compiler import flags_for
 from mbs.native.plain_source import plain_source
 from mbs.solvers.control_c import control_c
-from mbs.solvers.interpreted_run import run_interpreted
 from mbs.solvers.problem import (
     Equations,
     EventMotion,
     Events,
     IntegrationEvent,
     IntegrationProblem,
+    LawFailure,
     Passage,
     equations,
     failed,
+    failure_of,
     fired_of,
     interrupted,
     problem,
+    stopped_by_law,
 )
-
-# Integrations run by the compiled driver `native/runtime/driver.c`.
-
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -60,21 +56,6 @@ _REASONS = {
     15: "standstill",
 }
 _CROWDED = (14, 15)
-_RUNTIME = ("stepper", "dopri5")
-
-
-def is_compilable(function: casadi.Function) -> bool:
-    """Whether there is a compiler, and CasADi can write a Function as C.
-
-    Args:
-        function: any Function.
-    """
-    functions = [function]
-    return (
-        compiler_found()
-        and not calls_machine_code(functions)
-        and not unwritten(generated(functions))
-    )
 
 
 _LONG = 10_000
@@ -99,7 +80,10 @@ def _in_pieces(functions: Sequence[casadi.Function]) -> str:
 
 
 def library_of(equations: Equations) -> ctypes.CDLL | None:
-    """The compiled driver of these functions; None when CasADi can only interpret them.
+    """Return the machine code of the functions of an integration.
+
+    Returns:
+        None if CasADi can only interpret them.
 
     Raises:
         CompilerError: the compiler refused the code.
@@ -109,164 +93,74 @@ def library_of(equations: Equations) -> ctypes.CDLL | None:
     source = generated(equations.all)
     if unwritten(source):
         return None
-    flags = [*flags_for(source)]
     if source.count("\n") > _LONG and (pieces := _in_pieces(equations.all)):
-        source, flags = pieces, [*flags_for(pieces)]
-    names = [*_RUNTIME]
-    if equations.project is not None:
-        flags.append("-DMBS_PROJECT")
-    if equations.jacobian is not None:
-        names.append("rodas")
-        flags.append("-DMBS_RODAS")
-    if equations.indicators is not None:
-        names.append("events")
-        flags.append("-DMBS_EVENTS")
-    if equations.approaches is not None:
-        flags.append("-DMBS_APPROACHES")
-    if equations.passage is not None:
-        names.extend(("dense", "passage"))
-        flags.append("-DMBS_PASSAGE")
-    runtime = _runtime(tuple(names))
-    library = cached_library({"system.c": source, **runtime}, flags, common=tuple(runtime))
-    return _load(library, equations.indicators is not None, equations.passage is not None)
+        source = pieces
+    return ctypes.CDLL(str(cached_library({"system.c": source}, flags_for(source))))
 
 
-def run_compiled(
-    library: ctypes.CDLL, problem: IntegrationProblem, progress: Progress | None
-) -> EventMotion:
-    """The motion at the times of a problem, as far as it comes.
-
-    Control-C is heard between two chunks of steps: the compiled code runs to the end of its own.
-
-    Args:
-        library: what `library_of` gave for its equations.
-        problem: what to integrate.
-        progress: called now and then with the time reached, s.
-
-    Raises:
-        SolverError: there is no memory for it.
-    """
-    x, times = problem.x0.copy(), problem.times
-    table = np.empty((len(times), len(x)))
-    done = ctypes.c_longlong(0)
-    log: list[IntegrationEvent] = []
-    stop: SolverError | Interrupted | None = None
-    first: Array | None = None
-    with _opened(library, problem) as driver, control_c() as check:
-        status = library.mbs_begin(driver, _pointer(x))
-        if status <= _MORE and problem.equations.passage is not None:
-            slope = np.empty(len(x))
-            first = slope if library.mbs_leaves(driver, _pointer(x), _pointer(slope)) else None
-        try:
-            while status <= _MORE and done.value < len(times):
-                status = library.mbs_table(
-                    driver,
-                    _pointer(x),
-                    _pointer(times),
-                    len(times),
-                    _pointer(table),
-                    ctypes.byref(done),
-                    _CHUNK,
-                )
-                if status == _FIRED:
-                    log.append(_event(library, driver, problem))
-                if progress is not None:
-                    progress(library.mbs_time(driver))
-                check()
-        except KeyboardInterrupt:
-            stop = interrupted(library.mbs_time(driver))
-        if stop is None and status > _MORE:
-            blamed = _event(library, driver, problem).fired if status in _CROWDED else ()
-            stop = failed(
-                library.mbs_time(driver),
-                library.mbs_step(driver),
-                _REASONS[status],
-                blamed,
-                x.tolist(),
-            )
-    return replace(problem.motion(table[: done.value], log, stop), first_slope=first)
+# Evaluations of the functions of an integration, and its run by the run-time library.
 
 
-def _event(
-    library: ctypes.CDLL, driver: ctypes.c_void_p, problem: IntegrationProblem
-) -> IntegrationEvent:
-    assert problem.equations.indicators is not None
-    fired = np.empty(problem.equations.indicators.numel_out(0))
-    modes = np.empty(problem.modes)
-    library.mbs_event(driver, _pointer(fired), _pointer(modes))
-    return IntegrationEvent(library.mbs_time(driver), fired_of(fired), modes)
+def _compiled(function: casadi.Function, library: ctypes.CDLL) -> Any:
+    """Evaluation of the machine code of a function."""
+    name = function.name()
+    work = [ctypes.c_longlong() for _ in range(4)]
+    library[f"{name}_work"](*map(ctypes.byref, work))
+    address = ctypes.cast(library[name], ctypes.c_void_p).value
+    ports = function.n_in(), function.n_out()
+    return core_library().compiled(address, ports, tuple(size.value for size in work))
 
 
-@functools.cache
-def _runtime(names: tuple[str, ...]) -> dict[str, str]:
-    folder = resources.files("mbs.native") / "runtime"
-    files = ["driver.c", *(name + end for name in names for end in (".h", ".c"))]
-    return {name: (folder / name).read_text(encoding="utf-8") for name in files}
+def _interpreted(function: casadi.Function) -> Any:
+    """Evaluation of a function by CasADi, which reads and writes fixed arrays."""
+    buffer, call = function.buffer()
+    inputs = tuple(np.zeros(function.nnz_in(k)) for k in range(function.n_in()))
+    outputs = tuple(np.zeros(function.nnz_out(k)) for k in range(function.n_out()))
+    for number, array in enumerate(inputs):
+        if array.size:  # a buffer of no numbers cannot be given
+            buffer.set_arg(number, memoryview(array))
+    for number, array in enumerate(outputs):
+        if array.size:
+            buffer.set_res(number, memoryview(array))
+    return core_library().interpreted(call, _examine, buffer, inputs, outputs)
 
 
-def _load(path: Path, has_events: bool, has_passage: bool) -> ctypes.CDLL:
-    library = ctypes.CDLL(str(path))
-    handle, real, pointer = ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p
-    integer = ctypes.c_longlong
-    types: dict[str, tuple[Any, list[Any]]] = {
-        "mbs_open": (handle, [ctypes.c_int, ctypes.c_int, pointer, pointer, real]),
-        "mbs_close": (None, [handle]),
-        "mbs_begin": (ctypes.c_int, [handle, pointer]),
-        "mbs_table": (
-            ctypes.c_int,
-            [handle, pointer, pointer, integer, pointer, ctypes.POINTER(integer), integer],
-        ),
-        "mbs_sizes": (None, [handle, pointer, pointer]),
-        "mbs_stops": (None, [handle, pointer, pointer, integer]),
-        "mbs_time": (real, [handle]),
-        "mbs_step": (real, [handle]),
-    }
-    if has_events:
-        types["mbs_watch"] = (ctypes.c_int, [handle, ctypes.c_int, ctypes.c_int])
-        types["mbs_event"] = (None, [handle, pointer, pointer])
-    if has_passage:
-        types["mbs_pass"] = (ctypes.c_int, [handle, *2 * [pointer], real])
-        types["mbs_leaves"] = (ctypes.c_int, [handle, pointer, pointer])
-    for name, (result, arguments) in types.items():
-        function = getattr(library, name)
-        function.restype, function.argtypes = result, arguments
-    return library
+def _examine(error: BaseException) -> None:
+    """Return if an evaluation has no value; raise if its error must stop the integration."""
+    if not isinstance(error, RuntimeError):
+        raise error
+    failure_of(error, "rhs")
 
 
-@contextmanager
-def _opened(library: ctypes.CDLL, problem: IntegrationProblem) -> Iterator[ctypes.c_void_p]:
-    n, p, start = len(problem.x0), problem.p, float(problem.times[0])
-    indicators = problem.equations.indicators
-    afresh = problem.equations.first_step
-    control = np.array([problem.rtol, problem.atol, problem.max_step, afresh])
-    ends, jumps = problem.stops[0], problem.stops[1].astype(float)  # kept while the driver lives
-    driver = library.mbs_open(n, len(p), _pointer(p), _pointer(control), start)
-    full = not driver
-    try:
-        if driver and indicators is not None:
-            full = library.mbs_watch(driver, indicators.numel_out(0), problem.modes) != 0
-        if driver and not full and (through := problem.equations.passage) is not None:
-            full = _pass(library, driver, through)
-        if driver and problem.sizes is not None:
-            library.mbs_sizes(driver, *map(_pointer, problem.sizes))
-        if driver and len(ends):
-            library.mbs_stops(driver, _pointer(ends), _pointer(jumps), len(ends))
-        if full:
-            raise SolverError(f"no memory is left to integrate {n} states; close other programs")
-        yield driver
-    finally:
-        library.mbs_close(driver)
-
-
-def _pass(library: ctypes.CDLL, driver: ctypes.c_void_p, through: Passage) -> bool:
-    """Whether no memory is left for steps through singular configurations."""
-    sizes = (ctypes.c_int * len(through.size))(*through.size)
-    matrices = [(through.rows, number) for number in (1, 2, 5)] + [(through.forces, 0)]
-    places = [_places(function.sparsity_out(number)) for function, number in matrices]
-    pointers = (ctypes.c_void_p * len(places))(
-        *(None if x is None else _pointer(x) for x in places)
+def _evaluations(equations: Equations, library: ctypes.CDLL | None) -> tuple[Any, ...]:
+    """Evaluations in the order of `driver_model` in driver.h; None for a missing function."""
+    through = equations.passage
+    functions = (
+        equations.rhs,
+        equations.project,
+        equations.jacobian,
+        equations.indicators,
+        equations.rates,
+        equations.jump,
+        equations.approaches,
+        *((None,) * 3 if through is None else (through.rows, through.forces, through.regularity)),
     )
-    return bool(library.mbs_pass(driver, sizes, pointers, through.typical))
+
+    def evaluation(function: casadi.Function | None) -> Any:
+        if function is None:
+            return None
+        return _interpreted(function) if library is None else _compiled(function, library)
+
+    return tuple(map(evaluation, functions))
+
+
+def _passage(through: Passage | None) -> tuple[Any, ...] | None:
+    """Sizes, patterns of matrices and typical regularity, as the run-time library takes them."""
+    if through is None:
+        return None
+    matrices = [(through.rows, number) for number in (1, 2, 5)] + [(through.forces, 0)]
+    patterns = tuple(_places(function.sparsity_out(number)) for function, number in matrices)
+    return (tuple(through.size), patterns, through.typical)
 
 
 def _places(pattern: casadi.Sparsity) -> npt.NDArray[np.intc] | None:
@@ -276,8 +170,78 @@ def _places(pattern: casadi.Sparsity) -> npt.NDArray[np.intc] | None:
     return np.array([*pattern.colind(), *pattern.row()], dtype=np.intc)
 
 
-def _pointer(array: npt.NDArray[Any]) -> int:
-    return array.ctypes.data
+def _integration(given: IntegrationProblem, library: ctypes.CDLL | None) -> Any:
+    """The integration in the run-time library, at the first time.
+
+    Raises:
+        SolverError: no memory is left.
+    """
+    own, indicators = given.equations, given.equations.indicators
+    sizes = len(given.x0), len(given.p), given.modes
+    ends, jumps = given.stops[0], given.stops[1].astype(float)
+    try:
+        return core_library().integration(
+            _evaluations(own, library),
+            (*sizes, 0 if indicators is None else indicators.numel_out(0)),
+            _passage(own.passage),
+            given.p,
+            (given.rtol, given.atol, given.max_step, own.first_step),
+            None if given.sizes is None else np.ascontiguousarray(given.sizes),
+            (ends, jumps) if len(ends) else (None, None),
+            float(given.times[0]),
+        )
+    except MemoryError:
+        message = f"no memory is left to integrate {sizes[0]} states; close other programs"
+        raise SolverError(message) from None
+
+
+def run_problem(
+    given: IntegrationProblem, library: ctypes.CDLL | None, progress: Progress | None
+) -> EventMotion:
+    """Return the motion at the times of a problem, as far as it comes.
+
+    Args:
+        given: the problem.
+        library: machine code of its functions from `library_of`; None: CasADi interprets them.
+        progress: called now and then with the time that was reached [s].
+
+    Raises:
+        SolverError: no memory is left.
+    """
+    x, times = given.x0.copy(), given.times
+    table = np.empty((len(times), len(x)))
+    log: list[IntegrationEvent] = []
+    stop: SolverError | Interrupted | None = None
+    first: Array | None = None
+    run = _integration(given, library)
+    try:
+        with control_c() as check:
+            status = run.begin(x)
+            if status <= _MORE and given.equations.passage is not None:
+                slope = np.empty(len(x))
+                first = slope if run.leaves(x, slope) else None
+            while status <= _MORE and run.done < len(times):
+                status = run.fill(x, times, table, _CHUNK)
+                if status == _FIRED:
+                    log.append(_event(run, given))
+                if progress is not None:
+                    progress(run.time)
+                check()
+        if status > _MORE:
+            blamed = _event(run, given).fired if status in _CROWDED else ()
+            stop = failed(run.time, run.step, _REASONS[status], blamed, x.tolist())
+    except LawFailure as failure:
+        stop = stopped_by_law(run.time, failure, x.tolist())
+    except KeyboardInterrupt:
+        stop = interrupted(run.time)
+    return replace(given.motion(table[: run.done], log, stop), first_slope=first)
+
+
+def _event(run: Any, given: IntegrationProblem) -> IntegrationEvent:
+    assert given.equations.indicators is not None
+    fired, modes = np.empty(given.equations.indicators.numel_out(0)), np.empty(given.modes)
+    run.event(fired, modes)
+    return IntegrationEvent(run.time, fired_of(fired), modes)
 
 
 def integrate(
@@ -315,8 +279,8 @@ def integrate(
         atol: absolute tolerance of the error of one step, in the units of the states.
         max_step: the longest step, s; only the error limits it by default.
         progress: called now and then with the time reached, s.
-        compiled: False for the same algorithm in Python, about a hundred times slower; it is
-            what runs when there is no C compiler.
+        compiled: False if CasADi interprets the functions, which takes three to six times as
+            long. It does so without a C compiler too. The results are the same.
 
     Returns:
         (m, nx), a row for each time.
@@ -399,7 +363,7 @@ def integrate_events(
         sizes: (2, nx) factors of the absolute and of the relative tolerance of each state; one if
             left out.
         progress: called now and then with the time reached, s.
-        compiled: False for the same algorithm in Python.
+        compiled: as in `integrate`.
         partial: True for what was reached, with its `stop`, where the integration cannot go on or
             is interrupted by control-C; nothing is raised for that then.
         prepared: what an earlier call made of the same functions and method, and what this one
@@ -423,15 +387,7 @@ def integrate_events(
     functions, library = kept[key]
     modes = () if events is None else events.modes
     given = problem(functions, x0, times, p, modes, (rtol, atol), max_step, stops, sizes)
-    motion = _run(given, library, progress)
+    motion = run_problem(given, library, progress)
     if motion.stop is not None and not partial:
         raise motion.stop
     return motion
-
-
-def _run(
-    given: IntegrationProblem, library: ctypes.CDLL | None, progress: Progress | None
-) -> EventMotion:
-    if library is None:
-        return run_interpreted(given, progress)
-    return run_compiled(library, given, progress)

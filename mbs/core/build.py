@@ -1,0 +1,118 @@
+"""Compilation of the run-time library `mbs.core._core` from its C files.
+
+The build hook of the package and an editable checkout use these functions. They need nothing but
+the standard library, since mbs is not installed yet when the package is built.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+SOURCE = Path(__file__).parent / "source"
+LIBRARY = Path(__file__).parent / ("_core.pyd" if os.name == "nt" else "_core.abi3.so")
+_FLAGS = (
+    "-O2",
+    "-std=c99",
+    "-ffp-contract=off",  # contraction differs by processor and would change the results
+    "-fvisibility=hidden",
+    "-fPIC",
+    "-shared",
+    "-DPy_LIMITED_API=0x030B0000",
+)
+_KNOWN = ("cc", "gcc", "clang")
+
+
+class BuildError(RuntimeError):
+    """The run-time library was not built."""
+
+
+def source_sum() -> str:
+    """Return the hash of the C files, which the library contains too."""
+    found = hashlib.sha256()
+    for file in sorted(SOURCE.glob("*.[ch]")):
+        found.update(file.name.encode() + b"\0" + file.read_bytes())
+    return found.hexdigest()
+
+
+def is_current() -> bool:
+    """Return whether the library is there and was built from the present C files."""
+    return LIBRARY.is_file() and source_sum().encode() in LIBRARY.read_bytes()
+
+
+def installed_compiler() -> list[str] | None:
+    """Return the command of the C compiler: CC, else cc, gcc or clang; None if there is none."""
+    chosen = os.environ.get("CC", "").strip()
+    if chosen:
+        return shlex.split(chosen, posix=os.name != "nt")
+    found = next((name for name in _KNOWN if shutil.which(name)), None)
+    return None if found is None else [found]
+
+
+def build(target: Path = LIBRARY, extra: Sequence[str] = ()) -> Path:
+    """Compile the C files into a library.
+
+    Args:
+        target: the library to write. It appears complete or not at all.
+        extra: further arguments of the compiler.
+
+    Returns:
+        the target.
+
+    Raises:
+        BuildError: there is no compiler, or it reports an error.
+    """
+    command = installed_compiler() or [sys.executable, "-m", "ziglang", "cc"]
+    include = Path(sysconfig.get_path("include"))
+    if not (include / "Python.h").is_file():
+        raise BuildError(
+            f"mbs: the header Python.h is missing in {include}; install the development package"
+            " of Python, such as python3-dev, or a wheel of casadi-mbs"
+        )
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=".build-") as folder:
+        made = Path(folder) / target.name
+        arguments = [
+            *_FLAGS,
+            *extra,
+            f'-DCORE_SOURCES="{source_sum()}"',
+            f"-I{include}",
+            *map(str, sorted(SOURCE.glob("*.c"))),
+            *("-o", str(made)),
+            *(() if os.name == "nt" else ("-lm",)),
+            *(("-undefined", "dynamic_lookup") if sys.platform == "darwin" else ()),
+        ]
+        _run([*command, *arguments])
+        made.replace(target)
+    return target
+
+
+def _run(command: list[str]) -> None:
+    """Run the compiler; a BuildError if it fails."""
+    try:
+        answer = subprocess.run(command, capture_output=True, text=True, errors="replace")
+    except OSError as error:
+        raise BuildError(
+            f"mbs: the C compiler {command[0]} does not start ({error.strerror}); {_REMEDY}"
+        ) from error
+    if answer.returncode:
+        missing = "No module named ziglang" in answer.stderr
+        raise BuildError(
+            f"mbs: there is no C compiler; {_REMEDY}"
+            if missing
+            else f"mbs: the C compiler {command[0]} refused the run-time library:\n"
+            + answer.stderr[-2000:]
+        )
+
+
+_REMEDY = (
+    "install gcc or clang, or run: pip install ziglang, or name a C compiler by the environment"
+    " variable CC"
+)

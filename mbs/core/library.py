@@ -1,0 +1,38 @@
+"""The compiled run-time library, and the text of its C files."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+from collections.abc import Iterable
+from typing import Any
+
+from mbs.core.build import SOURCE, BuildError, build, is_current
+from mbs.errors import CompilerError
+
+
+@functools.cache
+def core_library() -> Any:
+    """Return the extension module `mbs.core._core`.
+
+    A checkout compiles the library again if a C file was changed.
+
+    Raises:
+        CompilerError: the library is missing or older than its C files, and cannot be built.
+    """
+    if not is_current():
+        try:
+            build()
+        except (BuildError, OSError) as error:
+            raise CompilerError(str(error)) from error
+        importlib.invalidate_caches()
+    return importlib.import_module("mbs.core._core")
+
+
+def core_files(names: Iterable[str]) -> dict[str, str]:
+    """Return the text of C files and headers of the run-time library.
+
+    Args:
+        names: file names.
+    """
+    return {name: (SOURCE / name).read_text(encoding="utf-8") for name in names}

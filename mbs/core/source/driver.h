@@ -1,0 +1,58 @@
+/* Integration of a model with events, projections and steps through singular configurations. */
+#ifndef MBS_DRIVER_H
+#define MBS_DRIVER_H
+
+#include "events.h"
+#include "model.h"
+#include "passage.h"
+
+#define DRIVER_STOPPED 100 /* an evaluation answered MODEL_STOP; beyond the states of the stepper */
+
+/* The functions of an integration. Each takes t, x (n,) and p (n_p,). The last n_modes of p are
+ * modes, which jumps change. */
+typedef struct {
+    int n, n_p, n_modes, n_indicators;
+    model_function rhs;      /* -> x' (n,) */
+    model_function project;  /* -> x after one Newton step onto the constraints, its residual */
+    model_function jacobian; /* -> d rhs / d x (n, n), d rhs / d t; given: the method is RODAS5P */
+    model_function indicators, rates; /* -> (n_indicators,) values, and their rates of change */
+    model_function approaches;        /* -> (n_indicators, 3), see events.h */
+    model_function jump;     /* takes the fired indicators too -> x, modes (n_modes,) */
+    model_function rows, forces, regularity; /* see passage.h */
+    passage_size size;          /* of rows */
+    passage_patterns patterns;  /* of the matrices of rows and forces */
+    double typical;             /* regularity at a common configuration */
+} driver_model;
+
+typedef struct {
+    double rtol, atol, max_step, first_step; /* first_step: after an event [s]; 0: estimated */
+    const double *absolute, *relative; /* (n,) factors of the tolerances of each state, or NULL */
+    const double *stops, *jumps; /* (n_stops,) times at which steps end; 1 if laws may jump there */
+    long n_stops;
+} driver_control;
+
+typedef struct driver driver;
+
+/* Begin at time t. All arrays stay with the caller, but p is copied. NULL: no memory is left. */
+driver *driver_new(const driver_model *model, const double *p, const driver_control *control,
+                   double t);
+void driver_free(driver *d);
+
+/* Project the first state x (n,) and evaluate the indicators there. Returns a status. */
+int driver_begin(driver *d, double *x);
+
+/* Fill rows *done .. count - 1 of table (count, n) with the states at times[]. Return after `budget`
+ * steps (STEPPER_MORE), after an event (EVENTS_FIRED), or with another status. */
+int driver_table(driver *d, double *x, const double *times, long count, double *table, long *done,
+                 long budget);
+
+/* After driver_begin: whether x is a singular configuration that the motion leaves on one branch;
+ * slope (n,) is then x' on this branch. */
+int driver_leaves(driver *d, const double *x, double *slope);
+
+double driver_time(const driver *d);
+double driver_step(const driver *d);        /* the next step that error control requires [s] */
+const double *driver_fired(const driver *d); /* (n_indicators,) 1 for those of the last event */
+const double *driver_modes(const driver *d); /* (n_modes,) present modes */
+
+#endif

@@ -57,12 +57,12 @@ def installed_compiler() -> list[str] | None:
     return None if found is None else [found]
 
 
-def build(target: Path = LIBRARY, extra: Sequence[str] = ()) -> Path:
+def build(target: Path = LIBRARY, sources: Sequence[Path] | None = None) -> Path:
     """Compile the C files into a library.
 
     Args:
         target: the library to write. It appears complete or not at all.
-        extra: further arguments of the compiler.
+        sources: the C files; all files of `SOURCE` if left out.
 
     Returns:
         the target.
@@ -81,10 +81,9 @@ def build(target: Path = LIBRARY, extra: Sequence[str] = ()) -> Path:
         made = Path(folder) / target.name
         arguments = [
             *_FLAGS,
-            *extra,
             f'-DCORE_SOURCES="{source_sum()}"',
             f"-I{include}",
-            *map(str, sorted(SOURCE.glob("*.c"))),
+            *map(str, sources or sorted(SOURCE.glob("*.c"))),
             *("-o", str(made)),
             *(() if os.name == "nt" else ("-lm",)),
             *(("-undefined", "dynamic_lookup") if sys.platform == "darwin" else ()),

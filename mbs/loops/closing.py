@@ -18,7 +18,7 @@ from mbs.assembly.tree import norm_rows, quaternion_slices
 from mbs.errors import Unclosable
 from mbs.loops.closure import closure_rows, facing, position_rows, velocity_row_units
 from mbs.numbers import OnArrays, on_arrays
-from mbs.solvers.least_squares import MANY, Entries, NewtonEquations, gauss_newton
+from mbs.solvers.least_squares import MANY, NewtonEquations
 
 # What rows of a closure are measured by: lengths by the size of the mechanism, cosines as such.
 #
@@ -177,18 +177,6 @@ class Closing:
             r, J = r[list(self.kept)], J[list(self.kept)]
         return r.ravel(), J[:, self.free] if self.locked else J
 
-    def _sparse_rows(self, q: Vector, free: Sequence[int]) -> tuple[Vector, Entries]:
-        """The same as `rows`, for many positions."""
-        functions = self._functions()
-        r, values = functions.elements(q, self.p)
-        number = np.full(self.system.nq, -1)
-        number[free] = np.arange(len(free))
-        rows, columns = functions.places
-        columns = number[columns]
-        kept = columns >= 0
-        entries = Entries(rows[kept], columns[kept], values.ravel()[kept], (r.size, len(free)))
-        return r.ravel(), entries
-
     @property
     def size(self) -> float:
         """The size of the mechanism [m]."""
@@ -216,28 +204,8 @@ class Closing:
 
     def nearest(self, q: Vector) -> Closed:
         """The configuration that Gauss-Newton reaches from q (nq,)."""
-        start, free = np.array(q, dtype=float), self.free
-
-        def residual(x: Vector) -> tuple[Vector, Vector | Entries]:
-            at = _replace(start, free, x)
-            dense = len(free) < MANY or self.kept is not None
-            return self.rows(at) if dense else self._sparse_rows(at, free)
-
-        def values(x: Vector) -> Vector:
-            r = self._functions().values(_replace(start, free, x), self.p)[0].ravel()
-            return r if self.kept is None else r[list(self.kept)]
-
         tolerance = TOLERANCE * self.sizes
-        compiled = (
-            None
-            if self.kept is not None
-            else self._functions().newton.near(start, self.p, free, tolerance)
-        )
-        if compiled is not None:
-            found, root = compiled
-            return Closed(found, root.residual, root.converged and self.faces(found))
-        root = gauss_newton(residual, start[free], tolerance=tolerance, values=values)
-        found = _replace(start, free, root.x)
+        found, root = self._newton().near(q, self.p, self.free, tolerance)
         return Closed(found, root.residual, root.converged and self.faces(found))
 
     def nearby(self, q: Vector, reach: float, tries: int, seed: int) -> Iterator[Vector]:
@@ -292,6 +260,18 @@ class Closing:
         names = [coordinate.name for coordinate in self.system.coordinates]
         return ", ".join(f"{names[k]} = {q[k]:.4g}" for k in self.locked)
 
+    def _newton(self) -> NewtonEquations:
+        """The rows that count, as equations for the free positions."""
+        kept = self.kept
+        if kept is None:
+            return self._functions().newton
+
+        def build() -> NewtonEquations:
+            return _equations_of(self.system, kept)
+
+        found: NewtonEquations = self.system.cached(f"closing rows {kept}", build)
+        return found
+
     def _functions(self) -> ClosingFunctions:
         functions: ClosingFunctions = self.system.cached("closing", lambda: _functions(self.system))
         return functions
@@ -302,18 +282,14 @@ class ClosingFunctions(NamedTuple):
 
     Attributes:
         equations: ``(q, p) -> r, J``: all rows, and their derivative by q.
-        elements: ``(q, p) -> r, e``: of the derivative the elements that need not be zero.
-        places: their rows and columns.
-        values: ``(q, p) -> r`` alone.
+        places: rows and columns of the elements of the derivative that need not be zero.
         facing: ``(q, p)``, positive where no axis is opposed.
         sizes: ``(p)``, the size of the mechanism and what each row is measured by.
-        newton: the rows, to be solved in machine code.
+        newton: all rows, as equations for the free positions.
     """
 
     equations: OnArrays
-    elements: OnArrays
     places: NDArray[np.int64]
-    values: OnArrays
     facing: OnArrays
     sizes: OnArrays
     newton: NewtonEquations
@@ -334,6 +310,15 @@ def closure_parameters(system: System, values: Mapping[str, float] | None = None
     return np.array(system.parameter_values(values, needed), dtype=float)
 
 
+def _equations_of(system: System, kept: Sequence[int]) -> NewtonEquations:
+    """Some rows of the loops and of quaternions, as equations for positions."""
+    q = SX.sym("q", system.nq)
+    r = casadi.vertcat(closure_rows(system, q), norm_rows(system.tree, q))
+    r, point = casadi.densify(r)[list(kept)], [q, system.p]
+    equations = Function("equations", point, [r, casadi.jacobian(r, q)])
+    return NewtonEquations(equations, Function("values", point, [r]))
+
+
 def _functions(system: System) -> ClosingFunctions:
     q = SX.sym("q", system.nq)
     r = casadi.densify(casadi.vertcat(closure_rows(system, q), norm_rows(system.tree, q)))
@@ -348,9 +333,7 @@ def _functions(system: System) -> ClosingFunctions:
     values = Function("values", [q, system.p], [r])
     return ClosingFunctions(
         equations=on_arrays(equations),
-        elements=arrays("elements", [q, system.p], [r, casadi.densify(J.nz[:])]),
         places=np.array(J.sparsity().get_triplet(), dtype=np.int64).reshape(2, -1),
-        values=on_arrays(values),
         facing=arrays("facing", [q, system.p], [facing(system, q)]),
         sizes=arrays("sizes", [system.p], [mechanism_size(system), sizes]),
         newton=NewtonEquations(equations, values),

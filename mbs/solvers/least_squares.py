@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import ctypes
-import functools
-import itertools
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from typing import Any
 
 import casadi
@@ -16,17 +11,10 @@ import numpy as np
 from casadi import DM, Function
 from numpy.typing import NDArray
 
-from mbs.errors import CompilerError
-from mbs.native import cached_library, compiler_found
-from mbs.solvers.rank import EQUAL
+from mbs.core import core_library
 
 Array = NDArray[np.float64]
-
-_sum = np.add.reduce  # as its method of arrays, without what that looks at before
-
-_CANCELLED = 1e-4
-"""Part of the square of a column's length below which what is left of it is summed anew, as four of
-its sixteen digits are gone then."""
+Arrays = tuple[Array, ...]
 
 
 def smallest_solution(A: Array, b: Array, gap: float) -> Array:
@@ -44,127 +32,10 @@ def smallest_solution(A: Array, b: Array, gap: float) -> Array:
         gap: columns that the ones before leave shorter than this part of the longest count as
             dependent.
     """
-    if (library := _library()) is not None:
-        A, b = (np.ascontiguousarray(given, dtype=float) for given in (A, b))
-        x = np.empty(A.shape[1])
-        if library.mbs_smallest_solution(*A.shape, _at(A), _at(b), gap, _at(x)):
-            raise MemoryError(f"no memory is left for {A.shape} equations")
-        return x
-    return plain_solution(A, b, gap)
-
-
-def plain_solution(A: Array, b: Array, gap: float) -> Array:
-    """The same without machine code, to the bit: the twin of `native/runtime/least_squares.c`.
-
-    Args:
-        A: as of `smallest_solution`, likewise the others.
-        b: likewise.
-        gap: likewise.
-    """
-    n = A.shape[1]
-    W = np.column_stack([A, b])[np.logical_or.reduce(A, axis=1)]
-    order = list(range(n))
-    rank = min(len(W), n)
-    squares = _sum(W[:, :n] ** 2, axis=0)
-    exact, longest = squares.copy(), float(squares.max(initial=0.0))
-    for k in range(rank):
-        left = squares[k:]
-        lost = left < _CANCELLED * exact[k:]
-        if np.logical_or.reduce(lost):
-            left[lost] = exact[k:][lost] = _sum(W[k:, k:n][:, lost] ** 2, axis=0)
-        most = np.maximum.reduce(left)
-        if most <= gap * gap * longest:
-            rank = k
-            break
-        # among columns of equal length the first: which of them rounding makes longest is luck
-        pivot = k + int((left >= (1 - EQUAL) * most).argmax())
-        if pivot != k:
-            W[:, k], W[:, pivot] = W[:, pivot].copy(), W[:, k].copy()
-            for row in (squares, exact):
-                row[k], row[pivot] = row[pivot], row[k]
-            order[k], order[pivot] = order[pivot], order[k]
-        _reflect(W[k:, k:])
-        squares -= W[k, :n] ** 2
-    X = W[:rank, rank:]
-    for k in reversed(range(rank)):
-        X[k] /= W[k, k]
-        X[:k] -= W[:k, k, None] * X[k]
-    x = np.zeros(n)
-    x[:rank] = X[:, -1]
-    free = np.vstack([-X[:, :-1], np.eye(n - rank)])
-    for k in range(n - rank):
-        u = free[:, k] / float(_sum(free[:, k] ** 2)) ** 0.5
-        free[:, k + 1 :] -= u[:, None] * _sum(u[:, None] * free[:, k + 1 :], axis=0)
-        x -= float(_sum(u * x)) * u
-    solution = np.empty(n)
-    solution[order] = x
-    return solution
-
-
-def _reflect(W: Array) -> None:
-    """Reflect the columns so that the first one has its first element alone; others may be zero."""
-    v = W[:, 0].copy()
-    size = math.sqrt(_sum(v * v))
-    first = -size if v[0] > 0 else size
-    v[0] -= first
-    rows = v.nonzero()[0]
-    v = v[rows, None]
-    rest = W[rows, 1:]
-    W[rows, 1:] = rest + v * (_sum(v * rest, axis=0) / (first * v[0, 0]))
-    W[0, 0] = first
-
-
-# The same in machine code, which is the same for all equations.
-
-
-_OFTEN = 300
-"""Solutions in this process from which machine code is worth its compiler, which takes as long as a
-thousand of them, once for all processes."""
-
-_asked = itertools.count()
-
-
-def _library() -> ctypes.CDLL | None:
-    """The machine code; None where few solutions were asked for, or there is no compiler."""
-    return _compiled() if next(_asked) >= _OFTEN else None
-
-
-@functools.cache
-def _compiled() -> ctypes.CDLL | None:
-    folder = resources.files("mbs.native") / "runtime"
-    names = ("least_squares.c", "least_squares.h")
-    try:
-        if not compiler_found():
-            return None
-        files = {name: (folder / name).read_text(encoding="utf-8") for name in names}
-        library = ctypes.CDLL(str(cached_library(files)))
-    except CompilerError:
-        return None
-    pointer, integer, real = ctypes.c_void_p, ctypes.c_int, ctypes.c_double
-    library.mbs_smallest_solution.argtypes = [integer, integer, pointer, pointer, real, pointer]
-    library.mbs_gauss_newton.argtypes = [ctypes.POINTER(_GaussNewton), ctypes.POINTER(real)]
-    return library
-
-
-def _at(array: NDArray[Any]) -> int:
-    return array.ctypes.data
-
-
-_EVALUATE = ctypes.CFUNCTYPE(ctypes.c_int)
-
-
-class _GaussNewton(ctypes.Structure):
-    """`least_squares` of `native/runtime/least_squares.h`."""
-
-    _fields_ = (
-        *((name, ctypes.c_int) for name in ("size", "rows", "unknowns", "elements")),
-        *((name, ctypes.c_void_p) for name in ("q", "r", "e", "free", "row", "column")),
-        ("tolerance", ctypes.c_void_p),
-        ("gap", ctypes.c_double),
-        ("iterations", ctypes.c_int),
-        ("equations", _EVALUATE),
-        ("values", _EVALUATE),
-    )
+    A, b = (np.ascontiguousarray(given, dtype=float) for given in (A, b))
+    x = np.empty(A.shape[1])
+    core_library().shortest_solution(A, b, gap, x)
+    return x
 
 
 MANY = 100
@@ -244,11 +115,7 @@ Residual = Callable[[Vector], tuple[Vector, Jacobian]]
 _RANK, _ITERATIONS = 1e-9, 100
 """Part of the largest singular value below which others count as zero: where Newton's method is of
 use none is near to it; and the most iterations, where ten are many."""
-_STALLED = 1e-14
-"""Length of a step [rad or m] that changes no digit of positions of size one that could matter."""
-
-_LAST_DIGITS = 1e-2
-"""Part of the tolerance above which one step more is taken: it takes the error to its square."""
+_CONVERGED = 1  # of least_squares.h
 
 
 @dataclass(frozen=True, slots=True)
@@ -294,39 +161,72 @@ def gauss_newton(
     """
     x = np.array(start, dtype=float)
     r, J = function(x)
-    if not _finite(r, J):
-        return LeastSquaresResult(x, np.inf, False)
-    norm, last_digits = _norm(r), _LAST_DIGITS * np.asarray(tolerance)
-    for _ in range(iterations):
-        size = np.abs(r)
-        reached = bool((size <= tolerance).all())
-        if reached and (size <= last_digits).all():
-            break
-        step = _step(J, -r, rank_tolerance)
-        length = 1.0
-        while length > (0.5 if reached else 1e-6):  # beyond the tolerance one step, if it helps
-            trial = x + length * step
-            if values is None or _norm(values(trial)) < norm:
-                r_trial, J_trial = function(trial)
-                norm_trial = _norm(r_trial)
-                if norm_trial < norm and _finite(r_trial, J_trial):
-                    break
-            length /= 2
-        else:
-            break
-        stalled = length * _norm(step) < _STALLED
-        x, r, J, norm = trial, r_trial, J_trial, norm_trial
-        if stalled or reached:
-            break
-    return LeastSquaresResult(x, norm, bool((np.abs(r) <= tolerance).all()))
+    first = J if isinstance(J, Entries) else _all_entries(J)
+    r, e = np.array(r, dtype=float), np.array(first.values, dtype=float)
+    limits = np.array(np.broadcast_to(tolerance, r.shape), dtype=float)
+    own, known = x.copy(), [(r, J)]  # the iteration begins with known values
+
+    def equations() -> None:
+        found, slopes = known.pop() if known else function(own.copy())
+        r_out[:] = found
+        e_out[:] = slopes.values if isinstance(slopes, Entries) else slopes.ravel()
+
+    def alone() -> None:
+        assert values is not None
+        v_out[:] = values(own.copy())
+
+    r_out, e_out, v_out = r.copy(), e.copy(), r.copy()
+    evaluate = _evaluation(equations, (own, np.empty(0)), (r_out, e_out))
+    reduced = None if values is None else _evaluation(alone, (own, np.empty(0)), (v_out,))
+    step = _sparse_step(first) if _is_large(first) else None
+    status, residual = core_library().gauss_newton(
+        (evaluate, reduced, step),
+        (x, np.empty(0), r, e),
+        (_indices(range(len(x))), _indices(first.rows), _indices(first.columns), limits),
+        rank_tolerance,
+        iterations,
+    )
+    return LeastSquaresResult(x, residual, status == _CONVERGED)
+
+
+def _evaluation(call: Callable[[], None], inputs: Arrays, outputs: Arrays, owner: Any = None) -> Any:
+    """Evaluation of Python code that reads and writes fixed arrays."""
+    return core_library().interpreted(call, _raise, owner, inputs, outputs)
+
+
+def _raise(error: BaseException) -> None:
+    """Pass an error on: every error stops the iteration."""
+    raise error
+
+
+def _indices(numbers: Iterable[int]) -> NDArray[np.intc]:
+    return np.array(numbers, dtype=np.intc)
+
+
+def _all_entries(J: Vector) -> Entries:
+    """All elements of a matrix, zeros included."""
+    rows, columns = np.indices(J.shape).reshape(2, -1)
+    return Entries(rows, columns, J.ravel(), J.shape)
+
+
+def _is_large(J: Entries) -> bool:
+    """Whether the matrix has its own arithmetic."""
+    m, n = J.shape
+    return n >= MANY and np.count_nonzero(J.values) < _FULL * m * n
+
+
+def _sparse_step(J: Entries) -> Any:
+    """Evaluation of the shortest solution of a large sparse matrix."""
+    e, b, x = np.empty(len(J.values)), np.empty(J.shape[0]), np.empty(J.shape[1])
+
+    def solve() -> None:
+        x[:] = sparse_solution(Entries(J.rows, J.columns, e, J.shape), b)
+
+    return _evaluation(solve, (e, b), (x,))
 
 
 class NewtonEquations:
-    """Equations r(q, p) = 0 that are solved for some of q, again and again.
-
-    What `gauss_newton` does with them is machine code, which calls their Functions by itself, for
-    fewer than `MANY` unknowns.
-    """
+    """Equations r(q, p) = 0 that are solved for some of q, again and again."""
 
     def __init__(self, equations: Function, values: Function) -> None:
         """Keep the Functions.
@@ -340,121 +240,85 @@ class NewtonEquations:
 
     def near(
         self, q: Vector, p: Vector, free: Sequence[int], tolerance: Vector
-    ) -> tuple[Vector, LeastSquaresResult] | None:
-        """Where `gauss_newton` ends, to the bit; None where there is no machine code for it.
+    ) -> tuple[Vector, LeastSquaresResult]:
+        """Return the end of the iteration of `gauss_newton`.
 
         Args:
-            q: (nq,) first guess; what is not free stays.
+            q: (nq,) first guess; positions that are not free stay.
             p: (np,).
-            free: numbers of the unknowns in q.
+            free: indices of the unknowns in q.
             tolerance: of each row.
 
         Returns:
-            q (nq,) at the end, and what `gauss_newton` says of the unknowns.
+            q (nq,) at the end, and the result for the unknowns.
+
+        Raises:
+            RuntimeError: the equations have no value, or no memory is left.
         """
-        library = _library() if len(free) < MANY else None
-        if library is None:
-            return None
         try:
             workspace = self._workspaces.pop()
         except IndexError:
             workspace = _Workspace(*self._functions)
-        found = workspace.solved(library, q, p, free, tolerance)
+        found = workspace.solved(q, p, free, tolerance)
         self._workspaces.append(workspace)
         return found
 
 
 class _Workspace:
-    """Memory from which Functions read and in which they write, and what calls them there."""
+    """Evaluations of equations, with their own memory."""
 
     def __init__(self, equations: Function, values: Function) -> None:
         pattern = equations.sparsity_out(1)
-        self.row, columns = (np.array(x, dtype=np.intc) for x in pattern.get_triplet())
-        self.columns, self.column = columns, np.empty_like(columns)
-        self.q, self.p = (np.zeros(equations.numel_in(k)) for k in range(2))
+        self.row, self.columns = (np.array(x, dtype=np.intc) for x in pattern.get_triplet())
+        self.shape = pattern.shape
+        self.calls = tuple(map(_function_evaluation, (equations, values)))
         self.r, self.e = np.zeros(equations.numel_out(0)), np.zeros(pattern.nnz())
-        self.error: BaseException | None = None
-        self.calls = [
-            self._call(equations, [self.r, self.e]),
-            self._call(values, [self.r]),
-        ]
-
-    def _call(self, function: Function, results: Sequence[Vector]) -> Any:
-        made: Any = function.buffer()
-        buffer, run = made
-        for k, array in enumerate((self.q, self.p)):
-            buffer.set_arg(k, array.data)
-        for k, array in enumerate(results):
-            buffer.set_res(k, array.data)
-
-        def evaluate() -> int:
-            try:
-                run()
-                return int(buffer.ret())
-            except BaseException as error:  # control-C too; it cannot pass through machine code
-                self.error = error
-                return 1
-
-        return _EVALUATE(evaluate)
 
     def solved(
-        self,
-        library: ctypes.CDLL,
-        q: Vector,
-        p: Vector,
-        free: Sequence[int],
-        tolerance: Vector,
+        self, q: Vector, p: Vector, free: Sequence[int], tolerance: Vector
     ) -> tuple[Vector, LeastSquaresResult]:
-        """What `NewtonEquations.near` gives.
-
-        Args:
-            library: the machine code.
-            q: as there, likewise the others.
-            p: likewise.
-            free: likewise.
-            tolerance: likewise.
-        """
-        self.q[:], self.p[:] = q, p
-        indices, number = np.array(free, dtype=np.intc), np.full(len(q), -1, dtype=np.intc)
-        number[indices] = np.arange(len(free))
-        self.column[:] = number[self.columns]
-        limits, residual = np.ascontiguousarray(tolerance), ctypes.c_double()
-        arrays: tuple[NDArray[Any], ...] = (self.q, self.r, self.e)
-        arrays += (indices, self.row, self.column, limits)
-        sizes = (len(q), len(self.r), len(free), len(self.e))
-        given = _GaussNewton(*sizes, *map(_at, arrays), _RANK, _ITERATIONS, *self.calls)
-        status = library.mbs_gauss_newton(ctypes.byref(given), ctypes.byref(residual))
-        if (error := self.error) is not None:
-            self.error = None
-            raise error
-        if status > 1:
+        """The result of `NewtonEquations.near`."""
+        found, unknowns = np.array(q, dtype=float), _indices(free)
+        number = np.full(len(q), -1, dtype=np.intc)
+        number[unknowns] = np.arange(len(free))
+        column = number[self.columns]
+        status, residual = core_library().gauss_newton(
+            (*self.calls, self._step(column, len(free))),
+            (found, np.array(p, dtype=float), self.r, self.e),
+            (unknowns, self.row, column, np.array(tolerance, dtype=float)),
+            _RANK,
+            _ITERATIONS,
+        )
+        if status > _CONVERGED:
             raise RuntimeError("equations of a closure have no value there, or no memory is left")
-        found = self.q.copy()
-        return found, LeastSquaresResult(found[indices], residual.value, status == 1)
+        return found, LeastSquaresResult(found[unknowns], residual, status == _CONVERGED)
+
+    def _step(self, column: NDArray[np.intc], count: int) -> Any:
+        """Evaluation of the steps if the Jacobian by the unknowns is large and sparse."""
+        if count < MANY:
+            return None
+        kept = column >= 0
+        if np.count_nonzero(kept) >= _FULL * self.shape[0] * count:
+            return None
+        e, b, x = np.empty(len(column)), np.empty(self.shape[0]), np.empty(count)
+        rows, columns, shape = self.row[kept], column[kept], (self.shape[0], count)
+
+        def solve() -> None:
+            x[:] = sparse_solution(Entries(rows, columns, e[kept], shape), b)
+
+        return _evaluation(solve, (e, b), (x,))
 
 
-def _step(J: Jacobian, b: Vector, rank_tolerance: float) -> Vector:
-    """The shortest x that brings J x nearest to b."""
-    m, n = J.shape
-    values = J.values if isinstance(J, Entries) else J
-    if n >= MANY and np.count_nonzero(values) < _FULL * m * n:
-        return sparse_solution(J if isinstance(J, Entries) else _entries(J), b)
-    return smallest_solution(J.dense() if isinstance(J, Entries) else J, b, rank_tolerance)
-
-
-def _entries(J: Vector) -> Entries:
-    rows, columns = J.nonzero()
-    return Entries(rows, columns, J[rows, columns], J.shape)
-
-
-def _norm(x: Vector) -> float:
-    """Its sum has one order, other than that of a dot product."""
-    return math.sqrt(_sum(x * x))
-
-
-def _finite(r: Vector, J: Jacobian) -> bool:
-    values = J.values if isinstance(J, Entries) else J
-    return bool(np.isfinite(r).all() and np.isfinite(values).all())
+def _function_evaluation(function: Function) -> Any:
+    """Evaluation of a function of CasADi, by its elements."""
+    buffer, call = function.buffer()
+    inputs = tuple(np.zeros(function.nnz_in(k)) for k in range(function.n_in()))
+    outputs = tuple(np.zeros(function.nnz_out(k)) for k in range(function.n_out()))
+    for bind, arrays in ((buffer.set_arg, inputs), (buffer.set_res, outputs)):
+        for number, array in enumerate(arrays):
+            if array.size:  # a buffer of no numbers cannot be bound
+                bind(number, array.data)
+    return _evaluation(call, inputs, outputs, buffer)
 
 
 # The smallest sum of squares, where no root is near.

@@ -1,12 +1,12 @@
 """Steps of many loops through singular configurations: sparse matrices give the same motion."""
 
 import importlib
-import re
 
 import casadi
 import numpy as np
 import pytest
 from support.change_points import rod
+from support.runtime import with_constant
 
 import mbs
 from mbs.components import Revolute, Spherical
@@ -61,18 +61,11 @@ def test_sparse_matrices_give_the_bits_of_dense_ones(monkeypatch, count, balls):
 
 
 @pytest.mark.parametrize(("longer", "end"), [(0.0, -16.16758), (1e-6, 0.140902)])
-def test_factors_of_rows_find_the_side_and_the_gap(monkeypatch, longer, end):
+def test_factors_of_rows_find_the_side_and_the_gap(monkeypatch, tmp_path, longer, end):
     """As if a window were many: it passes flat configurations, and reverses beside them."""
-    given = INTEGRATE._runtime
-
-    def as_many(names):
-        files = dict(given(names))
-        files["passage.c"], count = re.subn(r"(#define MANY) \d+", r"\1 0", files["passage.c"])
-        assert count == 1
-        return files
-
     few = motion(windows(1, longer))
-    monkeypatch.setattr(INTEGRATE, "_runtime", as_many)
+    library = with_constant(tmp_path, "MANY", lambda value: 0)
+    monkeypatch.setattr(INTEGRATE, "core_library", lambda: library)
     many = motion(windows(1, longer))
     # a reversal beside a singular configuration magnifies rounding by 1e10
     assert few["a0.q"][-1] == pytest.approx(end, abs=1e-5)

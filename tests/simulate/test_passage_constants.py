@@ -1,11 +1,11 @@
 """Constants of steps through singular configurations: what each tells apart, moved tenfold."""
 
 import importlib
-import re
 
 import numpy as np
 import pytest
 from support.change_points import linkage
+from support.runtime import with_constant
 
 import mbs
 from mbs.errors import SolverError
@@ -49,23 +49,10 @@ MOVED = [  # constant, factor, run, parts of the tolerance that tell the one fro
 ]
 
 
-def scale(monkeypatch, constant, factor):
-    """Compile the steps with another value of a constant."""
-    given = INTEGRATE._runtime
-
-    def changed(names):
-        files, found = dict(given(names)), 0
-        for name in ("passage.h", "passage.c"):
-            text, count = re.subn(
-                rf"(#define {constant}) (\S+)",
-                lambda m: f"{m[1]} {type(eval(m[2]))(eval(m[2]) * factor)!r}",
-                files[name],
-            )
-            files[name], found = text, found + count
-        assert found == 1
-        return files
-
-    monkeypatch.setattr(INTEGRATE, "_runtime", changed)
+def scale(monkeypatch, folder, constant, factor):
+    """Integrate with another value of a constant of passage.c."""
+    library = with_constant(folder, constant, lambda value: value * factor)
+    monkeypatch.setattr(INTEGRATE, "core_library", lambda: library)
 
 
 def outcome(run):
@@ -87,13 +74,15 @@ def outcome(run):
 
 @pytest.mark.sweep
 @pytest.mark.parametrize(("constant", "factor", "run", "bound"), MOVED)
-def test_a_constant_that_is_moved_tenfold_is_told(monkeypatch, constant, factor, run, bound):
+def test_a_constant_moved_tenfold_changes_a_motion(
+    monkeypatch, tmp_path, constant, factor, run, bound
+):
     ours = outcome(run)
-    scale(monkeypatch, constant, factor)
+    scale(monkeypatch, tmp_path, constant, factor)
     assert (ours < bound) != (outcome(run) < bound)
 
 
-def test_a_miss_is_named_where_it_is_larger_than_rounding(monkeypatch):
+def test_a_miss_is_named_where_it_is_larger_than_rounding(monkeypatch, tmp_path):
     """`APART` only chooses the words of a stop."""
 
     def words():
@@ -102,11 +91,11 @@ def test_a_miss_is_named_where_it_is_larger_than_rounding(monkeypatch):
         return str(stop.value)
 
     assert "come near each other" in words()
-    scale(monkeypatch, "APART", 10)
+    scale(monkeypatch, tmp_path, "APART", 10)
     assert "is not passed" in words()
 
 
-def test_the_rows_of_many_loops_in_their_order_lead_to_the_same_motion(monkeypatch):
+def test_the_rows_of_many_loops_in_their_order_lead_to_the_same_motion(monkeypatch, tmp_path):
     """As if few were many: without pivots, by reflections of rows where columns are not zero."""
 
     def motion():
@@ -114,7 +103,7 @@ def test_the_rows_of_many_loops_in_their_order_lead_to_the_same_motion(monkeypat
         return mbs.simulate.run(system, 3.0, v0={"a0": -4.0}, tolerance=1e-8, quiet=True)
 
     pivots = motion()
-    scale(monkeypatch, "MANY", 0)
+    scale(monkeypatch, tmp_path, "MANY", 0)
     ordered = motion()
     difference = np.abs(ordered.values - pivots.values).max(axis=0)
     assert difference.max() > 0

@@ -4,13 +4,10 @@ import casadi
 import numpy as np
 import pytest
 
-from mbs.native import compiler_found
-from mbs.solvers import least_squares
 from mbs.solvers.least_squares import (
     Entries,
     NewtonEquations,
     gauss_newton,
-    plain_solution,
     smallest_solution,
     sparse_solution,
 )
@@ -133,34 +130,8 @@ def test_a_residual_of_its_own_changes_no_digit():
     assert first.x.tolist() == other.x.tolist()
 
 
-needs_compiler = pytest.mark.skipif(not compiler_found(), reason="there is no C compiler")
-
-
-@needs_compiler
-@pytest.mark.parametrize("kind", ["full", "sparse", "equal columns", "of rank 1", "unlike"])
-def test_machine_code_gives_the_same_bits(kind, monkeypatch):
-    """From which solution on it runs must not show: sums have one order, also of 8 and 128."""
-    monkeypatch.setattr(least_squares, "_OFTEN", 0)
-    assert least_squares._compiled() is not None
-    rng = np.random.default_rng(5)
-    for m, n in [(1, 1), (1, 5), (9, 2), (7, 12), (20, 20), (40, 30), (150, 6), (300, 3)]:
-        A, b = rng.normal(size=(m, n)), rng.normal(size=m)
-        if kind == "sparse":
-            A *= rng.uniform(size=(m, n)) < 0.3
-        elif kind == "equal columns":
-            A[:, -1] = A[:, 0]
-            A[-1] = A[0]
-        elif kind == "of rank 1":
-            A = np.outer(A[:, 0], A[0])
-        elif kind == "unlike":
-            A *= np.exp(4 * rng.normal(size=n))
-        found, plain = smallest_solution(A, b, GAP), plain_solution(A, b, GAP)
-        assert found.tobytes() == plain.tobytes(), (m, n)
-
-
-@needs_compiler
-def test_equations_that_fail_in_machine_code_say_so(monkeypatch):
-    """What a Function raises passes through the machine code that called it."""
+def test_errors_of_equations_pass_through_the_library():
+    """An error that a Function raises ends the iteration."""
 
     class Broken(casadi.Callback):
         def __init__(self):
@@ -176,12 +147,10 @@ def test_equations_that_fail_in_machine_code_say_so(monkeypatch):
         def eval(self, arguments):
             raise ValueError("no value at all")
 
-    monkeypatch.setattr(least_squares, "_OFTEN", 0)
     q, p = casadi.SX.sym("q"), casadi.SX.sym("p")
     equations = casadi.Function("equations", [q, p], [q - 1, casadi.SX(1)])
     values, one = Broken(), np.ones(1)
     with pytest.raises(RuntimeError):
         NewtonEquations(equations, values).near(2 * one, one, [0], 1e-12 * one)
     found = NewtonEquations(equations, equations).near(2 * one, one, [0], 1e-12 * one)
-    assert found is not None
     assert found[0] == 1.0

@@ -1,19 +1,51 @@
-"""Parts of the C run-time on their own."""
+"""Parts of the C run-time on their own, and the run-time library with changed constants."""
 
 import ctypes
-from importlib import resources
+import importlib.machinery
+import importlib.util
+import re
+import shutil
 
 import numpy as np
 
+from mbs.core import core_files
+from mbs.core.build import SOURCE, build
 from mbs.native import cached_library
+
+INTEGRATION = ("model", "driver", "stepper", "dopri5", "rodas", "events", "dense", "passage")
 
 
 def runtime(*names):
     """The library of these files."""
-    folder = resources.files("mbs.native") / "runtime"
     files = [name + end for name in names for end in (".c", ".h")]
-    texts = {name: (folder / name).read_text(encoding="utf-8") for name in files}
-    return ctypes.CDLL(str(cached_library(texts)))
+    return ctypes.CDLL(str(cached_library(core_files(files))))
+
+
+def with_constant(folder, constant, change):
+    """The run-time library in which `#define constant value` has the value change(value).
+
+    Args:
+        folder: an empty folder.
+        constant: name, of stepper.c, events.c, passage.c or passage.h.
+        change: a function of the present value.
+    """
+    source, found = folder / "source", 0
+    shutil.copytree(SOURCE, source)
+    for file in source.glob("*.[ch]"):
+        text, count = re.subn(
+            rf"(#define {constant}) (\S+)",
+            lambda m: f"{m[1]} {type(eval(m[2]))(change(eval(m[2])))!r}",
+            file.read_text(),
+        )
+        file.write_text(text)
+        found += count
+    assert found == 1
+    library = build(folder / "_core.so", [source / f"{name}.c" for name in (*INTEGRATION, "module")])
+    loader = importlib.machinery.ExtensionFileLoader("mbs.core._core", str(library))
+    spec = importlib.util.spec_from_file_location("mbs.core._core", library, loader=loader)
+    module = importlib.util.module_from_spec(spec)
+    loader.exec_module(module)
+    return module
 
 
 def call(function, *arguments):

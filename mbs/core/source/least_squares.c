@@ -4,11 +4,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Part of the square of a column's length below which its remaining part is summed again: four of its
+ * sixteen digits have cancelled. */
 #define CANCELLED 1e-4
+/* Relative difference of lengths that count as equal: the first of equal columns is the pivot, since
+ * rounding decides which of them is the longest. */
 #define EQUAL 1e-6
-#define STALLED 1e-14
-#define LAST_DIGITS 1e-2
-#define SHORTEST 1e-6
+#define STALLED 1e-14   /* length of a step [rad or m] that changes no digit that matters */
+#define LAST_DIGITS 1e-2 /* part of the tolerance above which one more step is made */
+#define SHORTEST 1e-6   /* part of a step below which it is not halved any more */
 
 /* The sum of a (n,) in the order of NumPy: eight partial sums, of halves beyond 128 elements. */
 static double sum(const double *a, int n) {
@@ -199,7 +203,7 @@ static void solved(space *w, int m, int n, const double *A, const double *b, dou
     for (i = 0; i < n; i++) x[w->order[i]] = y[i];
 }
 
-int mbs_smallest_solution(int m, int n, const double *A, const double *b, double gap, double *x) {
+int shortest_solution(int m, int n, const double *A, const double *b, double gap, double *x) {
     space w;
     void *block = opened(&w, m, n);
     if (block) solved(&w, m, n, A, b, gap, x);
@@ -227,62 +231,120 @@ static void place(const least_squares *s, const double *x, double length, const 
     for (i = 0; i < s->unknowns; i++) s->q[s->free[i]] = x[i] + length * step[i];
 }
 
-/* The Jacobian by the unknowns, row by row; 1 where it or the residual is not finite. */
-static int spread(const least_squares *s, double *J) {
+/* The Jacobian by the unknowns, row by row. */
+static void spread(const least_squares *s, double *J) {
     int k, n = s->unknowns;
     memset(J, 0, sizeof(double) * (size_t)(s->rows * n));
     for (k = 0; k < s->elements; k++)
         if (s->column[k] >= 0) J[s->row[k] * n + s->column[k]] = s->e[k];
-    return !all_finite(s->r, s->rows) || !all_finite(J, s->rows * n);
 }
 
-int mbs_gauss_newton(least_squares *s, double *residual) {
-    int n = s->unknowns, m = s->rows, i, iteration, status = LEAST_SQUARES_FAILED;
-    size_t most = (size_t)(m > n ? m : n) + 1;
-    double *block = malloc(sizeof(double) * ((size_t)(m * n) + 5 * most)), size, *J = block;
-    double *x = J + m * n, *step = x + most, *b = step + most, *squares = b + most;
-    double *kept = squares + most;
-    space w;
-    void *other = opened(&w, m, n);
-    if (!block || !other || s->equations()) goto end;
-    for (i = 0; i < n; i++) x[i] = s->q[s->free[i]];
-    if (spread(s, J)) {
-        *residual = HUGE_VAL;
-        status = LEAST_SQUARES_OPEN;
-        goto end;
+static int is_finite(const least_squares *s) {
+    int k;
+    if (!all_finite(s->r, s->rows)) return 0;
+    for (k = 0; k < s->elements; k++)
+        if (s->column[k] >= 0 && !isfinite(s->e[k])) return 0;
+    return 1;
+}
+
+static int evaluate(const least_squares *s, const model_function *f) {
+    const double *arg[2];
+    double *res[2];
+    arg[0] = s->q;
+    arg[1] = s->p;
+    res[0] = s->r;
+    res[1] = s->e;
+    return f->evaluate(f->self, arg, res);
+}
+
+typedef struct {
+    double *J, *x, *step, *b, *squares, *kept; /* J: NULL if the model makes the steps */
+    space space;
+} iteration;
+
+static void *open_iteration(iteration *t, const least_squares *s) {
+    int m = s->rows, n = s->unknowns, dense = !s->step.evaluate;
+    size_t most = (size_t)(m > n ? m : n) + 1, area = dense ? (size_t)(m * n) : 0;
+    double *block = malloc(sizeof(double) * (area + 5 * most));
+    if (!block) return NULL;
+    t->J = dense ? block : NULL;
+    t->x = block + area;
+    t->step = t->x + most;
+    t->b = t->step + most;
+    t->squares = t->b + most;
+    t->kept = t->squares + most;
+    return block;
+}
+
+static int make_step(const least_squares *s, iteration *t) {
+    int i, m = s->rows, n = s->unknowns;
+    const double *arg[2];
+    for (i = 0; i < m; i++) t->b[i] = -s->r[i];
+    if (!t->J) {
+        arg[0] = s->e;
+        arg[1] = t->b;
+        return s->step.evaluate(s->step.self, arg, &t->step);
     }
-    size = norm(s->r, m, squares);
-    for (iteration = 0; iteration < s->iterations; iteration++) {
-        int reached = below(s, 1.0), found = 0;
-        double length = 1.0, next = size;
-        if (reached && below(s, LAST_DIGITS)) break;
-        memcpy(kept, s->r, sizeof(double) * (size_t)m);
-        for (i = 0; i < m; i++) b[i] = -s->r[i];
-        solved(&w, m, n, J, b, s->gap, step);
-        for (; length > (reached ? 0.5 : SHORTEST); length /= 2) {
-            place(s, x, length, step);
-            if (s->values()) goto end;
-            if (!(norm(s->r, m, squares) < size)) continue;
-            if (s->equations()) goto end;
-            next = norm(s->r, m, squares);
-            if (next < size && !spread(s, J)) {
-                found = 1;
-                break;
-            }
+    spread(s, t->J);
+    solved(&t->space, m, n, t->J, t->b, s->gap, t->step);
+    return 0;
+}
+
+/* Halve the step until the residual falls. Returns 0 if it did, 1 if no length is short enough, and
+ * -1 if a function failed. */
+static int line_search(least_squares *s, iteration *t, int reached, double *size, double *length) {
+    int m = s->rows;
+    for (*length = 1.0; *length > (reached ? 0.5 : SHORTEST); *length /= 2) {
+        double next;
+        place(s, t->x, *length, t->step);
+        if (s->values.evaluate) {
+            if (evaluate(s, &s->values)) return -1;
+            if (!(norm(s->r, m, t->squares) < *size)) continue;
         }
-        if (!found) { /* the last iterate */
-            for (i = 0; i < n; i++) s->q[s->free[i]] = x[i];
-            memcpy(s->r, kept, sizeof(double) * (size_t)m);
+        if (evaluate(s, &s->equations)) return -1;
+        next = norm(s->r, m, t->squares);
+        if (next < *size && is_finite(s)) {
+            *size = next;
+            return 0;
+        }
+    }
+    return 1;
+}
+
+static int iterate(least_squares *s, iteration *t, double *residual) {
+    int n = s->unknowns, m = s->rows, i, count, searched;
+    double size, length;
+    if (evaluate(s, &s->equations)) return LEAST_SQUARES_FAILED;
+    *residual = HUGE_VAL;
+    if (!is_finite(s)) return LEAST_SQUARES_OPEN;
+    for (i = 0; i < n; i++) t->x[i] = s->q[s->free[i]];
+    size = norm(s->r, m, t->squares);
+    for (count = 0; count < s->iterations; count++) {
+        int reached = below(s, 1.0);
+        if (reached && below(s, LAST_DIGITS)) break;
+        memcpy(t->kept, s->r, sizeof(double) * (size_t)m);
+        if (make_step(s, t)) return LEAST_SQUARES_FAILED;
+        searched = line_search(s, t, reached, &size, &length);
+        if (searched < 0) return LEAST_SQUARES_FAILED;
+        if (searched > 0) { /* the last iterate */
+            for (i = 0; i < n; i++) s->q[s->free[i]] = t->x[i];
+            memcpy(s->r, t->kept, sizeof(double) * (size_t)m);
             break;
         }
-        for (i = 0; i < n; i++) x[i] = s->q[s->free[i]];
-        size = next;
-        if (length * norm(step, n, squares) < STALLED || reached) break;
+        for (i = 0; i < n; i++) t->x[i] = s->q[s->free[i]];
+        if (length * norm(t->step, n, t->squares) < STALLED || reached) break;
     }
     *residual = size;
-    status = below(s, 1.0) ? LEAST_SQUARES_CONVERGED : LEAST_SQUARES_OPEN;
-end:
+    return below(s, 1.0) ? LEAST_SQUARES_CONVERGED : LEAST_SQUARES_OPEN;
+}
+
+int gauss_newton(least_squares *s, double *residual) {
+    iteration t;
+    int status = LEAST_SQUARES_FAILED;
+    void *block = open_iteration(&t, s);
+    void *other = block && t.J ? opened(&t.space, s->rows, s->unknowns) : block;
+    if (block && other) status = iterate(s, &t, residual);
+    if (other != block) free(other);
     free(block);
-    free(other);
     return status;
 }

@@ -1,32 +1,40 @@
-/* Smallest solutions and Gauss-Newton iterations: the twin of `solvers/least_squares.py`.
+/* Shortest solutions of linear equations, and Gauss-Newton iterations.
  *
- * Every sum has the order that it has there, which is NumPy's: results are the same to the bit, so
- * that it makes no difference which of the twins ran. A change here is a change there.
+ * Every sum has one order, that of NumPy. The digits of a result are therefore the same on every
+ * processor.
+ *
+ * Source: Golub and Van Loan 2013, section 5.4, for QR with column pivoting.
  */
 #ifndef MBS_LEAST_SQUARES_H
 #define MBS_LEAST_SQUARES_H
 
-/* The shortest x (n,) of those that bring A x nearest to b (m,), A (m, n) row by row; columns that
- * those before leave shorter than `gap` of the longest are dependent. 1 where memory is lacking. */
-int mbs_smallest_solution(int m, int n, const double *A, const double *b, double gap, double *x);
+#include "model.h"
 
-/* Equations r(q) = 0, of which some elements of q are unknown. The functions read q, and write r and
- * the elements of the Jacobian; what they return is 0 where they have values. */
+/* The shortest x (n,) of those that minimise |A x - b|, with A (m, n) row by row and b (m,). A column
+ * counts as dependent if its part orthogonal to the columns before it is shorter than `gap` of the
+ * longest column. Returns 1 if no memory is left. */
+int shortest_solution(int m, int n, const double *A, const double *b, double gap, double *x);
+
+/* Equations r(q, p) = 0 with some elements of q unknown. */
 typedef struct {
     int size, rows, unknowns, elements;
-    double *q, *r, *e;        /* (size,), (rows,), (elements,) */
-    const int *free;          /* numbers of the unknowns in q */
-    const int *row, *column;  /* of the elements, the column among the unknowns, -1 elsewhere */
-    const double *tolerance;  /* (rows,) */
-    double gap;
+    double *q, *r, *e;       /* (size,), (rows,), (elements,) */
+    const double *p;
+    const int *free;         /* (unknowns,) indices of the unknowns in q */
+    const int *row, *column; /* (elements,) of the Jacobian; the column among the unknowns, or -1 */
+    const double *tolerance; /* (rows,) */
+    double gap;              /* see shortest_solution */
     int iterations;
-    int (*equations)(void), (*values)(void); /* r and e, r alone */
+    model_function equations; /* (q, p) -> r, e */
+    model_function values;    /* (q, p) -> r; none: `equations` is used */
+    model_function step;      /* (e, b) -> the shortest x (unknowns,) for large sparse Jacobians */
 } least_squares;
 
-/* Failed: a function has no value, or memory is lacking. */
+/* Failed: a function has no value, or no memory is left. */
 enum { LEAST_SQUARES_OPEN, LEAST_SQUARES_CONVERGED, LEAST_SQUARES_FAILED };
 
-/* Damped Gauss-Newton from q, which becomes the last iterate; *residual: Euclidean norm there. */
-int mbs_gauss_newton(least_squares *s, double *residual);
+/* Damped Gauss-Newton iteration from q, which becomes the last iterate; *residual: Euclidean norm
+ * there. The step is halved until the residual falls. */
+int gauss_newton(least_squares *s, double *residual);
 
 #endif

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "driver.h"
+#include "least_squares.h"
 
 /* Evaluation: a function of a model. */
 
@@ -88,6 +89,16 @@ static Evaluation *new_evaluation(PyObject *module) {
     PyTypeObject *type = state_of(module)->evaluation;
     allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
     return (Evaluation *)allocate(type, 0);
+}
+
+static int take_function(PyObject *module, PyObject *one, model_function *to) {
+    if (one == Py_None) return 0;
+    if (!PyObject_TypeCheck(one, state_of(module)->evaluation)) {
+        PyErr_SetString(PyExc_TypeError, "a function is an Evaluation or None");
+        return 1;
+    }
+    *to = ((Evaluation *)one)->function;
+    return 0;
 }
 
 static PyObject *compiled(PyObject *module, PyObject *args) {
@@ -200,15 +211,8 @@ static int take_functions(PyObject *module, driver_model *model, PyObject *funct
         if (!PyErr_Occurred()) PyErr_Format(PyExc_ValueError, "give %d functions", FUNCTIONS);
         return 1;
     }
-    for (k = 0; k < FUNCTIONS; k++) {
-        PyObject *one = PyTuple_GetItem(functions, k);
-        if (one == Py_None) continue;
-        if (!PyObject_TypeCheck(one, state_of(module)->evaluation)) {
-            PyErr_SetString(PyExc_TypeError, "a function is an Evaluation or None");
-            return 1;
-        }
-        *to[k] = ((Evaluation *)one)->function;
-    }
+    for (k = 0; k < FUNCTIONS; k++)
+        if (take_function(module, PyTuple_GetItem(functions, k), to[k])) return 1;
     return 0;
 }
 
@@ -359,6 +363,60 @@ static PyType_Slot integration_slots[] = {
 static PyType_Spec integration_spec = {"mbs.core._core.Integration", sizeof(Integration), 0,
                                        Py_TPFLAGS_DEFAULT, integration_slots};
 
+/* Least squares. */
+
+static PyObject *py_shortest_solution(PyObject *module, PyObject *args) {
+    Py_buffer A, b, x;
+    double gap;
+    int failed;
+    (void)module;
+    if (!PyArg_ParseTuple(args, "y*y*dw*", &A, &b, &gap, &x)) return NULL;
+    Py_BEGIN_ALLOW_THREADS
+    failed = shortest_solution((int)(b.len / (Py_ssize_t)sizeof(double)),
+                               (int)(x.len / (Py_ssize_t)sizeof(double)), A.buf, b.buf, gap, x.buf);
+    Py_END_ALLOW_THREADS
+    PyBuffer_Release(&A);
+    PyBuffer_Release(&b);
+    PyBuffer_Release(&x);
+    if (failed) return PyErr_NoMemory();
+    Py_RETURN_NONE;
+}
+
+static PyObject *py_gauss_newton(PyObject *module, PyObject *args) {
+    enum { VIEWED = 8 };
+    PyObject *equations, *values, *step;
+    Py_buffer v[VIEWED];
+    least_squares s;
+    double residual = 0.0;
+    int status, k;
+    memset(&s, 0, sizeof s);
+    if (!PyArg_ParseTuple(args, "(OOO)(w*y*w*w*)(y*y*y*y*)di", &equations, &values, &step, v, v + 1,
+                          v + 2, v + 3, v + 4, v + 5, v + 6, v + 7, &s.gap, &s.iterations))
+        return NULL;
+    s.q = v[0].buf;
+    s.p = v[1].buf;
+    s.r = v[2].buf;
+    s.e = v[3].buf;
+    s.free = v[4].buf;
+    s.row = v[5].buf;
+    s.column = v[6].buf;
+    s.tolerance = v[7].buf;
+    s.size = (int)(v[0].len / (Py_ssize_t)sizeof(double));
+    s.rows = (int)(v[2].len / (Py_ssize_t)sizeof(double));
+    s.elements = (int)(v[3].len / (Py_ssize_t)sizeof(double));
+    s.unknowns = (int)(v[4].len / (Py_ssize_t)sizeof(int));
+    if (take_function(module, equations, &s.equations) ||
+        take_function(module, values, &s.values) || take_function(module, step, &s.step))
+        status = LEAST_SQUARES_FAILED;
+    else {
+        Py_BEGIN_ALLOW_THREADS
+        status = gauss_newton(&s, &residual);
+        Py_END_ALLOW_THREADS
+    }
+    for (k = 0; k < VIEWED; k++) PyBuffer_Release(&v[k]);
+    return PyErr_Occurred() ? NULL : Py_BuildValue("id", status, residual);
+}
+
 /* The module. */
 
 static PyMethodDef methods[] = {
@@ -366,6 +424,11 @@ static PyMethodDef methods[] = {
      "compiled(address, (inputs, outputs), (arg, res, iw, w)) -> Evaluation of machine code."},
     {"interpreted", interpreted, METH_VARARGS,
      "interpreted(call, examine, owner, inputs, outputs) -> Evaluation of a bound casadi.Function."},
+    {"shortest_solution", py_shortest_solution, METH_VARARGS,
+     "shortest_solution(A, b, gap, x): see least_squares.h."},
+    {"gauss_newton", py_gauss_newton, METH_VARARGS,
+     "gauss_newton((equations, values, step), (q, p, r, e), (free, row, column, tolerance), gap,"
+     " iterations) -> (status, residual): see least_squares.h."},
     {"integration", integration, METH_VARARGS, "See mbs.core.integration."},
     {NULL, NULL, 0, NULL},
 };

@@ -4,8 +4,12 @@ import gc
 import os
 import sys
 
+import pytest
 from hypothesis import settings
 from support.sweeps import EVERY_CASE, left_out
+
+from mbs.errors import CompilerError
+from mbs.native import compiler
 
 # Each worker of a run fills a core: threads of linear algebra would only wait for one another.
 # NumPy reads it when it is loaded, which is after this file.
@@ -67,3 +71,14 @@ def pytest_collection_finish():
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)
     gc.enable()
+
+
+@pytest.fixture
+def no_compiler(monkeypatch):
+    """A computer without a C compiler."""
+
+    def find(*_):
+        raise CompilerError("no C compiler was found")
+
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(compiler, "_find", find)

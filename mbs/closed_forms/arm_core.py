@@ -6,7 +6,6 @@ import ctypes
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeAlias
@@ -17,8 +16,9 @@ from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Arm, Array
 from mbs.closed_forms.raghavan_roth.numbers import Prepared
-from mbs.native import cached_library, compiler_found
-from mbs.native.handwritten import RUNTIME_FLAGS, handwritten
+from mbs.core import core_files, core_library
+from mbs.errors import ModelError
+from mbs.native.handwritten import handwritten
 
 Hits: TypeAlias = NDArray[np.int64]
 
@@ -30,11 +30,7 @@ _SOURCES = (
     "raghavan_roth_rest.c",
     "raghavan_roth_solve.c",
 )
-_CALLS = (
-    *("arm_nearest.h", "arm_nearest.c", "arm_reduce.h", "arm_reduce.c"),
-    "arm_calls.c",
-)  # for callers in Python
-_JOINTS = 7  # for which the core has room
+_JOINTS = 64  # ARM_JOINTS of arm.h: at most
 
 _pointer, _real, _integer = ctypes.c_void_p, ctypes.c_double, ctypes.c_longlong
 _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
@@ -51,6 +47,7 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
         _integer,
         (_pointer, _pointer, _pointer, _integer, _integer, _pointer, _pointer, _pointer, _pointer),
     ),
+    "mbs_candidates": (_integer, (_pointer, _pointer, _pointer)),
     "mbs_correct": (
         None,
         (_pointer, _pointer, _integer, _integer, _pointer, _pointer, ctypes.c_int, _pointer),
@@ -84,22 +81,19 @@ class _ArmStruct(ctypes.Structure):
     )
 
 
-def core() -> ctypes.CDLL | None:
-    """The compiled core; None where there is no C compiler.
+def core_of(arm: Arm) -> ctypes.CDLL:
+    """Return the run-time library for an arm.
 
     Raises:
-        CompilerError: the compiler refused the code.
+        ModelError: the arm has too many joints.
+        CompilerError: the library is missing and cannot be built.
     """
-    return _load() if compiler_found() else None
-
-
-def core_of(arm: Arm) -> ctypes.CDLL | None:
-    """The core for an arm; None where there is no C compiler, or it has more joints than seven.
-
-    Raises:
-        CompilerError: the compiler refused the code.
-    """
-    return core() if arm.size <= _JOINTS else None
+    if arm.size > _JOINTS:
+        raise ModelError(
+            f"the arm {arm.names[0]} ... {arm.names[-1]} has {arm.size} joints; inverse geometry"
+            f" takes {_JOINTS} at most, lock some of them"
+        )
+    return core()
 
 
 def path_of(library: ctypes.CDLL) -> Path:
@@ -109,14 +103,22 @@ def path_of(library: ctypes.CDLL) -> Path:
 
 def _files(sources: tuple[str, ...]) -> dict[str, str]:
     """The text of the core: the C files and headers of `_PAIRS`, and other C files."""
-    folder = resources.files("mbs.native") / "runtime"
-    names = [*(name + end for name in _PAIRS for end in (".c", ".h")), *sources]
-    return {name: (folder / name).read_text(encoding="utf-8") for name in names}
+    return core_files([*(name + end for name in _PAIRS for end in (".c", ".h")), *sources])
 
 
 @functools.cache
-def _load() -> ctypes.CDLL:
-    library = ctypes.CDLL(str(cached_library(_files((*_SOURCES, *_CALLS)), RUNTIME_FLAGS)))
+def core() -> ctypes.CDLL:
+    """The run-time library, with the signatures of its functions for arms.
+
+    Raises:
+        CompilerError: the library is missing and cannot be built.
+    """
+    return library_at(core_library().__file__)
+
+
+def library_at(path: str) -> ctypes.CDLL:
+    """A run-time library, with the signatures of its functions for arms."""
+    library = ctypes.CDLL(path)
     for name, (result, arguments) in _SIGNATURES.items():
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments
@@ -492,6 +494,12 @@ def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbe
         return found[0]
     numbers, configurations = zip(*found, strict=True)
     return np.concatenate(numbers), np.concatenate(configurations)
+
+
+def candidates_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> Array:
+    """(m, 6) configurations that may reach a pose (4, 4), before they are polished and checked."""
+    target, q = _wanted(T, 4, 4), np.empty((_CANDIDATES, 6))
+    return q[: library.mbs_candidates(handed.address, _at(target), _at(q))].copy()
 
 
 # The general method of one arm as a Function of C text, its numbers written out.

@@ -3,6 +3,19 @@
 The C files in `source` need no model. FMUs contain the same files.
 """
 
+from mbs.core.evaluations import (
+    compiled_evaluation,
+    interpreted_evaluation,
+    python_evaluation,
+    reraise,
+)
 from mbs.core.library import core_files, core_library
 
-__all__ = ["core_files", "core_library"]
+__all__ = [
+    "compiled_evaluation",
+    "core_files",
+    "core_library",
+    "interpreted_evaluation",
+    "python_evaluation",
+    "reraise",
+]

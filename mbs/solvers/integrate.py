@@ -10,7 +10,7 @@ import casadi
 import numpy as np
 import numpy.typing as npt
 
-from mbs.core import core_library
+from mbs.core import compiled_evaluation, core_library, interpreted_evaluation
 from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.native import cached_library, compiler_found
 from mbs.native.compiled import calls_machine_code, generated, unwritten
@@ -101,30 +101,6 @@ def library_of(equations: Equations) -> ctypes.CDLL | None:
 # Evaluations of the functions of an integration, and its run by the run-time library.
 
 
-def _compiled(function: casadi.Function, library: ctypes.CDLL) -> Any:
-    """Evaluation of the machine code of a function."""
-    name = function.name()
-    work = [ctypes.c_longlong() for _ in range(4)]
-    library[f"{name}_work"](*map(ctypes.byref, work))
-    address = ctypes.cast(library[name], ctypes.c_void_p).value
-    ports = function.n_in(), function.n_out()
-    return core_library().compiled(address, ports, tuple(size.value for size in work))
-
-
-def _interpreted(function: casadi.Function) -> Any:
-    """Evaluation of a function by CasADi, which reads and writes fixed arrays."""
-    buffer, call = function.buffer()
-    inputs = tuple(np.zeros(function.nnz_in(k)) for k in range(function.n_in()))
-    outputs = tuple(np.zeros(function.nnz_out(k)) for k in range(function.n_out()))
-    for number, array in enumerate(inputs):
-        if array.size:  # a buffer of no numbers cannot be given
-            buffer.set_arg(number, memoryview(array))
-    for number, array in enumerate(outputs):
-        if array.size:
-            buffer.set_res(number, memoryview(array))
-    return core_library().interpreted(call, _examine, buffer, inputs, outputs)
-
-
 def _examine(error: BaseException) -> None:
     """Return if an evaluation has no value; raise if its error must stop the integration."""
     if not isinstance(error, RuntimeError):
@@ -149,7 +125,9 @@ def _evaluations(equations: Equations, library: ctypes.CDLL | None) -> tuple[Any
     def evaluation(function: casadi.Function | None) -> Any:
         if function is None:
             return None
-        return _interpreted(function) if library is None else _compiled(function, library)
+        if library is None:
+            return interpreted_evaluation(function, _examine)
+        return compiled_evaluation(function, library)
 
     return tuple(map(evaluation, functions))
 

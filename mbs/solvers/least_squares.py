@@ -11,10 +11,9 @@ import numpy as np
 from casadi import DM, Function
 from numpy.typing import NDArray
 
-from mbs.core import core_library
+from mbs.core import core_library, interpreted_evaluation, python_evaluation, reraise
 
 Array = NDArray[np.float64]
-Arrays = tuple[Array, ...]
 
 
 def smallest_solution(A: Array, b: Array, gap: float) -> Array:
@@ -176,8 +175,8 @@ def gauss_newton(
         v_out[:] = values(own.copy())
 
     r_out, e_out, v_out = r.copy(), e.copy(), r.copy()
-    evaluate = _evaluation(equations, (own, np.empty(0)), (r_out, e_out))
-    reduced = None if values is None else _evaluation(alone, (own, np.empty(0)), (v_out,))
+    evaluate = python_evaluation(equations, (own, np.empty(0)), (r_out, e_out))
+    reduced = None if values is None else python_evaluation(alone, (own, np.empty(0)), (v_out,))
     step = _sparse_step(first) if _is_large(first) else None
     status, residual = core_library().gauss_newton(
         (evaluate, reduced, step),
@@ -187,16 +186,6 @@ def gauss_newton(
         iterations,
     )
     return LeastSquaresResult(x, residual, status == _CONVERGED)
-
-
-def _evaluation(call: Callable[[], None], inputs: Arrays, outputs: Arrays, owner: Any = None) -> Any:
-    """Evaluation of Python code that reads and writes fixed arrays."""
-    return core_library().interpreted(call, _raise, owner, inputs, outputs)
-
-
-def _raise(error: BaseException) -> None:
-    """Pass an error on: every error stops the iteration."""
-    raise error
 
 
 def _indices(numbers: Iterable[int]) -> NDArray[np.intc]:
@@ -222,7 +211,7 @@ def _sparse_step(J: Entries) -> Any:
     def solve() -> None:
         x[:] = sparse_solution(Entries(J.rows, J.columns, e, J.shape), b)
 
-    return _evaluation(solve, (e, b), (x,))
+    return python_evaluation(solve, (e, b), (x,))
 
 
 class NewtonEquations:
@@ -271,7 +260,7 @@ class _Workspace:
         pattern = equations.sparsity_out(1)
         self.row, self.columns = (np.array(x, dtype=np.intc) for x in pattern.get_triplet())
         self.shape = pattern.shape
-        self.calls = tuple(map(_function_evaluation, (equations, values)))
+        self.calls = tuple(interpreted_evaluation(f, reraise) for f in (equations, values))
         self.r, self.e = np.zeros(equations.numel_out(0)), np.zeros(pattern.nnz())
 
     def solved(
@@ -306,19 +295,7 @@ class _Workspace:
         def solve() -> None:
             x[:] = sparse_solution(Entries(rows, columns, e[kept], shape), b)
 
-        return _evaluation(solve, (e, b), (x,))
-
-
-def _function_evaluation(function: Function) -> Any:
-    """Evaluation of a function of CasADi, by its elements."""
-    buffer, call = function.buffer()
-    inputs = tuple(np.zeros(function.nnz_in(k)) for k in range(function.n_in()))
-    outputs = tuple(np.zeros(function.nnz_out(k)) for k in range(function.n_out()))
-    for bind, arrays in ((buffer.set_arg, inputs), (buffer.set_res, outputs)):
-        for number, array in enumerate(arrays):
-            if array.size:  # a buffer of no numbers cannot be bound
-                bind(number, array.data)
-    return _evaluation(call, inputs, outputs, buffer)
+        return python_evaluation(solve, (e, b), (x,))
 
 
 # The smallest sum of squares, where no root is near.

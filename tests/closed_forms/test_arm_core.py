@@ -1,25 +1,13 @@
 import numpy as np
 import pytest
-from support.plain_arms import apart, manseur_doty, needs_compiler, puma, random_arm
+from support.plain_arms import apart, manseur_doty, puma, random_arm
 
-import mbs.closed_forms.arm_core as core
 from mbs.closed_forms.arm_search import general, general_of, merged, nearest, polish, search
+from mbs.errors import ModelError
 
 
-@pytest.fixture
-def no_compiler(monkeypatch):
-    monkeypatch.setattr(core, "compiler_found", lambda: False)
-    assert core.core() is None
-
-
-@needs_compiler
-def test_the_core_is_loaded_once():
-    assert core.core() is core.core() is not None
-
-
-def test_arms_of_more_joints_than_the_core_has_room_for_are_solved_too():
+def test_redundant_arms_of_nine_joints_are_solved_too():
     arm = random_arm(np.random.default_rng(3), 9)
-    assert core.core_of(arm) is None
     q = np.random.default_rng(4).uniform(-1, 1, 9)
     T = arm.pose(q)
     assert np.max(polish(arm, T, q[None] + 1e-3).residual) < 1e-13
@@ -27,7 +15,6 @@ def test_arms_of_more_joints_than_the_core_has_room_for_are_solved_too():
     assert nearest(arm, T).distance < 1e-12
 
 
-@needs_compiler
 def test_poses_and_configurations_of_wrong_shapes_are_refused():
     arm, T = manseur_doty()
     for poses, configurations in (
@@ -42,8 +29,14 @@ def test_poses_and_configurations_of_wrong_shapes_are_refused():
         search(arm, T[:3], starts=2)
 
 
-@pytest.mark.usefixtures("no_compiler")
-def test_all_works_where_there_is_no_compiler():
+def test_an_arm_of_too_many_joints_is_an_error():
+    arm = random_arm(np.random.default_rng(3), 65)
+    with pytest.raises(ModelError, match="has 65 joints; inverse geometry takes 64 at most"):
+        polish(arm, np.eye(4), np.zeros((1, 65)))
+
+
+def test_the_library_needs_no_compiler(monkeypatch):
+    monkeypatch.setenv("PATH", "")
     arm, T = manseur_doty()
     q = general(general_of(arm), T)
     assert len(q) == 16

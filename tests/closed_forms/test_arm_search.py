@@ -1,13 +1,12 @@
 import numpy as np
 import pytest
-from support.plain_arms import apart, manseur_doty, needs_compiler, puma, random_arm
+from support.plain_arms import apart, manseur_doty, puma, random_arm
 
 from mbs.closed_forms.arm_search import (
     SEED,
     counted_search,
     random_configurations,
     search,
-    searched_with_numpy,
 )
 
 
@@ -72,15 +71,3 @@ def test_random_configurations_fill_the_range():
         assert np.max(np.abs(values)) <= span
         counts = np.histogram(values, bins=10, range=(-span, span))[0]
         assert np.all(np.abs(counts - 400) < 5 * np.sqrt(400))
-
-
-@needs_compiler
-def test_numpy_finds_what_the_compiled_core_finds():
-    rng = np.random.default_rng(9)
-    slides = random_arm(rng, 6, [False, True, False, False, True, False])
-    for arm in (puma(), random_arm(rng, 6), slides, random_arm(rng, 5)):
-        T = arm.pose(rng.uniform(-3, 3, arm.size))
-        compiled, plain = counted_search(arm, T), searched_with_numpy(arm, T, 300, SEED)
-        assert len(compiled.q) == len(plain.q) > 0
-        assert np.max(np.min(apart(arm, compiled.q, plain.q), axis=1)) < 1e-7
-        assert abs(np.sum(compiled.hits) - np.sum(plain.hits)) <= 3

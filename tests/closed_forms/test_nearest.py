@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from support.plain_arms import khalil, needs_compiler, puma, random_arm
+from support.plain_arms import khalil, puma, random_arm
 
-from mbs.closed_forms.arm_search import nearest, nearest_with_numpy
+from mbs.closed_forms.arm_search import nearest
 
 PLANAR = khalil([(0, 0, 0, 0), (0, 1.0, 0, 0), (0, 0.5, 0, 0)])
 
@@ -47,17 +47,6 @@ def test_no_small_move_comes_nearer():
         assert all(_cost(arm, T, q) >= least for q in moved)
         far = rng.uniform(-np.pi, np.pi, (2000, size))
         assert all(_cost(arm, T, q) > least for q in far)
-
-
-@needs_compiler
-def test_numpy_comes_as_near_as_the_compiled_core():
-    rng = np.random.default_rng(8)
-    for size in (4, 6):
-        arm = random_arm(rng, size)
-        T = arm.pose(rng.uniform(-3, 3, size))
-        T[:3, 3] *= 4
-        compiled, plain = nearest(arm, T).q, nearest_with_numpy(arm, T)
-        assert _cost(arm, T, compiled) == pytest.approx(_cost(arm, T, plain), rel=1e-10)
 
 
 def _cost(arm, T, q):

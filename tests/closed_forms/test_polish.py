@@ -1,18 +1,14 @@
 import numpy as np
 import pytest
 from support.plain_arms import (
-    apart,
-    both_ways,
     khalil,
     manseur_doty,
-    needs_compiler,
     puma,
     random_arm,
 )
 
-from mbs.closed_forms.arm_search import polish, polished_with_numpy
+from mbs.closed_forms.arm_search import polish
 
-WAYS = both_ways(polish, polished_with_numpy)
 RNG_SEED = 20260401
 
 
@@ -22,82 +18,62 @@ def arms():
     return [puma(), manseur_doty()[0], random_arm(rng, 6), slides, random_arm(rng, 4)]
 
 
-@pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("number", range(5))
-def test_configurations_beside_solutions_become_solutions(way, number):
+def test_configurations_beside_solutions_become_solutions(number):
     arm, rng = arms()[number], np.random.default_rng(number)
     q = rng.uniform(-3, 3, (40, arm.size))
     T = arm.pose(q)
     given = q + 1e-5 * rng.standard_normal(q.shape)
-    polished = way(arm, T, given)
+    polished = polish(arm, T, given)
     assert np.max(polished.residual) < 1e-14
     assert polished.residual == pytest.approx(arm.residual(polished.q, T), abs=3e-15)
     assert np.median(np.abs(polished.q - q)) < 1e-13
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_one_pose_serves_all_configurations(way):
+def test_one_pose_serves_all_configurations():
     arm, T = manseur_doty()
     given = np.random.default_rng(1).uniform(-3, 3, (30, 6))
-    each = way(arm, np.repeat(T[None], 30, axis=0), given)
-    assert np.array_equal(way(arm, T, given).q, each.q)
+    each = polish(arm, np.repeat(T[None], 30, axis=0), given)
+    assert np.array_equal(polish(arm, T, given).q, each.q)
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_no_residual_grows(way):
+def test_no_residual_grows():
     rng = np.random.default_rng(2)
     for arm in arms():
         T = arm.pose(rng.uniform(-3, 3, arm.size))
         T[:3, 3] += arm.length * np.array([2.0, 0.5, -1.0])  # out of reach
         given = rng.uniform(-3, 3, (30, arm.size))
         before = arm.residual(given, T)
-        polished = way(arm, T, given)
+        polished = polish(arm, T, given)
         assert np.all(polished.residual <= before + 1e-14)
         assert np.mean(polished.residual < before) > 0.5
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_an_exact_configuration_stays(way):
+def test_an_exact_configuration_stays():
     arm, q = puma(), np.array([[0.1, -0.4, 0.7, 0.2, 0.9, 4.0]])
-    assert np.array_equal(way(arm, arm.pose(q[0]), q).q, q)
+    assert np.array_equal(polish(arm, arm.pose(q[0]), q).q, q)
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_the_input_is_left_alone(way):
+def test_the_input_is_left_alone():
     arm, q = puma(), np.zeros((1, 6))
-    way(arm, arm.pose(np.full(6, 0.01)), q)
+    polish(arm, arm.pose(np.full(6, 0.01)), q)
     assert not q.any()
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_a_stretched_arm_where_two_solutions_meet(way):
+def test_a_stretched_arm_where_two_solutions_meet():
     arm = khalil([(0, 0, 0, 0), (0, 1.0, 0, 0), (0, 0.7, 0, 0)])
     q = np.array([[0.3, 0.0, 0.0], [1.2, 0.0, -0.4]])
     T = arm.pose(q)
-    polished = way(arm, T, q + np.array([0.02, -0.03, 0.04]))
+    polished = polish(arm, T, q + np.array([0.02, -0.03, 0.04]))
     assert np.max(polished.residual) < 1e-15
     assert np.max(np.abs(polished.q - q)) < 1e-7
 
 
-@pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("bend", [1e-5, 0.0])
-def test_a_wrist_that_is_nearly_or_quite_straight(way, bend):
+def test_a_wrist_that_is_nearly_or_quite_straight(bend):
     arm, rng = puma(), np.random.default_rng(3)
     q = rng.uniform(-3, 3, (40, 6))
     q[:, 4] = bend
     T = arm.pose(q)
-    polished = way(arm, T, q + 1e-4 * rng.standard_normal(q.shape))
+    polished = polish(arm, T, q + 1e-4 * rng.standard_normal(q.shape))
     assert np.max(polished.residual) < 1e-13
-
-
-@needs_compiler
-def test_numpy_takes_the_steps_of_the_compiled_core():
-    rng = np.random.default_rng(4)
-    for arm in arms():
-        q = rng.uniform(-3, 3, (25, arm.size))
-        given = q + 1e-3 * rng.standard_normal(q.shape)
-        compiled, plain = (
-            polish(arm, arm.pose(q), given),
-            polished_with_numpy(arm, arm.pose(q), given),
-        )
-        assert np.max(np.diag(apart(arm, compiled.q, plain.q))) < 1e-9

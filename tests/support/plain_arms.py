@@ -1,18 +1,8 @@
 """Arms as bare numbers, for tests of what works on numbers."""
 
 import numpy as np
-import pytest
 
 from mbs.closed_forms.arm import Arm
-from mbs.native import compiler_found
-
-needs_compiler = pytest.mark.skipif(not compiler_found(), reason="no C compiler")
-
-
-def both_ways(compiled, plain):
-    """An algorithm in C and the same in numpy, for `pytest.mark.parametrize`."""
-    in_c = pytest.param(compiled, id="compiled", marks=needs_compiler)
-    return [in_c, pytest.param(plain, id="numpy")]
 
 
 def khalil(rows, slides=None):

@@ -12,7 +12,11 @@ from mbs.core import core_files
 from mbs.core.build import SOURCE, build
 from mbs.native import cached_library
 
-INTEGRATION = ("model", "driver", "stepper", "dopri5", "rodas", "events", "dense", "passage")
+INTEGRATION = (
+    *("module", "model", "driver", "stepper", "dopri5", "rodas", "events", "dense", "passage"),
+    "least_squares",
+)
+"""C files of the extension without those of arms."""
 
 
 def runtime(*names):
@@ -26,21 +30,36 @@ def with_constant(folder, constant, change):
 
     Args:
         folder: an empty folder.
-        constant: name, of stepper.c, events.c, passage.c or passage.h.
+        constant: name, of one of the files of an integration.
         change: a function of the present value.
+    """
+    pattern = rf"(#define {constant}) (\S+)"
+
+    def value(match):
+        now = eval(match[2])
+        return f"{match[1]} {type(now)(change(now))!r}"
+
+    return changed_library(folder, pattern, value, INTEGRATION)
+
+
+def changed_library(folder, pattern, replacement, names=None):
+    """The run-time library with a change at the one place where a pattern is found.
+
+    Args:
+        folder: an empty folder.
+        pattern: regular expression.
+        replacement: of the text that is found, as for re.sub.
+        names: of the C files that are compiled; all if left out.
     """
     source, found = folder / "source", 0
     shutil.copytree(SOURCE, source)
     for file in source.glob("*.[ch]"):
-        text, count = re.subn(
-            rf"(#define {constant}) (\S+)",
-            lambda m: f"{m[1]} {type(eval(m[2]))(change(eval(m[2])))!r}",
-            file.read_text(),
-        )
+        text, count = re.subn(pattern, replacement, file.read_text())
         file.write_text(text)
         found += count
     assert found == 1
-    library = build(folder / "_core.so", [source / f"{name}.c" for name in (*INTEGRATION, "module")])
+    chosen = sorted(source.glob("*.c")) if names is None else [source / f"{n}.c" for n in names]
+    library = build(folder / "_core.so", chosen)
     loader = importlib.machinery.ExtensionFileLoader("mbs.core._core", str(library))
     spec = importlib.util.spec_from_file_location("mbs.core._core", library, loader=loader)
     module = importlib.util.module_from_spec(spec)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Arm, Field, inverse, motion
-from mbs.errors import ModelError, NoClosedForm
+from mbs.errors import ModelError
 from mbs.numbers import NONZERO
 
 # A point and a direction as fifteen numbers that every rigid displacement maps linearly.
@@ -122,6 +121,7 @@ def half_parts(prismatic: bool) -> Array:
 
 
 Joints = NDArray[np.bool_]
+Numbers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -597,112 +597,13 @@ def _reached(arm: Arm) -> Array:
     return arm.pose(np.where(arm.prismatic, slides, turns))
 
 
-# Joints 2, 1 and 6 when joints 3, 4 and 5 of the loop are known.
-#
-# The pair of the origin and the z axis beyond joint 5 must come, by joints 2 and 1, to where
-# joint 6 turns. What the motion of joint 1 leaves alone are six equations linear in (cos q2, sin
-# q2), or in (r2, r2^2). Joint 1 then aligns the pairs, and joint 6 is what remains.
-#
-# Source: Raghavan & Roth 1993, section 4.
-
-
-_FLAT = 1e-4  # ratio of singular values below which joint 2 has two roots too
-_NONE = 1e-9  # and below which it has no single root
-_NOTHING = 1e-12  # singular values, in lengths of the loop, that are rounding
-
-
-def completed(ways: Array, prismatic: Joints, middle: Array) -> tuple[Array, Array]:
-    """All positions of the loop's joints.
-
-    Args:
-        ways: (n, 6, 4, 4) of the loop.
-        prismatic: (6,) whether each joint slides.
-        middle: (n, 3) positions of joints 3, 4 and 5.
-
-    Returns:
-        (m,) numbers of the rows of `middle` that the solutions belong to, and (m, 6) positions.
-    """
-    beyond = ways[:, 1]
-    for k in (2, 3, 4):
-        beyond = beyond @ motion(middle[:, k - 2], bool(prismatic[k])) @ ways[:, k]
-    goal = inverse(ways[:, 5])
-    number, second = _second(ways[:, 0], prismatic, beyond, goal)
-    near = ways[number, 0] @ motion(second, bool(prismatic[1])) @ beyond[number]
-    first = _first(bool(prismatic[0]), near, goal[number])
-    left = inverse(motion(first, bool(prismatic[0])) @ near) @ goal[number]
-    sixth = np.arctan2(left[:, 1, 0] - left[:, 0, 1], left[:, 0, 0] + left[:, 1, 1])
-    return number, np.column_stack([first, second, middle[number], sixth])
-
-
-def _first(prismatic: bool, near: Array, goal: Array) -> Array:
-    """(n,) the position of joint 1 that takes the origin and z axis of frames near to the goal."""
-    if prismatic:
-        slide: Array = goal[:, 2, 3] - near[:, 2, 3]
-        return slide
-    x, y = near[:, 0, 2:], near[:, 1, 2:]
-    X, Y = goal[:, 0, 2:], goal[:, 1, 2:]
-    turn: Array = np.arctan2(np.sum(x * Y - y * X, axis=1), np.sum(x * X + y * Y, axis=1))
-    return turn
-
-
-def _second(way: Array, prismatic: Joints, beyond: Array, goal: Array) -> tuple[Array, Array]:
-    """Numbers of the rows, and positions of joint 2: two more where there is but one equation."""
-    kept = KEPT_BY_SLIDE if prismatic[0] else KEPT_BY_TURN
-    moved = np.einsum("iab,nb->nai", motion_parts(bool(prismatic[1])), pair(beyond))
-    A = (rho(way) @ moved)[:, kept]
-    U, s, V = np.linalg.svd(A[:, :, 1:], full_matrices=False)
-    g = np.einsum("nai,na->ni", U, pair(goal)[:, kept] - A[:, :, 0])
-    regular = s > np.maximum(_NONE * s[:, :1], _NOTHING)
-    sharp, flat = regular[:, 1], s[:, 1] <= np.maximum(_FLAT * s[:, 0], _NOTHING)
-    g = np.where(regular, g / np.where(regular, s, 1.0), 0.0)
-    f = np.einsum("nij,ni->nj", V, g)
-    single = f[:, 0] if prismatic[1] else np.arctan2(f[:, 1], f[:, 0])
-    low, high = _crossings(bool(prismatic[1]), V[:, 0], g[:, 0])
-    rows = [np.nonzero(mask)[0] for mask in (sharp, flat, flat)]
-    positions = [root[own] for root, own in zip((single, low, high), rows, strict=True)]
-    return np.concatenate(rows), np.concatenate(positions)
-
-
-def _crossings(prismatic: bool, n: Array, g: Array) -> tuple[Array, Array]:
-    """Both roots of n_x cos q + n_y sin q = g, or of n_x r + n_y r^2 = g; the fold if not real."""
-    if not prismatic:
-        middle = np.arctan2(n[:, 1], n[:, 0])
-        half = np.arccos(np.clip(g / np.maximum(np.linalg.norm(n, axis=1), NONZERO), -1, 1))
-        return middle - half, middle + half
-    root = np.sqrt(np.maximum(n[:, 0] ** 2 + 4 * n[:, 1] * g, 0))
-    larger = -0.5 * (n[:, 0] + np.copysign(root, n[:, 0]))
-    low = -g / np.where(np.abs(larger) > NONZERO, larger, NONZERO)
-    # less is rounding, and the second root lies 1e9 lengths away
-    curved = np.abs(n[:, 1]) > 1e-9 * np.abs(n[:, 0])
-    high = np.where(curved, larger / np.where(curved, n[:, 1], 1.0), low)
-    return low, high
-
-
 # The angles of joint 3 where the matrix is singular: eigenvalues of a companion matrix.
 #
 # Source: Manocha & Canny 1994.
 
 
-_OFF_CIRCLE = 0.5  # |log| of the size of e^(i u) of roots that are kept
 _OFFSETS = 0.2731 + np.arange(8) * np.pi / 4  # of joint 3 [rad], angles that no design prefers
-_COARSE, _FINE = 1e-3, 1e-6  # gaps between angles that may be one multiple root, a double one [rad]
-_LARGEST = 6  # solutions at one root
 _ROUNDING = 1e-16  # part of the largest singular value that divides in place of a smaller one
-
-
-def roots(M: Array) -> tuple[NDArray[np.int64], Array]:
-    """The angles u of joint 3 where the matrix is singular, or nearly so for a real angle.
-
-    Args:
-        M: (N, n3, n, n) parts of the matrices, see `elimination.weights`.
-
-    Returns:
-        (m,) numbers of the matrix, ascending, and (m,) angles in [-pi, pi), of roots e^(i u) near
-        the unit circle; a double root is there twice.
-    """
-    u = complex_roots(M)
-    number, column = np.nonzero(np.abs(u.imag) < _OFF_CIRCLE)
-    return number, (u.real[number, column] + np.pi) % (2 * np.pi) - np.pi
 
 
 def complex_roots(M: Array) -> NDArray[np.complex128]:
@@ -757,119 +658,3 @@ def _rotate(M: Array) -> tuple[Array, Array]:
     c, s = (part[:, None, None] for part in (np.cos(offset), np.sin(offset)))
     cosine, sine = c * M[:, 1] + s * M[:, 2], c * M[:, 2] - s * M[:, 1]
     return offset, np.stack([M[:, 0] + cosine, 2 * sine, M[:, 0] - cosine], axis=1)
-
-
-def clusters(u: Array) -> list[tuple[float, int]]:
-    """Groups of angles (m,) of one matrix: their means, and how many they are.
-
-    Roots that several solutions share are one group; a wide group is also there in narrow ones.
-    """
-    wide = _group(u, _COARSE)
-    narrow = [group for group in _group(u, _FINE) if not any(_same(group, own) for own in wide)]
-    return [(float(np.mean(group)), min(len(group), _LARGEST)) for group in wide + narrow]
-
-
-def _group(u: Array, gap: float) -> list[Array]:
-    """Around the circle, from the widest gap on."""
-    if len(u) < 2:
-        return [u] if len(u) else []
-    u = np.sort(u)
-    gaps = np.diff(np.append(u, u[0] + 2 * np.pi))
-    start = int(np.argmax(gaps)) + 1
-    u = np.concatenate([u[start:], u[:start] + 2 * np.pi])
-    return np.split(u, np.nonzero(np.diff(u) > gap)[0] + 1)
-
-
-def _same(a: Array, b: Array) -> bool:
-    return len(a) == len(b) and abs(a[0] - b[0]) < _FINE
-
-
-Numbers = NDArray[np.int64]
-
-_FAR = 1e3  # slides, in reaches of the arm, that are taken for infinite
-
-
-def candidates(prepared: Prepared, T: Array) -> Array:
-    """(m, 6) configurations that may reach a target pose; polish and check them.
-
-    Among them is every isolated configuration that does, near double ones too, some of them twice;
-    others do not reach the pose at all.
-
-    Args:
-        prepared: see `prepare`.
-        T: (4, 4) target pose [m].
-
-    Raises:
-        NoClosedForm: the method does not hold for the arm, see `Prepared.regular`.
-    """
-    return candidates_many(prepared, np.asarray(T, dtype=float)[None])[1]
-
-
-def candidates_many(prepared: Prepared, T: Array) -> tuple[Numbers, Array]:
-    """Configurations for many poses at once.
-
-    Args:
-        prepared: see `prepare`.
-        T: (N, 4, 4) target poses [m].
-
-    Returns:
-        (m,) numbers of the poses, ascending, and (m, 6) configurations for them.
-
-    Raises:
-        NoClosedForm: the method does not hold for the arm, see `Prepared.regular`.
-    """
-    if not prepared.regular:
-        raise NoClosedForm(
-            "the matrix of the general inverse geometric model is singular at every configuration"
-            " of this"
-            f" arm (its regularity is {prepared.regularity:.0e}); use method='search'"
-        )
-    T = np.asarray(T, dtype=float)
-    numbers, found = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 6))]
-    for one, poses in for_poses(prepared, T):
-        number, q = _candidates(one, T[poses])
-        numbers.append(poses[number])
-        found.append(q)
-    every = np.concatenate(numbers)
-    order = np.argsort(every, kind="stable")
-    return every[order], np.concatenate(found)[order]
-
-
-def _candidates(prepared: Prepared, T: Array) -> tuple[Numbers, Array]:
-    """`candidates_many` by one arrangement."""
-    loop = prepared.arrangement
-    ways = loop.all_ways(T)
-    number, middle = _middle(prepared, prepared.pencil.matrices(ways))
-    row, u = completed(ways[number], loop.prismatic, middle)
-    number = number[row]
-    order = np.argsort(number, kind="stable")
-    number, u = number[order], u[order]
-    reach = 1 + np.linalg.norm(T[number, :3, 3], axis=1) / loop.length
-    near = np.max(np.where(loop.prismatic, np.abs(u), 0.0), axis=1) < _FAR * reach
-    return number[near], loop.configurations(u[near])
-
-
-def _middle(prepared: Prepared, M: Array) -> tuple[Numbers, Array]:
-    """(n,) numbers of the poses, and (n, 3) positions of joints 3, 4 and 5 of the loop."""
-    prismatic = prepared.arrangement.prismatic
-    numbers, positions = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 3))]
-    for count, (number, u) in _by_size(M).items():
-        x4, x5 = middle_joints(at(M[number], u), prepared.pencil.elimination.grid, count)
-        x3 = np.repeat(np.tan(u / 2), count)
-        x = np.column_stack([x3, x4.ravel(), x5.ravel()])
-        numbers.append(np.repeat(number, count))
-        positions.append(np.where(prismatic[2:5], x, 2 * np.arctan(x)))
-    return np.concatenate(numbers), np.concatenate(positions)
-
-
-def _by_size(M: Array) -> dict[int, tuple[Numbers, Array]]:
-    """By the number of solutions that share an angle: numbers of the poses, and the angles."""
-    number, u = roots(M)
-    sized = defaultdict(list)
-    for n in np.unique(number):
-        for mean, count in clusters(u[number == n]):
-            sized[count].append((n, mean))
-    return {
-        count: (np.array([n for n, _ in found]), np.array([mean for _, mean in found]))
-        for count, found in sorted(sized.items())
-    }

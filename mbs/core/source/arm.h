@@ -6,7 +6,7 @@
 #ifndef MBS_ARM_H
 #define MBS_ARM_H
 
-enum { ARM_JOINTS = 7, /* at most */ ARM_STEPS = 60 /* of a descent, at most */ };
+enum { ARM_JOINTS = 64, /* at most */ ARM_STEPS = 60 /* of a descent, at most */ };
 
 typedef struct {
     int n;
@@ -15,15 +15,17 @@ typedef struct {
     double length;               /* of the arm's size [m] */
 } arm;
 
-/* A configuration and what follows from it. */
+/* A configuration and the quantities that follow from it. */
 typedef struct {
-    double q[ARM_JOINTS];    /* rad or m */
     double T[16];            /* its pose */
-    double J[ARM_JOINTS][6]; /* motion of the frame for each joint, [V / length; w], in the base;
-                                lengths in arm lengths */
     double gap[6];           /* to the target pose, [translation / length; rotation vector] */
     double cost;             /* |gap|^2 */
+    double q[ARM_JOINTS];    /* rad or m */
+    double J[ARM_JOINTS][6]; /* motion of the frame for each joint, [V / length; w], in the base;
+                                lengths in arm lengths */
 } configuration;
+
+void arm_copy(const arm *a, configuration *to, const configuration *from);
 
 void arm_pose(const arm *a, const double *q, double *T);
 

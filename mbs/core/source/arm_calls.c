@@ -102,6 +102,11 @@ EXPORT long long mbs_general(const arm *a, const roth_loop *r, const double *tar
     return count;
 }
 
+/* `roth_candidates`; q has room for ROTH_CONFIGURATIONS. */
+EXPORT long long mbs_candidates(const roth_loop *r, const double *target, double *q) {
+    return roth_candidates(r, target, q);
+}
+
 /* `pose_solve` in CasADi's convention: T and a pose_solver -> q, residual, number, (count, state). */
 EXPORT int mbs_pose(const double **arg, double **res, long long *iw, double *w, int mem) {
     long long count;

@@ -19,6 +19,15 @@ static const double STRAIGHT = 0.9;    /* cosine of 26 degrees, by which a step 
 static const double FINISHED = 1e-14;  /* step that is rounding of angles of about one */
 static const double SETTLED = 1e-12;   /* step that is hardly more than rounding, likewise */
 
+void arm_copy(const arm *a, configuration *to, const configuration *from) {
+    size_t n = (size_t)a->n;
+    memcpy(to->T, from->T, sizeof to->T);
+    memcpy(to->gap, from->gap, sizeof to->gap);
+    to->cost = from->cost;
+    memcpy(to->q, from->q, n * sizeof *to->q);
+    memcpy(to->J, from->J, n * sizeof *to->J);
+}
+
 /* (J' J + shift) dx = J' gap by Cholesky. 0: too close to singular. */
 static int normal_step(const arm *a, const configuration *p, double shift, double *dx) {
     double L[ARM_JOINTS][ARM_JOINTS], most = 0.0;
@@ -65,10 +74,17 @@ static void reflect_rows(double A[ARM_JOINTS + 1][ROWS], int j, int n, int rows)
     A[j][j] = size;
 }
 
+/* Columns 0 .. n of A, with `rows` elements each, become zero. */
+static void clear_columns(double A[ARM_JOINTS + 1][ROWS], int n, int rows) {
+    int j;
+    for (j = 0; j <= n; j++) memset(A[j], 0, (size_t)rows * sizeof **A);
+}
+
 /* The same step by reflections of [J gap; sqrt(shift) 0], which do not square the Jacobian. */
 static void orthogonal_step(const arm *a, const configuration *p, double shift, double *dx) {
-    double A[ARM_JOINTS + 1][ROWS] = {{0.0}};
+    double A[ARM_JOINTS + 1][ROWS];
     int j, k, n = a->n, rows = 6 + a->n;
+    clear_columns(A, n, rows);
     for (j = 0; j < n; j++) {
         memcpy(A[j], p->J[j], sizeof p->J[j]);
         A[j][6 + j] = sqrt(shift);
@@ -85,8 +101,9 @@ static void orthogonal_step(const arm *a, const configuration *p, double shift, 
 /* Least squares of [J; held] dx = [right; value] by reflections, damped by rows of `damping`. */
 static void held_step(const arm *a, const configuration *p, const double *right, const double *held,
                       double value, double damping, double *dx) {
-    double A[ARM_JOINTS + 1][ROWS] = {{0.0}};
+    double A[ARM_JOINTS + 1][ROWS];
     int j, k, n = a->n;
+    clear_columns(A, n, 7 + n);
     for (j = 0; j < n; j++) {
         memcpy(A[j], p->J[j], sizeof p->J[j]);
         A[j][6] = held[j];
@@ -339,7 +356,7 @@ void arm_descend(const arm *a, const double *target, configuration *p) {
         gain = 1.0 - next.cost / p->cost;
         damping *= gain > 0.5 ? 0.2 : gain > 0.1 ? 0.5 : 2.0;
         stalls = gain < 5e-2 ? stalls + 1 : 0;
-        *p = next;
+        arm_copy(a, p, &next);
     }
 }
 

@@ -34,8 +34,9 @@ static double norm(const double *v, int n) {
 /* Differences of the slope. */
 static void curvature(const arm *a, const double *target, const configuration *p, matrix H) {
     double ahead[ARM_JOINTS], behind[ARM_JOINTS];
-    configuration near = *p;
+    configuration near;
     int i, k;
+    arm_copy(a, &near, p);
     for (k = 0; k < a->n; k++) {
         near.q[k] = p->q[k] + NUDGE * arm_unit(a, k);
         arm_examine(a, target, &near);
@@ -92,8 +93,8 @@ static void refine(const arm *a, const double *target, configuration *p) {
             arm_examine(a, target, &next);
             slope(a, &next, next_g);
             if (lower(next.cost, norm(next_g, a->n), p->cost, norm(g, a->n))) {
-                *p = next;
-                memcpy(g, next_g, sizeof g);
+                arm_copy(a, p, &next);
+                memcpy(g, next_g, (size_t)a->n * sizeof *g);
                 shift = fmax(0.1 * shift, 1e-12);
                 known = 0;
                 continue;
@@ -104,14 +105,14 @@ static void refine(const arm *a, const double *target, configuration *p) {
 }
 
 /* Keeps the best ones apart, in the order of their costs. */
-static int keep(const configuration *p, configuration *best, int count) {
+static int keep(const arm *a, const configuration *p, configuration *best, int count) {
     int i, rank = 0;
     while (rank < count && best[rank].cost <= p->cost) rank++;
     if (rank > 0 && p->cost - best[rank - 1].cost < EQUAL * p->cost) return count;
     if (rank == KEPT) return count;
     if (count < KEPT) count++;
-    for (i = count - 1; i > rank; i--) best[i] = best[i - 1];
-    best[rank] = *p;
+    for (i = count - 1; i > rank; i--) arm_copy(a, &best[i], &best[i - 1]);
+    arm_copy(a, &best[rank], p);
     return count;
 }
 
@@ -123,7 +124,7 @@ double arm_nearest(const arm *a, const double *target, long long starts, unsigne
     for (start = 0; start < starts; start++) {
         arm_start(a, target, seed, start, p.q);
         arm_descend(a, target, &p);
-        count = keep(&p, best, count);
+        count = keep(a, &p, best, count);
     }
     for (i = 0; i < count; i++) {
         refine(a, target, &best[i]);

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
+from mbs.core import core_files
 from mbs.errors import ExportError
 from mbs.export.fmu import fmi2_xml, fmi3_xml
 from mbs.export.fmu.description import FmuModel, Solver
@@ -107,21 +108,20 @@ class Face:
     def fixed(self, solver: Solver, target: Target = "hosted") -> dict[str, str]:
         """The files that do not depend on the equations: name to text."""
         own = resources.files("mbs.export.fmu") / "c"
-        runtime = resources.files("mbs.native") / "runtime"
         standard = resources.files("fmpy") / "c-code"
         parts = tuple(f"{name}.{end}" for name in _runtime(solver, target) for end in "ch")
         written = [name for name in self._own(solver, target) if name not in parts]
         heap = ("memory.h",) if _MEMORY in written else ()
         folders = (
             (own, (*written, *_CORE_HEADERS, *self.headers, *heap)),
-            (runtime, parts),
             (standard, self.standard),
         )
-        return {
+        texts = {
             name: (folder / name).read_text(encoding="utf-8")
             for folder, names in folders
             for name in names
         }
+        return texts | core_files(parts)
 
 
 def _runtime(solver: Solver, target: Target) -> tuple[str, ...]:

@@ -426,9 +426,7 @@ def _arm_rows(arm: Arm) -> Rows:
 
     def rows(x: Array, T: Array) -> tuple[Array, Array]:
         q = (x * arm.units)[None]
-        gap, J = (
-            examine_arm(arm, T, q)[1:] if library is None else core.examined_by(library, arm, T, q)
-        )
+        gap, J = core.examined_by(library, arm, T, q)
         return gap[0], J[0]
 
     return rows

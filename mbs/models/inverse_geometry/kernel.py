@@ -17,7 +17,7 @@ from mbs.closed_forms.arm import Array
 from mbs.closed_forms.arm_search import General
 from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import NoClosedForm
-from mbs.loops.pose import pose_numbers, rounded
+from mbs.loops.pose import pose_numbers
 from mbs.models.inverse_geometry.branches import branch_labels
 from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, plain_branches, sequence_of
@@ -98,11 +98,8 @@ class PoseKernel:
         library, numbers = core.core_of(self.arm), pose_numbers(T)
         if numbers is None or numbers.shape != (4, 4):
             return None
-        if library is not None:
-            pose = core.rounded_by(library, numbers)
-            return None if pose is None else self._by_arrays(pose)
-        pose, good = rounded(numbers)
-        return self._by_arrays(pose) if good else None
+        pose = core.rounded_by(library, numbers)
+        return None if pose is None else self._by_arrays(pose)
 
     def _by_code(self, T: Any) -> PoseDraft | None:
         """From one compiled call; None where there is none, or it does not take the pose."""
@@ -127,7 +124,7 @@ class PoseKernel:
     def _by_arrays(self, T: Array) -> PoseDraft:
         """Without machine code of the closed form."""
         library = core.core_of(self.arm)
-        if library is not None and isinstance(self._solves, StepSequence):
+        if isinstance(self._solves, StepSequence):
             return self._settled(library, T, self._solves)
         if isinstance(self._solves, General):
             draft = general_draft(self._solves, T[None])
@@ -225,8 +222,6 @@ class _PoseCode:
 def _pose_code(chain: FrameChain, p: Array, solves: StepSequence | General) -> _PoseCode | None:
     arm, nq = chain.arm(p), chain.system.nq
     library = core.core_of(arm)
-    if library is None:
-        return None
     plain = chain.indices == tuple(range(nq))
     indices = np.array(chain.indices, dtype=np.int64)
     others = np.array(chain.system.position(chain.locked))

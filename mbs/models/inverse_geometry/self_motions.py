@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,22 +95,7 @@ def _nearest_on_sphere(reduced: TargetReduction, directions: Array) -> Array:
     target = reduced.target
     x = reduced.x + _AWAY * (directions @ reduced.null.T)
     library = core.core_of(target.arm)
-    if library is not None:
-        return core.on_sphere_by(library, target.arm, target.T, reduced.x, _AWAY, x)
-    for _ in range(60):
-        e, J = target.excess(x)
-        away = (x - reduced.x) / _AWAY
-        rows = np.concatenate([J, away[:, None]], axis=1)
-        rest = 0.5 * _AWAY * (np.sum(away * away, axis=1) - 1.0)
-        right = np.concatenate([e, rest[:, None]], axis=1)
-        # rows that a self-motion leaves dependent are so but for rounding, no others are so near
-        step = -(np.linalg.pinv(rows, rcond=1e-10) @ right[..., None])[..., 0]
-        size = np.linalg.norm(step, axis=1, keepdims=True)
-        # short beside the sphere, so that it is not left for another solution
-        x = x + step * np.minimum(1.0, 0.3 * _AWAY / np.maximum(size, NONZERO))
-        if np.max(size) < 1e-14:  # rounding of positions of about one [rad or arm lengths]
-            break
-    return x
+    return core.on_sphere_by(library, target.arm, target.T, reduced.x, _AWAY, x)
 
 
 def curve(
@@ -170,85 +154,12 @@ class _Way:
 
     def _walk(self, start: Array, tangent: Array) -> tuple[list[Array], bool]:
         """Configurations from the start on, and whether they come back to it."""
-        points, step, target = [start], _STEP, self.target
-        library = core.core_of(target.arm)
-        if library is not None:
-            found, closed = core.walked_by(
-                library, target.arm, target.T, start, tangent, self.limit, self.most, self.sided
-            )
-            return list(found), closed
-        side = _Side.at(target, start, tangent, None)
-        while len(points) < self.most and step > _SMALLEST_STEP:
-            x = _step(target, points[-1], tangent, step)
-            moved = x - points[-1]
-            far = np.linalg.norm(moved) > 1.5 * step
-            if far or target.residual(x * target.unit) > self.limit:
-                step /= 2
-                continue
-            ahead, turned = _tangent(target, x, moved / np.linalg.norm(moved))
-            there = _Side.at(target, x, ahead, side.left)
-            # onto another curve that passes close by: straight on its side changes, and to either
-            # hand the direction does
-            sharp = turned or ahead @ tangent < _STRAIGHT
-            if self.sided and (sharp or there.sign != side.sign) and step > 2 * _SMALLEST_STEP:
-                step /= 2
-                continue
-            tangent, side = ahead, there
-            points.append(x)
-            step = min(2 * step, _STEP)
-            home = target.wrapped(start - x)
-            # the start lies within the next step, and a tenth for the bend of the curve
-            near = np.linalg.norm(home) <= 1.1 * step
-            if len(points) > 3 and near and 0 < home @ tangent <= step:
-                return [*points, x + home], True
-        return points, False
-
-
-class _Side(NamedTuple):
-    """Which way round a curve is seen: it changes where two curves cross, and nowhere else.
-
-    It is the sign of det [[J, left], [tangent', 0]], kept along a curve of regular points.
-    Source: Allgower & Georg 1990, chapter 8.
-
-    Attributes:
-        left: (6,) the direction of the equations that the joints do not change.
-        sign: 1 or -1; 0 for arms of fewer than six joints.
-    """
-
-    left: Array
-    sign: float
-
-    @classmethod
-    def at(cls, target: Target, x: Array, tangent: Array, before: Array | None) -> _Side:
-        """At a configuration x, (n,), the direction on the same side as the one before."""
-        if x.size != 6:
-            return cls(np.zeros(6), 0.0)
-        J = target.excess(x)[1]
-        left = np.linalg.svd(J)[0][:, -1]
-        left = -left if before is not None and left @ before < 0 else left
-        bordered = np.block([[J, left[:, None]], [tangent[None, :], np.zeros((1, 1))]])
-        return cls(left, float(np.sign(np.linalg.det(bordered))))
-
-
-def _step(target: Target, x: Array, tangent: Array, step: float) -> Array:
-    held = tangent[None, :]
-    ahead = x + step * tangent
-    return target.corrected(ahead, held, held @ ahead, 12)
-
-
-def _tangent(target: Target, x: Array, before: Array) -> tuple[Array, bool]:
-    """The direction along which the equations stay solved, nearest the one before.
-
-    Straight on, and true, where the null space has turned away from it by 84 degrees.
-    """
-    J = target.excess(x)[1]
-    _, s, Vt = np.linalg.svd(J)
-    rank = min(int(np.sum(s > _ZERO)), x.size - 1)
-    null = Vt[rank:].T
-    along: Array = null @ (null.T @ before)
-    size = float(np.linalg.norm(along))
-    # the cosine of 84 degrees: less is no direction but what rounding leaves of one
-    return (along / size, False) if size > 0.1 else (before, True)
+        target = self.target
+        found, closed = core.walked_by(
+            core.core_of(target.arm),
+            *(target.arm, target.T, start, tangent, self.limit, self.most, self.sided),
+        )
+        return list(found), closed
 
 
 Whole = Callable[[Array], Array]

@@ -52,7 +52,7 @@ class Target:
 
     arm: Arm
     T: Array
-    _library: ctypes.CDLL | None = field(init=False, repr=False)
+    _library: ctypes.CDLL = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_library", core.core_of(self.arm))
@@ -79,7 +79,7 @@ class Target:
     def residual(self, q: Array) -> Array:
         """(...) largest element of pose(q) - T at configurations q, (..., n)."""
         library = self._library
-        if library is None or (self.T.ndim > 2 and q.ndim != 2):
+        if self.T.ndim > 2 and q.ndim != 2:
             return self.arm.residual(q, self.T)
         flat = np.asarray(q, dtype=float).reshape(-1, self.arm.size)
         return core.residual_by(library, self.arm, self.T, flat).reshape(q.shape[:-1])
@@ -87,7 +87,7 @@ class Target:
     def excess(self, x: Array) -> tuple[Array, Array]:
         """The equations e(x) = 0, (..., 6), and their derivative to first order, (..., 6, n)."""
         library = self._library
-        if library is not None and (self.T.ndim == 2 or x.ndim == 2):
+        if self.T.ndim == 2 or x.ndim == 2:
             q = (x * self.unit).reshape(-1, self.arm.size)
             gap, slope = core.examined_by(library, self.arm, self.T, q)
             return -gap.reshape(*x.shape[:-1], 6), slope.reshape(*x.shape[:-1], 6, self.arm.size)
@@ -117,7 +117,7 @@ class Target:
             (..., n) the last iterates; whether they solve the equations is left to the residual.
         """
         library = self._library
-        if library is not None and held.shape[-2] == 1 and type(self) is Target:
+        if held.shape[-2] == 1 and type(self) is Target:
             every = np.broadcast_to(x, np.broadcast_shapes(x.shape, held.shape[:-2] + x.shape[-1:]))
             flat = every.reshape(-1, x.shape[-1])
             rows = np.broadcast_to(held[..., 0, :], every.shape).reshape(flat.shape)
@@ -139,12 +139,7 @@ class Target:
 
 def nearly_singular(arm: Arm, q: Array, bound: float = NEARLY_SINGULAR) -> NDArray[np.bool_]:
     """(m,) which of configurations q, (m, n), have a singular value below a bound."""
-    library = core.core_of(arm)
-    if library is not None:
-        return core.singular_by(library, arm, q, bound)
-    # of whatever pose
-    least = Target(arm, np.eye(4)).singular_values(q)[:, -1]
-    return np.asarray(least < bound)
+    return core.singular_by(core.core_of(arm), arm, q, bound)
 
 
 # Which of the configurations that were found are one solution.

@@ -10,7 +10,6 @@ import pytest
 from support.arm_search import distance
 from support.near_singular import KINDS, ROBOTS, near_singular, plain, robot, told_apart
 
-import mbs.closed_forms.arm_core as core
 from mbs.models.inverse_geometry import solve, solve_many, solver
 
 ROUNDING = 3e-14
@@ -65,9 +64,8 @@ def test_the_other_side_of_the_shoulder_is_found():
 
 
 @pytest.mark.parametrize(("name", "kind", "seed"), [FEW[0], ("rx90", "shoulder", 1)])
-def test_without_a_compiler(name, kind, seed, monkeypatch):
-    monkeypatch.setattr(core, "compiler_found", lambda: False)
-    assert core.core() is None
+def test_without_a_compiler(name, kind, seed, no_compiler):
+    robot.cache_clear()
     check(name, kind, seed)
 
 
@@ -78,18 +76,6 @@ def test_two_branches_of_a_closed_form_are_told_apart_from_a_ten_millionth_on():
         near = [s for s in solve(system, arm.pose(q)) if distance(arm, s.q, q) < 1e-3]
         assert len(near) == count
         assert {s.multiplicity for s in near} == {3 - count}
-
-
-def test_two_ways_list_the_same_self_motions(monkeypatch):
-    """A configuration on a self-motion is not listed beside it, whichever is found first."""
-    T = plain("rx90").pose(near_singular("rx90", "wrist and elbow", 20))
-    compiled = solve(robot("rx90"), T)
-    monkeypatch.setattr(core, "compiler_found", lambda: False)
-    other = solve(robot("rx90"), T)
-    assert len(compiled) == len(other) == 4
-    assert all(s.family is not None for s in (*compiled, *other))
-    apart = [np.min(distance(plain("rx90"), other.q, q)) for q in compiled.q]
-    assert max(apart) < 1e-2  # ends of curves that are ones but for rounding
 
 
 def test_where_two_singular_configurations_meet_the_other_shoulder_is_found():

@@ -3,12 +3,10 @@ import pytest
 from support.arms import general_6r, placements, slides_and_turns, spherical, three_parallel
 from support.catalogue_systems import catalogue_system
 
+from mbs.closed_forms import arm_core
 from mbs.closed_forms.arm import Arm, gap_to, motion
-from mbs.closed_forms.raghavan_roth import (
-    candidates,
-    candidates_many,
-    prepare,
-)
+from mbs.closed_forms.arm_search import general_many, general_of
+from mbs.closed_forms.raghavan_roth import prepare
 from mbs.closed_forms.raghavan_roth.numbers import (
     back_parts,
     half_parts,
@@ -83,8 +81,18 @@ def distinct(arm, q, tolerance=1e-5):
     return kept
 
 
-def solved(arm, prepared, T):
-    q, residual = newton(arm, T, candidates(prepared, T))
+def candidates(arm, T):
+    """Configurations that may reach a pose, before they are polished and checked."""
+    return arm_core.candidates_by(arm_core.core(), general_of(arm).handed, T)
+
+
+def candidates_many(arm, T):
+    every = [candidates(arm, pose) for pose in T]
+    return np.repeat(np.arange(len(T)), [len(q) for q in every]), np.concatenate(every)
+
+
+def solved(arm, T):
+    q, residual = newton(arm, T, candidates(arm, T))
     return distinct(arm, q[residual < 1e-10 * (1 + arm.length)])
 
 
@@ -94,11 +102,10 @@ def searched(arm, T, rng, starts=120):
 
 
 def assert_complete(arm, rng, poses, oracle=1):
-    prepared = prepare(arm)
-    assert prepared.regular
+    assert prepare(arm).regular
     for number, q in enumerate(configurations(arm, rng, poses)):
         T = arm.pose(q)
-        found = solved(arm, prepared, T)
+        found = solved(arm, T)
         assert np.min(distance(arm, found, q)) < 1e-6
         if number < oracle:
             for other in searched(arm, T, rng):
@@ -164,7 +171,7 @@ def test_slides_against_a_search(kinds):
 def test_sixteen_configurations_of_one_pose():
     arm = arm_of(catalogue_system("manseur_doty"))
     T = arm.pose(configurations(arm, np.random.default_rng(0), 40))
-    number, q = candidates_many(prepare(arm), T)
+    number, q = candidates_many(arm, T)
     reached = np.max(np.abs(arm.pose(q) - T[number]), axis=(1, 2)) < 1e-7
     counts = [len(distinct(arm, q[reached & (number == k)])) for k in range(len(T))]
     assert max(counts) == 16
@@ -173,11 +180,11 @@ def test_sixteen_configurations_of_one_pose():
 
 def test_many_poses_are_as_one_by_one():
     arm = arm_of(general_6r(1))
-    prepared, T = prepare(arm), arm.pose(configurations(arm, np.random.default_rng(5), 4))
-    number, q = candidates_many(prepared, T)
+    T = arm.pose(configurations(arm, np.random.default_rng(5), 4))
+    number, q = general_many(general_of(arm), T)
     assert np.all(np.diff(number) >= 0)
     for k in range(len(T)):
-        alone = candidates(prepared, T[k])
+        alone = solved(arm, T[k])
         assert len(alone) == np.sum(number == k)
         for configuration in alone:
             assert np.min(distance(arm, q[number == k], configuration)) < 1e-6
@@ -186,7 +193,7 @@ def test_many_poses_are_as_one_by_one():
 def test_candidates_are_accurate_before_any_step():
     arm = arm_of(general_6r(2))
     T = arm.pose(configurations(arm, np.random.default_rng(6), 20))
-    number, q = candidates_many(prepare(arm), T)
+    number, q = candidates_many(arm, T)
     residual = np.max(np.abs(arm.pose(q) - T[number]), axis=(1, 2))
     best = [np.min(residual[number == k]) for k in range(len(T))]
     assert np.max(best) < 1e-9
@@ -195,19 +202,19 @@ def test_candidates_are_accurate_before_any_step():
 @pytest.mark.parametrize("value", [0.0, np.pi, np.pi / 2])
 def test_right_angles_of_a_general_arm(value):
     arm = arm_of(general_6r(3))
-    prepared, rng = prepare(arm), np.random.default_rng(7)
+    rng = np.random.default_rng(7)
     for _ in range(4):
         q = np.where(rng.uniform(size=6) < 0.6, value, configurations(arm, rng, 1)[0])
-        assert np.min(distance(arm, solved(arm, prepared, arm.pose(q)), q)) < 1e-6
+        assert np.min(distance(arm, solved(arm, arm.pose(q)), q)) < 1e-6
 
 
 @pytest.mark.parametrize("system", [general_6r(4), slides_and_turns("PRRRRR", 2)])
 def test_double_configurations(system):
     arm = arm_of(system)
-    prepared, rng = prepare(arm), np.random.default_rng(8)
+    rng = np.random.default_rng(8)
     for _ in range(4):
         q = singular_configuration(arm, rng)
-        assert np.min(distance(arm, candidates(prepared, arm.pose(q)), q)) < 1e-4
+        assert np.min(distance(arm, candidates(arm, arm.pose(q)), q)) < 1e-4
 
 
 def singular_configuration(arm, rng):
@@ -232,7 +239,7 @@ def test_out_of_reach_there_is_nothing():
     arm = arm_of(general_6r(5))
     T = arm.pose(np.zeros(6))
     T[:3, 3] = 3 * arm.length
-    assert len(solved(arm, prepare(arm), T)) == 0
+    assert len(solved(arm, T)) == 0
 
 
 def test_units_do_not_matter():
@@ -244,7 +251,7 @@ def test_units_do_not_matter():
         configurations(arm, np.random.default_rng(9), 1)[0],
     )
     assert prepare(large).regularity == pytest.approx(prepare(arm).regularity, rel=1e-6)
-    assert np.min(distance(large, candidates(prepare(large), large.pose(q)), q)) < 1e-8
+    assert np.min(distance(large, candidates(large, large.pose(q)), q)) < 1e-8
 
 
 def test_a_far_base_and_a_long_tool_do_not_matter():
@@ -257,7 +264,7 @@ def test_a_far_base_and_a_long_tool_do_not_matter():
         configurations(arm, np.random.default_rng(9), 1)[0],
     )
     assert prepare(moved).regularity == pytest.approx(prepare(arm).regularity, rel=1e-6)
-    assert np.min(distance(arm, candidates(prepare(moved), moved.pose(q)), q)) < 1e-8
+    assert np.min(distance(arm, candidates(moved, moved.pose(q)), q)) < 1e-8
 
 
 def test_four_parallel_axes_give_samples_of_the_self_motion():
@@ -265,19 +272,18 @@ def test_four_parallel_axes_give_samples_of_the_self_motion():
     gaps = arm.gaps.copy()
     gaps[2:5, :3, :3] = np.eye(3)
     arm = Arm(arm.names, arm.prismatic, gaps)
-    prepared, q = prepare(arm), configurations(arm, np.random.default_rng(10), 1)[0]
-    assert prepared.regular
-    assert len(solved(arm, prepared, arm.pose(q))) > 2
+    q = configurations(arm, np.random.default_rng(10), 1)[0]
+    assert prepare(arm).regular
+    assert len(solved(arm, arm.pose(q))) > 2
 
 
 def test_parallel_axes_everywhere_are_refused():
     gap = np.eye(4)
     gap[0, 3] = 0.5
     arm = Arm(tuple("abcdef"), np.zeros(6, bool), np.stack([gap] * 7))
-    prepared = prepare(arm)
-    assert not prepared.regular
+    assert not prepare(arm).regular
     with pytest.raises(NoClosedForm, match="regularity"):
-        candidates(prepared, arm.pose(np.ones(6)))
+        candidates(arm, arm.pose(np.ones(6)))
 
 
 @pytest.mark.parametrize("slides", [[False] * 5, [True] * 6])

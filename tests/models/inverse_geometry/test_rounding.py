@@ -7,6 +7,7 @@ and the eigenvalues of the general method are. The lists are the same, or both a
 import numpy as np
 import pytest
 from support.arm_search import distance
+from support.arms import general_6r
 from support.near_singular import (
     KINDS,
     ROBOTS,
@@ -16,9 +17,9 @@ from support.near_singular import (
     robot,
     units_away,
 )
+from support.runtime import changed_library
 
 import mbs.closed_forms.arm_core as core
-from mbs.closed_forms.raghavan_roth import numbers
 from mbs.models.inverse_geometry import solve, solve_many, solver
 from mbs.models.inverse_geometry.target import ONE, TWO, Target
 
@@ -138,21 +139,26 @@ def test_residuals_and_singular_values_that_differ_in_the_last_places(
 
 
 @pytest.mark.parametrize("count", [1, 100])
-def test_eigenvalues_that_differ_in_the_last_places(count, monkeypatch):
-    """Without a compiler the eigenvalues of the general method are those of numpy."""
-    name, rng, eps = "general_6r", np.random.default_rng(4), np.finfo(float).eps
+def test_eigenvalues_that_differ_in_the_last_places(count, monkeypatch, tmp_path):
+    """The library is compiled with eigenvalues that are off by units in the last place."""
+    name, eps = "general_6r", np.finfo(float).eps
     poses = [plain(name).pose(at_distance(name, "wrist", 1, 10.0**e)) for e in FEW]
-    monkeypatch.setattr(core, "compiler_found", lambda: False)
     answers = [solve(robot(name), T) for T in poses]
-    roots = numbers.complex_roots
-
-    def moved(M):
-        angles = roots(M)
-        return angles * (1 + count * eps * rng.uniform(-1, 1, angles.shape))
-
-    monkeypatch.setattr(numbers, "complex_roots", moved)
+    off = " * (1.0 + {count} * {eps} * sin(1e8 * real[i] + {shift} * i))"
+    changed = changed_library(
+        tmp_path,
+        r"double x = real\[i\], y = imaginary\[i\];",
+        "double x = real[i]"
+        + off.format(count=count, eps=eps, shift=12345.0)
+        + ", y = imaginary[i]"
+        + off.format(count=count, eps=eps, shift=54321.0)
+        + ";",
+    )
+    library = core.library_at(changed.__file__)
+    monkeypatch.setattr(core, "core", lambda: library)
+    system = general_6r(0)
     for T, answer in zip(poses, answers, strict=True):
-        require_same(name, answer, solve(robot(name), T))
+        require_same(name, answer, solve(system, T))
 
 
 def test_the_text_names_undecided_solutions():

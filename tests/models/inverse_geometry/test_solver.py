@@ -9,7 +9,6 @@ from support.arms import general_6r, spherical
 from support.catalogue_systems import catalogue_system
 
 import mbs
-import mbs.closed_forms.arm_core as core
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry import PoseAnswer, PoseSolver, function, solve, solve_many, solver
 from mbs.models.inverse_geometry.kernel import kernel_of
@@ -49,15 +48,14 @@ def test_all_configurations_and_nothing_else(name):
 
 
 @pytest.mark.parametrize("name", ["puma560", "ur5", "general"])
-def test_without_a_compiler_the_answers_are_the_same(name, monkeypatch):
+def test_without_a_compiler_the_answers_are_the_same(name, request):
     fresh = general_6r(0) if name == "general" else mbs.load(name).assemble()
     arm, T = posed(fresh)
     far = T.copy()
     far[:3, 3] += 9.0
     compiled = solver(robot(name))
-    monkeypatch.setattr(core, "compiler_found", lambda: False)
+    request.getfixturevalue("no_compiler")
     plain = solver(fresh)
-    assert core.core() is None
     one, other = compiled(T), plain(T)
     order = np.argmin(distance(arm, one.q[:, None], other.q[None]), axis=1)
     assert sorted(order) == list(range(len(one))) == list(range(len(other)))
@@ -195,7 +193,6 @@ def test_wrong_questions():
         solved(mirrored)
 
 
-@pytest.mark.skipif(not compiler_found(), reason="no C compiler")
 def test_poses_are_rounded_as_everywhere():
     """To 1e-6 a transform counts as rigid, in C as in Python."""
     system = catalogue_system("puma560")
@@ -213,7 +210,7 @@ def test_poses_are_rounded_as_everywhere():
 
 @pytest.mark.skipif(not compiler_found(), reason="no C compiler")
 @pytest.mark.parametrize("name", ["puma560", "ur5", "general"])
-def test_the_compiled_call_answers_what_numpy_does(name, monkeypatch):
+def test_the_compiled_call_and_arrays_give_the_same(name):
     """Row for row, on random poses and on those next to singular ones that stay certain."""
     system = robot(name)
     kernel = kernel_of(*_chain(system))
@@ -225,9 +222,7 @@ def test_the_compiled_call_answers_what_numpy_does(name, monkeypatch):
     q[:10, 4] = 10 ** rng.uniform(-3.5, -1, 10)
     for pose in arm.pose(q):
         one = kernel.draft(pose)
-        monkeypatch.setattr(core, "compiler_found", lambda: False)
         other = kernel._by_arrays(pose)
-        monkeypatch.undo()
         assert one.certain == other.certain
         assert len(one.q) == len(other.q)
         if name != "general":

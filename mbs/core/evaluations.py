@@ -1,0 +1,64 @@
+"""Functions of a model in the form in which the run-time library evaluates them."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from casadi import Function
+from numpy.typing import NDArray
+
+from mbs.core.library import core_library
+
+Arrays = tuple[NDArray[np.float64], ...]
+
+
+def compiled_evaluation(function: Function, library: ctypes.CDLL) -> Any:
+    """Return the evaluation of machine code.
+
+    Args:
+        function: the function, with all inputs and outputs.
+        library: its code, in the calling convention of CasADi.
+    """
+    name = function.name()
+    work = [ctypes.c_longlong() for _ in range(4)]
+    library[f"{name}_work"](*map(ctypes.byref, work))
+    address = ctypes.cast(library[name], ctypes.c_void_p).value
+    ports = function.n_in(), function.n_out()
+    return core_library().compiled(address, ports, tuple(size.value for size in work))
+
+
+def interpreted_evaluation(function: Function, examine: Callable[[BaseException], None]) -> Any:
+    """Return the evaluation of a function that CasADi interprets.
+
+    Args:
+        function: its inputs and outputs are given by their stored elements.
+        examine: called with the error of an evaluation. It returns if the function has no value
+            there, and raises an error that ends the algorithm.
+    """
+    buffer, call = function.buffer()
+    inputs = tuple(np.zeros(function.nnz_in(k)) for k in range(function.n_in()))
+    outputs = tuple(np.zeros(function.nnz_out(k)) for k in range(function.n_out()))
+    for bind, arrays in ((buffer.set_arg, inputs), (buffer.set_res, outputs)):
+        for number, array in enumerate(arrays):
+            if array.size:  # a buffer of no numbers cannot be bound
+                bind(number, array.data)
+    return core_library().interpreted(call, examine, buffer, inputs, outputs)
+
+
+def python_evaluation(call: Callable[[], None], inputs: Arrays, outputs: Arrays) -> Any:
+    """Return the evaluation of Python code. An error that it raises ends the algorithm.
+
+    Args:
+        call: reads the inputs and writes the outputs.
+        inputs: arrays, which must not be replaced.
+        outputs: arrays, which must not be replaced.
+    """
+    return core_library().interpreted(call, reraise, None, inputs, outputs)
+
+
+def reraise(error: BaseException) -> None:
+    """Pass an error on: every error ends the algorithm."""
+    raise error

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import ctypes
-import functools
 from collections.abc import Callable, Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from casadi import DM, MX, SX, Function, Sparsity
 
-from mbs.errors import CompilerError, ModelError
-from mbs.native.compiler import cached_library
+from mbs.core import core_library
+from mbs.errors import ModelError
 from mbs.numbers import doubles
 
 # A builtin that calls a compiled function on numbers, without conversions in Python.
@@ -24,59 +22,6 @@ ArrayCall: TypeAlias = Callable[..., Any]
 
 _MOST = 64
 """Inputs, and outputs, of a function that is called so; as in the C code."""
-_TYPES = (np.ndarray, np.ma.MaskedArray, float, int, list, tuple, bytes)
-_STABLE_INTERFACE = (
-    "PyObject_GetBuffer",
-    "PyBuffer_Release",
-    "PyErr_Clear",
-    "Py_IncRef",
-    "Py_DecRef",
-    "PyObject_CallObject",
-    "PyTuple_New",
-    "PyTuple_SetItem",
-    "PyCapsule_New",
-    "PyCapsule_GetPointer",
-    "PyCFunction_NewEx",
-    "PyObject_CheckBuffer",
-    "PyObject_Type",
-    "PyType_IsSubtype",
-    "PyFloat_AsDouble",
-    "PyErr_Occurred",
-    "PyList_GetItem",
-    "PyList_Size",
-    "PyTuple_GetItem",
-    "PyTuple_Size",
-)
-_Pointer = ctypes.c_void_p
-
-
-class _Shape(ctypes.Structure):
-    _fields_ = (
-        *((name, ctypes.c_longlong) for name in ("rows", "columns", "stored")),
-        ("indices", _Pointer),
-    )
-
-
-class _PythonInterface(ctypes.Structure):
-    _fields_ = (
-        ("none", _Pointer),
-        *((f"type_{made.__name__}", _Pointer) for made in _TYPES),
-        *((name, _Pointer) for name in _STABLE_INTERFACE),
-    )
-
-
-class _Function(ctypes.Structure):
-    _fields_ = (
-        *((name, _Pointer) for name in ("evaluate", "checkout", "release", "empty")),
-        ("new", _Pointer * _MOST),
-        ("guard", _Pointer),
-        ("guarded", ctypes.c_longlong * _MOST),
-        *((name, ctypes.c_longlong) for name in ("inputs", "outputs", "finite")),
-        *((name, ctypes.c_longlong) for name in ("arguments", "results", "integers", "reals")),
-        ("space", ctypes.c_longlong),
-        ("inputs_of", _Shape * _MOST),
-        ("outputs_of", _Shape * _MOST),
-    )
 
 
 class InputCheck(NamedTuple):
@@ -121,25 +66,19 @@ def array_builtin(
     work[3].value += more
     inputs = [function.sparsity_in(k) for k in range(function.n_in())]
     outputs = [function.sparsity_out(k) for k in range(function.n_out())]
-    caller = _caller()
-    if caller is None or max(len(inputs), len(outputs)) > _MOST:
+    if max(len(inputs), len(outputs)) > _MOST:
         return None
     if hasattr(code, f"{name}_incref"):
         code[f"{name}_incref"]()
-    # kept until the builtin has copies of them
-    indices = [None if s.is_dense() else _indices(s) for s in (*inputs, *outputs)]
-    new = [_arguments_of_empty(pattern) for pattern in outputs]
-    description = _Function(
-        *(_address(code, f"{name}{end}") for end in ("", "_checkout", "_release")),
-        id(np.empty),
-        (_Pointer * _MOST)(*map(id, new)),
-        None if guard is None else id(guard.builtin.__self__),
-        (ctypes.c_longlong * _MOST)(*(() if guard is None else guard.inputs)),
-        *(len(inputs), len(outputs), finite, *(number.value for number in work), 0),
-        (_Shape * _MOST)(*map(_shape, inputs, indices)),
-        (_Shape * _MOST)(*map(_shape, outputs, indices[len(inputs) :])),
+    builtin: ArrayCall = core_library().array_call(
+        tuple(_address(code, f"{name}{end}") for end in ("", "_checkout", "_release")),
+        tuple(number.value for number in work),
+        (np.ndarray, np.ma.MaskedArray, np.empty),
+        tuple(map(_shape, inputs)),
+        tuple((_shape(pattern), _arguments_of_empty(pattern)) for pattern in outputs),
+        finite,
+        *((None, ()) if guard is None else (guard.builtin, tuple(guard.inputs))),
     )
-    builtin: ArrayCall = caller(ctypes.byref(description))
     return builtin
 
 
@@ -148,9 +87,10 @@ def _indices(pattern: Sparsity) -> np.ndarray[Any, np.dtype[np.int64]]:
     return np.array(pattern.find(), dtype=np.int64)
 
 
-def _shape(pattern: Sparsity, indices: Any) -> _Shape:
-    rows, columns = pattern.shape
-    return _Shape(rows, columns, pattern.nnz(), None if indices is None else indices.ctypes.data)
+def _shape(pattern: Sparsity) -> tuple[Any, ...]:
+    """Rows, columns, number of stored elements, and their indices if some are not stored."""
+    indices = None if pattern.is_dense() else _indices(pattern)
+    return (*pattern.shape, pattern.nnz(), indices)
 
 
 def _arguments_of_empty(pattern: Sparsity) -> tuple[Any, ...]:
@@ -159,25 +99,9 @@ def _arguments_of_empty(pattern: Sparsity) -> tuple[Any, ...]:
     return ((rows,) if columns == 1 else (rows, columns)), np.float64, "F"
 
 
-def _address(code: ctypes.CDLL, name: str) -> int | None:
-    return ctypes.cast(code[name], _Pointer).value if hasattr(code, name) else None
-
-
-@functools.cache
-def _caller() -> Callable[[Any], ArrayCall] | None:
-    """What makes builtins; None where it cannot be built."""
-    source = resources.files("mbs.native").joinpath("runtime/python_call.c").read_text("utf-8")
-    try:
-        library = ctypes.PyDLL(str(cached_library({"python_call.c": source})))
-    except (CompilerError, OSError):
-        return None
-    addresses = (
-        ctypes.cast(getattr(ctypes.pythonapi, name), _Pointer).value for name in _STABLE_INTERFACE
-    )
-    library.mbs_setup(ctypes.byref(_PythonInterface(id(None), *map(id, _TYPES), *addresses)))
-    make = library.mbs_builtin
-    make.restype = ctypes.py_object
-    return make
+def _address(code: ctypes.CDLL, name: str) -> int:
+    """Address of a function; zero if the library has none of this name."""
+    return (ctypes.cast(code[name], ctypes.c_void_p).value or 0) if hasattr(code, name) else 0
 
 
 def with_array_calls(

@@ -14,7 +14,7 @@ from mbs.native import cached_library
 
 INTEGRATION = (
     *("module", "model", "driver", "stepper", "dopri5", "rodas", "events", "dense", "passage"),
-    "least_squares",
+    *("least_squares", "array_call"),
 )
 """C files of the extension without those of arms."""
 

@@ -8,6 +8,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "array_call.h"
 #include "driver.h"
 #include "least_squares.h"
 
@@ -424,6 +425,7 @@ static PyMethodDef methods[] = {
      "compiled(address, (inputs, outputs), (arg, res, iw, w)) -> Evaluation of machine code."},
     {"interpreted", interpreted, METH_VARARGS,
      "interpreted(call, examine, owner, inputs, outputs) -> Evaluation of a bound casadi.Function."},
+    {"array_call", array_call_new, METH_VARARGS, "See mbs.native.array_calls.array_builtin."},
     {"shortest_solution", py_shortest_solution, METH_VARARGS,
      "shortest_solution(A, b, gap, x): see least_squares.h."},
     {"gauss_newton", py_gauss_newton, METH_VARARGS,

@@ -1,74 +1,19 @@
-/* A builtin of Python that calls one compiled function on numbers without conversions in Python.
+/* A builtin of Python that calls machine code on numbers without conversions in Python.
  *
- * Arrays of doubles whose columns follow each other in memory are read where they are; other
- * arrays, lists and numbers are gathered into work space. No header of Python is needed: the few
- * functions of its stable interface come in a table. The builtin answers None for whatever it does
- * not take; the caller then calls otherwise. */
+ * Arrays of doubles whose columns are contiguous in memory are read in place. Other arrays, lists and
+ * numbers are gathered into work space. The builtin returns None for arguments that it does not
+ * take. The caller then uses another call. */
+#define PY_SSIZE_T_CLEAN
+#include "array_call.h"
+
 #include <math.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-
 #define MOST 64     /* inputs, and outputs */
 #define STACK 2048  /* doubles of work space on the stack; beyond, on the heap */
-
-typedef struct object object;
-typedef intptr_t size;
-
-/* Py_buffer, part of the stable interface since Python 3.11. */
-typedef struct {
-  void *data;
-  object *owner;
-  size bytes;
-  size item;
-  int readonly;
-  int dimensions;
-  char *format;
-  size *shape;
-  size *strides;
-  size *suboffsets;
-  void *internal;
-} view;
-
-enum { WRITABLE = 0x1, FORMAT = 0x4, STRIDES = 0x18 };
-
-typedef struct {
-  object *none;
-  object *array_type;  /* numpy.ndarray */
-  object *masked_type; /* numpy.ma.MaskedArray, whose mask a buffer does not show */
-  object *float_type;
-  object *int_type;
-  object *list_type;
-  object *tuple_type;
-  object *bytes_type;
-  int (*get_buffer)(object *, view *, int);
-  void (*release_buffer)(view *);
-  void (*clear_error)(void);
-  void (*increase)(object *);
-  void (*decrease)(object *);
-  object *(*call)(object *, object *);
-  object *(*new_tuple)(size);
-  int (*set_item)(object *, size, object *); /* PyTuple_SetItem keeps the reference */
-  object *(*new_capsule)(void *, const char *, void (*)(object *));
-  void *(*capsule_pointer)(object *, const char *);
-  object *(*new_function)(void *, object *, object *);
-  int (*check_buffer)(object *);
-  object *(*type)(object *);
-  int (*subtype)(object *, object *);
-  double (*as_double)(object *);
-  object *(*error)(void);
-  object *(*list_item)(object *, size); /* borrowed, as that of a tuple */
-  size (*list_size)(object *);
-  object *(*tuple_item)(object *, size);
-  size (*tuple_size)(object *);
-} python;
 
 typedef struct {
   long long rows;
@@ -81,13 +26,15 @@ typedef struct {
   int (*evaluate)(const double **, double **, long long *, double *, int);
   int (*checkout)(void);
   void (*release)(int);
-  object *empty;      /* numpy.empty */
-  object *new_[MOST]; /* its arguments for each output */
-  object *guard;      /* NULL, or what holds the function that gives 1 where inputs are taken */
+  PyObject *array_type;  /* numpy.ndarray */
+  PyObject *masked_type; /* numpy.ma.MaskedArray, whose mask a buffer does not show */
+  PyObject *empty;       /* numpy.empty */
+  PyObject *new_[MOST]; /* its arguments for each output */
+  PyObject *guard;      /* NULL, or what holds the function that gives 1 where inputs are taken */
   long long guarded[MOST]; /* the inputs of which it is asked */
   long long inputs;
   long long outputs;
-  long long finite; /* whether inputs and results must be numbers */
+  int finite; /* whether inputs and results must be numbers */
   long long arguments; /* pointers that the code works with */
   long long results;
   long long integers;
@@ -100,32 +47,23 @@ typedef struct {
 /* Where the element (r, c) of a matrix is in memory, and what it is. */
 typedef struct {
   char *data;
-  size row;
-  size column;
-  size item;
+  Py_ssize_t row;
+  Py_ssize_t column;
+  Py_ssize_t item;
   char kind; /* i, u or f */
   int swapped;
 } place;
 
 typedef struct {
-  view in[MOST]; /* of inputs that are read where they are */
-  view out[MOST];
+  Py_buffer in[MOST]; /* of inputs that are read where they are */
+  Py_buffer out[MOST];
   place to[MOST]; /* of outputs that are written there after the call */
-  object *arrays[MOST];
+  PyObject *arrays[MOST];
   int opened; /* views of inputs */
-  int made;   /* outputs that are in view */
+  int made;   /* outputs that are in Py_buffer */
 } call;
 
-typedef struct {
-  const char *name;
-  object *(*code)(object *, object *const *, size);
-  int flags;
-  const char *doc;
-} method;
-
-static const char LABEL[] = "mbs.native.array_call";
-
-static python py; /* set once, before anything else is called */
+static const char LABEL[] = "mbs.core.array_call";
 
 /* What an array holds, by the format of a buffer. */
 
@@ -134,9 +72,9 @@ static int little(void) {
   return *(const char *)&one;
 }
 
-static int understood(const view *v, place *p) {
+static int understood(const Py_buffer *v, place *p) {
   const char *f = v->format;
-  p->item = v->item;
+  p->item = v->itemsize;
   p->swapped = 0;
   if (!f) return 0;
   if (*f && strchr("@=^", *f)) {
@@ -148,10 +86,10 @@ static int understood(const view *v, place *p) {
   if (!*f || f[1]) return 0;
   p->kind = strchr("bhilqn", *f) ? 'i' : strchr("BHILQN?", *f) ? 'u' : strchr("efdg", *f) ? 'f' : 0;
   if (p->kind == 'f') {
-    if (v->item == 2 || v->item == 4 || v->item == 8) return 1;
-    return v->item == (size)sizeof(long double) && !p->swapped;
+    if (v->itemsize == 2 || v->itemsize == 4 || v->itemsize == 8) return 1;
+    return v->itemsize == (Py_ssize_t)sizeof(long double) && !p->swapped;
   }
-  return p->kind && (v->item == 1 || v->item == 2 || v->item == 4 || v->item == 8);
+  return p->kind && (v->itemsize == 1 || v->itemsize == 2 || v->itemsize == 4 || v->itemsize == 8);
 }
 
 static double half(uint16_t bits) {
@@ -171,7 +109,7 @@ static double half(uint16_t bits) {
 static double read_number(const place *p, const char *at) {
   char turned[8];
   if (p->swapped) {
-    for (size k = 0; k < p->item; ++k) turned[k] = at[p->item - 1 - k];
+    for (Py_ssize_t k = 0; k < p->item; ++k) turned[k] = at[p->item - 1 - k];
     at = turned;
   }
   if (p->kind == 'f') {
@@ -196,17 +134,17 @@ static double read_number(const place *p, const char *at) {
 
 /* Where the elements of a matrix are in an array: of its shape, a line of either direction, or,
  * where one may stand for all, a single element. */
-static int placed(const view *v, const shape *s, int one_for_all, place *p) {
+static int placed(const Py_buffer *v, const shape *s, int one_for_all, place *p) {
   const long long count = s->rows * s->columns;
   const int line = s->rows == 1 || s->columns == 1;
-  const size *n = v->shape, *step = v->strides;
-  p->data = v->data;
+  const Py_ssize_t *n = v->shape, *step = v->strides;
+  p->data = v->buf;
   p->row = p->column = 0;
-  if (v->dimensions > 2) return 0;
-  if (v->bytes == v->item && (count == 1 || (one_for_all && count > 0))) return 1;
-  if (v->bytes == 0 || count == 0) return v->bytes == 0 && count == 0 && v->dimensions > 0;
-  if (v->dimensions == 0) return 0;
-  if (v->dimensions == 1) {
+  if (v->ndim > 2) return 0;
+  if (v->len == v->itemsize && (count == 1 || (one_for_all && count > 0))) return 1;
+  if (v->len == 0 || count == 0) return v->len == 0 && count == 0 && v->ndim > 0;
+  if (v->ndim == 0) return 0;
+  if (v->ndim == 1) {
     p->row = p->column = step[0];
     return line && n[0] == count;
   }
@@ -222,7 +160,7 @@ static int placed(const view *v, const shape *s, int one_for_all, place *p) {
 
 /* Whether the code can read or write an array where it is. */
 static int in_place(const place *p, const shape *s) {
-  const size item = sizeof(double);
+  const Py_ssize_t item = sizeof(double);
   return !s->indices && p->kind == 'f' && p->item == item && !p->swapped &&
          (uintptr_t)p->data % sizeof(double) == 0 && (s->rows <= 1 || p->row == item) &&
          (s->columns <= 1 || p->column == item * s->rows);
@@ -255,66 +193,66 @@ static void scatter(const double *from, const shape *s, const place *p) {
 
 typedef enum { OTHER, NUMBER, ARRAY, LIST, TUPLE } sort;
 
-static sort sort_of(object *x) {
-  object *type = py.type(x);
-  py.decrease(type); /* it lives as long as x */
-  if (type == py.array_type) return ARRAY;
-  if (type == py.float_type) return NUMBER;
-  if (type == py.list_type) return LIST;
-  if (py.subtype(type, py.float_type) || py.subtype(type, py.int_type)) return NUMBER;
-  if (py.subtype(type, py.tuple_type)) return TUPLE;
-  if (py.subtype(type, py.list_type)) return LIST;
-  if (!py.check_buffer(x) || py.subtype(type, py.masked_type)) return OTHER;
-  return py.subtype(type, py.bytes_type) ? OTHER : ARRAY;
+static sort sort_of(const function *f, PyObject *x) {
+  PyTypeObject *type = Py_TYPE(x);
+  if ((PyObject *)type == f->array_type) return ARRAY;
+  if (type == &PyFloat_Type) return NUMBER;
+  if (type == &PyList_Type) return LIST;
+  if (PyType_IsSubtype(type, &PyFloat_Type) || PyType_IsSubtype(type, &PyLong_Type)) return NUMBER;
+  if (PyType_IsSubtype(type, &PyTuple_Type)) return TUPLE;
+  if (PyType_IsSubtype(type, &PyList_Type)) return LIST;
+  if (!PyObject_CheckBuffer(x)) return OTHER;
+  if (PyType_IsSubtype(type, (PyTypeObject *)f->masked_type)) return OTHER;
+  return PyType_IsSubtype(type, &PyBytes_Type) ? OTHER : ARRAY;
 }
 
-static int opened(object *x, view *v, int flags) {
-  if (py.get_buffer(x, v, STRIDES | FORMAT | flags) == 0) return 1;
-  py.clear_error();
+static int opened(PyObject *x, Py_buffer *v, int flags) {
+  if (PyObject_GetBuffer(x, v, PyBUF_STRIDES | PyBUF_FORMAT | flags) == 0) return 1;
+  PyErr_Clear();
   return 0;
 }
 
-static int number(object *x, sort of, double *to) {
+static int number(PyObject *x, sort of, double *to) {
   if (of != NUMBER) return 0;
-  *to = py.as_double(x);
-  if (*to != -1.0 || !py.error()) return 1;
-  py.clear_error(); /* an integer that no double holds */
+  *to = PyFloat_AsDouble(x);
+  if (*to != -1.0 || !PyErr_Occurred()) return 1;
+  PyErr_Clear(); /* an integer that no double holds */
   return 0;
 }
 
 /* The numbers in an array, matched to a shape, gathered. */
-static int numbers(object *x, const shape *s, int one_for_all, double *to) {
-  view v;
+static int numbers(PyObject *x, const shape *s, int one_for_all, double *to) {
+  Py_buffer v;
   place p;
   if (!opened(x, &v, 0)) return 0;
   const int done = understood(&v, &p) && placed(&v, s, one_for_all, &p);
   if (done) gather(&p, s, to);
-  py.release_buffer(&v);
+  PyBuffer_Release(&v);
   return done;
 }
 
-static size length(object *x, sort of) {
-  return of == LIST ? py.list_size(x) : py.tuple_size(x);
+static Py_ssize_t length(PyObject *x, sort of) {
+  return of == LIST ? PyList_Size(x) : PyTuple_Size(x);
 }
 
-static object *item(object *x, sort of, size k) {
-  return of == LIST ? py.list_item(x, k) : py.tuple_item(x, k);
+static PyObject *item(PyObject *x, sort of, Py_ssize_t k) {
+  return of == LIST ? PyList_GetItem(x, k) : PyTuple_GetItem(x, k);
 }
 
 /* What to answer of a list that the buffer of one of its items has made shorter. */
 static int shrunk(void) {
-  py.clear_error();
+  PyErr_Clear();
   return 0;
 }
 
 /* A list of numbers, of doubles at a distance in `to`. */
-static int flat(object *x, sort of, size count, size step, double *to) {
+static int flat(const function *f, PyObject *x, sort of, Py_ssize_t count, Py_ssize_t step, double *to) {
   const shape one = {1, 1, 1, NULL};
   if (length(x, of) != count) return 0;
-  for (size k = 0; k < count; ++k) {
-    object *each = item(x, of, k);
+  for (Py_ssize_t k = 0; k < count; ++k) {
+    PyObject *each = item(x, of, k);
     if (!each) return shrunk();
-    const sort what = sort_of(each);
+    const sort what = sort_of(f, each);
     if (!number(each, what, to + k * step) &&
         !(what == ARRAY && numbers(each, &one, 0, to + k * step)))
       return 0;
@@ -323,55 +261,55 @@ static int flat(object *x, sort of, size count, size step, double *to) {
 }
 
 /* A list of numbers, or of rows that are lists or arrays, as a dense matrix. */
-static int nested(object *x, sort of, const shape *s, double *to, double *row) {
+static int nested(const function *f, PyObject *x, sort of, const shape *s, double *to, double *row) {
   const int line = s->rows == 1 || s->columns == 1;
-  const size given = length(x, of), count = (size)(s->rows * s->columns);
+  const Py_ssize_t given = length(x, of), count = (Py_ssize_t)(s->rows * s->columns);
   if (s->indices) return 0;
   if (given == 0) return count == 0;
-  const sort first = sort_of(item(x, of, 0));
-  if (line && given == count && first == NUMBER) return flat(x, of, count, 1, to);
-  if (line && given == count && flat(x, of, count, 1, to)) return 1;
-  const int turned = given != (size)s->rows;
-  if (turned && !(line && given == (size)s->columns)) return 0;
-  const size width = (size)(turned ? s->rows : s->columns);
-  const size step = turned ? 1 : (size)s->rows, next = turned ? (size)s->rows : 1;
+  const sort first = sort_of(f, item(x, of, 0));
+  if (line && given == count && first == NUMBER) return flat(f, x, of, count, 1, to);
+  if (line && given == count && flat(f, x, of, count, 1, to)) return 1;
+  const int turned = given != (Py_ssize_t)s->rows;
+  if (turned && !(line && given == (Py_ssize_t)s->columns)) return 0;
+  const Py_ssize_t width = (Py_ssize_t)(turned ? s->rows : s->columns);
+  const Py_ssize_t step = turned ? 1 : (Py_ssize_t)s->rows, next = turned ? (Py_ssize_t)s->rows : 1;
   const shape of_row = {1, width, width, NULL};
-  for (size k = 0; k < given; ++k) {
-    object *each = item(x, of, k);
+  for (Py_ssize_t k = 0; k < given; ++k) {
+    PyObject *each = item(x, of, k);
     if (!each) return shrunk();
-    const sort what = sort_of(each);
+    const sort what = sort_of(f, each);
     if (what == LIST || what == TUPLE) {
-      if (!flat(each, what, width, step, to + k * next)) return 0;
+      if (!flat(f, each, what, width, step, to + k * next)) return 0;
       continue;
     }
     if (what != ARRAY || !numbers(each, &of_row, 0, row)) return 0;
-    for (size c = 0; c < width; ++c) to[k * next + c * step] = row[c];
+    for (Py_ssize_t c = 0; c < width; ++c) to[k * next + c * step] = row[c];
   }
   return 1;
 }
 
 /* One input: where the code finds its numbers, or NULL. `room` is for what must be gathered. */
-static const double *input(const function *f, call *c, object *x, const shape *s, double *room) {
-  const sort what = sort_of(x);
+static const double *input(const function *f, call *c, PyObject *x, const shape *s, double *room) {
+  const sort what = sort_of(f, x);
   if (what == ARRAY) {
-    view *v = &c->in[c->opened];
+    Py_buffer *v = &c->in[c->opened];
     place p;
     if (!opened(x, v, 0)) return NULL;
     if (!understood(v, &p) || !placed(v, s, !f->finite, &p)) {
-      py.release_buffer(v);
+      PyBuffer_Release(v);
       return NULL;
     }
     if (s->stored && in_place(&p, s)) {
       ++c->opened;
-      return v->data;
+      return v->buf;
     }
     gather(&p, s, room);
-    py.release_buffer(v);
+    PyBuffer_Release(v);
     return room;
   }
   if (what == LIST || what == TUPLE) {
     double *row = room + s->stored;
-    return nested(x, what, s, room, row) ? room : NULL;
+    return nested(f, x, what, s, room, row) ? room : NULL;
   }
   double value;
   const long long count = s->rows * s->columns;
@@ -381,9 +319,9 @@ static const double *input(const function *f, call *c, object *x, const shape *s
   return room;
 }
 
-static int apart(const view *a, const view *b) {
-  const char *p = a->data, *q = b->data;
-  return p + a->bytes <= q || q + b->bytes <= p;
+static int apart(const Py_buffer *a, const Py_buffer *b) {
+  const char *p = a->buf, *q = b->buf;
+  return p + a->len <= q || q + b->len <= p;
 }
 
 static int regular(const double *x, long long count) {
@@ -396,26 +334,26 @@ static int regular(const double *x, long long count) {
 }
 
 /* One output in an array: where the code writes its numbers, or NULL. */
-static double *output(call *c, object *array, const shape *s, double *room) {
-  view *v = &c->out[c->made];
+static double *output(call *c, PyObject *array, const shape *s, double *room) {
+  Py_buffer *v = &c->out[c->made];
   place *p = &c->to[c->made];
-  if (!opened(array, v, WRITABLE)) return NULL;
+  if (!opened(array, v, PyBUF_WRITABLE)) return NULL;
   if (!understood(v, p) || p->kind != 'f' || p->item != 8 || p->swapped || !placed(v, s, 0, p)) {
-    py.release_buffer(v);
+    PyBuffer_Release(v);
     return NULL;
   }
   int direct = in_place(p, s);
   for (int i = 0; direct && i < c->opened; ++i) direct = apart(v, &c->in[i]);
   for (int i = 0; direct && i < c->made; ++i) direct = apart(v, &c->out[i]);
-  py.increase(array);
+  Py_INCREF(array);
   c->arrays[c->made++] = array;
-  return direct ? v->data : room;
+  return direct ? v->buf : room;
 }
 
 /* Whether the inputs are taken; in the room of outputs that are not yet written. */
 static int taken(const function *f, const double *const *arguments, double *space,
                  long long *integers) {
-  const function *g = f->guard ? py.capsule_pointer(f->guard, LABEL) : NULL;
+  const function *g = f->guard ? PyCapsule_GetPointer(f->guard, LABEL) : NULL;
   if (!g) return !f->guard;
   const double **in = (const double **)space;
   double **out = (double **)(space + g->arguments), *w = space + g->arguments + g->results;
@@ -430,7 +368,7 @@ static int taken(const function *f, const double *const *arguments, double *spac
 }
 
 /* Room: pointers, work space of the code, gathered inputs, outputs that are written elsewhere. */
-static int run(const function *f, call *c, object *const *given, int brought, double *space,
+static int run(const function *f, call *c, PyObject *const *given, int brought, double *space,
                long long *integers) {
   const double **arguments = (const double **)space;
   double **results = (double **)(space + f->arguments);
@@ -443,13 +381,13 @@ static int run(const function *f, call *c, object *const *given, int brought, do
   }
   if (!taken(f, arguments, room, integers)) return 0;
   for (int k = 0; k < f->outputs; ++k) {
-    object *array = brought ? given[f->inputs + k] : py.call(f->empty, f->new_[k]);
+    PyObject *array = brought ? given[f->inputs + k] : PyObject_CallObject(f->empty, f->new_[k]);
     if (!array) {
-      py.clear_error();
+      PyErr_Clear();
       return 0;
     }
     results[k] = output(c, array, &f->out[k], room);
-    if (!brought) py.decrease(array);
+    if (!brought) Py_DECREF(array);
     if (!results[k]) return 0;
     room += f->out[k].stored;
   }
@@ -463,7 +401,7 @@ static int run(const function *f, call *c, object *const *given, int brought, do
   for (int k = 0; k < f->outputs; ++k) {
     const shape *s = &f->out[k];
     if (f->finite && !regular(written[k], s->stored)) return 0;
-    if (written[k] != c->out[k].data) scatter(written[k], s, &c->to[k]);
+    if (written[k] != c->out[k].buf) scatter(written[k], s, &c->to[k]);
   }
   return 1;
 }
@@ -477,25 +415,25 @@ static long long space_of(const function *f) {
     count += s->stored;
   }
   for (int k = 0; k < f->outputs; ++k) count += f->out[k].stored;
-  const function *g = f->guard ? py.capsule_pointer(f->guard, LABEL) : NULL;
+  const function *g = f->guard ? PyCapsule_GetPointer(f->guard, LABEL) : NULL;
   return count + widest /* a row of a list */ + (g ? g->arguments + g->results + g->reals : 0);
 }
 
-static object *answer(const function *f, object **arrays) {
+static PyObject *answer(const function *f, PyObject **arrays) {
   if (f->outputs == 1) return arrays[0];
-  object *tuple = py.new_tuple((size)f->outputs);
+  PyObject *tuple = PyTuple_New((Py_ssize_t)f->outputs);
   for (int k = 0; k < f->outputs; ++k) {
     if (tuple)
-      py.set_item(tuple, k, arrays[k]);
+      PyTuple_SetItem(tuple, k, arrays[k]);
     else
-      py.decrease(arrays[k]);
+      Py_DECREF(arrays[k]);
   }
   return tuple;
 }
 
 /* Takes the inputs, then either nothing or an array for each output. */
-static object *array_call(object *self, object *const *given, size count) {
-  const function *f = py.capsule_pointer(self, LABEL);
+static PyObject *array_call(PyObject *self, PyObject *const *given, Py_ssize_t count) {
+  const function *f = PyCapsule_GetPointer(self, LABEL);
   if (!f) return NULL;
   call c;
   c.opened = c.made = 0;
@@ -508,61 +446,99 @@ static object *array_call(object *self, object *const *given, size count) {
       w && iw && (brought || count == f->inputs) && run(f, &c, given, brought, w, iw);
   if (w != reals) free(w);
   if (iw != integers) free(iw);
-  for (int k = 0; k < c.opened; ++k) py.release_buffer(&c.in[k]);
-  for (int k = 0; k < c.made; ++k) py.release_buffer(&c.out[k]);
+  for (int k = 0; k < c.opened; ++k) PyBuffer_Release(&c.in[k]);
+  for (int k = 0; k < c.made; ++k) PyBuffer_Release(&c.out[k]);
   if (done) return answer(f, c.arrays);
-  for (int k = 0; k < c.made; ++k) py.decrease(c.arrays[k]);
-  py.increase(py.none);
-  return py.none;
+  for (int k = 0; k < c.made; ++k) Py_DECREF(c.arrays[k]);
+  Py_INCREF(Py_None);
+  return Py_None;
 }
 
-static void forget(object *capsule) {
-  function *f = py.capsule_pointer(capsule, LABEL);
+static void forget(PyObject *capsule) {
+  function *f = PyCapsule_GetPointer(capsule, LABEL);
   if (!f) return;
-  py.decrease(f->empty);
-  if (f->guard) py.decrease(f->guard);
+  Py_XDECREF(f->array_type);
+  Py_XDECREF(f->masked_type);
+  Py_XDECREF(f->empty);
+  Py_XDECREF(f->guard);
   for (int k = 0; k < f->outputs; ++k) {
-    py.decrease(f->new_[k]);
+    Py_XDECREF(f->new_[k]);
     free((void *)f->out[k].indices);
   }
   for (int k = 0; k < f->inputs; ++k) free((void *)f->in[k].indices);
   free(f);
 }
 
-/* A copy of its own of the indices of a sparse matrix; 0 without memory. */
-static int own_indices(shape *s) {
-  if (!s->indices) return 1;
-  const size_t bytes = (size_t)s->stored * sizeof(long long);
-  long long *copy = malloc(bytes ? bytes : 1);
-  if (copy) memcpy(copy, s->indices, bytes);
+/* A shape from (rows, columns, stored, indices or None); 1: an exception is set. */
+static int take_shape(PyObject *given, shape *s) {
+  PyObject *indices;
+  Py_buffer view;
+  if (!PyArg_ParseTuple(given, "LLLO", &s->rows, &s->columns, &s->stored, &indices)) return 1;
+  if (indices == Py_None) return 0;
+  if (PyObject_GetBuffer(indices, &view, PyBUF_SIMPLE)) return 1;
+  long long *copy = malloc((size_t)view.len + 1);
+  if (copy) memcpy(copy, view.buf, (size_t)view.len);
   s->indices = copy;
-  return copy != NULL;
+  PyBuffer_Release(&view);
+  if (!copy) PyErr_NoMemory();
+  return !copy;
 }
 
-EXPORT void mbs_setup(const python *table) { py = *table; }
+static int take_ports(function *f, PyObject *inputs, PyObject *outputs) {
+  for (f->inputs = 0; f->inputs < PyTuple_Size(inputs); ++f->inputs)
+    if (take_shape(PyTuple_GetItem(inputs, f->inputs), &f->in[f->inputs])) return 1;
+  for (f->outputs = 0; f->outputs < PyTuple_Size(outputs); ++f->outputs) {
+    PyObject *pair = PyTuple_GetItem(outputs, f->outputs);
+    if (take_shape(PyTuple_GetItem(pair, 0), &f->out[f->outputs])) return 1;
+    f->new_[f->outputs] = PyTuple_GetItem(pair, 1);
+    Py_INCREF(f->new_[f->outputs]);
+  }
+  return 0;
+}
 
-/* The builtin of a function; needs the interpreter's lock, as all of the above. */
-EXPORT object *mbs_builtin(const function *given) {
-  static method description = {"array_call", array_call, 0x80 /* METH_FASTCALL */, NULL};
-  function *f = malloc(sizeof *f);
-  if (!f) return NULL;
-  *f = *given;
-  int complete = 1;
-  py.increase(f->empty);
-  if (f->guard) {
-    const function *g = py.capsule_pointer(f->guard, LABEL);
-    py.increase(f->guard);
-    if (g && g->integers > f->integers) f->integers = g->integers;
+static int take_guard(function *f, PyObject *builtin, PyObject *numbers) {
+  if (builtin == Py_None) return 0;
+  f->guard = PyObject_GetAttrString(builtin, "__self__"); /* the capsule of its function */
+  const function *g = f->guard ? PyCapsule_GetPointer(f->guard, LABEL) : NULL;
+  if (!g) return 1;
+  for (Py_ssize_t k = 0; k < PyTuple_Size(numbers); ++k)
+    f->guarded[k] = PyLong_AsLongLong(PyTuple_GetItem(numbers, k));
+  if (g->integers > f->integers) f->integers = g->integers;
+  return PyErr_Occurred() != NULL;
+}
+
+PyObject *array_call_new(PyObject *module, PyObject *args) {
+  static PyMethodDef description = {"array_call", (PyCFunction)(void (*)(void))array_call,
+                                    METH_FASTCALL, NULL};
+  unsigned long long evaluate, checkout, release;
+  PyObject *inputs, *outputs, *guard, *guarded, *capsule, *builtin;
+  function *f = calloc(1, sizeof *f);
+  (void)module;
+  if (!f) return PyErr_NoMemory();
+  if (!(capsule = PyCapsule_New(f, LABEL, forget))) {
+    free(f);
+    return NULL;
   }
-  for (int k = 0; k < f->outputs; ++k) {
-    py.increase(f->new_[k]);
-    complete = own_indices(&f->out[k]) && complete;
+  if (!PyArg_ParseTuple(args, "(KKK)(LLLL)(OOO)O!O!pOO!", &evaluate, &checkout, &release,
+                        &f->arguments, &f->results, &f->integers, &f->reals, &f->array_type,
+                        &f->masked_type, &f->empty, &PyTuple_Type, &inputs, &PyTuple_Type, &outputs,
+                        &f->finite, &guard, &PyTuple_Type, &guarded)) {
+    f->array_type = f->masked_type = f->empty = NULL;
+    Py_DECREF(capsule);
+    return NULL;
   }
-  for (int k = 0; k < f->inputs; ++k) complete = own_indices(&f->in[k]) && complete;
+  Py_INCREF(f->array_type);
+  Py_INCREF(f->masked_type);
+  Py_INCREF(f->empty);
+  memcpy(&f->evaluate, &evaluate, sizeof f->evaluate);
+  memcpy(&f->checkout, &checkout, sizeof f->checkout);
+  memcpy(&f->release, &release, sizeof f->release);
+  if (take_ports(f, inputs, outputs) || take_guard(f, guard, guarded)) {
+    Py_DECREF(capsule);
+    return NULL;
+  }
   f->space = space_of(f);
-  object *capsule = complete ? py.new_capsule(f, LABEL, forget) : NULL;
-  if (!capsule) return NULL;
-  object *builtin = py.new_function(&description, capsule, NULL);
-  py.decrease(capsule);
+  builtin = PyCFunction_NewEx(&description, capsule, NULL);
+  Py_DECREF(capsule);
   return builtin;
 }

@@ -6,7 +6,7 @@ import casadi
 import numpy as np
 import pytest
 from support.change_points import rod
-from support.runtime import with_constant
+from support.runtime import integrate_with, with_constant
 
 import mbs
 from mbs.components import Revolute, Spherical
@@ -65,7 +65,7 @@ def test_factors_of_rows_find_the_side_and_the_gap(monkeypatch, tmp_path, longer
     """As if a window were many: it passes flat configurations, and reverses beside them."""
     few = motion(windows(1, longer))
     library = with_constant(tmp_path, "MANY", lambda value: 0)
-    monkeypatch.setattr(INTEGRATE, "core_library", lambda: library)
+    integrate_with(monkeypatch, library)
     many = motion(windows(1, longer))
     # a reversal beside a singular configuration magnifies rounding by 1e10
     assert few["a0.q"][-1] == pytest.approx(end, abs=1e-5)

@@ -1,6 +1,7 @@
 """Parts of the C run-time on their own, and the run-time library with changed constants."""
 
 import ctypes
+import importlib
 import importlib.machinery
 import importlib.util
 import re
@@ -8,13 +9,15 @@ import shutil
 
 import numpy as np
 
-from mbs.core import core_files
+from mbs.core import core_files, evaluations
 from mbs.core.build import SOURCE, build
 from mbs.native import cached_library
 
+integrate_module = importlib.import_module("mbs.solvers.integrate")
+
 INTEGRATION = (
     *("module", "model", "driver", "stepper", "dopri5", "rodas", "events", "dense", "passage"),
-    *("least_squares", "array_call"),
+    *("least_squares", "array_call", "projection"),
 )
 """C files of the extension without those of arms."""
 
@@ -40,6 +43,22 @@ def with_constant(folder, constant, change):
         return f"{match[1]} {type(now)(change(now))!r}"
 
     return changed_library(folder, pattern, value, INTEGRATION)
+
+
+def integrate_with(monkeypatch, library):
+    """Let another run-time library integrate."""
+
+    def of_library(make):
+        def made(*arguments):
+            with monkeypatch.context() as patch:
+                patch.setattr(evaluations, "core_library", lambda: library)
+                return make(*arguments)
+
+        return made
+
+    for make in (evaluations.compiled_evaluation, evaluations.interpreted_evaluation):
+        monkeypatch.setattr(integrate_module, make.__name__, of_library(make))
+    monkeypatch.setattr(integrate_module, "core_library", lambda: library)
 
 
 def changed_library(folder, pattern, replacement, names=None):

@@ -6,14 +6,12 @@
 #include <string.h>
 
 #include "dopri5.h"
+#include "projection.h"
 #include "rodas.h"
 
 #ifdef __FAST_MATH__
 #error "results of the run-time library need IEEE arithmetic: compile it without -ffast-math"
 #endif
-
-#define TOLERANCE 1e-12 /* residual, of the largest state, at which a projection has converged */
-#define ITERATIONS 10   /* Newton steps of a projection; each squares the error */
 
 struct driver {
     stepper solver;
@@ -57,22 +55,15 @@ static int jacobian(void *user, double t, const double *x, double *J, double *f_
     return pair_of(d, &d->model.jacobian, t, x, J, f_t);
 }
 
+static int project_once(void *user, double t, const double *x, double *after, double *residual) {
+    driver *d = user;
+    return pair_of(d, &d->model.project, t, x, after, residual);
+}
+
 static int project(void *user, double t, double *x) {
     driver *d = user;
-    int k, i, n = d->solver.n;
     if (d->passage && !passage_project(d->passage, t, x)) return 0;
-    for (k = 0; k < ITERATIONS; k++) {
-        double residual = 0.0, scale = 1.0;
-        if (pair_of(d, &d->model.project, t, x, d->projected, &residual) || !isfinite(residual))
-            return 1;
-        for (i = 0; i < n; i++) scale = fmax(scale, fabs(x[i]));
-        if (stepper_all_finite(d->projected, n))
-            memcpy(x, d->projected, sizeof(double) * (size_t)n);
-        else if (!(residual < TOLERANCE * scale)) /* else x is on the rows, where they depend */
-            return 1;
-        if (residual < TOLERANCE * scale) return 0;
-    }
-    return 1;
+    return projection_converge(d->model.n, project_once, d, t, x, d->projected);
 }
 
 static int indicators(void *user, double t, const double *x, double *values) {

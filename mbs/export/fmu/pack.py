@@ -63,11 +63,11 @@ _CORE_HEADERS = (
     "solver.h",
 )
 _HOSTED = ("charts.c",)
-_RUNTIME = ("stepper", "events", "dense", "passage")
+_RUNTIME = ("stepper", "events", "dense", "passage", "projection")
 _TABLEAU = "dopri5"
 """What steps through singular configurations take, whichever the solver is."""
 
-_BARE_RUNTIME = ("stepper",)
+_BARE_RUNTIME = ("stepper", "projection")
 _MEMORY = "memory.c"
 """Instances and saved states from the heap of C."""
 

@@ -3,6 +3,7 @@
 
 #include "closure.h"
 #include "internal.h"
+#include "projection.h"
 
 #include <math.h>
 #include <string.h>
@@ -28,9 +29,6 @@ static int jacobian(void *user, double t, const double *x, double *J, double *f_
 
 #ifdef MODEL_TREE
 
-#define TOLERANCE 1e-12 /* largest row of the loops, for coordinates of size one */
-#define PROJECTIONS 10
-
 static int tree_rhs(void *user, double t, const double *x, double *xdot) {
     core *c = user;
     core_point(c, &t, x, c->z);
@@ -39,25 +37,20 @@ static int tree_rhs(void *user, double t, const double *x, double *xdot) {
     return mbs_tree_rhs(c->arg, c->res, c->iw, c->w, 0);
 }
 
+static int tree_project_once(void *user, double t, const double *x, double *after,
+                             double *residual) {
+    core *c = user;
+    core_point(c, &t, x, c->z);
+    c->res[0] = after;
+    c->res[1] = residual;
+    return mbs_tree_project(c->arg, c->res, c->iw, c->w, 0);
+}
+
 static int tree_project(void *user, double t, double *x) {
     core *c = user;
-    double projected[NT], residual = HUGE_VAL;
-    int k, i;
+    double projected[NT];
     if (!passage_project(c->passage, t, x)) return 0;
-    for (k = 0; k < PROJECTIONS; k++) {
-        double scale = 1.0;
-        core_point(c, &t, x, c->z);
-        c->res[0] = projected;
-        c->res[1] = &residual;
-        if (mbs_tree_project(c->arg, c->res, c->iw, c->w, 0) || !isfinite(residual)) return 1;
-        for (i = 0; i < NT; i++) scale = fmax(scale, fabs(x[i]));
-        if (stepper_all_finite(projected, NT))
-            memcpy(x, projected, sizeof projected);
-        else if (!(residual < TOLERANCE * scale))
-            return 1;
-        if (residual < TOLERANCE * scale) return 0;
-    }
-    return 1;
+    return projection_converge(NT, tree_project_once, c, t, x, projected);
 }
 
 static int tree_rows(void *user, double t, const double *x, const passage_rows *r) {

@@ -1,0 +1,31 @@
+#include "projection.h"
+
+#include <math.h>
+#include <string.h>
+
+#define TOLERANCE 1e-12 /* of the largest state or one: above rounding, and below the residual before
+                           the last step, 1e-8 */
+#define STEPS 10        /* each squares the error: more do not converge */
+
+static int all_finite(const double *v, int n) {
+    int i;
+    for (i = 0; i < n; i++)
+        if (!isfinite(v[i])) return 0;
+    return 1;
+}
+
+int projection_converge(int n, projection_step step, void *user, double t, double *x,
+                        double *after) {
+    int k, i;
+    for (k = 0; k < STEPS; k++) {
+        double residual = HUGE_VAL, scale = 1.0;
+        if (step(user, t, x, after, &residual) || !isfinite(residual)) return 1;
+        for (i = 0; i < n; i++) scale = fmax(scale, fabs(x[i]));
+        if (all_finite(after, n))
+            memcpy(x, after, sizeof(double) * (size_t)n);
+        else if (!(residual < TOLERANCE * scale)) /* else x is on rows that are dependent there */
+            return 1;
+        if (residual < TOLERANCE * scale) return 0;
+    }
+    return 1;
+}

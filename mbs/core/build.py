@@ -26,8 +26,15 @@ _FLAGS = (
     "-fvisibility=hidden",
     "-fPIC",
     "-shared",
+    "-g0",
+    "-s",
     "-DPy_LIMITED_API=0x030B0000",
 )
+_LIBRARIES = {
+    "darwin": ("-undefined", "dynamic_lookup"),
+    "win32": (f"-L{Path(sys.base_prefix, 'libs')}", "-lpython3"),
+}
+"""Libraries by platform: the symbols of Python come from the process, on Windows from python3.dll."""
 _KNOWN = ("cc", "gcc", "clang")
 
 
@@ -85,8 +92,7 @@ def build(target: Path = LIBRARY, sources: Sequence[Path] | None = None) -> Path
             f"-I{include}",
             *map(str, sources or sorted(SOURCE.glob("*.c"))),
             *("-o", str(made)),
-            *(() if os.name == "nt" else ("-lm",)),
-            *(("-undefined", "dynamic_lookup") if sys.platform == "darwin" else ()),
+            *_LIBRARIES.get(sys.platform, ("-lm",)),
         ]
         _run([*command, *arguments])
         made.replace(target)
@@ -102,11 +108,10 @@ def _run(command: list[str]) -> None:
             f"mbs: the C compiler {command[0]} does not start ({error.strerror}); {_REMEDY}"
         ) from error
     if answer.returncode:
-        missing = "No module named ziglang" in answer.stderr
+        if command[0] == sys.executable and "No module named ziglang" in answer.stderr:
+            raise BuildError(f"mbs: there is no C compiler; {_REMEDY}")
         raise BuildError(
-            f"mbs: there is no C compiler; {_REMEDY}"
-            if missing
-            else f"mbs: the C compiler {command[0]} refused the run-time library:\n"
+            f"mbs: the C compiler {command[0]} refused the run-time library:\n"
             + answer.stderr[-2000:]
         )
 

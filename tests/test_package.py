@@ -80,7 +80,7 @@ def test_types_and_c_sources_are_shipped() -> None:
     package = resources.files("mbs")
     assert (package / "py.typed").is_file()
     assert (package / "export" / "fmu" / "c" / "core.c").is_file()
-    assert (package / "native" / "runtime" / "dopri5.c").is_file()
+    assert (package / "core" / "source" / "dopri5.c").is_file()
     assert (package / "view" / "assets" / "viewer.js").is_file()
 
 

@@ -22,7 +22,7 @@ Field = TypeVar("Field", NDArray[np.float64], NDArray[np.complex128])
 class Arm:
     """A `Chain` of revolute and prismatic joints in flat numbers, made by `arm_of` alone.
 
-    `mbs/native/runtime/arm.c` reads the same numbers; all its chains run forwards.
+    `mbs/core/source/arm.c` reads the same numbers. All its chains run forwards.
 
     Attributes:
         names: of the joints.

@@ -1,4 +1,4 @@
-"""The compiled core of the inverse geometric model, of `native/runtime`, on numpy arrays."""
+"""Algorithms of arms in the run-time library, on numpy arrays."""
 
 from __future__ import annotations
 

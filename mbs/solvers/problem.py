@@ -18,7 +18,7 @@ from mbs.text import quoted
 class Passage:
     """Functions of t, x = [q; v; z] and p, for steps in local tangent coordinates.
 
-    `native/runtime/passage.h` tells what is done with them.
+    `core/source/passage.h` describes their use.
 
     Attributes:
         rows: `rows(t, x, p) -> place, slope, J, b, c, N, bend, rank`: rows of positions and their

@@ -269,8 +269,8 @@ def test_all_is_the_same_without_a_compiler(monkeypatch):
         assert result["j.v"][-1] == pytest.approx(-30, rel=1e-6)
 
 
-def test_the_python_twin_meets_it_too():
-    """A point on a circle, whose first steps in Python pass over the obstacle without looks."""
+def test_interpreted_functions_meet_it_too():
+    """A point on a circle, whose first steps pass over the obstacle without looks."""
     t, x, p = (casadi.SX.sym(name, n) for name, n in (("t", 1), ("x", 2), ("p", 1)))
     gap = casadi.sqrt(2 - 2 * casadi.cos(x[0] - 3) + 1e-12) - 0.01
     rhs = casadi.Function("rhs", [t, x, p], [casadi.vertcat(x[1], 0)])
@@ -286,7 +286,7 @@ def test_the_python_twin_meets_it_too():
             motion = integrate_events(rhs, [0, 20.0], [0, 0.2], events, compiled=compiled)
             ends.append(motion.x[-1])
     np.testing.assert_allclose(ends[0], [2 * (3 - 0.01) - 4, -20], atol=1e-5)
-    np.testing.assert_allclose(ends[1], ends[0], atol=1e-12)
+    assert ends[1].tobytes() == ends[0].tobytes()
     np.testing.assert_allclose(ends[2:], 2 * [[4, 20]], atol=1e-12)  # two looks miss it
 
 

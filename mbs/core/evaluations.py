@@ -38,7 +38,8 @@ def interpreted_evaluation(function: Function, examine: Callable[[BaseException]
         examine: called with the error of an evaluation. It returns if the function has no value
             there, and raises an error that ends the algorithm.
     """
-    buffer, call = function.buffer()
+    bound: Any = function.buffer()
+    buffer, call = bound
     inputs = tuple(np.zeros(function.nnz_in(k)) for k in range(function.n_in()))
     outputs = tuple(np.zeros(function.nnz_out(k)) for k in range(function.n_out()))
     for bind, arrays in ((buffer.set_arg, inputs), (buffer.set_res, outputs)):

@@ -201,7 +201,7 @@ def _all_entries(J: Vector) -> Entries:
 def _is_large(J: Entries) -> bool:
     """Whether the matrix has its own arithmetic."""
     m, n = J.shape
-    return n >= MANY and np.count_nonzero(J.values) < _FULL * m * n
+    return bool(n >= MANY and np.count_nonzero(J.values) < _FULL * m * n)
 
 
 def _sparse_step(J: Entries) -> Any:
@@ -290,7 +290,8 @@ class _Workspace:
         if np.count_nonzero(kept) >= _FULL * self.shape[0] * count:
             return None
         e, b, x = np.empty(len(column)), np.empty(self.shape[0]), np.empty(count)
-        rows, columns, shape = self.row[kept], column[kept], (self.shape[0], count)
+        rows, columns = (part[kept].astype(np.int64) for part in (self.row, column))
+        shape = self.shape[0], count
 
         def solve() -> None:
             x[:] = sparse_solution(Entries(rows, columns, e[kept], shape), b)

@@ -20,7 +20,7 @@ from pathlib import Path
 SOURCE = Path(__file__).parent / "source"
 LIBRARY = Path(__file__).parent / ("_core.pyd" if os.name == "nt" else "_core.abi3.so")
 _FLAGS = (
-    "-O2",
+    "-O3",
     "-std=c99",
     "-ffp-contract=off",  # contraction differs by processor and would change the results
     "-fvisibility=hidden",
@@ -34,7 +34,7 @@ _LIBRARIES = {
     "darwin": ("-undefined", "dynamic_lookup"),
     "win32": (f"-L{Path(sys.base_prefix, 'libs')}", "-lpython3"),
 }
-"""Libraries by platform: the symbols of Python come from the process, on Windows from python3.dll."""
+"""Libraries by platform. Symbols of Python come from the process, on Windows from python3.dll."""
 _KNOWN = ("cc", "gcc", "clang")
 
 
@@ -43,8 +43,8 @@ class BuildError(RuntimeError):
 
 
 def source_sum() -> str:
-    """Return the hash of the C files, which the library contains too."""
-    found = hashlib.sha256()
+    """Return the hash of the C files and flags, which the library contains too."""
+    found = hashlib.sha256(" ".join(_FLAGS).encode())
     for file in sorted(SOURCE.glob("*.[ch]")):
         found.update(file.name.encode() + b"\0" + file.read_bytes())
     return found.hexdigest()

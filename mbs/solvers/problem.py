@@ -257,7 +257,7 @@ def equations(
     jacobian = None
     if method == "rodas":
         f_xt = [casadi.jacobian(slope, v) for v in (x, t)]
-        jacobian = _dense("mbs_jacobian", txp, *f_xt)
+        jacobian = _scalar(_dense("mbs_jacobian", txp, *f_xt))
     g = None if project is None else _projection(project, txp)
     through = None if passage is None else _passage(passage, txp)
     if events is None:
@@ -288,6 +288,18 @@ def _first(function: casadi.Function, inputs: list[casadi.MX]) -> casadi.MX:
 
 def _dense(name: str, inputs: list[casadi.MX], *outputs: casadi.MX) -> casadi.Function:
     return casadi.Function(name, inputs, [casadi.densify(value) for value in outputs])
+
+
+def _scalar(function: casadi.Function) -> casadi.Function:
+    """The same function by scalar operations, if it has no other ones.
+
+    Machine code in pieces is written from these operations. Interpreted and compiled functions give
+    the same bits if all are evaluated from the same operations.
+    """
+    try:
+        return function.expand()
+    except RuntimeError:
+        return function
 
 
 def _projection(project: casadi.Function, txp: list[casadi.MX]) -> casadi.Function:

@@ -21,7 +21,7 @@ from mbs.loops.configuration import start as configuration
 from mbs.models.state.tree import full_state
 from mbs.simulate.run import with_crossings
 from mbs.simulate.tolerances import step_tolerances
-from mbs.solvers.integrate import library_of, run_compiled
+from mbs.solvers.integrate import IntegrationCode, run_problem
 from mbs.solvers.problem import equations, problem
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
@@ -72,15 +72,15 @@ class Ours:
         )
         self.events, (rhs, project, _) = with_crossings(state, self.x0, 0.0, None, ())
         self.functions = equations(rhs, project, method, self.events)
-        self.library = library_of(self.functions)
-        if self.library is None:
+        self.code = IntegrationCode(self.functions, may_compile=True)
+        if not self.code.compile():
             raise SystemExit("there is no C compiler; mbs is measured compiled")
 
     def run(self, tolerance: float) -> Array:
         """(m, nx) states, the integration alone."""
         times, control = np.linspace(0, DURATION, ROWS + 1), step_tolerances(tolerance)
         given = problem(self.functions, self.x0, times, None, self.events.modes, control, np.inf)
-        motion = run_compiled(self.library, given, None)
+        motion = run_problem(given, self.code, None)
         if motion.stop is not None:
             raise motion.stop
         return motion.x

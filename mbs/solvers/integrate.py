@@ -2,8 +2,9 @@
 
 import ctypes
 import math
+import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi
@@ -37,7 +38,8 @@ from mbs.solvers.problem import (
 Array = npt.NDArray[np.float64]
 Progress = Callable[[float], None]
 
-_CHUNK = 200  # steps between two looks at the keyboard
+_CHUNK = 200  # steps of machine code between two looks at the keyboard
+_FEW = 10  # steps of interpreted functions, after which the compiler may be due
 _FIRED, _MORE = -1, 1
 _REASONS = {
     2: "steps",
@@ -79,11 +81,8 @@ def _in_pieces(functions: Sequence[casadi.Function]) -> str:
     return "\n".join([text, *lines])
 
 
-def library_of(equations: Equations) -> ctypes.CDLL | None:
-    """Return the machine code of the functions of an integration.
-
-    Returns:
-        None if CasADi can only interpret them.
+def _machine_code(equations: Equations) -> ctypes.CDLL | None:
+    """The machine code of the functions of an integration; None if CasADi can only interpret them.
 
     Raises:
         CompilerError: the compiler refused the code.
@@ -98,6 +97,71 @@ def library_of(equations: Equations) -> ctypes.CDLL | None:
     return ctypes.CDLL(str(cached_library({"system.c": source}, flags_for(source))))
 
 
+_START, _PER_INSTRUCTION = 0.2, 1e-4
+"""Time of the compiler [s], for a start and for each instruction: that of gcc 12 for 1,000 to
+20,000 instructions, to a factor of two."""
+
+
+@dataclass(slots=True, eq=False)
+class IntegrationCode:
+    """Functions of an integration, interpreted until that has cost as much as the compiler.
+
+    Both ways give the same bits. The time is therefore at most twice that of the faster way.
+
+    Attributes:
+        equations: the functions.
+        may_compile: False if CasADi interprets them always.
+        library: their machine code; None while CasADi interprets them.
+        spent: time that interpreted runs have taken [s].
+    """
+
+    equations: Equations
+    may_compile: bool
+    library: ctypes.CDLL | None = None
+    spent: float = 0.0
+
+    def compile(self) -> bool:
+        """Compile the functions, if they can be compiled. Return whether that was done now.
+
+        Raises:
+            CompilerError: the compiler refused the code.
+        """
+        if self.library is not None or not self.may_compile:
+            return False
+        self.library = _machine_code(self.equations)
+        self.may_compile = self.library is not None
+        return self.may_compile
+
+    def evaluations(self) -> tuple[Any, ...]:
+        """Evaluations in the order of `driver_model` in driver.h; None for a missing function."""
+        own, library = self.equations, self.library
+        through = own.passage
+        last = (
+            (None,) * 3 if through is None else (through.rows, through.forces, through.regularity)
+        )
+        changes = own.indicators, own.rates, own.jump, own.approaches
+
+        def evaluation(function: casadi.Function | None) -> Any:
+            if function is None:
+                return None
+            if library is None:
+                return interpreted_evaluation(function, _examine)
+            return compiled_evaluation(function, library)
+
+        return tuple(map(evaluation, (own.rhs, own.project, own.jacobian, *changes, *last)))
+
+    def is_due(self, further: float) -> bool:
+        """Whether interpreted runs have taken as long as the compiler.
+
+        Args:
+            further: time of the present run [s].
+        """
+        if self.library is not None or not self.may_compile:
+            return False
+        instructions = sum(f.n_instructions() for f in self.equations.all)
+        return self.spent + further > _START + _PER_INSTRUCTION * instructions
+
+
 # Evaluations of the functions of an integration, and its run by the run-time library.
 
 
@@ -106,30 +170,6 @@ def _examine(error: BaseException) -> None:
     if not isinstance(error, RuntimeError):
         raise error
     failure_of(error, "rhs")
-
-
-def _evaluations(equations: Equations, library: ctypes.CDLL | None) -> tuple[Any, ...]:
-    """Evaluations in the order of `driver_model` in driver.h; None for a missing function."""
-    through = equations.passage
-    functions = (
-        equations.rhs,
-        equations.project,
-        equations.jacobian,
-        equations.indicators,
-        equations.rates,
-        equations.jump,
-        equations.approaches,
-        *((None,) * 3 if through is None else (through.rows, through.forces, through.regularity)),
-    )
-
-    def evaluation(function: casadi.Function | None) -> Any:
-        if function is None:
-            return None
-        if library is None:
-            return interpreted_evaluation(function, _examine)
-        return compiled_evaluation(function, library)
-
-    return tuple(map(evaluation, functions))
 
 
 def _passage(through: Passage | None) -> tuple[Any, ...] | None:
@@ -148,7 +188,7 @@ def _places(pattern: casadi.Sparsity) -> npt.NDArray[np.intc] | None:
     return np.array([*pattern.colind(), *pattern.row()], dtype=np.intc)
 
 
-def _integration(given: IntegrationProblem, library: ctypes.CDLL | None) -> Any:
+def _integration(given: IntegrationProblem, code: IntegrationCode) -> Any:
     """The integration in the run-time library, at the first time.
 
     Raises:
@@ -159,7 +199,7 @@ def _integration(given: IntegrationProblem, library: ctypes.CDLL | None) -> Any:
     ends, jumps = given.stops[0], given.stops[1].astype(float)
     try:
         return core_library().integration(
-            _evaluations(own, library),
+            code.evaluations(),
             (*sizes, 0 if indicators is None else indicators.numel_out(0)),
             _passage(own.passage),
             given.p,
@@ -174,24 +214,26 @@ def _integration(given: IntegrationProblem, library: ctypes.CDLL | None) -> Any:
 
 
 def run_problem(
-    given: IntegrationProblem, library: ctypes.CDLL | None, progress: Progress | None
+    given: IntegrationProblem, code: IntegrationCode, progress: Progress | None
 ) -> EventMotion:
     """Return the motion at the times of a problem, as far as it comes.
 
     Args:
         given: the problem.
-        library: machine code of its functions from `library_of`; None: CasADi interprets them.
+        code: its functions.
         progress: called now and then with the time that was reached [s].
 
     Raises:
         SolverError: no memory is left.
+        CompilerError: the compiler refused the code.
     """
     x, times = given.x0.copy(), given.times
     table = np.empty((len(times), len(x)))
     log: list[IntegrationEvent] = []
     stop: SolverError | Interrupted | None = None
     first: Array | None = None
-    run = _integration(given, library)
+    run, begin = _integration(given, code), time.perf_counter()
+    interpreted = code.library is None
     try:
         with control_c() as check:
             status = run.begin(x)
@@ -199,9 +241,11 @@ def run_problem(
                 slope = np.empty(len(x))
                 first = slope if run.leaves(x, slope) else None
             while status <= _MORE and run.done < len(times):
-                status = run.fill(x, times, table, _CHUNK)
+                status = run.fill(x, times, table, _FEW if code.library is None else _CHUNK)
                 if status == _FIRED:
                     log.append(_event(run, given))
+                if code.is_due(time.perf_counter() - begin) and code.compile():
+                    run.replace(core_library(), code.evaluations())
                 if progress is not None:
                     progress(run.time)
                 check()
@@ -212,6 +256,8 @@ def run_problem(
         stop = stopped_by_law(run.time, failure, x.tolist())
     except KeyboardInterrupt:
         stop = interrupted(run.time)
+    if interpreted:
+        code.spent += time.perf_counter() - begin
     return replace(given.motion(table[: run.done], log, stop), first_slope=first)
 
 
@@ -257,8 +303,9 @@ def integrate(
         atol: absolute tolerance of the error of one step, in the units of the states.
         max_step: the longest step, s; only the error limits it by default.
         progress: called now and then with the time reached, s.
-        compiled: False if CasADi interprets the functions, which takes three to six times as
-            long. It does so without a C compiler too. The results are the same.
+        compiled: False if CasADi interprets the functions always, which takes three to six times
+            as long. With a C compiler they are compiled as soon as interpreting them has cost as
+            much as the compiler. The results are the same.
 
     Returns:
         (m, nx), a row for each time.
@@ -287,8 +334,8 @@ def integrate(
     return motion.x
 
 
-Prepared = dict[tuple[str, bool], tuple[Equations, ctypes.CDLL | None]]
-"""Functions of an integration and their machine code, by method and whether it is compiled."""
+Prepared = dict[tuple[str, bool], IntegrationCode]
+"""Functions of an integration, by method and whether they may be compiled."""
 
 
 def integrate_events(
@@ -361,11 +408,11 @@ def integrate_events(
     kept = {} if prepared is None else prepared
     if key not in kept:
         made = equations(rhs, project, method, events, passage)
-        kept[key] = made, library_of(made) if key[1] else None
-    functions, library = kept[key]
+        kept[key] = IntegrationCode(made, may_compile=key[1])
+    code = kept[key]
     modes = () if events is None else events.modes
-    given = problem(functions, x0, times, p, modes, (rtol, atol), max_step, stops, sizes)
-    motion = run_problem(given, library, progress)
+    given = problem(code.equations, x0, times, p, modes, (rtol, atol), max_step, stops, sizes)
+    motion = run_problem(given, code, progress)
     if motion.stop is not None and not partial:
         raise motion.stop
     return motion

@@ -207,6 +207,8 @@ driver *driver_new(const driver_model *model, const double *p, const driver_cont
     return d;
 }
 
+void driver_replace(driver *d, const driver_model *model) { d->model = *model; }
+
 int driver_begin(driver *d, double *x) {
     int status = STEPPER_OK;
     fenv_t environment; /* other libraries may have switched denormal numbers off */

@@ -38,6 +38,9 @@ driver *driver_new(const driver_model *model, const double *p, const driver_cont
                    double t);
 void driver_free(driver *d);
 
+/* Evaluate other functions from now on, which must give the same values. Sizes stay. */
+void driver_replace(driver *d, const driver_model *model);
+
 /* Project the first state x (n,) and evaluate the indicators there. Returns a status. */
 int driver_begin(driver *d, double *x);
 

@@ -274,6 +274,20 @@ static PyObject *integration(PyObject *module, PyObject *args) {
     return (PyObject *)i;
 }
 
+static PyObject *replace(PyObject *self, PyObject *args) {
+    Integration *i = (Integration *)self;
+    PyObject *module, *functions, *before = i->functions;
+    driver_model model = i->model;
+    if (!PyArg_ParseTuple(args, "OO!", &module, &PyTuple_Type, &functions)) return NULL;
+    if (take_functions(module, &model, functions)) return NULL;
+    Py_INCREF(functions);
+    i->functions = functions;
+    i->model = model;
+    driver_replace(i->driver, &model);
+    Py_DECREF(before);
+    Py_RETURN_NONE;
+}
+
 static PyObject *begin(PyObject *self, PyObject *args) {
     Integration *i = (Integration *)self;
     Py_buffer x;
@@ -342,6 +356,7 @@ static PyObject *done_of(PyObject *self, void *closure) {
 }
 
 static PyMethodDef integration_methods[] = {
+    {"replace", replace, METH_VARARGS, "replace(module, functions): evaluate others from now on."},
     {"begin", begin, METH_VARARGS, "begin(x) -> status: project the first state."},
     {"leaves", leaves, METH_VARARGS, "leaves(x, slope) -> bool: whether x is singular."},
     {"fill", fill, METH_VARARGS, "fill(x, times, table, budget) -> status."},

@@ -18,7 +18,7 @@ int projection_converge(int n, projection_step step, void *user, double t, doubl
                         double *after) {
     int k, i;
     for (k = 0; k < STEPS; k++) {
-        double residual = HUGE_VAL, scale = 1.0;
+        double residual = 0.0, scale = 1.0; /* without constraints no residual is written */
         if (step(user, t, x, after, &residual) || !isfinite(residual)) return 1;
         for (i = 0; i < n; i++) scale = fmax(scale, fabs(x[i]));
         if (all_finite(after, n))

@@ -1,4 +1,5 @@
 import gc
+import importlib
 import weakref
 
 import casadi as ca
@@ -7,8 +8,10 @@ import pytest
 from support.counted import counted
 
 from mbs.errors import CompilerError, ModelError, SolverError
-from mbs.solvers import integrate
+from mbs.native import compiler_found
+from mbs.solvers import integrate, integrate_events
 
+INTEGRATE = importlib.import_module("mbs.solvers.integrate")
 T, X, P = ca.SX.sym("t"), ca.SX.sym("x", 2), ca.SX.sym("p")
 OSCILLATOR = ca.Function("oscillator", [T, X, P], [ca.vertcat(X[1], -(P**2) * X[0])])
 PENDULUM = ca.Function("pendulum", [T, X, P], [ca.vertcat(X[1], -P * ca.sin(X[0]))])
@@ -176,6 +179,37 @@ def test_no_compiler_falls_back(monkeypatch):
     expected = integrate(PENDULUM, [1, 0], [0, 1], p=1, compiled=False)
     monkeypatch.setitem(integrate.__globals__, "compiler_found", lambda: False)
     assert np.array_equal(integrate(PENDULUM, [1, 0], [0, 1], p=1), expected)
+
+
+@pytest.mark.skipif(not compiler_found(), reason="there is no C compiler")
+@pytest.mark.parametrize("method", ["dopri5", "rodas"])
+def test_functions_that_are_compiled_during_a_run_give_the_same_bits(method, monkeypatch):
+    options = {"p": 9.81, "method": method}
+    times = np.linspace(0, 20, 301)
+    kept, made = {}, []
+    compiler = INTEGRATE.IntegrationCode.compile
+    monkeypatch.setattr(
+        INTEGRATE.IntegrationCode, "compile", lambda self: made.append(self) or compiler(self)
+    )
+    interpreted = integrate(PENDULUM, [2.0, 0.5], times, compiled=False, **options)
+    assert not made
+    monkeypatch.setattr(INTEGRATE, "_START", 0.0)
+    monkeypatch.setattr(INTEGRATE, "_PER_INSTRUCTION", 0.0)
+    both = integrate_events(PENDULUM, [2.0, 0.5], times, None, prepared=kept, **options).x
+    assert len(made) == 1
+    assert made[0].library is not None
+    compiled = integrate_events(PENDULUM, [2.0, 0.5], times, None, prepared=kept, **options).x
+    assert len(made) == 1
+    assert interpreted.tobytes() == both.tobytes() == compiled.tobytes()
+
+
+def test_short_runs_do_not_need_the_compiler(monkeypatch):
+    def compile_now(*_):
+        raise AssertionError("nothing is compiled")
+
+    monkeypatch.setattr(INTEGRATE.IntegrationCode, "compile", compile_now)
+    x = integrate(PENDULUM, [1, 0], [0, 1], p=1)
+    assert x[1, 0] == pytest.approx(0.60008536, abs=1e-7)
 
 
 def test_a_compiler_that_does_not_start_is_an_error(monkeypatch):

@@ -402,6 +402,20 @@ def cached_library(
             ) from error
 
 
+def known_library(files: Mapping[str, str], flags: Sequence[str] = FLAGS) -> Path | None:
+    """Return the library of `cached_library` if it is in the cache already, None if not.
+
+    Args:
+        files: file name to its text.
+        flags: every flag of the compiler.
+
+    Raises:
+        CompilerError: there is no compiler.
+    """
+    compiler, flags = find_compiler(), chosen_flags(flags)
+    return _known(cache_dir(), _key(files, flags, compiler), LIBRARY_SUFFIX)
+
+
 _TOGETHER = "all_of_them.c"
 """In the folder of a build: it includes the files that are compiled as one."""
 

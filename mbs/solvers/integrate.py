@@ -1,10 +1,10 @@
-"""Motions of a generated system, advanced in time by compiled code and kept on its constraints."""
+"""Integration of functions of CasADi by the run-time library."""
 
 import ctypes
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi
@@ -15,7 +15,7 @@ from mbs.core import compiled_evaluation, core_library, interpreted_evaluation
 from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.native import cached_library, compiler_found
 from mbs.native.compiled import calls_machine_code, generated, unwritten
-from mbs.native.compiler import flags_for
+from mbs.native.compiler import flags_for, known_library
 from mbs.native.plain_source import plain_source
 from mbs.solvers.control_c import control_c
 from mbs.solvers.problem import (
@@ -81,56 +81,89 @@ def _in_pieces(functions: Sequence[casadi.Function]) -> str:
     return "\n".join([text, *lines])
 
 
-def _machine_code(equations: Equations) -> ctypes.CDLL | None:
-    """The machine code of the functions of an integration; None if CasADi can only interpret them.
-
-    Raises:
-        CompilerError: the compiler refused the code.
-    """
+def _source(equations: Equations) -> str | None:
+    """The C text of the functions of an integration; None if CasADi can only interpret them."""
     if calls_machine_code(equations.all):
         return None
     source = generated(equations.all)
     if unwritten(source):
         return None
-    if source.count("\n") > _LONG and (pieces := _in_pieces(equations.all)):
-        source = pieces
-    return ctypes.CDLL(str(cached_library({"system.c": source}, flags_for(source))))
+    pieces = _in_pieces(equations.all) if source.count("\n") > _LONG else ""
+    return pieces or source
 
 
-_START, _PER_INSTRUCTION = 0.2, 1e-4
-"""Time of the compiler [s], for a start and for each instruction: that of gcc 12 for 1,000 to
-20,000 instructions, to a factor of two."""
+_WRITING, _COMPILING = (0.01, 5e-6), (0.2, 1e-4)
+"""Times that writing C text and compiling it take [s]: of a start, and of each instruction. They are
+those of gcc 12 for 1,000 to 20,000 instructions, to a factor of two."""
 
 
 @dataclass(slots=True, eq=False)
 class IntegrationCode:
     """Functions of an integration, interpreted until that has cost as much as the compiler.
 
-    Both ways give the same bits. The time is therefore at most twice that of the faster way.
+    Both ways give the same bits. The time is therefore at most twice that of the faster way. Machine
+    code that is in the cache is used as soon as interpreting has cost as much as writing the text,
+    which is the key in the cache.
 
     Attributes:
         equations: the functions.
         may_compile: False if CasADi interprets them always.
         library: their machine code; None while CasADi interprets them.
         spent: time that interpreted runs have taken [s].
+        source: C text; None until it is written.
+        instructions: number of instructions of all functions.
     """
 
     equations: Equations
     may_compile: bool
     library: ctypes.CDLL | None = None
     spent: float = 0.0
+    source: str | None = None
+    instructions: int = field(init=False)
 
-    def compile(self) -> bool:
-        """Compile the functions, if they can be compiled. Return whether that was done now.
+    def __post_init__(self) -> None:
+        every = (g for f in self.equations.all for g in (f, *f.find_functions()))
+        counted = (g for g in every if g.is_a("SXFunction") or g.is_a("MXFunction"))
+        self.instructions = sum(g.n_instructions() for g in counted)
+
+    def is_worth(self, further: float, cost: tuple[float, float]) -> bool:
+        """Whether interpreted runs have taken as long as some work.
+
+        Args:
+            further: time of the present run [s].
+            cost: time of the work, for a start and for each instruction [s].
+        """
+        return self.spent + further > cost[0] + cost[1] * self.instructions
+
+    def compile(self, further: float = math.inf) -> bool:
+        """Compile the functions, if that is worth its time. Return whether they are compiled.
+
+        Args:
+            further: time of the present run [s].
 
         Raises:
             CompilerError: the compiler refused the code.
         """
         if self.library is not None or not self.may_compile:
-            return False
-        self.library = _machine_code(self.equations)
-        self.may_compile = self.library is not None
-        return self.may_compile
+            return self.library is not None
+        if self.source is None:
+            if not self.is_worth(further, _WRITING):
+                return False
+            self.source = _source(self.equations)
+            self.may_compile = self.source is not None
+            if self.source is None:
+                return False
+            known = known_library(*self._build(self.source))
+        else:
+            known = None
+        if known is None and self.is_worth(further, _COMPILING):
+            known = cached_library(*self._build(self.source))
+        self.library = None if known is None else ctypes.CDLL(str(known))
+        return known is not None
+
+    @staticmethod
+    def _build(source: str) -> tuple[dict[str, str], tuple[str, ...]]:
+        return {"system.c": source}, flags_for(source)
 
     def evaluations(self) -> tuple[Any, ...]:
         """Evaluations in the order of `driver_model` in driver.h; None for a missing function."""
@@ -149,17 +182,6 @@ class IntegrationCode:
             return compiled_evaluation(function, library)
 
         return tuple(map(evaluation, (own.rhs, own.project, own.jacobian, *changes, *last)))
-
-    def is_due(self, further: float) -> bool:
-        """Whether interpreted runs have taken as long as the compiler.
-
-        Args:
-            further: time of the present run [s].
-        """
-        if self.library is not None or not self.may_compile:
-            return False
-        instructions = sum(f.n_instructions() for f in self.equations.all)
-        return self.spent + further > _START + _PER_INSTRUCTION * instructions
 
 
 # Evaluations of the functions of an integration, and its run by the run-time library.
@@ -241,11 +263,13 @@ def run_problem(
                 slope = np.empty(len(x))
                 first = slope if run.leaves(x, slope) else None
             while status <= _MORE and run.done < len(times):
-                status = run.fill(x, times, table, _FEW if code.library is None else _CHUNK)
+                status = run.fill(x, times, table, _FEW if interpreted else _CHUNK)
                 if status == _FIRED:
                     log.append(_event(run, given))
-                if code.is_due(time.perf_counter() - begin) and code.compile():
+                if interpreted and code.compile(time.perf_counter() - begin):
                     run.replace(core_library(), code.evaluations())
+                    code.spent += time.perf_counter() - begin
+                    interpreted = False
                 if progress is not None:
                     progress(run.time)
                 check()

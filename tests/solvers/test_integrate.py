@@ -10,6 +10,7 @@ from support.counted import counted
 from mbs.errors import CompilerError, ModelError, SolverError
 from mbs.native import compiler_found
 from mbs.solvers import integrate, integrate_events
+from mbs.solvers.problem import equations
 
 INTEGRATE = importlib.import_module("mbs.solvers.integrate")
 T, X, P = ca.SX.sym("t"), ca.SX.sym("x", 2), ca.SX.sym("p")
@@ -187,27 +188,46 @@ def test_functions_that_are_compiled_during_a_run_give_the_same_bits(method, mon
     options = {"p": 9.81, "method": method}
     times = np.linspace(0, 20, 301)
     kept, made = {}, []
-    compiler = INTEGRATE.IntegrationCode.compile
-    monkeypatch.setattr(
-        INTEGRATE.IntegrationCode, "compile", lambda self: made.append(self) or compiler(self)
-    )
+    source = INTEGRATE._source
+    monkeypatch.setattr(INTEGRATE, "_source", lambda made_of: made.append(1) or source(made_of))
     interpreted = integrate(PENDULUM, [2.0, 0.5], times, compiled=False, **options)
     assert not made
-    monkeypatch.setattr(INTEGRATE, "_START", 0.0)
-    monkeypatch.setattr(INTEGRATE, "_PER_INSTRUCTION", 0.0)
+    monkeypatch.setattr(INTEGRATE, "_WRITING", (0.0, 0.0))
+    monkeypatch.setattr(INTEGRATE, "_COMPILING", (0.0, 0.0))
     both = integrate_events(PENDULUM, [2.0, 0.5], times, None, prepared=kept, **options).x
     assert len(made) == 1
-    assert made[0].library is not None
+    assert all(code.library is not None for code in kept.values())
     compiled = integrate_events(PENDULUM, [2.0, 0.5], times, None, prepared=kept, **options).x
     assert len(made) == 1
     assert interpreted.tobytes() == both.tobytes() == compiled.tobytes()
 
 
-def test_short_runs_do_not_need_the_compiler(monkeypatch):
-    def compile_now(*_):
-        raise AssertionError("nothing is compiled")
+@pytest.mark.skipif(not compiler_found(), reason="there is no C compiler")
+def test_code_is_written_then_looked_up_then_compiled(monkeypatch, tmp_path):
+    monkeypatch.setenv("MBS_CACHE_DIR", str(tmp_path))
+    made = equations(PENDULUM, None, "dopri5", None)
 
-    monkeypatch.setattr(INTEGRATE.IntegrationCode, "compile", compile_now)
+    def code():
+        return INTEGRATE.IntegrationCode(made, may_compile=True)
+
+    first = code()
+    assert first.instructions >= PENDULUM.n_instructions()
+    times = [a + b * first.instructions for a, b in (INTEGRATE._WRITING, INTEGRATE._COMPILING)]
+    assert not first.compile(0.9 * times[0])
+    assert first.source is None
+    assert not first.compile(1.1 * times[0])
+    assert first.source is not None
+    assert not first.compile(0.9 * times[1])
+    assert first.compile(1.1 * times[1])
+    other = code()
+    assert other.compile(1.1 * times[0])  # from the cache
+
+
+def test_short_runs_do_not_need_the_compiler(monkeypatch):
+    def write(*_):
+        raise AssertionError("no C text is written")
+
+    monkeypatch.setattr(INTEGRATE, "_source", write)
     x = integrate(PENDULUM, [1, 0], [0, 1], p=1)
     assert x[1, 0] == pytest.approx(0.60008536, abs=1e-7)
 

@@ -93,7 +93,7 @@ def _source(equations: Equations) -> str | None:
 
 
 _WRITING, _COMPILING = (0.01, 5e-6), (0.2, 1e-4)
-"""Times that writing C text and compiling it take [s]: of a start, and of each instruction. They are
+"""Times of writing C text and of compiling it [s]: for a start, and for each instruction. They are
 those of gcc 12 for 1,000 to 20,000 instructions, to a factor of two."""
 
 

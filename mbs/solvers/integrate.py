@@ -101,9 +101,9 @@ those of gcc 12 for 1,000 to 20,000 instructions, to a factor of two."""
 class IntegrationCode:
     """Functions of an integration, interpreted until that has cost as much as the compiler.
 
-    Both ways give the same bits. The time is therefore at most twice that of the faster way. Machine
-    code that is in the cache is used as soon as interpreting has cost as much as writing the text,
-    which is the key in the cache.
+    Both ways give the same bits. The time is therefore at most twice that of the faster way.
+    Machine code that is in the cache is used as soon as interpreting has cost as much as writing
+    the text, which is the key in the cache.
 
     Attributes:
         equations: the functions.

@@ -24,6 +24,7 @@ from mbs.assembly.parameter_bounds import BoundedField, Bounds
 from mbs.assembly.parts import AttachedPart, Quantity
 from mbs.assembly.tables import (
     AttachedSensor,
+    Balance,
     BodyRow,
     Closure,
     Coordinate,
@@ -194,9 +195,11 @@ def _loops(system: System) -> list[str]:
                 f" {_count(len(loop.rows), 'row')} {'is' if kept == 1 else 'are'} independent."
             )
             continue
-        if loop.closing == "balance":
+        if loop.closing in ("balance", "damped balance"):
+            what = "the velocities of " if loop.closing == "damped balance" else ""
             lines.append(
-                f"The balance of forces gives {listed(loop.joints)}, which move no mass: {kept} of"
+                f"The balance of forces gives {what}{listed(loop.joints)}, which move no mass:"
+                f" {kept} of"
                 f" {_count(len(loop.rows), 'row')} {'is' if kept == 1 else 'are'} independent."
             )
             continue
@@ -325,8 +328,9 @@ class System:
         numbered: the body of each frame of the table that it was made from, by the number there;
             empty where these are the numbers of the links.
         shapes: what the links and the base look like.
-        balanced: coordinates that move no mass and that the balance of forces determines: index in
-            q, index in v, and a typical stiffness [N/m or N m/rad].
+        nodes: coordinates that move no mass and that the balance of forces determines: index in q
+            and index in v.
+        balances: of the forces on them, those of positions first.
     """
 
     name: str
@@ -356,7 +360,8 @@ class System:
     described: tuple[Component, ...] = ()
     numbered: Mapping[int, str] = field(default_factory=dict)
     shapes: tuple[ShapeRow, ...] = ()
-    balanced: tuple[tuple[int, int, float], ...] = ()
+    nodes: tuple[tuple[int, int], ...] = ()
+    balances: tuple[Balance, ...] = ()
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:

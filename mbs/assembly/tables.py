@@ -177,6 +177,22 @@ class LoopRow:
 
 
 @dataclass(frozen=True, slots=True)
+class Balance:
+    """A balance of the forces on massless nodes.
+
+    Attributes:
+        weights: index in v of each node, and the weight of the force on it.
+        size: what the force is divided by: a typical stiffness [N/m or N m/rad], or damping
+            [N s/m or N m s/rad].
+        is_damped: whether dampers act, so that it determines a velocity.
+    """
+
+    weights: tuple[tuple[int, float], ...]
+    size: float
+    is_damped: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Closure:
     """How the loops of a system constrain its velocities.
 

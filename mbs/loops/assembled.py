@@ -138,7 +138,7 @@ def _unknowns(system: System) -> set[int]:
         f"{part.name}.{name}" for part in system.parts for name in part.element.names_of("unknown")
     }
     found = {k for k, coordinate in enumerate(system.coordinates) if coordinate.name in names}
-    return found | {position for position, _, _ in system.balanced}
+    return found | {position for position, _ in system.nodes}
 
 
 def _stages(

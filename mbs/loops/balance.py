@@ -1,21 +1,26 @@
-"""Massless nodes between springs: their positions follow from the balance of forces.
+"""Massless nodes between springs and dampers: their motion follows from the balance of forces.
 
 The equation of motion of a coordinate that moves no inertia is the balance of the forces on it. If
 these depend on positions alone, the balance is a row of the loops: the analysis makes the position
 dependent, and no force acts through the row, since the row is zero where the forces balance.
+
+Where dampers act, the balance D v + f(q) = 0 is a row on velocities, with a constant part: the
+position is a state, and its velocity follows. Dampers between nodes leave sums of the forces without
+velocities; these are rows of positions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import casadi
 import numpy as np
 from casadi import SX, Function
+from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.tables import LoopRow
+from mbs.assembly.tables import Balance, LoopRow
 from mbs.assembly.tree import Link
 from mbs.components import Mechanism
 from mbs.components.custom import Row
@@ -26,13 +31,18 @@ from mbs.recursions.newton_euler import joint_efforts, newton_euler
 from mbs.recursions.parts import PartsAt
 from mbs.recursions.poses import link_poses
 from mbs.recursions.velocities import resting_base
-from mbs.solvers.rank import rank
+from mbs.solvers.rank import independent_rows, rank
 
 GROUP = "balance of forces"
-"""Name of the rows of massless nodes."""
+"""Name of the rows of positions of massless nodes."""
+DAMPED = "balance of forces with dampers"
+"""Name of their rows of velocities."""
 _SEED, _REACH = 20261128, 0.3
 """Random configurations at which the stiffness of nodes is examined, and their distance from the
 assembled one [rad or m]: springs are stretched there, also those that are relaxed as assembled."""
+_DIGITS = 9
+"""Decimals of the weights of forces in sums: rounding leaves 1e-15 of them, and weights are ratios
+of levers."""
 
 
 def with_balance(system: System, mechanism: Mechanism) -> System:
@@ -46,20 +56,27 @@ def with_balance(system: System, mechanism: Mechanism) -> System:
     if not any(part.element.acts for part in parts) and all(k.stiffness.is_zero() for k in links):
         return system
     driven = {joint.name for joint in mechanism.joints() if joint.actuated}
-    nodes = [j for j in _massless_links(system) if _joint(system, j) not in driven]
-    velocities = tuple(links[j].v.start for j in nodes)
-    stiffness = _stiffness(system, velocities) if velocities else None
-    if stiffness is None:
+    found = [j for j in _massless_links(system) if _joint(system, j) not in driven]
+    nodes = tuple((links[j].q.start, links[j].v.start) for j in found)
+    balances = _balances(system, nodes) if nodes else None
+    if balances is None:
         return system
-    positions = tuple(links[j].q.start for j in nodes)
-    names = tuple(system.coordinates[k].name for k in positions)
+    names = [system.coordinates[k].name for k, _ in nodes]
     first = len(system.cuts) + len(system.couplings)
     first += sum(part.element.has("rows") for part in parts)
-    row = LoopRow(GROUP, "balance", names, ())
+    loops = list(system.loops)
+    for is_damped, where in ((False, first), (True, len(loops) + 1)):
+        own = [b for b in balances if b.is_damped is is_damped]
+        held = {velocity for b in own for velocity, _ in b.weights}
+        if own:
+            bound = tuple(n for n, (_, k) in zip(names, nodes, strict=True) if k in held)
+            kind = (DAMPED, "damped balance") if is_damped else (GROUP, "balance")
+            loops.insert(where, LoopRow(*kind, bound, ()))
     return replace(
         system,
-        balanced=tuple(zip(positions, velocities, stiffness, strict=True)),
-        loops=(*system.loops[:first], row, *system.loops[first:]),
+        nodes=nodes,
+        balances=balances,
+        loops=tuple(loops),
         coordinates=tuple(
             replace(c, actuated=False) if c.name in names else c for c in system.coordinates
         ),
@@ -69,21 +86,43 @@ def with_balance(system: System, mechanism: Mechanism) -> System:
 
 
 def balance_rows(system: System, q: SX) -> list[tuple[str, list[tuple[str, Row]]]]:
-    """Return the rows of the massless nodes: forces divided by typical stiffnesses.
+    """Return the rows of positions of the massless nodes: forces divided by typical stiffnesses.
 
     Args:
         system: with or without such nodes.
         q: (nq, 1) symbols of positions.
     """
-    if not system.balanced:
+    return _rows(system, q, SX.zeros(system.nv), is_damped=False)
+
+
+def velocity_balance_rows(system: System, q: SX, v: SX) -> list[tuple[str, list[tuple[str, Row]]]]:
+    """Return the rows of velocities of the massless nodes: forces divided by typical dampings.
+
+    They are linear in v, with a constant part.
+
+    Args:
+        system: with or without such nodes.
+        q: (nq, 1) symbols of positions.
+        v: (nv, 1) velocities.
+    """
+    return _rows(system, q, v, is_damped=True)
+
+
+def _rows(
+    system: System, q: SX, v: SX, *, is_damped: bool
+) -> list[tuple[str, list[tuple[str, Row]]]]:
+    """Balances of one kind with their names."""
+    own = [balance for balance in system.balances if balance.is_damped is is_damped]
+    if not own:
         return []
-    efforts = _static_efforts(system, q, SX.zeros(system.nv))
+    efforts = _static_efforts(system, q, v)
     rows = []
-    for position, velocity, stiffness in system.balanced:
-        coordinate = system.coordinates[position]
-        unit = "m" if coordinate.unit == "m" else "1"
-        rows.append((coordinate.name, Row(efforts[velocity] / stiffness, unit)))
-    return [(GROUP, rows)]
+    for balance in own:
+        last = system.speeds[balance.weights[-1][0]]
+        force = sum((weight * efforts[k] for k, weight in balance.weights), SX(0))
+        unit = "m" if last.unit.startswith("m") else "1"
+        rows.append((last.name, Row(force / balance.size, unit)))
+    return [(DAMPED if is_damped else GROUP, rows)]
 
 
 def require_no_balance(
@@ -101,7 +140,7 @@ def require_no_balance(
         ModelError: a massless node moves one of the links, or along one of the velocities.
     """
     paths = [system.tree.links[j].v.start for link in links for j in system.tree.path(link)]
-    for position, velocity, _ in system.balanced:
+    for position, velocity in system.nodes:
         if velocity in (*paths, *velocities):
             raise ModelError(
                 f"{system.name}: {what} acts on {system.coordinates[position].name}, which moves no"
@@ -142,27 +181,71 @@ def _static_efforts(system: System, q: SX, v: SX) -> SX:
     return weight.efforts + own + element_efforts(PartsAt(system, q, v), poses)
 
 
-def _stiffness(system: System, velocities: tuple[int, ...]) -> tuple[float, ...] | None:
-    """Typical stiffness of each node [N/m or N m/rad]; None if forces do not determine the nodes.
+def _balances(system: System, nodes: Sequence[tuple[int, int]]) -> tuple[Balance, ...] | None:
+    """Balances of the forces on nodes; None if forces do not determine the nodes.
 
-    Forces on a node that depend on velocities, states, inputs or contacts do not.
+    Forces that depend on states, inputs, time or contacts do not, nor those not linear in
+    velocities.
     """
+    positions, velocities = [k for k, _ in nodes], [k for _, k in nodes]
     for part in system.parts:
         levers = [lever for port in part.coordinates.values() for lever in port]
         if part.element.switches and any(lever.velocity in velocities for lever in levers):
             return None
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
-    efforts = _static_efforts(system, q, v)[list(velocities)]
-    known = Function("known", [q, system.p], [efforts], {"allow_free": True})
-    if known.has_free():  # velocities, states, inputs, time
+    efforts = _static_efforts(system, q, v)[velocities]
+    slopes = [casadi.jacobian(efforts, x) for x in (q, v)]
+    slopes[0] = casadi.substitute(slopes[0], v, SX.zeros(system.nv))
+    resting = casadi.substitute(efforts, v, SX.zeros(system.nv))
+    found = Function("slopes", [q, system.p], [*slopes, resting], {"allow_free": True})
+    if found.has_free():  # states, inputs, time, or velocities with a law that is not linear
         return None
-    positions = [link.q.start for link in system.tree.links if link.v.start in velocities]
-    slopes = Function("slopes", [q, system.p], [casadi.jacobian(efforts, q)[:, positions]])
     rng = np.random.default_rng(_SEED)
     at = np.array(system.configuration) + rng.uniform(-_REACH, _REACH, (8, system.nq))
-    every = [np.array(slopes(one, system.p_default)) for one in at]
-    every = [K for K in every if np.isfinite(K).all()]
-    typical = np.median([np.abs(np.diag(K)) for K in every], axis=0) if every else np.zeros(1)
-    if not typical.all() or any(rank(K / typical) < len(K) for K in every):
+    pairs = [[np.array(M) for M in found(one, system.p_default)[:2]] for one in at]
+    pairs = [pair for pair in pairs if all(np.isfinite(M).all() for M in pair)]
+    if not pairs:
         return None
-    return tuple(map(float, typical))
+    K, dampings = [pair[0][:, positions] for pair in pairs], [pair[1] for pair in pairs]
+    D = [M[:, velocities] for M in dampings]
+    size = _typical(D)
+    sizes = np.where(size > 0, size, 1.0)
+    every = np.hstack([M / sizes[:, None] for M in dampings])
+    count = rank(every) if every.any() else 0
+    damped = independent_rows([M / sizes[:, None] for M in D], count) if count else []
+    if any(rank(M[damped] / sizes[damped, None]) < count for M in D if count):
+        return None
+    others = [k for k in range(len(nodes)) if k not in damped]
+    # sums of forces without velocities: the dampings of the others are these parts of the damped
+    parts = every[others] @ np.linalg.pinv(every[damped]) if count else np.zeros((len(others), 0))
+    parts = np.round(parts * sizes[others, None] / sizes[damped], _DIGITS)
+    N = np.zeros((len(others), len(nodes)))
+    N[:, damped], N[range(len(others)), others] = -parts, 1.0
+    stiffness = _typical([M @ N.T for M in [N @ M for M in K]])
+    if not stiffness.all():
+        return None
+    whole = [
+        np.vstack([M[damped] / sizes[damped, None], N @ k / stiffness[:, None]])
+        for M, k in zip(D, K, strict=True)
+    ]
+    if any(rank(M) < len(nodes) for M in whole):
+        return None
+    free = [
+        Balance(_weights(velocities, row), float(one), False)
+        for row, one in zip(N, stiffness, strict=True)
+    ]
+    held = [Balance(((velocities[k], 1.0),), float(sizes[k]), True) for k in damped]
+    return (*free, *held)
+
+
+def _typical(matrices: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """(n,) typical sizes of the diagonal of (n, n) matrices."""
+    found: NDArray[np.float64] = np.median([np.abs(np.diag(M)) for M in matrices], axis=0)
+    return found
+
+
+def _weights(velocities: Sequence[int], row: NDArray[np.float64]) -> tuple[tuple[int, float], ...]:
+    """The weights that are not zero; the last one is that of the node that the row is named by."""
+    last = int(np.flatnonzero(row == 1.0)[-1])
+    order = [*(k for k in np.flatnonzero(row) if k != last), last]
+    return tuple((velocities[k], float(row[k])) for k in order)

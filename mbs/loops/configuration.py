@@ -24,7 +24,7 @@ from mbs.loops.closing import (
 )
 from mbs.loops.function import configuration_on, fixed_positions, independent_names
 from mbs.loops.nearest import GuessTarget, nearest_configuration
-from mbs.loops.velocity import closure_jacobian
+from mbs.loops.velocity import closure_jacobian, constraint_drift_at
 from mbs.result import Result, State, positions_of, state_of, velocities_of
 from mbs.solvers.least_squares import smallest_solution
 from mbs.solvers.rank import RELATIVE_GAP, null_space
@@ -340,12 +340,15 @@ def start_velocity(
         return np.array(system.velocity(v0))
     p = [system.parameter_values(parameters)] if system.parameters else []
     J = np.array(closure_jacobian(system)(q, *p))
+    own = node_velocities(system, J, q, system.parameter_values(parameters))
     if isinstance(v0, Mapping) and v0:
         at_rest = dict.fromkeys(_spring_speeds(system), 0.0)
-        v, missed = smallest_velocity(system, J, {**at_rest, **v0}) if at_rest else (J, "none")
+        v, missed = (J, "none")
+        if at_rest:
+            v, missed = smallest_velocity(system, J, {**at_rest, **v0}, own)
         if not missed:
             return v
-    v, missed = smallest_velocity(system, J, v0)
+    v, missed = smallest_velocity(system, J, v0, own)
     if missed:
         names = ", ".join(system.speeds[k].name for k in system.active)
         remedy = f"give those of independent joints: {names}" if names else "leave them out"
@@ -360,22 +363,47 @@ def _spring_speeds(system: System) -> list[str]:
     return [
         system.speeds[link.v.start].name
         for link in system.tree.links
-        if link.v.stop - link.v.start == 1 and not link.stiffness.is_zero()
+        if link.v.stop - link.v.start == 1
+        and not link.stiffness.is_zero()
+        and link.v.start not in {velocity for _, velocity in system.nodes}
     ]
 
 
-def smallest_velocity(system: System, J: Vector, v0: Values) -> tuple[Vector, str]:
+def node_velocities(system: System, J: Vector, q: Vector, p: Vector) -> Vector | None:
+    """(nv,) velocities of massless nodes that dampers hold while all else rests; None without any.
+
+    Args:
+        system: any.
+        J: (m, nv) every row.
+        q: (nq,) positions.
+        p: (np,) parameters.
+    """
+    drift = constraint_drift_at(system)
+    if drift is None:
+        return None
+    v, nodes = np.zeros(system.nv), [velocity for _, velocity in system.nodes]
+    v[nodes] = np.linalg.lstsq(J[:, nodes], -np.array(drift(q, p)).ravel(), rcond=None)[0]
+    return v
+
+
+def smallest_velocity(
+    system: System, J: Vector, v0: Values, own: Vector | None = None
+) -> tuple[Vector, str]:
     """The smallest velocities with J v = 0 that give the joints named in v0 theirs.
 
     Args:
         system: any.
         J: (m, nv) rows, dependent ones included.
         v0: velocities by name [rad/s or m/s], or all of them.
+        own: (nv,) velocities to which these are added, of which v0 has the sum.
 
     Returns:
         v (nv,); the velocities of v0 as text where no v has them, else an empty one.
     """
     target = np.array(system.velocity(v0))
+    if own is not None:
+        v, missed = smallest_velocity(system, J, _less(system, v0, own))
+        return v + own, missed
     names = [speed.name for speed in system.speeds]
     named = v0 is None or isinstance(v0, Mapping)
     rows = [k for k, name in enumerate(names) if not named or name in (v0 or {})]
@@ -389,6 +417,16 @@ def smallest_velocity(system: System, J: Vector, v0: Values) -> tuple[Vector, st
     if _fit(near[rows], target[rows]):
         return v, ""
     return near, ", ".join(f"{names[k]} = {target[k]:g}" for k in rows)
+
+
+def _less(system: System, v0: Values, own: Vector) -> Values:
+    """Return velocities as they are given, less others (nv,)."""
+    less = np.array(system.velocity(v0)) - own
+    if v0 is None:
+        return None
+    if not isinstance(v0, Mapping):
+        return less
+    return {s.name: float(x) for s, x in zip(system.speeds, less, strict=True) if s.name in v0}
 
 
 def _fit(v: Vector, target: Vector) -> bool:

@@ -248,7 +248,7 @@ class GuessTarget:
         moves = np.abs(moves) / distance_units((row.unit for row in rows), closing.size)
         count = range(len(rows)) if own is None else own
         guessed = sorted(set(self.guessed) & set(count))
-        nodes = [k for k, _, _ in self.system.balanced if k in count]
+        nodes = [k for k, _ in self.system.nodes if k in count]
         return _largest(moves[guessed]), _largest(moves[list(count)]), _largest(moves[nodes])
 
 

@@ -178,16 +178,16 @@ class LoopRow:
 
 @dataclass(frozen=True, slots=True)
 class Balance:
-    """A balance of the forces on massless nodes.
+    """The balance of the forces on a massless node.
 
     Attributes:
-        weights: index in v of each node, and the weight of the force on it.
+        velocity: index in v of the node.
         size: what the force is divided by: a typical stiffness [N/m or N m/rad], or damping
             [N s/m or N m s/rad].
         is_damped: whether dampers act, so that it determines a velocity.
     """
 
-    weights: tuple[tuple[int, float], ...]
+    velocity: int
     size: float
     is_damped: bool
 

@@ -4,8 +4,8 @@ The equation of motion of a coordinate that moves no inertia is the balance of t
 these depend on positions alone, the balance is a row of the loops: the analysis makes the position
 dependent, and no force acts through the row, since the row is zero where the forces balance.
 
-Where dampers act, the balance D v + f(q) = 0 is a row on velocities, with a constant part: the
-position is a state, and its velocity follows. Dampers between nodes leave sums of the forces without
+Where dampers act, the balance D v + f(q) = 0 is a row on velocities with a constant part: the
+position is a state, and its velocity follows. Dampers between nodes leave sums of forces without
 velocities; these are rows of positions.
 """
 
@@ -31,6 +31,7 @@ from mbs.recursions.newton_euler import joint_efforts, newton_euler
 from mbs.recursions.parts import PartsAt
 from mbs.recursions.poses import link_poses
 from mbs.recursions.velocities import resting_base
+from mbs.solvers.block_triangular import solve_large
 from mbs.solvers.rank import independent_rows, rank
 
 GROUP = "balance of forces"
@@ -40,9 +41,6 @@ DAMPED = "balance of forces with dampers"
 _SEED, _REACH = 20261128, 0.3
 """Random configurations at which the stiffness of nodes is examined, and their distance from the
 assembled one [rad or m]: springs are stretched there, also those that are relaxed as assembled."""
-_DIGITS = 9
-"""Decimals of the weights of forces in sums: rounding leaves 1e-15 of them, and weights are ratios
-of levers."""
 
 
 def with_balance(system: System, mechanism: Mechanism) -> System:
@@ -67,9 +65,8 @@ def with_balance(system: System, mechanism: Mechanism) -> System:
     loops = list(system.loops)
     for is_damped, where in ((False, first), (True, len(loops) + 1)):
         own = [b for b in balances if b.is_damped is is_damped]
-        held = {velocity for b in own for velocity, _ in b.weights}
         if own:
-            bound = tuple(n for n, (_, k) in zip(names, nodes, strict=True) if k in held)
+            bound = tuple(system.speeds[balance.velocity].name for balance in own)
             kind = (DAMPED, "damped balance") if is_damped else (GROUP, "balance")
             loops.insert(where, LoopRow(*kind, bound, ()))
     return replace(
@@ -115,13 +112,20 @@ def _rows(
     own = [balance for balance in system.balances if balance.is_damped is is_damped]
     if not own:
         return []
-    efforts = _static_efforts(system, q, v)
+    numbers = [balance.velocity for balance in own]
+    if is_damped:
+        efforts = _static_efforts(system, q, v)[numbers]
+    else:
+        every, speed = [balance.velocity for balance in system.balances], SX.sym("v", system.nv)
+        moving = _static_efforts(system, q, speed)[every]
+        still, D = casadi.substitute(moving, speed, v), casadi.jacobian(moving, speed)[:, every]
+        n = len(every)
+        efforts = _without_velocities(still, D, range(len(own), n), range(len(own)))
     rows = []
-    for balance in own:
-        last = system.speeds[balance.weights[-1][0]]
-        force = sum((weight * efforts[k] for k, weight in balance.weights), SX(0))
-        unit = "m" if last.unit.startswith("m") else "1"
-        rows.append((last.name, Row(force / balance.size, unit)))
+    for k, balance in enumerate(own):
+        node = system.speeds[balance.velocity]
+        unit = "m" if node.unit.startswith("m") else "1"
+        rows.append((node.name, Row(efforts[k] / balance.size, unit)))
     return [(DAMPED if is_damped else GROUP, rows)]
 
 
@@ -194,58 +198,61 @@ def _balances(system: System, nodes: Sequence[tuple[int, int]]) -> tuple[Balance
             return None
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     efforts = _static_efforts(system, q, v)[velocities]
-    slopes = [casadi.jacobian(efforts, x) for x in (q, v)]
-    slopes[0] = casadi.substitute(slopes[0], v, SX.zeros(system.nv))
-    resting = casadi.substitute(efforts, v, SX.zeros(system.nv))
-    found = Function("slopes", [q, system.p], [*slopes, resting], {"allow_free": True})
-    if found.has_free():  # states, inputs, time, or velocities with a law that is not linear
+    still, damping = casadi.substitute(efforts, v, 0 * v), casadi.jacobian(efforts, v)
+    known = Function("known", [q, system.p], [still, damping], {"allow_free": True})
+    if known.has_free():  # states, inputs, time, or velocities with a law that is not linear
         return None
-    rng = np.random.default_rng(_SEED)
-    at = np.array(system.configuration) + rng.uniform(-_REACH, _REACH, (8, system.nq))
-    pairs = [[np.array(M) for M in found(one, system.p_default)[:2]] for one in at]
-    pairs = [pair for pair in pairs if all(np.isfinite(M).all() for M in pair)]
-    if not pairs:
-        return None
-    K, dampings = [pair[0][:, positions] for pair in pairs], [pair[1] for pair in pairs]
-    D = [M[:, velocities] for M in dampings]
-    size = _typical(D)
-    sizes = np.where(size > 0, size, 1.0)
-    every = np.hstack([M / sizes[:, None] for M in dampings])
-    count = rank(every) if every.any() else 0
-    damped = independent_rows([M / sizes[:, None] for M in D], count) if count else []
-    if any(rank(M[damped] / sizes[damped, None]) < count for M in D if count):
+    every = _samples(system, q, damping)
+    sizes = _typical([M[:, velocities] for M in every])
+    sizes[sizes == 0] = 1.0
+    whole = [M / sizes[:, None] for M in every]
+    count = max((rank(M) if M.any() else 0 for M in whole), default=0)
+    damped = independent_rows([M[:, velocities] for M in every], count)  # the strongest first
+    D = [M[:, velocities] for M in whole]
+    if any(rank(M[np.ix_(damped, damped)]) < count for M in D if count):
         return None
     others = [k for k in range(len(nodes)) if k not in damped]
-    # sums of forces without velocities: the dampings of the others are these parts of the damped
-    parts = every[others] @ np.linalg.pinv(every[damped]) if count else np.zeros((len(others), 0))
-    parts = np.round(parts * sizes[others, None] / sizes[damped], _DIGITS)
-    N = np.zeros((len(others), len(nodes)))
-    N[:, damped], N[range(len(others)), others] = -parts, 1.0
-    stiffness = _typical([M @ N.T for M in [N @ M for M in K]])
-    if not stiffness.all():
+    left = _without_velocities(still, damping[:, velocities], damped, others)
+    slopes = casadi.jacobian(left, q)[:, positions]
+    K = _samples(system, q, slopes)
+    stiffness = _typical([M[:, others] for M in K])
+    if len(K) < len(D) or not D or not stiffness.all():
         return None
-    whole = [
-        np.vstack([M[damped] / sizes[damped, None], N @ k / stiffness[:, None]])
-        for M, k in zip(D, K, strict=True)
-    ]
+    whole = [np.vstack([M[damped], k / stiffness[:, None]]) for M, k in zip(D, K, strict=True)]
     if any(rank(M) < len(nodes) for M in whole):
         return None
-    free = [
-        Balance(_weights(velocities, row), float(one), False)
-        for row, one in zip(N, stiffness, strict=True)
-    ]
-    held = [Balance(((velocities[k], 1.0),), float(sizes[k]), True) for k in damped]
-    return (*free, *held)
+    free = [Balance(velocities[k], float(x), False) for k, x in zip(others, stiffness, strict=True)]
+    return (*free, *(Balance(velocities[k], float(sizes[k]), True) for k in damped))
+
+
+def _without_velocities(efforts: SX, D: SX, damped: Sequence[int], others: Sequence[int]) -> SX:
+    """Sums of efforts on which no velocity acts, one for each of the others.
+
+    Args:
+        efforts: (n, 1) at rest.
+        D: (n, n) their slopes for velocities, of the rank of its damped rows.
+        damped: numbers of rows.
+        others: numbers of all other rows.
+    """
+    left = efforts[list(others)]
+    if damped and others and not D[list(others), list(damped)].is_zero():
+        share = solve_large(D[list(damped), list(damped)], efforts[list(damped)])
+        left -= casadi.mtimes(D[list(others), list(damped)], share)
+    return left
+
+
+def _samples(system: System, q: SX, matrix: SX) -> list[NDArray[np.float64]]:
+    """Values of a matrix at random configurations, as far as they are finite."""
+    function = Function("matrix", [q, system.p], [casadi.densify(matrix)])
+    rng = np.random.default_rng(_SEED)
+    at = np.array(system.configuration) + rng.uniform(-_REACH, _REACH, (8, system.nq))
+    found = [np.array(function(one, system.p_default)) for one in at]
+    return [M for M in found if np.isfinite(M).all()]
 
 
 def _typical(matrices: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """(n,) typical sizes of the diagonal of (n, n) matrices."""
+    """(n,) typical sizes of the diagonal of (n, n) matrices; zeros without any matrix."""
+    if not matrices:
+        return np.zeros(1)
     found: NDArray[np.float64] = np.median([np.abs(np.diag(M)) for M in matrices], axis=0)
     return found
-
-
-def _weights(velocities: Sequence[int], row: NDArray[np.float64]) -> tuple[tuple[int, float], ...]:
-    """The weights that are not zero; the last one is that of the node that the row is named by."""
-    last = int(np.flatnonzero(row == 1.0)[-1])
-    order = [*(k for k in np.flatnonzero(row) if k != last), last]
-    return tuple((velocities[k], float(row[k])) for k in order)

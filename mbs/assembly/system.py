@@ -462,6 +462,11 @@ class System:
         return self.closure.free if self.closure else tuple(range(self.nv))
 
     @property
+    def node_frictions(self) -> frozenset[str]:
+        """Names of the components whose dry friction acts on massless nodes."""
+        return frozenset(name for balance in self.balances for name in balance.frictions)
+
+    @property
     def motors(self) -> tuple[int, ...]:
         """Numbers of the velocities whose efforts direct and inverse dynamics have.
 

@@ -185,11 +185,13 @@ class Balance:
         size: what the force is divided by: a typical stiffness [N/m or N m/rad], or damping
             [N s/m or N m s/rad].
         is_damped: whether dampers act, so that it determines a velocity.
+        frictions: names of the components whose dry friction acts on the node.
     """
 
     velocity: int
     size: float
     is_damped: bool
+    frictions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

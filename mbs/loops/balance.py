@@ -6,7 +6,8 @@ dependent, and no force acts through the row, since the row is zero where the fo
 
 Where dampers act, the balance D v + f(q) = 0 is a row on velocities with a constant part: the
 position is a state, and its velocity follows. Dampers between nodes leave sums of forces without
-velocities; these are rows of positions.
+velocities; these are rows of positions. Dry friction that acts with a damper on one node holds it
+until the other forces are larger: D v = f - limit sign(f), or v = 0.
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
+from mbs.assembly.parts import AttachedPart
 from mbs.assembly.tables import Balance, LoopRow
 from mbs.assembly.tree import Link
 from mbs.components import Mechanism
-from mbs.components.custom import Row
+from mbs.components.custom import Friction, OneWay, Row, Stop
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
 from mbs.recursions.force_elements import element_efforts
@@ -33,11 +35,14 @@ from mbs.recursions.poses import link_poses
 from mbs.recursions.velocities import resting_base
 from mbs.solvers.block_triangular import solve_large
 from mbs.solvers.rank import independent_rows, rank
+from mbs.text import listed
 
 GROUP = "balance of forces"
 """Name of the rows of positions of massless nodes."""
 DAMPED = "balance of forces with dampers"
 """Name of their rows of velocities."""
+_DEPTH = 20
+"""Operations deep in which expressions are compared: laws of friction have few of them."""
 _SEED, _REACH = 20261128, 0.3
 """Random configurations at which the stiffness of nodes is examined, and their distance from the
 assembled one [rad or m]: springs are stretched there, also those that are relaxed as assembled."""
@@ -115,6 +120,12 @@ def _rows(
     numbers = [balance.velocity for balance in own]
     if is_damped:
         efforts = _static_efforts(system, q, v)[numbers]
+        still = _static_efforts(system, q, 0 * v)[numbers]
+        for k, balance in enumerate(own):
+            if balance.frictions:
+                limit = _limit(system, balance.frictions, q)
+                pushed = casadi.fmax(still[k] - limit, 0) + casadi.fmin(still[k] + limit, 0)
+                efforts[k] += pushed - still[k]
     else:
         every, speed = [balance.velocity for balance in system.balances], SX.sym("v", system.nv)
         moving = _static_efforts(system, q, speed)[every]
@@ -127,6 +138,15 @@ def _rows(
         unit = "m" if node.unit.startswith("m") else "1"
         rows.append((node.name, Row(efforts[k] / balance.size, unit)))
     return [(DAMPED if is_damped else GROUP, rows)]
+
+
+def _limit(system: System, names: Sequence[str], q: SX) -> SX:
+    """(1, 1) the sum of the limits of dry frictions [N or N m]."""
+    at, total = PartsAt(system, q, SX.zeros(system.nv)), SX(0)
+    for part in system.parts:
+        if part.name in names:
+            total += sum((SX(law.limit) for law in part.element.frictions(at.at(part)).values()), 0)
+    return total
 
 
 def require_no_balance(
@@ -152,6 +172,60 @@ def require_no_balance(
             )
 
 
+def obstacles(system: System, velocity: int) -> str:
+    """Return what keeps the balance of forces from giving a coordinate, as the end of a sentence.
+
+    Args:
+        system: in which the coordinate moves no inertia.
+        velocity: its index in v.
+    """
+    link = next(
+        j for j, one in enumerate(system.tree.links) if one.v.start <= velocity < one.v.stop
+    )
+    node, name = system.tree.links[link], system.speeds[velocity].name
+    if link not in _massless_links(system):
+        return ""
+    found = []
+    if not SX(node.Fs).is_zero():
+        found.append(
+            f"the friction Fs of {_joint(system, link)}, which is not linear in velocities"
+        )
+    acts = not node.stiffness.is_zero() or not SX(node.Fv).is_zero()
+    for part in system.parts:
+        levers = [lever.velocity for port in part.coordinates.values() for lever in port]
+        links = {k for one, _ in part.frames if one >= 0 for k in system.tree.path(one)}
+        if velocity in levers or link in links:
+            acts = acts or part.element.acts
+            reason = _obstacle(system, part, velocity)
+            if reason:
+                found.append(f"{type(part.element).__name__} {part.name}, {reason}")
+    if found:
+        return f"; the balance of forces does not give {name} because of {listed(found)}"
+    if not acts:
+        return f"; no spring and no damper acts on {name}"
+    return f"; the springs and dampers on {name} do not determine its motion, or it has a motor"
+
+
+def _obstacle(system: System, part: AttachedPart, velocity: int) -> str:
+    """Why the balance of forces on a node cannot have a component; empty where it can."""
+    q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
+    if part.element.has("stops"):
+        return "which locks and releases"
+    if part.element.has("frictions"):
+        return (
+            "which needs viscous damping of the node alone, such as Fv of its joint, and sticking ="
+            " sliding"
+        )
+    if not part.element.acts:
+        return ""
+    if part.inputs or part.states:
+        return "which has inputs or states"
+    alone = replace(system, parts=(part,), _cache={})
+    effort = element_efforts(PartsAt(alone, q, v), link_poses(system.tree, q))[velocity]
+    is_linear = not casadi.depends_on(casadi.jacobian(effort, v), v)
+    return "" if is_linear else "which is not linear in velocities"
+
+
 def _joint(system: System, link: int) -> str:
     """Name of the joint of a link."""
     name: str = system.coordinates[system.tree.links[link].q.start].joint
@@ -164,17 +238,25 @@ def _massless_links(system: System) -> list[int]:
     bound = {name for loop in system.loops for name in loop.joints}
     found = set(range(len(links)))
     for j in reversed(range(len(links))):
-        link = links[j]
-        in_loop = link.name in bound or _joint(system, j) in bound
-        if j in found and (in_loop or not _is_massless(link)):
-            found -= set(system.tree.path(j))
+        link, path = links[j], system.tree.path(j)
+        if link.name in bound or _joint(system, j) in bound or not _is_plain(link):
+            found -= set(path)
+        elif not link.inertia.parameters.is_zero():
+            # moments of inertia alone do not resist displacements
+            turns = {k for k in path if links[k].motion is Motion.REVOLUTE}
+            found -= set(path) if _has_mass(link) else turns
     return [] if len(found) == len(links) else sorted(found)
 
 
-def _is_massless(link: Link) -> bool:
-    """Whether a link has no inertia by its description, whatever the parameters are."""
-    is_plain = link.motion in (Motion.REVOLUTE, Motion.PRISMATIC) and link.rotor is None
-    return is_plain and link.Ia.is_zero() and link.inertia.parameters.is_zero()
+def _is_plain(link: Link) -> bool:
+    """Whether a link moves along one coordinate without a rotor."""
+    is_one = link.motion in (Motion.REVOLUTE, Motion.PRISMATIC)
+    return is_one and link.rotor is None and link.Ia.is_zero()
+
+
+def _has_mass(link: Link) -> bool:
+    """Whether a link has a mass or a first moment by its description."""
+    return not (link.inertia.m.is_zero() and link.inertia.ms.is_zero())
 
 
 def _static_efforts(system: System, q: SX, v: SX) -> SX:
@@ -192,14 +274,14 @@ def _balances(system: System, nodes: Sequence[tuple[int, int]]) -> tuple[Balance
     velocities.
     """
     positions, velocities = [k for k, _ in nodes], [k for _, k in nodes]
-    for part in system.parts:
-        levers = [lever for port in part.coordinates.values() for lever in port]
-        if part.element.switches and any(lever.velocity in velocities for lever in levers):
-            return None
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
+    frictions = _frictions(system, nodes, q, v)
+    if frictions is None:
+        return None
     efforts = _static_efforts(system, q, v)[velocities]
     still, damping = casadi.substitute(efforts, v, 0 * v), casadi.jacobian(efforts, v)
-    known = Function("known", [q, system.p], [still, damping], {"allow_free": True})
+    limits = [law.limit for laws in frictions.values() for _, law in laws]
+    known = Function("known", [q, system.p], [still, damping, *limits], {"allow_free": True})
     if known.has_free():  # states, inputs, time, or velocities with a law that is not linear
         return None
     every = _samples(system, q, damping)
@@ -210,6 +292,8 @@ def _balances(system: System, nodes: Sequence[tuple[int, int]]) -> tuple[Balance
     damped = independent_rows([M[:, velocities] for M in every], count)  # the strongest first
     D = [M[:, velocities] for M in whole]
     if any(rank(M[np.ix_(damped, damped)]) < count for M in D if count):
+        return None
+    if any(not _is_alone(damping, velocities, k) or k not in damped for k in frictions):
         return None
     others = [k for k in range(len(nodes)) if k not in damped]
     left = _without_velocities(still, damping[:, velocities], damped, others)
@@ -222,7 +306,62 @@ def _balances(system: System, nodes: Sequence[tuple[int, int]]) -> tuple[Balance
     if any(rank(M) < len(nodes) for M in whole):
         return None
     free = [Balance(velocities[k], float(x), False) for k, x in zip(others, stiffness, strict=True)]
-    return (*free, *(Balance(velocities[k], float(sizes[k]), True) for k in damped))
+    names = {k: tuple(name for name, _ in laws) for k, laws in frictions.items()}
+    held = (Balance(velocities[k], float(sizes[k]), True, names.get(k, ())) for k in damped)
+    return (*free, *held)
+
+
+_Frictions = dict[int, list[tuple[str, Friction]]]
+"""For the number of each node with dry friction the components, and their laws."""
+
+
+def _frictions(system: System, nodes: Sequence[tuple[int, int]], q: SX, v: SX) -> _Frictions | None:
+    """Dry frictions on nodes; None if a node has another contact, or one with more than a node."""
+    at, found = PartsAt(system, q, v), _Frictions()
+    own = casadi.vertcat(*(x for k, j in nodes for x in (q[k], v[j])))
+    for part in system.parts:
+        if not part.element.switches:
+            continue
+        seen = at.at(part)
+        laws = [*part.element.stops(seen).values(), *part.element.frictions(seen).values()]
+        touched = [law for law in laws if casadi.depends_on(casadi.vertcat(*_motion(law)), own)]
+        for law in touched:
+            slip = SX(law.slip) if isinstance(law, Friction) else SX(0)
+            number = next((n for n, (_, j) in enumerate(nodes) if _same(slip, v[j])), None)
+            if number is None or len(laws) > 1 or not _sticks_as_it_slides(law):
+                return None
+            found.setdefault(number, []).append((part.name, law))
+    return found
+
+
+def _same(one: SX, other: SX) -> bool:
+    """Whether two expressions are equal by their operations."""
+    return bool(casadi.is_equal(casadi.simplify(one), casadi.simplify(other), _DEPTH))
+
+
+def _motion(law: Friction | Stop | OneWay) -> list[SX]:
+    """What a contact depends on."""
+    if isinstance(law, Stop):
+        return [SX(law.gap)]
+    return [SX(law.slip if isinstance(law, Friction) else law.velocity)]
+
+
+def _sticks_as_it_slides(law: Friction) -> bool:
+    """Whether no more friction acts at rest than while it slides."""
+    return law.sticking is None or _same(SX(law.sticking), SX(law.limit))
+
+
+def _is_alone(damping: SX, velocities: Sequence[int], node: int) -> bool:
+    """Whether the damping of a node depends on no other velocity, nor others on that of the node.
+
+    Args:
+        damping: (n, nv) slopes of the efforts on nodes.
+        velocities: of the nodes.
+        node: number of one.
+    """
+    row, column = SX(damping[node, :]), SX(damping[:, velocities[node]])
+    row[velocities[node]], column[node] = 0, 0
+    return bool(casadi.sparsify(row).nnz() == 0 and casadi.sparsify(column).nnz() == 0)
 
 
 def _without_velocities(efforts: SX, D: SX, damped: Sequence[int], others: Sequence[int]) -> SX:

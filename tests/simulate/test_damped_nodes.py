@@ -12,11 +12,15 @@ from mbs.components import (
     Body,
     Box,
     Cartesian,
+    CoulombFriction,
     Damper,
     FixedTendon,
+    ForceInput,
+    JointFriction,
     PointMass,
     Prismatic,
     Revolute,
+    RigidStop,
     Spring,
     SpringDamperSeries,
 )
@@ -259,3 +263,116 @@ def test_a_push_on_a_damped_node_raises():
     system = element().assemble(guess={"x": 1.0})
     with pytest.raises(mbs.errors.ModelError, match="the motion acts on n, which moves no mass"):
         mbs.simulate.run(system, 0.1, motion={"n.q": 0.1})
+
+
+# Dry friction with a damper: D v = f - limit sign(f), or v = 0 while |f| is below the limit.
+
+
+def braked(*elements, friction=5.0, viscous=8.0, node=0.0, **joint):
+    """A mass between two springs, one of which ends at a node with friction."""
+    m = mbs.Mechanism("braked")
+    body, knot = m.add(PointMass("body", mass=MASS)), m.add(PointMass("knot", mass=node))
+    m.connect(m.world, Prismatic("x", axis="x"), body)
+    m.connect(m.world, Prismatic("n", axis="x", Fv=viscous, **joint), knot)
+    m.add(Spring("s", knot.at(), body.at(), stiffness=K, length=1.0))
+    m.add(Spring("p", m.world.at(-1), body.at(), stiffness=200.0, length=2.0))
+    if friction:
+        m.add(CoulombFriction("f", joint="n", sliding=friction))
+    for element in elements:
+        m.add(element(m, knot, body))
+    return m
+
+
+def held(result, friction=5.0, viscous=8.0):
+    """The velocity of the node by the law of friction."""
+    force = K * (result["x.q"] - 1 - result["n.q"])
+    return np.sign(force) * np.maximum(np.abs(force) - friction, 0) / viscous
+
+
+def test_a_node_with_dry_and_viscous_friction(tmp_path):
+    system = braked().assemble(guess={"x": 1.0})
+    start = {"q0": {"x": 1.1}, "tolerance": 1e-9, "step": 1e-3}
+    result = mbs.simulate.run(system, 1.0, **start)
+    np.testing.assert_allclose(result["n.v"], held(result), atol=1e-8)
+    assert (result["n.v"] == 0).sum() > 100
+    assert np.ptp(result["n.q"]) > 0.1
+    energy = result["kinetic_energy"] + result["potential_energy"]
+    power = 8 * result["n.v"] ** 2 + 5 * np.abs(result["n.v"])
+    lost = np.sum(power[:-1:2] + 4 * power[1::2] + power[2::2]) * 1e-3 / 3
+    assert energy[0] - energy[-1] == pytest.approx(lost, rel=1e-4)
+    rodas = mbs.simulate.run(system, 1.0, method="rodas", **start)
+    np.testing.assert_allclose(rodas["n.q"], result["n.q"], atol=1e-6)
+    path = mbs.export.fmu(system, tmp_path / "braked.fmu")
+    for kind in ("CoSimulation", "ModelExchange"):
+        options = {"start": {"x": 1.1}, "tolerance": 1e-9, "quiet": True}
+        other = mbs.simulate.fmu(path, 1.0, kind=kind, **options)
+        at = np.interp(other.time, result.time, result["n.q"])
+        np.testing.assert_allclose(other["n.q"], at, atol=1e-5)
+
+
+def test_dry_friction_of_a_node_is_that_of_one_of_little_mass():
+    result = mbs.simulate.run(braked().assemble(guess={"x": 1.0}), 1.0, q0={"x": 1.1})
+    small = braked(node=1e-4).assemble()
+    v0 = {"n": float(result["n.v"][0])}
+    options = {"q0": {"x": 1.1}, "v0": v0, "tolerance": 1e-6, "method": "rodas"}
+    other = mbs.simulate.run(small, 1.0, **options)
+    for name in ("x.q", "n.q"):
+        np.testing.assert_allclose(result[name], other[name], atol=2e-4)
+
+
+REFUSED = {
+    "friction alone": (
+        (lambda m, knot, body: CoulombFriction("g", joint="n", sliding=1.0),),
+        {"friction": 0, "viscous": 0},
+        "CoulombFriction g, which needs viscous damping of the node alone",
+    ),
+    "sticking": (
+        (lambda m, knot, body: CoulombFriction("g", joint="n", sliding=1.0, sticking=2.0),),
+        {"friction": 0},
+        "CoulombFriction g, which needs .* sticking = sliding",
+    ),
+    "a damper to a mass": (
+        (lambda m, knot, body: Damper("d", knot, body, damping=3.0),),
+        {},
+        "CoulombFriction f, which needs viscous damping of the node alone",
+    ),
+    "smooth friction": (
+        (lambda m, knot, body: JointFriction("j", joint="n", coulomb=1.0),),
+        {"friction": 0},
+        "JointFriction j, which is not linear in velocities",
+    ),
+    "friction of the joint": ((), {"friction": 0, "Fs": 1.0}, "the friction Fs of n"),
+    "a stop": (
+        (lambda m, knot, body: RigidStop("r", joint="n", lower=-1.0),),
+        {"friction": 0},
+        "RigidStop r, which locks and releases",
+    ),
+    "an input": (
+        (lambda m, knot, body: ForceInput("push", knot.at()),),
+        {"friction": 0},
+        "ForceInput push, which has inputs or states",
+    ),
+    "a component with states": (
+        (lambda m, k, b: SpringDamperSeries("e", m.world, k, stiffness=3.0, damping=1.0),),
+        {"friction": 0},
+        "SpringDamperSeries e, which has inputs or states",
+    ),
+    "a motor": ((), {"friction": 0, "actuated": True}, "or it has a motor"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_keeps_the_balance_from_giving_a_node_is_named(name):
+    elements, options, text = REFUSED[name]
+    system = braked(*elements, **options).assemble(guess={"x": 1.0})
+    with pytest.raises(mbs.errors.MbsError, match=text):
+        mbs.simulate.run(system, 0.1, q0={"x": 1.1}, quiet=True)
+
+
+def test_a_node_without_springs_and_dampers_is_named():
+    m = mbs.Mechanism("loose")
+    body, knot = m.add(PointMass("body", mass=MASS)), m.add(PointMass("knot", mass=0))
+    m.connect(m.world, Prismatic("x", axis="x", stiffness=1.0), body)
+    m.connect(m.world, Prismatic("n", axis="x"), knot)
+    with pytest.raises(mbs.errors.ModelError, match="no spring and no damper acts on n"):
+        mbs.simulate.run(m.assemble(), 0.1)

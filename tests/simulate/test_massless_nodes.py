@@ -8,6 +8,7 @@ import pytest
 
 import mbs
 from mbs.components import (
+    Body,
     Cartesian,
     CoulombFriction,
     Custom,
@@ -244,3 +245,33 @@ def test_friction_on_a_node_is_one_error():
     m.add(CoulombFriction("f", "n", sliding=3.0))
     with pytest.raises(SolverError, match=r"n can move without moving any inertia.*needs springs"):
         mbs.simulate.run(m.assemble(guess={"x": 1.0}), 0.1, q0={"x": 1.05}, quiet=True)
+
+
+def with_inertia(*joints):
+    """A mass on a spring that ends at a part with moments of inertia and no mass."""
+    m = mbs.Mechanism("inertia", gravity=(0, 0, 0))
+    node, body = m.add(Body("node", mass=0, inertia=(0.1, 0.1, 0.1))), m.add(PointMass("body", 2.0))
+    place = m.world
+    for joint in joints[:-1]:
+        m.connect(place, joint, between := m.add(PointMass(f"at_{joint.name}", mass=0)))
+        place = between
+    m.connect(place, joints[-1], node)
+    m.connect(m.world, Prismatic("x", axis="x"), body)
+    m.add(Spring("s1", m.world.at(-1), node.at(), stiffness=K1, length=1.0))
+    m.add(Spring("s2", node.at(), body.at(), stiffness=K2, length=1.0))
+    return m.assemble(guess={"x": 1.0})
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_moments_of_inertia_do_not_resist_displacements(turns):
+    """A node on a slide has no inertia along it; the angle behind it keeps its own."""
+    joints = [Prismatic("n", axis="x"), *([Revolute("r", axis="x")] if turns else [])]
+    system = with_inertia(*joints)
+    assert [system.speeds[k].name for k in system.active] == ["r", "x"][not turns :]
+    v0 = {"r": 0.5} if turns else None
+    result = mbs.simulate.run(system, 1.0, q0={"x": 1.1}, v0=v0, tolerance=1e-10)
+    exact = 0.1 * np.cos(np.sqrt(SERIES / MASS) * result.time)
+    np.testing.assert_allclose(result["x.q"], 1 + exact, atol=1e-9)
+    np.testing.assert_allclose(result["n.q"], exact * K2 / (K1 + K2), atol=1e-9)
+    if turns:
+        np.testing.assert_allclose(result["r.q"], 0.5 * result.time, atol=1e-9)

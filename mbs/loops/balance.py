@@ -140,6 +140,27 @@ def _rows(
     return [(DAMPED if is_damped else GROUP, rows)]
 
 
+def require_no_drift(system: System, what: str, velocities: Iterable[int]) -> None:
+    """Refuse a matrix of the independent velocities where massless nodes move without them.
+
+    Args:
+        system: with or without massless nodes that dampers hold.
+        what: the matrix, for the message.
+        velocities: indices in v of the velocities that belong to it.
+
+    Raises:
+        ModelError: a node with a damper is among them.
+    """
+    nodes = {k for _, k in system.nodes} if any(b.is_damped for b in system.balances) else set()
+    for velocity in velocities:
+        if velocity in nodes:
+            raise ModelError(
+                f"{system.name}: {what} in independent coordinates does not give the velocity of"
+                f" {system.speeds[velocity].name}, which moves no mass and which springs move while"
+                " the independent joints rest; use coordinates='tree', or give it a mass"
+            )
+
+
 def _limit(system: System, names: Sequence[str], q: SX) -> SX:
     """(1, 1) the sum of the limits of dry frictions [N or N m]."""
     at, total = PartsAt(system, q, SX.zeros(system.nv)), SX(0)
@@ -326,9 +347,10 @@ def _frictions(system: System, nodes: Sequence[tuple[int, int]], q: SX, v: SX) -
         laws = [*part.element.stops(seen).values(), *part.element.frictions(seen).values()]
         touched = [law for law in laws if casadi.depends_on(casadi.vertcat(*_motion(law)), own)]
         for law in touched:
-            slip = SX(law.slip) if isinstance(law, Friction) else SX(0)
-            number = next((n for n, (_, j) in enumerate(nodes) if _same(slip, v[j])), None)
-            if number is None or len(laws) > 1 or not _sticks_as_it_slides(law):
+            if not isinstance(law, Friction) or len(laws) > 1 or not _sticks_as_it_slides(law):
+                return None
+            number = next((n for n, (_, j) in enumerate(nodes) if _same(SX(law.slip), v[j])), None)
+            if number is None:
                 return None
             found.setdefault(number, []).append((part.name, law))
     return found

@@ -340,7 +340,7 @@ def start_velocity(
         return np.array(system.velocity(v0))
     p = [system.parameter_values(parameters)] if system.parameters else []
     J = np.array(closure_jacobian(system)(q, *p))
-    own = node_velocities(system, J, q, system.parameter_values(parameters))
+    own = node_velocities(system, J, q, np.array(system.parameter_values(parameters)))
     if isinstance(v0, Mapping) and v0:
         at_rest = dict.fromkeys(_spring_speeds(system), 0.0)
         v, missed = (J, "none")
@@ -425,7 +425,7 @@ def _less(system: System, v0: Values, own: Vector) -> Values:
     if v0 is None:
         return None
     if not isinstance(v0, Mapping):
-        return less
+        return list(map(float, less))
     return {s.name: float(x) for s, x in zip(system.speeds, less, strict=True) if s.name in v0}
 
 

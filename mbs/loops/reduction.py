@@ -41,6 +41,8 @@ class Reduction:
 def reduction_matrix(system: System) -> Function:
     """``reduction_matrix(q) -> G``: velocities of the tree from the independent ones, v = G v_a.
 
+    Massless nodes that dampers hold move besides, v = G v_a + g; G has the slopes.
+
     Returns:
         Function of q (nq, 1) that closes the loops; G (nv, m).
 

@@ -14,6 +14,7 @@ from mbs.assembly.tree import position_rate
 from mbs.components import Free, Spherical, Universal
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
+from mbs.loops.balance import require_no_drift
 from mbs.loops.closure import cut_twist
 from mbs.loops.cut_positions import cut_position
 from mbs.loops.examine import DETERMINED
@@ -132,6 +133,7 @@ class _LoopRows:
 
 
 def _require_loops(system: System) -> None:
+    require_no_drift(system, "the closure of velocities", range(system.nv))
     if system.closure is None:
         raise ModelError(
             f"{system.name}: an open chain has no loops whose velocities could be tied; use the"

@@ -376,3 +376,15 @@ def test_a_node_without_springs_and_dampers_is_named():
     m.connect(m.world, Prismatic("n", axis="x"), knot)
     with pytest.raises(mbs.errors.ModelError, match="no spring and no damper acts on n"):
         mbs.simulate.run(m.assemble(), 0.1)
+
+
+def test_matrices_that_would_leave_out_the_drift_of_a_node_raise():
+    system = arm(0.0).assemble(guess={"j": 0.5, "x": 0.12})
+    J = mbs.models.jacobian(system, frame="tip")([0.5, 0.02, 0.12])
+    assert J.shape == (6, 2)
+    text = "does not give the velocity of n, which moves no mass"
+    with pytest.raises(mbs.errors.ModelError, match=text):
+        mbs.models.jacobian(system, frame="node")
+    with pytest.raises(mbs.errors.ModelError, match=text):
+        mbs.models.velocity_closure(system)
+    assert mbs.models.jacobian(system, frame="node", coordinates="tree").size_out(0) == (6, 3)

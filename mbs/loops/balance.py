@@ -235,7 +235,7 @@ def _obstacle(system: System, part: AttachedPart, velocity: int) -> str:
     if part.element.has("frictions"):
         return (
             "which needs viscous damping of the node alone, such as Fv of its joint, and sticking ="
-            " sliding"
+            " sliding; a SpringFrictionSeries has a spring and friction alone"
         )
     if not part.element.acts:
         return ""

@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from mbs.arguments import names_given, values_given
 from mbs.components.bodies import Mount, RigidBody, World, three
-from mbs.components.component import Component, Placement, Point, in_rotated_axes
+from mbs.components.component import (
+    Component,
+    Placement,
+    Point,
+    check_arguments,
+    in_rotated_axes,
+)
 from mbs.components.couplings import Coupling
 from mbs.components.custom import Custom, Flange, Signal
 from mbs.components.drives import flange_pair
@@ -642,6 +648,9 @@ class Mechanism:
             self._ports.update((p.owner.name, p.port) for p in pair)
         self._counted = len(self.connections)
         return (point.owner.name, point.port) in self._ports
+
+
+check_arguments(Mechanism)
 
 
 def _what(value: object) -> str:

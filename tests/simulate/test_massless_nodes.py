@@ -12,6 +12,7 @@ from mbs.components import (
     Cartesian,
     CoulombFriction,
     Custom,
+    Damper,
     FixedFlange,
     ForceInput,
     PointMass,
@@ -21,6 +22,7 @@ from mbs.components import (
     ShaftSpringDamperSeries,
     Spring,
     SpringDamperSeries,
+    WrenchSensor,
     custom,
 )
 from mbs.errors import ModelError, SolverError
@@ -275,3 +277,73 @@ def test_moments_of_inertia_do_not_resist_displacements(turns):
     np.testing.assert_allclose(result["n.q"], exact * K2 / (K1 + K2), atol=1e-9)
     if turns:
         np.testing.assert_allclose(result["r.q"], 0.5 * result.time, atol=1e-9)
+
+
+def structure(*elements):
+    """A triangle of bars that cannot move, a node on a slide, and a sensor at a foot."""
+    m = mbs.Mechanism("structure", gravity=(0, -9.81, 0))
+    own = {"mass": 1.0, "com": (0.25, 0, 0), "inertia": (0.1, 0.1, 0.1)}
+    left, right = m.add(Body("left", **own)), m.add(Body("right", **own))
+    m.connect(m.world, Revolute("a", axis="z"), left)
+    m.connect(left.at(0.5), Revolute("c", axis="z"), right.at(0.5))
+    m.connect(m.world.at(0.6), Revolute("b", axis="z"), right)
+    knot = m.add(PointMass("knot", mass=0))
+    m.connect(m.world, Prismatic("n", axis="x"), knot)
+    m.add(WrenchSensor("foot", "a", axes="world"))
+    for element in elements:
+        m.add(element(m, left, knot))
+    guess = {"a": np.arccos(0.6), "b": np.pi - np.arccos(0.6)}
+    return m.assemble(guess=guess)
+
+
+BETWEEN = (
+    lambda m, left, knot: Spring("s1", m.world.at(-1), knot, stiffness=300, length=0.8),
+    lambda m, left, knot: Spring("s2", knot, left.at(0.5), stiffness=100, length=0.1),
+)
+
+
+def damper(m, left, knot):
+    return Damper("d", m.world.at(-1), knot, damping=20.0)
+
+
+@pytest.mark.parametrize("method", ["dopri5", "rodas"])
+def test_a_node_of_a_structure_rests_where_its_springs_balance(method):
+    system = structure(*BETWEEN)
+    assert system.closure.active == ()
+    result = mbs.simulate.run(system, 0.1, method=method, tolerance=1e-9)
+    n = result["n.q"]
+    assert np.ptp(n) < 1e-12
+    first = 300 * (n[0] + 0.2)
+    stretched = np.hypot(0.3 - n[0], 0.4)
+    assert first == pytest.approx(100 * (stretched - 0.1) * (0.3 - n[0]) / stretched)
+    assert result["s1.force"][-1] == pytest.approx(first)
+    # the wrench at the foot is that of one spring in the place of both
+    alone = structure(
+        BETWEEN[0],
+        lambda m, left, knot: Spring(
+            "pull", m.world.at(n[0]), left.at(0.5), stiffness=100, length=0.1
+        ),
+    )
+    other = mbs.simulate.run(alone, 0.1, method=method, tolerance=1e-9)
+    np.testing.assert_allclose(result["foot.f.x"], other["foot.f.x"], rtol=1e-9)
+
+
+def test_a_damped_node_of_a_structure_creeps():
+    """Nothing else moves: the rate is that of the spring over the damping."""
+    system = structure(BETWEEN[0], damper)
+    assert system.closure.active == ()
+    for method in ("dopri5", "rodas"):
+        result = mbs.simulate.run(system, 1.0, q0={"n": 0.3}, method=method, tolerance=1e-9)
+        exact = -0.2 + 0.5 * np.exp(-15 * result.time)
+        np.testing.assert_allclose(result["n.q"], exact, atol=1e-8)
+        assert np.ptp(result["foot.f.y"]) < 1e-9
+    np.testing.assert_allclose(mbs.models.linearise(system).at().A, [[-15]], atol=1e-9)
+
+
+def test_an_fmu_of_a_structure_with_a_damped_node(tmp_path):
+    path = mbs.export.fmu(structure(BETWEEN[0], damper), tmp_path / "structure.fmu")
+    for kind in ("CoSimulation", "ModelExchange"):
+        options = {"start": {"n": 0.3}, "kind": kind, "tolerance": 1e-8, "quiet": True}
+        result = mbs.simulate.fmu(path, 1.0, **options)
+        exact = -0.2 + 0.5 * np.exp(-15 * result.time)
+        np.testing.assert_allclose(result["n.q"], exact, atol=1e-6)

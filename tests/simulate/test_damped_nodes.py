@@ -310,6 +310,21 @@ def test_a_node_with_dry_and_viscous_friction(tmp_path):
         np.testing.assert_allclose(other["n.q"], at, atol=1e-5)
 
 
+def test_a_node_moves_without_a_compiler_too(monkeypatch):
+    """Equal to the compiled motion but for rounding."""
+    system = braked().assemble(guess={"x": 1.0})
+    found = []
+    for compiler in (True, False):
+        if not compiler:
+            monkeypatch.setenv("CC", "")
+            monkeypatch.setenv("PATH", "")
+        for method in ("dopri5", "rodas"):
+            options = {"q0": {"x": 1.1}, "method": method, "tolerance": 1e-9}
+            found.append(mbs.simulate.run(system, 0.3, **options)["n.q"])
+    for one, other in zip(found[:2], found[2:], strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-11)
+
+
 def test_dry_friction_of_a_node_is_that_of_one_of_little_mass():
     result = mbs.simulate.run(braked().assemble(guess={"x": 1.0}), 1.0, q0={"x": 1.1})
     small = braked(node=1e-4).assemble()

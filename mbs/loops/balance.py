@@ -306,6 +306,8 @@ def _balances(system: System, nodes: Sequence[tuple[int, int]]) -> tuple[Balance
     if known.has_free():  # states, inputs, time, or velocities with a law that is not linear
         return None
     every = _samples(system, q, damping)
+    if not every:
+        return None
     sizes = _typical([M[:, velocities] for M in every])
     sizes[sizes == 0] = 1.0
     whole = [M / sizes[:, None] for M in every]

@@ -193,6 +193,19 @@ def require_no_balance(
             )
 
 
+def without_values(system: System) -> str:
+    """Return which parameters without value keep massless nodes from being found; else nothing."""
+    missing = [parameter.name for parameter in system.parameters if parameter.default is None]
+    nodes = [system.speeds[system.tree.links[j].v.start].name for j in _massless_links(system)]
+    if system.nodes or not nodes or not missing:
+        return ""
+    verb = "moves" if len(nodes) == 1 else "move"
+    return (
+        f"; {listed(nodes)} {verb} no mass, and the balance of forces needs values of"
+        f" {listed(missing)}: give Mechanism(parameters=)"
+    )
+
+
 def obstacles(system: System, velocity: int) -> str:
     """Return what keeps the balance of forces from giving a coordinate, as the end of a sentence.
 

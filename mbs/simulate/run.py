@@ -31,6 +31,7 @@ from mbs.components.custom import OneWay, Signal
 from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.files import read_sealed, write_sealed
 from mbs.loops.analysis import rows_at
+from mbs.loops.balance import without_values
 from mbs.loops.closure import least_upright, rolling_discs
 from mbs.loops.configuration import Guess, Start, Values, start, start_position, start_velocity
 from mbs.loops.examine import row_independence
@@ -450,7 +451,7 @@ def _without_inertia(system: System) -> str:
         require_inertia(system)
     except ModelError as error:
         return "; " + str(error).removeprefix(f"{system.name}: ")
-    return ""
+    return without_values(system)
 
 
 def _with_names(system: System, stop: SolverError) -> str:

@@ -403,3 +403,9 @@ def test_matrices_that_would_leave_out_the_drift_of_a_node_raise():
     with pytest.raises(mbs.errors.ModelError, match=text):
         mbs.models.velocity_closure(system)
     assert mbs.models.jacobian(system, frame="node", coordinates="tree").size_out(0) == (6, 3)
+
+
+def test_parameters_without_value_are_named():
+    system = element(damping="c").assemble(guess={"x": 1.0})
+    with pytest.raises(mbs.errors.SolverError, match=r"n moves no mass.* needs values of c"):
+        mbs.simulate.run(system, 0.1, parameters={"c": 5.0}, q0={"x": 1.1})

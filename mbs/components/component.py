@@ -324,7 +324,7 @@ def check_arguments(cls: type) -> None:
     """Let the constructor of a class name wrong arguments by one error.
 
     Args:
-        cls: whose own `__init__` is replaced; it is left alone if it inherits that.
+        cls: the class; only an `__init__` of its own is replaced.
     """
     own = vars(cls).get("__init__")
     if own is None or hasattr(own, "__wrapped__"):
@@ -355,7 +355,7 @@ def _checking(init: Callable[..., None]) -> Callable[..., None]:
 def _wrong_arguments(
     init: Callable[..., None], args: Sequence[Any], kwargs: Mapping[str, Any]
 ) -> str:
-    """What is wrong with the arguments of a constructor; empty if they fit."""
+    """The fault of the arguments of a constructor; empty if they fit."""
     known = list(signature(init).parameters.values())[1:]
     if any(one.kind in (one.VAR_POSITIONAL, one.VAR_KEYWORD) for one in known):
         return ""

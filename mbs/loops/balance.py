@@ -6,8 +6,8 @@ dependent, and no force acts through the row, since the row is zero where the fo
 
 Where dampers act, the balance D v + f(q) = 0 is a row on velocities with a constant part: the
 position is a state, and its velocity follows. Dampers between nodes leave sums of forces without
-velocities; these are rows of positions. Dry friction that acts with a damper on one node holds it
-until the other forces are larger: D v = f - limit sign(f), or v = 0.
+velocities; these are rows of positions. Dry friction beside a damper on a node holds the node up to
+a limit of the other forces: D v = f - limit sign(f), or v = 0.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def velocity_balance_rows(system: System, q: SX, v: SX) -> list[tuple[str, list[
 def _rows(
     system: System, q: SX, v: SX, *, is_damped: bool
 ) -> list[tuple[str, list[tuple[str, Row]]]]:
-    """Balances of one kind with their names."""
+    """Balances of positions, or of velocities, with their names."""
     own = [balance for balance in system.balances if balance.is_damped is is_damped]
     if not own:
         return []
@@ -207,10 +207,10 @@ def without_values(system: System) -> str:
 
 
 def obstacles(system: System, velocity: int) -> str:
-    """Return what keeps the balance of forces from giving a coordinate, as the end of a sentence.
+    """Return the elements that keep the balance of forces from giving a coordinate, in words.
 
     Args:
-        system: in which the coordinate moves no inertia.
+        system: a system in which the coordinate moves no inertia.
         velocity: its index in v.
     """
     link = next(
@@ -241,7 +241,7 @@ def obstacles(system: System, velocity: int) -> str:
 
 
 def _obstacle(system: System, part: AttachedPart, velocity: int) -> str:
-    """Why the balance of forces on a node cannot have a component; empty where it can."""
+    """Reason why the balance of forces on a node excludes a component; empty if there is none."""
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     if part.element.has("stops"):
         return "which locks and releases"
@@ -304,8 +304,7 @@ def _static_efforts(system: System, q: SX, v: SX) -> SX:
 def _balances(system: System, nodes: Sequence[tuple[int, int]]) -> tuple[Balance, ...] | None:
     """Balances of the forces on nodes; None if forces do not determine the nodes.
 
-    Forces that depend on states, inputs, time or contacts do not, nor those not linear in
-    velocities.
+    Forces on nodes must be linear in velocities, and depend on positions and parameters beside.
     """
     positions, velocities = [k for k, _ in nodes], [k for _, k in nodes]
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
@@ -377,7 +376,7 @@ def _same(one: SX, other: SX) -> bool:
 
 
 def _motion(law: Friction | Stop | OneWay) -> list[SX]:
-    """What a contact depends on."""
+    """The gap of a stop, or the velocity of another contact."""
     if isinstance(law, Stop):
         return [SX(law.gap)]
     return [SX(law.slip if isinstance(law, Friction) else law.velocity)]
@@ -389,12 +388,12 @@ def _sticks_as_it_slides(law: Friction) -> bool:
 
 
 def _is_alone(damping: SX, velocities: Sequence[int], node: int) -> bool:
-    """Whether the damping of a node depends on no other velocity, nor others on that of the node.
+    """Whether a node and the others have no damper in common.
 
     Args:
         damping: (n, nv) slopes of the efforts on nodes.
-        velocities: of the nodes.
-        node: number of one.
+        velocities: indices in v of the nodes.
+        node: number of the node.
     """
     row, column = SX(damping[node, :]), SX(damping[:, velocities[node]])
     row[velocities[node]], column[node] = 0, 0

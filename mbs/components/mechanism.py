@@ -18,7 +18,7 @@ from mbs.components.forces import Force
 from mbs.components.joints import Joint
 from mbs.components.locking import lock
 from mbs.components.motion_joint import MotionJoint
-from mbs.components.mounting import Mounting, mount_of
+from mbs.components.mounting import Mounting, mount_of, notes_on_degrees
 from mbs.components.notes import Note
 from mbs.components.sensors import Sensor
 from mbs.components.shapes import Shape
@@ -71,6 +71,8 @@ class Placed:
         return self.body("world")
 
 
+OUTER_WORLD = "outer_world"
+"""Name of the frame in which gravity and the mount of the base are given."""
 _SCOPE = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*", re.ASCII)
 
 
@@ -111,6 +113,14 @@ def place(outer: Mechanism, inner: Mechanism, name: str) -> Placed:
     )
     for frame, point in inner.frames.items():
         outer.frames[f"{scope}.{frame}"] = on_placed(point, placed, scope)
+    if inner.mount.steps:
+        if OUTER_WORLD in inner.frames:
+            raise DescriptionError(
+                f"{inner.name}: the frame {OUTER_WORLD!r} has the name of the frame in which the"
+                " mount is given; rename it"
+            )
+        base = Point(inner.world, placement=inner.mount.inverse())
+        outer.frames[f"{scope}.{OUTER_WORLD}"] = on_placed(base, placed, scope)
     outer.shapes.extend((on_placed(point, placed, scope), shape) for point, shape in inner.shapes)
     outer.cuts.extend(f"{scope}.{joint}" for joint in inner.cuts)
     outer.guess.update({f"{scope}.{name}": value for name, value in inner.guess.items()})
@@ -265,6 +275,7 @@ class Mechanism:
             placed = placed.then(*steps)
             if rotation is not None:
                 vector = in_rotated_axes(tuple(map(expression, vector)), rotation, place)
+            self.notes.extend(notes_on_degrees(steps))
         object.__setattr__(self.world, "gravity", tuple(vector))
         self.mount = placed
 
@@ -277,7 +288,9 @@ class Mechanism:
     def add(self, component: C | Mechanism, name: str | None = None) -> C | Placed:
         """Add a body, a joint or a whole mechanism, whose names are then scoped by its own.
 
-        A mechanism that is placed in another one moves in the gravity of the outer one.
+        A mechanism that is placed in another one moves in the gravity of the outer one. Its base is
+        at the position at which it is connected. A mount gives it the frame "outer_world":
+        `connect(outer.world, placed.point("outer_world"))` puts the base at its mount.
 
         Args:
             component: what to add.

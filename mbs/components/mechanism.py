@@ -111,16 +111,8 @@ def place(outer: Mechanism, inner: Mechanism, name: str) -> Placed:
         (f"{scope}.{source}", replace(target, owner=placed[target.owner.name]))
         for source, target in inner.wires
     )
-    for frame, point in inner.frames.items():
+    for frame, point in _frames_of(inner).items():
         outer.frames[f"{scope}.{frame}"] = on_placed(point, placed, scope)
-    if inner.mount.steps:
-        if OUTER_WORLD in inner.frames:
-            raise DescriptionError(
-                f"{inner.name}: the frame {OUTER_WORLD!r} has the name of the frame in which the"
-                " mount is given; rename it"
-            )
-        base = Point(inner.world, placement=inner.mount.inverse())
-        outer.frames[f"{scope}.{OUTER_WORLD}"] = on_placed(base, placed, scope)
     outer.shapes.extend((on_placed(point, placed, scope), shape) for point, shape in inner.shapes)
     outer.cuts.extend(f"{scope}.{joint}" for joint in inner.cuts)
     outer.guess.update({f"{scope}.{name}": value for name, value in inner.guess.items()})
@@ -129,6 +121,18 @@ def place(outer: Mechanism, inner: Mechanism, name: str) -> Placed:
         if (scoped := f"{scope}.{symbol}") in used:  # not what only its gravity used
             outer.values[scoped] = replace(value, name=scoped)
     return Placed(outer, scope)
+
+
+def _frames_of(inner: Mechanism) -> dict[str, Point]:
+    """Return the named frames of a mechanism; a mount adds the frame of the outer world."""
+    if not inner.mount.steps:
+        return inner.frames
+    if OUTER_WORLD in inner.frames:
+        raise DescriptionError(
+            f"{inner.name}: the frame {OUTER_WORLD!r} has the name of the frame in which the mount"
+            " is given; rename it"
+        )
+    return {**inner.frames, OUTER_WORLD: Point(inner.world, placement=inner.mount.inverse())}
 
 
 def on_placed(point: Point, placed: Mapping[str, Component], scope: str) -> Point:

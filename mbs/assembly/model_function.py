@@ -267,10 +267,10 @@ class ModelFunction(Function):
         if self._state is None and (valid := self._valid_of_one()) is not None:
             symbols = {"q": SX.sym("q", self._system.nq), "p": self._system.p}
             given, check = [symbols[name] for name in valid.name_in()], self._check_configuration
-            asks = check is not None and check.delicate is not None and "q" in valid.name_in()
-            delicate = check.delicate(self._system, symbols["q"]) if asks else SX(0)
+            expression = check.delicate if check and "q" in valid.name_in() else None
 
             def build() -> Function:
+                delicate = SX(0) if expression is None else expression(self._system, symbols["q"])
                 return Function("state", given, [valid(*given), delicate], {"cse": True})
 
             self._state = self._system.cached(("state", self.asked(), check), build)

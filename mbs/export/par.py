@@ -103,7 +103,7 @@ def robot_table(system: System, file: str = ".par") -> RobotTable:
     ]
     names = [f"q{number[j]}" for j in range(len(system.tree.links))]
     configuration = dict(zip(names, system.configuration, strict=True)) if system.cuts else {}
-    pose = base_pose(system)
+    base = base_pose(system)
     table = RobotTable(
         name=system.name,
         frames=(*frames, *moving, *fixed),
@@ -112,7 +112,7 @@ def robot_table(system: System, file: str = ".par") -> RobotTable:
         gravity=tuple(text(system.tree.gravity[k]) for k in range(3)),
         source=system.source,
         guess={name: value for name, value in configuration.items() if value},
-        extras={} if pose is None else {POSE: base_pose_texts(pose)},
+        extras={} if base is None else {POSE: base_pose_texts(base)},
     )
     # symbols may have cancelled, such as a length along the axis of the last link
     defaults = {p.name: p.default for p in system.parameters if p.name in table.symbols}

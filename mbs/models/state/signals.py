@@ -260,8 +260,12 @@ def effort_function(system: System, tau: Effort) -> Function | None:
     given = system.plain_names(tau, EFFORTS)
     if not isinstance(tau, Mapping):
         array, short = numbers_given(tau), len(system.motors)
-        vector = not isinstance(array, str) and array.ndim and is_vector(array.shape)
-        if vector and array.size == short != system.nv:
+        if (
+            not isinstance(array, str)
+            and array.ndim
+            and is_vector(array.shape)
+            and array.size == short != system.nv
+        ):
             motors = (names[k] for k in system.motors)
             given = dict(zip(motors, array.ravel().tolist(), strict=True))
     values = SX(DM(system.effort(given)))

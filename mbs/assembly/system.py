@@ -42,7 +42,7 @@ from mbs.components.bodies import RigidBody
 from mbs.errors import MbsError, ModelError
 from mbs.expressions import Parameter, out_of_bounds
 from mbs.files import PathLike
-from mbs.numbers import numbers_given
+from mbs.numbers import is_vector, numbers_given
 from mbs.spatial import Pose
 from mbs.text import did_you_mean, listed, quoted, without_values
 
@@ -663,6 +663,11 @@ class System:
         array = numbers_given(values)
         if isinstance(array, str):
             raise ModelError(f"{self.name}: the {what} {array}")
+        if not is_vector(array.shape):
+            raise ModelError(
+                f"{self.name}: the {what} has the shape {array.shape}; give a list, or an array of"
+                " one dimension"
+            )
         if not np.isfinite(array).all():
             raise ModelError(
                 f"{self.name}: the {what} is {quoted(values)}; give a finite number for each"

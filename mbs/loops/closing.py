@@ -122,6 +122,9 @@ CLOSED = 1e-10
 """The same of configurations that formulas or others give: hundreds of roundings, no missing
 step."""
 
+_DEPENDENT = 1e-9
+"""Part of the largest singular value below which a row of the loops is redundant."""
+
 OPEN = 1e-6
 """The same of configurations that a user gives, with seven digits; forces are wrong by as
 little."""
@@ -240,6 +243,20 @@ class Closing:
         found = _replace(start, free, root.x)
         return Closed(found, root.residual, root.converged and self.faces(found))
 
+    def polished(self, q: Vector, steps: int) -> Vector:
+        """The configuration (nq,) after the least Newton steps onto the loops, closed to rounding.
+
+        `nearest` ends at `TOLERANCE`, above the rounding of the rows.
+        """
+        found, free = np.array(q, dtype=float), self.free
+        for _ in range(steps):
+            r, J = self.rows(found)
+            if r.size:
+                sizes = self.sizes
+                move = np.linalg.lstsq(J / sizes[:, None], r / sizes, rcond=_DEPENDENT)[0]
+                found[free] -= move
+        return found
+
     def nearby(self, q: Vector, reach: float, tries: int, seed: int) -> Iterator[Vector]:
         """Closed configurations that Gauss-Newton reaches from random ones around q (nq,).
 
@@ -255,20 +272,16 @@ class Closing:
             if closed.is_closed:
                 yield closed.q
 
-    @property
-    def acting(self) -> NDArray[np.bool_]:
-        """(nq,) whether a closure row depends on each position."""
-        acting = np.zeros(self.system.nq, dtype=bool)
-        acting[self._functions().places[1]] = True
-        return acting
+    def acting(self, *, norms: bool) -> NDArray[np.bool_]:
+        """(nq,) whether a closure row depends on each position.
 
-    @property
-    def bound(self) -> NDArray[np.bool_]:
-        """(nq,) whether a loop depends on each position; norms of quaternions are no loops."""
-        bound = np.zeros(self.system.nq, dtype=bool)
+        Args:
+            norms: whether rows that keep the norms of quaternions count; they are no loops.
+        """
+        acting = np.zeros(self.system.nq, dtype=bool)
         rows, columns = self._functions().places
-        bound[columns[rows < len(position_rows(self.system))]] = True
-        return bound
+        acting[columns if norms else columns[rows < len(position_rows(self.system))]] = True
+        return acting
 
     def faces(self, q: Vector) -> bool:
         """Whether no axis of a closing joint is opposed at q (nq,)."""
@@ -685,7 +698,7 @@ def _line(
     size = closing.size
     lengths = np.array([c.unit.startswith("m") for c in system.coordinates])
     scales = np.where(lengths, size, 1.0)
-    acting = closing.acting
+    acting = closing.acting(norms=True)
     first = np.where(acting, ends[0], ends[1])
     change = np.zeros(system.nq)
     change[list(locked)] = np.abs(ends[1] - first)[list(locked)]
@@ -786,7 +799,7 @@ def candidates(closing: Closing, start: Vector, most: int = _CANDIDATES) -> list
             it.
         most: number of configurations at which the search ends.
     """
-    rng, bound = np.random.default_rng(_SEED), closing.bound
+    rng, bound = np.random.default_rng(_SEED), closing.acting(norms=False)
     free = [k for k in closing.free if bound[k]]
     lengths = [closing.system.coordinates[k].unit.startswith("m") for k in free]
     reach = np.where(lengths, closing.size, np.pi)

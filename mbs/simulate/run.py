@@ -62,7 +62,7 @@ from mbs.models.state.tree import FullState, full_state
 from mbs.models.symbols import part_equations
 from mbs.native import compiled
 from mbs.native.compiler import cache_dir
-from mbs.numbers import OnArrays, has_boolean, numbers_given, on_arrays
+from mbs.numbers import OnArrays, has_boolean, is_vector, numbers_given, on_arrays
 from mbs.progress import progress
 from mbs.recursions.parts import part_event_names
 from mbs.result import (
@@ -289,7 +289,8 @@ def device_states(system: System, z0: Mapping[str, float] | Sequence[float] | No
 
 def _numbers(system: System, what: str, values: Any) -> list[float]:
     array = numbers_given(values)
-    if isinstance(array, str) or not np.isfinite(array).all() or array.ndim == 0:
+    vector = not isinstance(array, str) and array.ndim > 0 and is_vector(array.shape)
+    if isinstance(array, str) or not vector or not np.isfinite(array).all():
         raise ModelError(f"{system.name}: {what} is {quoted(values)}; give finite numbers")
     return [float(value) for value in array.ravel()]
 

@@ -591,6 +591,16 @@ class System:
         start, given = list(self.configuration), self.plain_names(values, GUESSES)
         return self._fill(given, self.coordinates, start, "position")
 
+    def positions_at_cuts(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return the positions of cut joints among positions by coordinate name.
+
+        Raises:
+            ModelError: a position of a cut joint is no finite number.
+        """
+        names = [coordinate.name for coordinate in self.cut_coordinates]
+        found = {name: value for name, value in values.items() if name in names}
+        return {name: self._number(value, f"position of {name}") for name, value in found.items()}
+
     def velocity(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
         """Velocities v from values by name, the others zero; errors as for `position`."""
         given = self.plain_names(values, VELOCITIES)

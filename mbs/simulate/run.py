@@ -1463,7 +1463,7 @@ def _degrees_given(system: System, q0: Start, guess: Guess) -> str:
     elif q0 is not None:
         names = (coordinate.name for coordinate in system.coordinates)
         given.update(zip(names, system.position(q0), strict=True))
-    return like_degrees(system.coordinates, given)
+    return like_degrees([*system.coordinates, *system.cut_coordinates], given)
 
 
 def _started(

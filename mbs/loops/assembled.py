@@ -13,10 +13,11 @@ from mbs.components.joints import Motion
 from mbs.errors import Unclosable
 from mbs.loops.closing import Closing, unwound
 from mbs.loops.configuration import closed_configuration
+from mbs.loops.guess_target import GuessTarget
 from mbs.loops.nearest import (
     Assembled,
-    GuessTarget,
     closes,
+    moved_to_guess,
     nearest_configuration,
     nearest_of,
 )
@@ -71,12 +72,14 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
         if found:
             first = nearest_of(Closing(system, p), [one.q for one in found], target)[0]
             return next(one for one in found if one.q is first)
-    motors = tuple(k for k, c in enumerate(system.coordinates) if c.actuated)
+    motors = {k for k, c in enumerate(system.coordinates) if c.actuated}
+    held = target.closing(set(target.guessed) & motors)
     try:
-        q = closed_configuration(Closing(system, p, motors), start, restarts=10)
+        q = closed_configuration(target.closing(motors), start, restarts=10)
     except Unclosable:
-        q = closed_configuration(Closing(system, p), start)
-    return Assembled(unwound(Closing(system, p), q, start))
+        held = Closing(system, p)
+        q = closed_configuration(held, start)
+    return Assembled(moved_to_guess(held, target, [unwound(held, q, start)])[0])
 
 
 def rest_positions(system: System, p: Vector) -> dict[int, float]:

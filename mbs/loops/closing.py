@@ -218,9 +218,8 @@ class Closing:
         def build() -> list[Vector]:
             return self._functions().sizes(self._given)
 
-        found: list[Vector] = self.system.recent(
-            ("closing sizes", self.aims), self.p.tobytes(), build, _KEPT
-        )
+        key = self.p.tobytes(), self.aims
+        found: list[Vector] = self.system.recent("closing sizes", key, build, _KEPT)
         return found
 
     def openness(self, q: Vector) -> float:

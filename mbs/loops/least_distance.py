@@ -27,6 +27,9 @@ _FLAT = 1e-6
 _LEVEL = 1e-7
 """Second derivatives of half the square of the distance, in rad or sizes, that count as zero:
 rounding leaves 1e-13 of one, and a guess out of reach by 1e-5 about 1e-5 of one."""
+_ROUNDING = 1e-11
+"""Slope of half the square of the distance that counts as zero where its curvature vanishes:
+rounding leaves 1e-14."""
 _LONGEST = 0.5
 """Longest step [rad, or sizes of the mechanism]: the first order holds the loops for about that."""
 _SHORT = 1e-3
@@ -48,8 +51,7 @@ _GAIN = 1e-4
 
 def is_movable(closing: Closing, q: Vector) -> bool:
     """Whether the loops leave motions at the closed configuration q (nq,)."""
-    J = closing.rows(q)[1]
-    return J.shape[1] > 0 and _null_space(closing, q)[1].shape[1] > 0
+    return len(closing.free) > 0 and _null_space(closing, q)[1].shape[1] > 0
 
 
 def least_distance(closing: Closing, target: GuessTarget, starts: Iterable[Vector]) -> list[Vector]:
@@ -126,7 +128,7 @@ class _Objective:
         moves = self.counted * self.target.moves(q) / self.units
         return float(moves @ moves) / 2
 
-    def point(self, q: Vector) -> _Point:
+    def point(self, q: Vector) -> _ManifoldPoint:
         """The objective and its derivatives on the manifold at the closed q (nq,)."""
         closing, nq, units = self.closing, self.closing.system.nq, self.units
         counted, free = self.counted, closing.free
@@ -144,15 +146,15 @@ class _Objective:
         rows = len(forces) - len(closing.aims)
         for k, force in zip(closing.aims, forces[rows:], strict=True):
             at_cut[k] += force
-        curved = _curvature(closing.system)(q, closing.p, forces[:rows], at_cut)[0][
-            np.ix_(free, free)
-        ]
-        hessian = slopes.T @ (counted[:, None] * slopes) + curved * np.outer(
-            units[free], units[free]
-        )
-        return _Point(float(moves @ moves) / 2, N.T @ gradient, N.T @ hessian @ N, N, units[free])
+        curved = _curvature(closing.system)(q, closing.p, forces[:rows], at_cut)[0]
+        hessian = slopes.T @ (counted[:, None] * slopes)
+        hessian += curved[np.ix_(free, free)] * np.outer(units[free], units[free])
+        if not np.isfinite(hessian).all():  # a position of a cut joint has no derivative there
+            N = N[:, :0]
+        value = float(moves @ moves) / 2
+        return _ManifoldPoint(value, N.T @ gradient, N.T @ hessian @ N, N, units[free])
 
-    def moved(self, q: Vector, point: _Point, step: Vector) -> Vector | None:
+    def moved(self, q: Vector, point: _ManifoldPoint, step: Vector) -> Vector | None:
         """The closed configuration after a step on the manifold; None if none is near."""
         free, predicted = self.closing.free, q.copy()
         predicted[free] += point.units * (point.basis @ step)
@@ -170,7 +172,7 @@ def _objective(closing: Closing, target: GuessTarget, indices: Iterable[int]) ->
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Point:
+class _ManifoldPoint:
     """An objective on the manifold.
 
     Attributes:
@@ -196,7 +198,7 @@ def _descended(objective: _Objective, start: Vector, known: Sequence[Vector] = (
     q, longest = start, _LONGEST
     point = objective.point(q)
     for _ in range(_STEPS):
-        step = _newton_step(point, longest)
+        step = _newton_step(point.gradient, point.hessian, longest)
         size, predicted = float(np.linalg.norm(step)), -float(point.gradient @ step)
         if size < _SHORTEST:
             break
@@ -211,19 +213,23 @@ def _descended(objective: _Objective, start: Vector, known: Sequence[Vector] = (
     return q
 
 
-def _is_better(after: _Point, before: _Point, size: float, predicted: float) -> bool:
+def _is_better(
+    after: _ManifoldPoint, before: _ManifoldPoint, size: float, predicted: float
+) -> bool:
     """Whether a step to a point leads down, by its distance or for short steps its gradient."""
     if predicted > _VISIBLE and after.value <= before.value - _GAIN * predicted:
         return True
     return size < _SHORT and bool(np.linalg.norm(after.gradient) < np.linalg.norm(before.gradient))
 
 
-def _newton_step(point: _Point, longest: float) -> Vector:
+def _newton_step(gradient: Vector, hessian: Vector, longest: float) -> Vector:
     """Step (m,) to the minimum of the second order, away from maxima and saddles."""
-    if not len(point.gradient):
+    if not len(gradient):
         return np.zeros(0)
-    values, vectors = np.linalg.eigh(point.hessian)
-    step: Vector = -vectors @ ((vectors.T @ point.gradient) / np.maximum(np.abs(values), _LEVEL))
+    values, vectors = np.linalg.eigh(hessian)
+    rates = vectors.T @ gradient
+    rates[(np.abs(values) < _LEVEL) & (np.abs(rates) < _ROUNDING)] = 0.0
+    step: Vector = -vectors @ (rates / np.maximum(np.abs(values), _LEVEL))
     size = float(np.linalg.norm(step))
     return step * min(1.0, longest / size) if size > 0 else step
 
@@ -239,14 +245,8 @@ def _balanced(closing: Closing, target: GuessTarget, q: Vector) -> Vector:
             break
         values, vectors = np.linalg.eigh(point.hessian)
         level = vectors[:, np.abs(values) < _LEVEL]
-        reduced = _Point(
-            all_of.value,
-            level.T @ all_of.gradient,
-            level.T @ all_of.hessian @ level,
-            level,
-            point.units,
-        )
-        step = _newton_step(reduced, longest)
+        slope, curvature = level.T @ all_of.gradient, level.T @ all_of.hessian @ level
+        step = _newton_step(slope, curvature, longest)
         size = float(np.linalg.norm(step))
         if size < EQUAL * _SHORT:
             break

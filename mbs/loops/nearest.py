@@ -15,6 +15,7 @@ from mbs.loops.closing import CLOSED, Closing, candidates, difference, distance_
 from mbs.loops.closure import facing, position_rows
 from mbs.loops.guess_target import EQUAL, GuessTarget
 from mbs.loops.least_distance import MET, is_movable, least_distance
+from mbs.solvers.least_squares import MANY
 from mbs.solvers.rank import rank
 
 Vector = NDArray[np.float64]
@@ -71,27 +72,49 @@ def nearest_configuration(closing: Closing, target: GuessTarget) -> Assembled | 
     many = len(closing.free) > _FEW
     own = range(closing.system.nq) if many else None
     if q is not None and target.distances(closing, q, own)[1] < _NEAR:
-        return Assembled(_slid(closing, target, [q])[0])
+        return Assembled(moved_to_guess(closing, target, [q])[0])
     if many:
         reached = _by_blocks(closing, target, q)
-        return None if reached is None else Assembled(_slid(closing, target, [reached])[0])
+        return None if reached is None else Assembled(_met(closing, target, [reached]))
     found = _modes(closing, target, q)
     if not found:
         return None
     best = nearest_of(closing, found, target)[0]
-    if target.miss(closing, best) > MET and is_movable(closing, best):
-        starts = [*found, *candidates(closing, start, _MODES)]
-        best = nearest_of(closing, _slid(closing, target, starts), target)[0]
-        found = _modes(closing, target, best)
+    met = _met(closing, target, [best, *found])
+    if met is not best:
+        best, found = met, _modes(closing, target, met)
     return Assembled(best, _others(closing, best, found))
 
 
-def _slid(closing: Closing, target: GuessTarget, starts: list[Vector]) -> list[Vector]:
+def moved_to_guess(closing: Closing, target: GuessTarget, starts: list[Vector]) -> list[Vector]:
     """Configurations nearest to guessed positions that are not met, from closed starts."""
+    if not target.guessed:
+        return starts
     missed = [q for q in starts if target.miss(closing, q) > MET]
     if len(missed) < len(starts) or not any(is_movable(closing, q) for q in starts):
         return starts
     return least_distance(closing, target, starts)
+
+
+def _met(closing: Closing, target: GuessTarget, found: list[Vector]) -> Vector:
+    """The first configuration, or one nearer to guessed positions that it does not meet.
+
+    Args:
+        closing: the rows, and the positions that must not change.
+        target: first guess.
+        found: (nq,) closed configurations, the nearest one first.
+    """
+    q = found[0]
+    if not target.guessed or target.miss(closing, q) <= MET or not is_movable(closing, q):
+        return q
+    if len(closing.free) < MANY:
+        found = [*found, *candidates(closing, target.start, _MODES)]
+    best = nearest_of(closing, moved_to_guess(closing, target, found), target)[0]
+    # random starts have other branches of loops that the guess does not depend on
+    reached = _by_blocks(closing, target, best)
+    if reached is None or target.miss(closing, reached) > target.miss(closing, best) + EQUAL:
+        return best
+    return nearest_of(closing, [best, reached], target)[0]
 
 
 def _modes(closing: Closing, target: GuessTarget, q: Vector | None) -> list[Vector]:

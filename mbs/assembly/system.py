@@ -646,9 +646,10 @@ class System:
             return given
         for name, value in values.items():
             if name in [coordinate.name for coordinate in self.cut_coordinates]:
+                remedy = ", or give it as a guess" if what == "position" else ""
                 raise ModelError(
                     f"{self.name}: {name} has no {what} of its own, since its joint was cut to open"
-                    " a loop; name another joint, or cut another one with m.cut(joint)"
+                    f" a loop; name another joint, or cut another one with m.cut(joint){remedy}"
                 )
             if name not in names:
                 raise ModelError(

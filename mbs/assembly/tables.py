@@ -568,7 +568,8 @@ def _on_coordinate(
         frames = ball.frame_a, ball.frame_b
         return AttachedSensor(sensor, frames, name, None, tuple(quantities), name)
     if not any(name in table for table in (q, v, cut)):
-        known = dict.fromkeys([*q, *v, *cut])
+        angular = [f"{ball}.{element}" for ball in balls for element in ANGULAR]
+        known = dict.fromkeys([*q, *v, *cut, *angular])
         raise AssemblyError(
             f"{sensor.name}: there is no coordinate {name!r}; {did_you_mean(name, known)}"
         )

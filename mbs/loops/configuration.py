@@ -12,6 +12,7 @@ from mbs.assembly.model_function import require_system
 from mbs.assembly.validity import plain_fault
 from mbs.assembly.variable_names import GUESSES, POSITIONS, VELOCITIES
 from mbs.errors import LoopError, ModelError, Unclosable
+from mbs.loops.balance import GROUP
 from mbs.loops.closing import (
     OPEN,
     Closed,
@@ -22,6 +23,7 @@ from mbs.loops.closing import (
     follow_configuration,
     unwound,
 )
+from mbs.loops.closure import position_rows
 from mbs.loops.cut_positions import cut_positions_and_slopes
 from mbs.loops.function import configuration_on, fixed_positions, independent_names
 from mbs.loops.guess_target import GuessTarget
@@ -30,7 +32,7 @@ from mbs.loops.velocity import closure_jacobian
 from mbs.result import Result, State, positions_of, state_of, velocities_of
 from mbs.solvers.least_squares import smallest_solution
 from mbs.solvers.rank import RELATIVE_GAP, null_space
-from mbs.text import quoted
+from mbs.text import did_you_mean, quoted
 
 Values = Mapping[str, float] | Sequence[float] | None
 """Positions or velocities by name, or all of them in their order."""
@@ -114,6 +116,12 @@ def _closed(
     p = closure_parameters(system, parameters)
     at_cut = system.positions_at_cuts(guess)
     own = {name: value for name, value in guess.items() if name not in at_cut}
+    known = [row.name for row in (*system.coordinates, *system.cut_coordinates)]
+    for name in own:
+        if name not in known:
+            raise ModelError(
+                f"{system.name}: there is no coordinate {name!r}; {did_you_mean(name, known)}"
+            )
     target = np.array(system.position({**own, **fixed}))
     if not system.is_closed:
         return target
@@ -255,7 +263,17 @@ def _require_joined(closing: Closing, q: Vector) -> None:
     """Raise LoopError if the configuration q (nq,) leaves the loops open."""
     name = closing.system.name
     if closing.openness(q) > OPEN:
-        worst = float(np.max(np.abs(closing.rows(q)[0]), initial=0.0))
+        missed = np.abs(closing.rows(q)[0])
+        row = int(np.argmax(missed / closing.sizes))
+        groups = position_rows(closing.system)
+        if row < len(groups) and groups[row][0] == GROUP:
+            node = groups[row][1]
+            raise LoopError(
+                f"{name}: the forces on {node}, which moves no mass, are not balanced at"
+                f" {node} = {q[_coordinate_names(closing.system).index(node)]:.6g}; leave {node}"
+                " out, so that it follows from the other positions"
+            )
+        worst = float(np.max(missed, initial=0.0))
         raise LoopError(
             f"{name}: the configuration leaves the loops open by {worst:.3g};"
             " use mbs.loops.solve to get one that closes them, or give the independent positions"

@@ -11,6 +11,7 @@ from support.ring_loops import ring_loop
 from mbs import models
 from mbs.assembly.tables import ANGULAR, QUATERNION
 from mbs.components import JointSensor, WrenchSensor
+from mbs.errors import AssemblyError
 from mbs.loops.cut_positions import cut_positions
 
 LOOPS = ["RSUR", "RRSRR", "RCSR", "RSRU", "RRSC"]
@@ -87,3 +88,11 @@ def test_the_tree_passes_spherical_joints_both_ways():
         if link.motion.nq == 4
     }
     assert directions == {True, False}
+
+
+@pytest.mark.parametrize("cut", [1, 2])
+def test_suggested_names_of_readings_do_not_depend_on_the_cut(cut):
+    m = ring_loop(1, "RSUR", cut=cut)
+    m.add(JointSensor("s", "j1.w"))
+    with pytest.raises(AssemblyError, match="did you mean 'j1.wz' or 'j1.wy' or 'j1.wx'"):
+        m.assemble()

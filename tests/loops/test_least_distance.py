@@ -197,3 +197,13 @@ def test_a_guess_of_a_cut_joint_that_looks_like_degrees_has_a_note():
     assert note in result.info["note"]
     with pytest.raises(mbs.errors.Unclosable, match=note):
         four_bar(0.4, 1.0, 0.9, 5.8, "j3").assemble(guess={"j3": 30})
+
+
+def test_names_of_cut_joints_in_other_arguments():
+    system = four_bar(0.4, 1.0, 0.9, 0.8, "j3", motor=True).assemble()
+    with pytest.raises(mbs.errors.ModelError, match=r"j3\.q', which is no state, since its joint"):
+        mbs.simulate.run(system, 1e-3, tolerance={"j3.q": 1e-6}, quiet=True)
+    with pytest.raises(mbs.errors.ModelError, match="or give it as a guess"):
+        mbs.simulate.run(system, 1e-3, q0={"j3": 0.7}, quiet=True)
+    with pytest.raises(mbs.errors.ModelError, match=r"no coordinate 'j5'; use one of .*j3"):
+        mbs.loops.solve(system, guess={"j5": 0.7})

@@ -253,3 +253,9 @@ def test_friction_on_a_node_is_one_error():
     m.add(CoulombFriction("f", "n", sliding=3.0))
     with pytest.raises(SolverError, match=r"n can move without moving any inertia.*needs springs"):
         mbs.simulate.run(m.assemble(guess={"x": 1.0}), 0.1, q0={"x": 1.05}, quiet=True)
+
+
+@pytest.mark.parametrize("q0", [{"n": 0.2, "x": 1.1}, [0.2, 1.1]])
+def test_a_position_of_a_node_out_of_balance_names_the_node(q0):
+    with pytest.raises(mbs.errors.LoopError, match=r"forces on n, .* at n = 0.2; leave n out"):
+        mbs.simulate.run(assembled(), 0.01, q0=q0, quiet=True)

@@ -248,8 +248,16 @@ def _configuration(system: System, closure: Closure) -> list[str]:
     lines += [f"  Another configuration: {shown(q)}." for q in closure.others[:_SHOWN_MODES]]
     if closure.meets:
         lines.append(
-            "  The configuration next to the guess is singular: branches of motion meet there."
-            " Guess more positions to choose another branch."
+            "  The configuration next to the guess is singular: branches of motion meet there. The"
+            " mechanism is assembled beside it, on the branch nearest to the guess. Guess more"
+            " positions to choose another branch."
+        )
+    if closure.dead:
+        names = ", ".join(system.speeds[k].name for k in closure.active)
+        lines.append(
+            f"  The configuration is a dead centre of {names}: the other joints do not follow"
+            f" from {names} there, and models in independent joints have no value. Guess another"
+            " position, or name other independent joints (assemble(active=...))."
         )
     return lines
 

@@ -195,9 +195,10 @@ class Closure:
         residual: largest closure residual at the assembled configuration.
         guess: approximate positions by name that the user gave [rad or m].
         at_cut: positions by name of guessed joints that are cut, as assembled [rad or m].
-        others: further configurations with the same locked positions, (nq,) each.
+        others: further configurations with the same locked or independent positions, (nq,) each.
         meets: whether the configuration next to the guess is singular, so that branches of motion
             meet there.
+        dead: whether the independent joints are at a dead centre in the assembled configuration.
     """
 
     rows: tuple[int, ...]
@@ -213,6 +214,7 @@ class Closure:
     at_cut: tuple[tuple[str, float], ...] = ()
     others: tuple[tuple[float, ...], ...] = ()
     meets: bool = False
+    dead: bool = False
 
     @property
     def mobility(self) -> int:

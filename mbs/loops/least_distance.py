@@ -80,7 +80,7 @@ def least_distance(closing: Closing, target: GuessTarget, starts: Iterable[Vecto
     found = list[Vector]()
     for q, miss in zip(minima, misses, strict=True):
         if miss <= least + EQUAL:
-            exact = _with_met_guesses(closing, target, _nearest_in_all(closing, target, q))
+            exact = _with_met_guesses(closing, target, nearest_in_all(closing, target, q))
             near = unwound(closing, exact, target.start)
             if not _is_listed(closing, near, found, EQUAL):
                 found.append(near)
@@ -234,7 +234,7 @@ def _newton_step(gradient: Vector, hessian: Vector, longest: float) -> Vector:
     return step * min(1.0, longest / size) if size > 0 else step
 
 
-def _nearest_in_all(closing: Closing, target: GuessTarget, q: Vector) -> Vector:
+def nearest_in_all(closing: Closing, target: GuessTarget, q: Vector) -> Vector:
     """Of the configurations with the distance of the minimum q (nq,) the one nearest in all."""
     own = _objective(closing, target, target.guessed)
     every = _objective(closing, target, range(len(target.moves(q))))
@@ -252,11 +252,7 @@ def _nearest_in_all(closing: Closing, target: GuessTarget, q: Vector) -> Vector:
             break
         trial = own.moved(q, point, level @ step)
         trial = None if trial is None else _descended(own, trial)
-        if (
-            trial is None
-            or every.value(trial) >= value
-            or own.value(trial) > point.value + EQUAL**2
-        ):
+        if trial is None or every.value(trial) >= value or own.value(trial) > point.value + MET**2:
             longest = size / 4
             continue
         q, value, longest = trial, every.value(trial), min(2 * size, _LONGEST)

@@ -14,7 +14,7 @@ from mbs.assembly.tree import quaternion_slices
 from mbs.loops.closing import CLOSED, Closing, candidates, difference, distance_units, unwound
 from mbs.loops.closure import facing, position_rows
 from mbs.loops.guess_target import EQUAL, GuessTarget
-from mbs.loops.least_distance import MET, is_movable, least_distance
+from mbs.loops.least_distance import MET, is_movable, least_distance, nearest_in_all
 from mbs.solvers.least_squares import MANY
 from mbs.solvers.rank import rank
 
@@ -76,9 +76,16 @@ def nearest_configuration(closing: Closing, target: GuessTarget) -> Assembled | 
     if many:
         reached = _by_blocks(closing, target, q)
         return None if reached is None else Assembled(_met(closing, target, [reached]))
-    found = _modes(closing, target, q)
-    if not found:
-        return None
+    if q is None:
+        found = candidates(closing, start, _MODES)
+        if not found:
+            return None
+        q = nearest_of(closing, found, target)[0]
+        if is_movable(closing, q):
+            q = nearest_in_all(closing, target, q)
+            found = _modes(closing, target, q)
+    else:
+        found = _modes(closing, target, q)
     best = nearest_of(closing, found, target)[0]
     met = _met(closing, target, [best, *found])
     if met is not best:

@@ -94,5 +94,5 @@ def test_the_tree_passes_spherical_joints_both_ways():
 def test_suggested_names_of_readings_do_not_depend_on_the_cut(cut):
     m = ring_loop(1, "RSUR", cut=cut)
     m.add(JointSensor("s", "j1.w"))
-    with pytest.raises(AssemblyError, match="did you mean 'j1.wz' or 'j1.wy' or 'j1.wx'"):
+    with pytest.raises(AssemblyError, match=r"did you mean 'j1.wz' or 'j1.wy' or 'j1.wx'"):
         m.assemble()

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.components import Box, Revolute
-from mbs.errors import LoopError
+from mbs.components import Box, JointStop, Revolute, RigidStop
+from mbs.errors import LoopError, SolverError
 
 JOINTS = ("j1", "j2", "j3", "j4")
 
@@ -93,3 +93,26 @@ def test_configurations_of_one_motion_are_not_listed_as_others(cut):
     """A kite without motor, for which Newton's method finds nothing from zero."""
     system = four_bar(0.5, 0.5, 0.8, 0.8, cut, motor=False).assemble()
     assert len(system.closure.others) == 1
+
+
+def parallelogram_with(stop):
+    m = four_bar(*PARALLELOGRAM, motor=False)
+    m.add(stop)
+    return m.assemble(guess={"j1": 0.5, "j2": -0.5})
+
+
+@pytest.mark.parametrize(("limit", "restitution"), [(0.0, 0.0), (0.0, 0.5), (1e-4, 0.0)])
+def test_a_rigid_stop_at_a_flat_parallelogram_is_named(limit, restitution):
+    system = parallelogram_with(RigidStop("stop", "j1", lower=limit, restitution=restitution))
+    with pytest.raises(SolverError, match=r"rigid stop at j1 is closed there: .* JointStop"):
+        mbs.simulate.run(system, 1.0, quiet=True)
+
+
+def test_stops_next_to_a_flat_parallelogram_hold_it():
+    beside = parallelogram_with(RigidStop("stop", "j1", lower=0.01))
+    result = mbs.simulate.run(beside, 1.0, quiet=True)
+    assert result["j1.q"][-1] == pytest.approx(0.01, abs=1e-9)
+    elastic = JointStop("stop", "j1", lower=0.0, stiffness=1e4, damping=10, width=1e-3)
+    result = mbs.simulate.run(parallelogram_with(elastic), 1.0, quiet=True)
+    assert abs(result["j1.q"][-1]) < 0.01
+    np.testing.assert_allclose(result["j4.q"], result["j1.q"], atol=1e-6)  # on its branch

@@ -251,8 +251,16 @@ def _configuration(system: System, closure: Closure) -> list[str]:
     lines += [f"  Another configuration: {shown(q)}." for q in closure.others[:_SHOWN_MODES]]
     if closure.meets:
         lines.append(
-            "  The configuration next to the guess is singular: branches of motion meet there."
-            " Guess more positions to choose another branch."
+            "  The configuration next to the guess is singular: branches of motion meet there. The"
+            " mechanism is assembled beside it, on the branch nearest to the guess. Guess more"
+            " positions to choose another branch."
+        )
+    if closure.dead:
+        names = ", ".join(system.speeds[k].name for k in closure.active)
+        lines.append(
+            f"  The configuration is a dead centre of {names}: the other joints do not follow"
+            f" from {names} there, and models in independent joints have no value. Guess another"
+            " position, or name other independent joints (assemble(active=...))."
         )
     return lines
 
@@ -601,6 +609,16 @@ class System:
         start, given = list(self.configuration), self.plain_names(values, GUESSES)
         return self._fill(given, self.coordinates, start, "position")
 
+    def positions_at_cuts(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return the positions of cut joints among positions by coordinate name.
+
+        Raises:
+            ModelError: a position of a cut joint is no finite number.
+        """
+        names = [coordinate.name for coordinate in self.cut_coordinates]
+        found = {name: value for name, value in values.items() if name in names}
+        return {name: self._number(value, f"position of {name}") for name, value in found.items()}
+
     def velocity(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
         """Velocities v from values by name, the others zero; errors as for `position`."""
         given = self.plain_names(values, VELOCITIES)
@@ -646,9 +664,10 @@ class System:
             return given
         for name, value in values.items():
             if name in [coordinate.name for coordinate in self.cut_coordinates]:
+                remedy = ", or give it as a guess" if what == "position" else ""
                 raise ModelError(
                     f"{self.name}: {name} has no {what} of its own, since its joint was cut to open"
-                    " a loop; name another joint, or cut another one with m.cut(joint)"
+                    f" a loop; name another joint, or cut another one with m.cut(joint){remedy}"
                 )
             if name not in names:
                 raise ModelError(

@@ -60,7 +60,7 @@ def _analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...
     try:
         return analyse(system, guess, chosen)
     except Unclosable as error:
-        note = like_degrees(system.coordinates, guess)
+        note = like_degrees([*system.coordinates, *system.cut_coordinates], guess)
         raise (Unclosable(f"{error}; {note}") if note else error) from None
 
 

@@ -17,6 +17,7 @@ from mbs.assembly.tables import Coordinate
 from mbs.assembly.tree import norm_rows, quaternion_slices
 from mbs.errors import Unclosable
 from mbs.loops.closure import closure_rows, facing, position_rows, velocity_row_units
+from mbs.loops.cut_positions import cut_positions
 from mbs.numbers import OnArrays, on_arrays
 from mbs.solvers.least_squares import MANY, Entries, NewtonEquations, gauss_newton
 
@@ -159,6 +160,9 @@ class Closing:
         locked: positions that must not change.
         kept: indices of the rows that count; None for all rows.
         axes: indices of the cosines that count; None for all.
+        aims: indices in `system.cut_coordinates` of positions that must have a value. Each adds a
+            row.
+        cut: (c,) values of `system.cut_coordinates`, of which those of the aims count.
     """
 
     system: System
@@ -166,6 +170,8 @@ class Closing:
     locked: tuple[int, ...] = ()
     kept: tuple[int, ...] | None = None
     axes: tuple[int, ...] | None = None
+    aims: tuple[int, ...] = ()
+    cut: Vector | None = None
 
     @property
     def free(self) -> list[int]:
@@ -175,7 +181,7 @@ class Closing:
 
     def rows(self, q: Vector) -> tuple[Vector, Vector]:
         """Residual (m,) and its derivative by the free positions (m, n)."""
-        r, J = self._functions().equations(q, self.p)
+        r, J = self._functions().equations(q, self._given)
         if self.kept is not None:
             r, J = r[list(self.kept)], J[list(self.kept)]
         return r.ravel(), J[:, self.free] if self.locked else J
@@ -183,7 +189,7 @@ class Closing:
     def _sparse_rows(self, q: Vector, free: Sequence[int]) -> tuple[Vector, Entries]:
         """The same as `rows`, for many positions."""
         functions = self._functions()
-        r, values = functions.elements(q, self.p)
+        r, values = functions.elements(q, self._given)
         number = np.full(self.system.nq, -1)
         number[free] = np.arange(len(free))
         rows, columns = functions.places
@@ -204,13 +210,19 @@ class Closing:
         return sizes if self.kept is None else sizes[list(self.kept)]
 
     @property
+    def position_units(self) -> Vector:
+        """(nq,) what differences of positions are divided by: 1, or the size of the mechanism."""
+        return distance_units((row.unit for row in self.system.coordinates), self.size)
+
+    @property
     def _sizes(self) -> list[Vector]:
         """The size of the mechanism and those of the rows; starts have the same p as a rule."""
 
         def build() -> list[Vector]:
-            return self._functions().sizes(self.p)
+            return self._functions().sizes(self._given)
 
-        found: list[Vector] = self.system.recent("closing sizes", self.p.tobytes(), build, _KEPT)
+        key = self.p.tobytes(), self.aims
+        found: list[Vector] = self.system.recent("closing sizes", key, build, _KEPT)
         return found
 
     def openness(self, q: Vector) -> float:
@@ -227,14 +239,14 @@ class Closing:
             return self.rows(at) if dense else self._sparse_rows(at, free)
 
         def values(x: Vector) -> Vector:
-            r = self._functions().values(_replace(start, free, x), self.p)[0].ravel()
+            r = self._functions().values(_replace(start, free, x), self._given)[0].ravel()
             return r if self.kept is None else r[list(self.kept)]
 
         tolerance = TOLERANCE * self.sizes
         compiled = (
             None
             if self.kept is not None
-            else self._functions().newton.near(start, self.p, free, tolerance)
+            else self._functions().newton.near(start, self._given, free, tolerance)
         )
         if compiled is not None:
             found, root = compiled
@@ -285,7 +297,7 @@ class Closing:
 
     def faces(self, q: Vector) -> bool:
         """Whether no axis of a closing joint is opposed at q (nq,)."""
-        cosines = self._functions().facing(q, self.p)[0]
+        cosines = self._functions().facing(q, self._given)[0]
         return bool(np.all((cosines if self.axes is None else cosines[list(self.axes)]) > 0))
 
     def gap(self, q: Vector) -> str:
@@ -306,15 +318,23 @@ class Closing:
         return ", ".join(f"{names[k]} = {q[k]:.4g}" for k in self.locked)
 
     def _functions(self) -> ClosingFunctions:
-        functions: ClosingFunctions = self.system.cached("closing", lambda: _functions(self.system))
+        functions: ClosingFunctions = self.system.cached(
+            ("closing", self.aims), lambda: _functions(self.system, self.aims)
+        )
         return functions
+
+    @property
+    def _given(self) -> Vector:
+        """Second argument of the functions: the parameters, then the values of cut positions."""
+        return self.p if self.cut is None or not self.aims else np.concatenate([self.p, self.cut])
 
 
 class ClosingFunctions(NamedTuple):
     """What is computed of the closure of a system.
 
     Attributes:
-        equations: ``(q, p) -> r, J``: all rows, and their derivative by q.
+        equations: ``(q, p) -> r, J``: all rows, then differences of positions of cut joints that
+            have aims, and their derivative by q.
         elements: ``(q, p) -> r, e``: of the derivative the elements that need not be zero.
         places: their rows and columns.
         values: ``(q, p) -> r`` alone.
@@ -347,27 +367,48 @@ def closure_parameters(system: System, values: Mapping[str, float] | None = None
     return np.array(system.parameter_values(values, needed), dtype=float)
 
 
-def _functions(system: System) -> ClosingFunctions:
-    q = SX.sym("q", system.nq)
-    r = casadi.densify(casadi.vertcat(closure_rows(system, q), norm_rows(system.tree, q)))
+def _functions(system: System, aims: tuple[int, ...]) -> ClosingFunctions:
+    q, p = SX.sym("q", system.nq), system.p
     norms = norm_rows(system.tree, q)
     sizes = casadi.vertcat(row_sizes(system), SX.ones(norms.shape))
+    more = SX(0, 1)
+    if aims:
+        target = SX.sym("c", len(system.cut_coordinates))
+        p = casadi.vertcat(p, target)
+        more = _cut_moves(system, q, target)[list(aims)]
+        lengths = [system.cut_coordinates[k].unit.startswith("m") for k in aims]
+        own = (mechanism_size(system) if is_length else SX(1) for is_length in lengths)
+        sizes = casadi.vertcat(sizes, *own)
+    r = casadi.densify(casadi.vertcat(closure_rows(system, q), norms, more))
     J = casadi.jacobian(r, q)
 
     def arrays(name: str, inputs: list[SX], outputs: list[SX]) -> OnArrays:
         return on_arrays(Function(name, inputs, outputs))
 
-    equations = Function("equations", [q, system.p], [r, J])
-    values = Function("values", [q, system.p], [r])
+    equations = Function("equations", [q, p], [r, J])
+    values = Function("values", [q, p], [r])
     return ClosingFunctions(
         equations=on_arrays(equations),
-        elements=arrays("elements", [q, system.p], [r, casadi.densify(J.nz[:])]),
+        elements=arrays("elements", [q, p], [r, casadi.densify(J.nz[:])]),
         places=np.array(J.sparsity().get_triplet(), dtype=np.int64).reshape(2, -1),
         values=on_arrays(values),
-        facing=arrays("facing", [q, system.p], [facing(system, q)]),
-        sizes=arrays("sizes", [system.p], [mechanism_size(system), sizes]),
+        facing=arrays("facing", [q, p], [facing(system, q)]),
+        sizes=arrays("sizes", [p], [mechanism_size(system), sizes]),
         newton=NewtonEquations(equations, values),
     )
+
+
+def _cut_moves(system: System, q: SX, target: SX) -> SX:
+    """(c, 1) differences of positions of cut joints from a target, as `row_difference`."""
+    found, rows = cut_positions(system)(q, system.p), system.cut_coordinates
+    for first in [k for k, row in enumerate(rows) if row.kind == "quaternion"][::4]:
+        part = slice(first, first + 4)
+        found[part] *= casadi.if_else(casadi.dot(found[part], target[part]) < 0, -1, 1)
+    moves = found - target
+    for k, row in enumerate(rows):
+        if row.unit == "rad":
+            moves[k] -= 2 * casadi.pi * casadi.floor(moves[k] / (2 * casadi.pi) + 0.5)
+    return moves
 
 
 def _replace(q: Vector, indices: Sequence[int], values: Vector) -> Vector:
@@ -401,8 +442,9 @@ def within_half_turn(system: System, q: Vector) -> Vector:
 
 def _within_half_turn(rows: Sequence[Coordinate], q: Vector) -> Vector:
     turned = np.array(q, dtype=float)
-    turns = [row.unit == "rad" for row in rows]
+    turns = np.array([row.unit == "rad" for row in rows], dtype=bool)
     turned[turns] = np.remainder(turned[turns] + np.pi, 2 * np.pi) - np.pi
+    turned[turns & (turned < _HALF_TURN - np.pi)] += 2 * np.pi  # rounding decides no sign
     return turned
 
 
@@ -830,6 +872,7 @@ def candidates(closing: Closing, start: Vector, most: int = _CANDIDATES) -> list
 
 
 _HALF_TURN = 1e-6
-"""Elements and scalar products of unit quaternions that decide no sign: rounding is below."""
+"""Elements and scalar products of unit quaternions that decide no sign, and differences from half a
+turn [rad] that do not: rounding is below. Bars in one line have angles of half a turn."""
 _OTHER = 1e-4
 """Smallest difference of two listed configurations [rad or m]; iterations leave 1e-10."""

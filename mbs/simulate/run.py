@@ -430,6 +430,8 @@ def integrate_legs(
         lost = _lost(system, q, p) if stop.singular and system.is_closed else ""
         cause = stop.__cause__
         reason = lost if lost or stop.singular else _without_inertia(system)
+        if stop.singular:
+            reason += _at_stops(system, np.array(stop.state), _own(system, p))
         stop = SolverError(
             f"{system.name}: {_with_names(system, stop)}; the configuration is {where}{reason}",
             state=stop.state,
@@ -453,6 +455,29 @@ def _without_inertia(system: System) -> str:
     except ModelError as error:
         return "; " + str(error).removeprefix(f"{system.name}: ")
     return without_values(system)
+
+
+_TOUCHED = 1e-6
+"""Distance from a limit [rad or m] at which a rigid stop is closed; impacts are found to 1e-9."""
+
+
+def _at_stops(system: System, x: Array, p: Array) -> str:
+    """The rigid stops that are closed at a singular state, and the remedy; empty if none is."""
+    contacts = contacts_of(system)
+    if not len(contacts):
+        return ""
+    q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
+    limits = Function("limits", [q, v, system.p], [*contacts.bounds, contacts.at(q, v).measure])
+    found = limits(x[: system.nq], x[system.nq : system.nq + system.nv], p)
+    lower, upper, value = (np.array(row)[:, 0] for row in found)
+    gaps = np.minimum(np.abs(value - lower), np.abs(upper - value))
+    closed = [name for name, gap in zip(contacts.names, gaps, strict=True) if gap < _TOUCHED]
+    if not closed:
+        return ""
+    return (
+        f"; the rigid stop at {' and '.join(closed)} is closed there: move its limit away from the"
+        " singular configuration, or use an elastic JointStop"
+    )
 
 
 def _with_names(system: System, stop: SolverError) -> str:
@@ -1465,7 +1490,7 @@ def _degrees_given(system: System, q0: Start, guess: Guess) -> str:
     elif q0 is not None:
         names = (coordinate.name for coordinate in system.coordinates)
         given.update(zip(names, system.position(q0), strict=True))
-    return like_degrees(system.coordinates, given)
+    return like_degrees([*system.coordinates, *system.cut_coordinates], given)
 
 
 def _started(

@@ -12,6 +12,7 @@ import mbs
 from mbs import models
 from mbs.assembly.tables import ANGULAR, QUATERNION
 from mbs.components import Body, JointSensor, Revolute, Spherical, WrenchSensor
+from mbs.errors import AssemblyError
 from mbs.loops.cut_positions import cut_positions
 
 LOOPS = ["RSUR", "RRSRR", "RCSR", "RSRU", "RRSC"]
@@ -139,3 +140,11 @@ def test_an_over_constrained_loop_has_the_same_wrenches_for_every_cut(kinds, tur
     assert np.abs(found[0]).max() > 10
     for other in found[1:]:
         np.testing.assert_allclose(other, found[0], atol=1e-10)
+
+
+@pytest.mark.parametrize("cut", [1, 2])
+def test_suggested_names_of_readings_do_not_depend_on_the_cut(cut):
+    m = ring_loop(1, "RSUR", cut=cut)
+    m.add(JointSensor("s", "j1.w"))
+    with pytest.raises(AssemblyError, match=r"did you mean 'j1.wz' or 'j1.wy' or 'j1.wx'"):
+        m.assemble()

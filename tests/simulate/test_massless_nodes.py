@@ -347,3 +347,9 @@ def test_an_fmu_of_a_structure_with_a_damped_node(tmp_path):
         result = mbs.simulate.fmu(path, 1.0, **options)
         exact = -0.2 + 0.5 * np.exp(-15 * result.time)
         np.testing.assert_allclose(result["n.q"], exact, atol=1e-6)
+
+
+@pytest.mark.parametrize("q0", [{"n": 0.2, "x": 1.1}, [0.2, 1.1]])
+def test_a_position_of_a_node_out_of_balance_names_the_node(q0):
+    with pytest.raises(mbs.errors.LoopError, match=r"forces on n, .* at n = 0.2; leave n out"):
+        mbs.simulate.run(assembled(), 0.01, q0=q0, quiet=True)

@@ -2,6 +2,7 @@
 
     MbsError
     ├── DescriptionError      a component or a file says something impossible
+    │   ├── ArgumentError     a component has no such argument, or needs another one
     │   └── ExpressionError   a text is not a number or an expression of symbols
     ├── AssemblyError         the components do not form a mechanism
     ├── LoopError             a closed loop has no usable configuration
@@ -28,6 +29,10 @@ class MbsError(Exception):
 
 class DescriptionError(MbsError, ValueError):
     """A component or a robot file describes something impossible."""
+
+
+class ArgumentError(DescriptionError, TypeError):
+    """A component is made with an argument that it does not have, or without one that it needs."""
 
 
 class ExpressionError(DescriptionError):

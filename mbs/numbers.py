@@ -65,6 +65,14 @@ def has_boolean(value: Any) -> bool:
     return isinstance(value, (bool, np.bool_))
 
 
+def is_vector(shape: tuple[int, ...]) -> bool:
+    """Return whether an array of this shape is one number, a row or a column.
+
+    The elements of a matrix have two orders, by rows in NumPy and by columns in CasADi.
+    """
+    return sum(length != 1 for length in shape) <= 1
+
+
 def on_arrays(function: Function) -> OnArrays:
     """A Function of arrays, for where it is evaluated many times.
 

@@ -108,11 +108,14 @@ class ConfigurationCheck:
         verify: `verify(system, names, evaluate, inputs, outputs)` raises an error if numeric
             outputs, in the order of their names, have no accuracy; `evaluate(inputs)` returns the
             outputs at other inputs. None if nothing is verified.
+        delicate: `delicate(system, q)` is an expression of q and `system.p`, 1 at configurations at
+            which outputs are verified, else 0. None if there are no such configurations.
     """
 
     rows: Callable[[System, SX], list[ValidityRow]]
     refuse: Callable[[System, Any, Any], None]
     verify: Callable[[System, list[str], Any, dict[str, Any], Sequence[DM]], None] | None = None
+    delicate: Callable[[System, SX], SX] | None = None
 
 
 _SAME_UNIT = {unit: unit for unit in EFFORT_UNIT}
@@ -156,6 +159,7 @@ class ModelFunction(Function):
         self._check_configuration = check
         self._sizes = {name: self.size_in(name) for name in self.name_in()}
         self._of_one: Function | None = None
+        self._state: Function | None = None
         # what a call asks beyond finite numbers; the rows themselves are made when first needed
         ruled = system.bounds or system.bounded or quaternion_slices(system.tree)
         self._asks = bool(check or ruled)
@@ -178,7 +182,7 @@ class ModelFunction(Function):
         """Evaluate it on numbers or symbols, as a casadi.Function, its inputs checked."""
         given = self._given(args, kwargs)
         inputs = {name: self._input(name, value) for name, value in given.items()}
-        self._require_valid(inputs)
+        delicate = self._require_valid(inputs)
         try:
             outputs = Function.__call__(self, *inputs.values())
         except (RuntimeError, NotImplementedError, TypeError, ValueError) as error:
@@ -187,7 +191,8 @@ class ModelFunction(Function):
                 f" of the shapes {self._shapes()}"
             ) from error
         self._require_numbers(outputs)
-        self._verify(inputs, outputs)
+        if delicate:
+            self._verify(inputs, outputs)
         if kwargs:
             every = outputs if isinstance(outputs, tuple) else (outputs,)
             return dict(zip(self.name_out(), every, strict=True))
@@ -256,6 +261,20 @@ class ModelFunction(Function):
             inputs = {name: symbols[name] for name in self.asked()}
             self._of_one = all_hold(self._system, key, inputs, rows)
         return self._of_one
+
+    def _state_of_one(self) -> Function | None:
+        """``state(..) -> valid, delicate`` of one column; what both contain is evaluated once."""
+        if self._state is None and (valid := self._valid_of_one()) is not None:
+            symbols = {"q": SX.sym("q", self._system.nq), "p": self._system.p}
+            given, check = [symbols[name] for name in valid.name_in()], self._check_configuration
+            expression = check.delicate if check and "q" in valid.name_in() else None
+
+            def build() -> Function:
+                delicate = SX(0) if expression is None else expression(self._system, symbols["q"])
+                return Function("state", given, [valid(*given), delicate], {"cse": True})
+
+            self._state = self._system.cached(("state", self.asked(), check), build)
+        return self._state
 
     def default_of_p(self) -> NDArray[np.float64] | None:
         """Values of the parameters where they are left out; None where one has no value."""
@@ -369,32 +388,37 @@ class ModelFunction(Function):
         has = f"the shape {shape}" if len(shape) > 1 else f"{rows} values"
         raise ModelError(f"{self._title}: {name} has {has}, it needs {expected}{known}")
 
-    def _require_valid(self, inputs: dict[str, Any]) -> None:
-        """Refuse numbers at which the model has no sense."""
-        one = self._valid_of_one() if self._asks else None
+    def _require_valid(self, inputs: dict[str, Any]) -> bool:
+        """Refuse numbers at which the model has no sense; return whether to verify its outputs."""
+        one = self._state_of_one() if self._asks else None
         if one is None:
-            return
-        system, names = self._system, one.name_in()
+            return False
+        system, names = self._system, self.asked()
         point = [inputs[name] for name in names]
         sizes = [(one.size1_in(k), 1) for k in range(len(names))]
-        plain = all(isinstance(x, DM) for x in point) and [x.shape for x in point] == sizes
-        if plain and _is_one(one, point):
-            return
-        columns = {name: _columns(inputs[name], one.size1_in(name)) for name in names}
+        if all(isinstance(x, DM) for x in point) and [x.shape for x in point] == sizes:
+            valid, delicate = one.call(point)
+            if valid == 1:
+                return bool(delicate == 1)
+        columns = {
+            name: _columns(inputs[name], size) for name, (size, _) in zip(names, sizes, strict=True)
+        }
         known = {name: values for name, values in columns.items() if values is not None}
         whole = len(known) == len(names)
         count = max((values.shape[1] for values in known.values()), default=0)
         places = {name: np.arange(count) % values.shape[1] for name, values in known.items()}
-        suspects = np.arange(count)
+        suspects, is_delicate = np.arange(count), False
         if whole and count:
             every = [_dm(known[name][:, places[name]]) for name in names]
-            suspects = np.flatnonzero(one.map(count).call(every)[0].full().ravel() != 1)
+            valid, delicate = (x.full().ravel() for x in one.map(count).call(every))
+            suspects, is_delicate = np.flatnonzero(valid != 1), bool(np.any(delicate == 1))
         for k in suspects:
             column = {name: values[:, places[name][k]] for name, values in known.items()}
             if fault := plain_fault(system, column.get("q"), column.get("p")):
                 raise ModelError(f"{self._title}: {fault}")
             if whole:
                 self._refuse(column)
+        return is_delicate
 
     def _refuse(self, column: dict[str, NDArray[np.float64]]) -> None:
         """Say what is wrong where no component and no quaternion has a sentence for it."""
@@ -437,10 +461,6 @@ class ModelFunction(Function):
     def _shapes(self) -> str:
         sizes = (f"{name} {self.size_in(name)}" for name in self.name_in())
         return ", ".join(sizes)
-
-
-def _is_one(valid: Function, point: list[DM]) -> bool:
-    return bool(valid.call(point)[0] == 1)
 
 
 def _dm(array: NDArray[np.float64]) -> DM:

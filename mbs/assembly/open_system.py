@@ -36,6 +36,7 @@ from mbs.assembly.tables import (
 from mbs.assembly.tree import zero_position
 from mbs.components import Box, Component, Cylinder, Free, Joint, Mechanism
 from mbs.components.bodies import Mount, RigidBody
+from mbs.components.mechanism import OUTER_WORLD
 from mbs.errors import AssemblyError
 from mbs.expressions import Parameter, expression, to_float, to_sx
 from mbs.spatial import Pose
@@ -275,10 +276,6 @@ def _frames(
         link, pose = frames["base"]
         frames[OUTER_WORLD] = link, pose @ mechanism.mount.inverse().pose(symbols)
     return frames
-
-
-OUTER_WORLD = "outer_world"
-"""Name of the frame in which gravity and the mount of the base are given."""
 
 
 def _shapes(

@@ -24,6 +24,7 @@ from mbs.assembly.parameter_bounds import BoundedField, Bounds
 from mbs.assembly.parts import AttachedPart, Quantity
 from mbs.assembly.tables import (
     AttachedSensor,
+    Balance,
     BodyRow,
     Closure,
     Coordinate,
@@ -41,7 +42,7 @@ from mbs.components.bodies import RigidBody
 from mbs.errors import MbsError, ModelError
 from mbs.expressions import Parameter, out_of_bounds
 from mbs.files import PathLike
-from mbs.numbers import numbers_given
+from mbs.numbers import is_vector, numbers_given
 from mbs.spatial import Pose
 from mbs.text import did_you_mean, listed, quoted, without_values
 
@@ -194,9 +195,11 @@ def _loops(system: System) -> list[str]:
                 f" {_count(len(loop.rows), 'row')} {'is' if kept == 1 else 'are'} independent."
             )
             continue
-        if loop.closing == "balance":
+        if loop.closing in ("balance", "damped balance"):
+            what = "the velocities of " if loop.closing == "damped balance" else ""
             lines.append(
-                f"The balance of forces gives {listed(loop.joints)}, which move no mass: {kept} of"
+                f"The balance of forces gives {what}{listed(loop.joints)}, which move no mass:"
+                f" {kept} of"
                 f" {_count(len(loop.rows), 'row')} {'is' if kept == 1 else 'are'} independent."
             )
             continue
@@ -248,8 +251,16 @@ def _configuration(system: System, closure: Closure) -> list[str]:
     lines += [f"  Another configuration: {shown(q)}." for q in closure.others[:_SHOWN_MODES]]
     if closure.meets:
         lines.append(
-            "  The configuration next to the guess is singular: branches of motion meet there."
-            " Guess more positions to choose another branch."
+            "  The configuration next to the guess is singular: branches of motion meet there. The"
+            " mechanism is assembled beside it, on the branch nearest to the guess. Guess more"
+            " positions to choose another branch."
+        )
+    if closure.dead:
+        names = ", ".join(system.speeds[k].name for k in closure.active)
+        lines.append(
+            f"  The configuration is a dead centre of {names}: the other joints do not follow"
+            f" from {names} there, and models in independent joints have no value. Guess another"
+            " position, or name other independent joints (assemble(active=...))."
         )
     return lines
 
@@ -325,8 +336,9 @@ class System:
         numbered: the body of each frame of the table that it was made from, by the number there;
             empty where these are the numbers of the links.
         shapes: what the links and the base look like.
-        balanced: coordinates that move no mass and that the balance of forces determines: index in
-            q, index in v, and a typical stiffness [N/m or N m/rad].
+        nodes: coordinates that move no mass and that the balance of forces determines: index in q
+            and index in v.
+        balances: of the forces on them, those of positions first.
     """
 
     name: str
@@ -356,7 +368,8 @@ class System:
     described: tuple[Component, ...] = ()
     numbered: Mapping[int, str] = field(default_factory=dict)
     shapes: tuple[ShapeRow, ...] = ()
-    balanced: tuple[tuple[int, int, float], ...] = ()
+    nodes: tuple[tuple[int, int], ...] = ()
+    balances: tuple[Balance, ...] = ()
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -455,6 +468,11 @@ class System:
     def free(self) -> tuple[int, ...]:
         """Indices of the velocities whose positions may be chosen: active, or those of discs."""
         return self.closure.free if self.closure else tuple(range(self.nv))
+
+    @property
+    def node_frictions(self) -> frozenset[str]:
+        """Names of the components whose dry friction acts on massless nodes."""
+        return frozenset(name for balance in self.balances for name in balance.frictions)
 
     @property
     def motors(self) -> tuple[int, ...]:
@@ -591,6 +609,16 @@ class System:
         start, given = list(self.configuration), self.plain_names(values, GUESSES)
         return self._fill(given, self.coordinates, start, "position")
 
+    def positions_at_cuts(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return the positions of cut joints among positions by coordinate name.
+
+        Raises:
+            ModelError: a position of a cut joint is no finite number.
+        """
+        names = [coordinate.name for coordinate in self.cut_coordinates]
+        found = {name: value for name, value in values.items() if name in names}
+        return {name: self._number(value, f"position of {name}") for name, value in found.items()}
+
     def velocity(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
         """Velocities v from values by name, the others zero; errors as for `position`."""
         given = self.plain_names(values, VELOCITIES)
@@ -636,9 +664,10 @@ class System:
             return given
         for name, value in values.items():
             if name in [coordinate.name for coordinate in self.cut_coordinates]:
+                remedy = ", or give it as a guess" if what == "position" else ""
                 raise ModelError(
                     f"{self.name}: {name} has no {what} of its own, since its joint was cut to open"
-                    " a loop; name another joint, or cut another one with m.cut(joint)"
+                    f" a loop; name another joint, or cut another one with m.cut(joint){remedy}"
                 )
             if name not in names:
                 raise ModelError(
@@ -653,6 +682,11 @@ class System:
         array = numbers_given(values)
         if isinstance(array, str):
             raise ModelError(f"{self.name}: the {what} {array}")
+        if not is_vector(array.shape):
+            raise ModelError(
+                f"{self.name}: the {what} has the shape {array.shape}; give a list, or an array of"
+                " one dimension"
+            )
         if not np.isfinite(array).all():
             raise ModelError(
                 f"{self.name}: the {what} is {quoted(values)}; give a finite number for each"

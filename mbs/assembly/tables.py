@@ -177,6 +177,24 @@ class LoopRow:
 
 
 @dataclass(frozen=True, slots=True)
+class Balance:
+    """The balance of the forces on a massless node.
+
+    Attributes:
+        velocity: index in v of the node.
+        size: what the force is divided by: a typical stiffness [N/m or N m/rad], or damping
+            [N s/m or N m s/rad].
+        is_damped: whether dampers act, so that it determines a velocity.
+        frictions: names of the components whose dry friction acts on the node.
+    """
+
+    velocity: int
+    size: float
+    is_damped: bool
+    frictions: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Closure:
     """How the loops of a system constrain its velocities.
 
@@ -195,9 +213,10 @@ class Closure:
         residual: largest closure residual at the assembled configuration.
         guess: approximate positions by name that the user gave [rad or m].
         at_cut: positions by name of guessed joints that are cut, as assembled [rad or m].
-        others: further configurations with the same locked positions, (nq,) each.
+        others: further configurations with the same locked or independent positions, (nq,) each.
         meets: whether the configuration next to the guess is singular, so that branches of motion
             meet there.
+        dead: whether the independent joints are at a dead centre in the assembled configuration.
     """
 
     rows: tuple[int, ...]
@@ -213,6 +232,7 @@ class Closure:
     at_cut: tuple[tuple[str, float], ...] = ()
     others: tuple[tuple[float, ...], ...] = ()
     meets: bool = False
+    dead: bool = False
 
     @property
     def mobility(self) -> int:
@@ -568,7 +588,8 @@ def _on_coordinate(
         frames = ball.frame_a, ball.frame_b
         return AttachedSensor(sensor, frames, name, None, tuple(quantities), name)
     if not any(name in table for table in (q, v, cut)):
-        known = dict.fromkeys([*q, *v, *cut])
+        angular = [f"{ball}.{element}" for ball in balls for element in ANGULAR]
+        known = dict.fromkeys([*q, *v, *cut, *angular])
         raise AssemblyError(
             f"{sensor.name}: there is no coordinate {name!r}; {did_you_mean(name, known)}"
         )

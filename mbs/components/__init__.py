@@ -65,6 +65,7 @@ from mbs.components.forces import (
     RigidStop,
     Spring,
     SpringDamperSeries,
+    SpringFrictionSeries,
     Torque,
 )
 from mbs.components.given_forces import (
@@ -266,6 +267,7 @@ __all__ = [
     "Spherical",
     "Spring",
     "SpringDamperSeries",
+    "SpringFrictionSeries",
     "Step",
     "Sum",
     "Table",

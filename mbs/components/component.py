@@ -7,13 +7,15 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from decimal import Decimal
+from functools import wraps
+from inspect import signature
 from typing import Any, TypeVar
 
 import numpy as np
 from casadi import DM, SX
 from numpy.typing import NDArray
 
-from mbs.errors import DescriptionError
+from mbs.errors import ArgumentError, DescriptionError
 from mbs.expressions import (
     Expression,
     Number,
@@ -28,7 +30,7 @@ from mbs.expressions import (
     without_defaults,
 )
 from mbs.spatial import Khalil, Pose, align_z, nearest_rotation, unit_vector, vector
-from mbs.text import quoted, seen
+from mbs.text import did_you_mean, listed, quoted, seen
 
 # Where a point of a component is: a chain of displacements, kept as data.
 #
@@ -315,6 +317,69 @@ class Point:
 C = TypeVar("C", bound="Component")
 
 
+# Arguments of constructors.
+
+
+def check_arguments(cls: type) -> None:
+    """Let the constructor of a class name wrong arguments by one error.
+
+    Args:
+        cls: the class; only an `__init__` of its own is replaced.
+    """
+    own = vars(cls).get("__init__")
+    if own is None or hasattr(own, "__wrapped__"):
+        return
+    setattr(cls, "__init__", _checking(own))  # noqa: B010
+
+
+def _checking(init: Callable[..., None]) -> Callable[..., None]:
+    """The same constructor; wrong arguments raise an ArgumentError."""
+
+    @wraps(init)
+    def checked(self: Any, *args: Any, **kwargs: Any) -> None:
+        try:
+            init(self, *args, **kwargs)
+        except TypeError:
+            fault = _wrong_arguments(init, args, kwargs)
+            if not fault:
+                raise
+            name = kwargs.get("name", args[0] if args else "")
+            title = (
+                f"{type(self).__name__} {name}" if isinstance(name, str) else type(self).__name__
+            )
+            raise ArgumentError(f"{title.strip()}: {fault}") from None
+
+    return checked
+
+
+def _wrong_arguments(
+    init: Callable[..., None], args: Sequence[Any], kwargs: Mapping[str, Any]
+) -> str:
+    """The fault of the arguments of a constructor; empty if they fit."""
+    known = list(signature(init).parameters.values())[1:]
+    if any(one.kind in (one.VAR_POSITIONAL, one.VAR_KEYWORD) for one in known):
+        return ""
+    names = [one.name for one in known]
+    for name in kwargs:
+        if name not in names:
+            return f"there is no argument {name!r}; {did_you_mean(name, names)}"
+    in_order = [one.name for one in known if one.kind is not one.KEYWORD_ONLY]
+    if len(args) > len(in_order):
+        return (
+            f"{len(args)} arguments without a name are given, and {len(in_order)} are possible:"
+            f" {', '.join(in_order)}; give the others by name"
+        )
+    given = {*in_order[: len(args)], *kwargs}
+    twice = [name for name in in_order[: len(args)] if name in kwargs]
+    if twice:
+        return f"{twice[0]} is given twice, by position and by name; give it once"
+    missing = [one.name for one in known if one.default is one.empty and one.name not in given]
+    if not missing:
+        return ""
+    verb = "is" if len(missing) == 1 else "are"
+    return f"{listed(missing)} {verb} missing; give for example {missing[0]}=..."
+
+
 @dataclass(frozen=True, slots=True)
 class Component:
     """A named part of a mechanism.
@@ -324,6 +389,10 @@ class Component:
     """
 
     name: str
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super(Component, cls).__init_subclass__(**kwargs)
+        check_arguments(cls)
 
     def __post_init__(self) -> None:
         if (

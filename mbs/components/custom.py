@@ -34,7 +34,7 @@ from typing import Any, ClassVar, TypeVar
 import casadi
 from casadi import SX
 
-from mbs.components.component import Component, Point
+from mbs.components.component import Component, Point, check_arguments
 from mbs.components.on_points import OnPoints
 from mbs.components.shapes import Shape
 from mbs.errors import DescriptionError
@@ -625,6 +625,7 @@ class Custom(OnPoints):
         cls.declared = {n: what for one in (*inherited, own) for n, what in one.items()}
         if own:
             _make_fields(cls, own)
+            check_arguments(cls)
 
     def __post_init__(self) -> None:
         Component.__post_init__(self)

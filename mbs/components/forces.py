@@ -399,6 +399,85 @@ class SpringDamperSeries(ForceElement):
         return SX(self._tension(at) - at.parallel * at.elongation)
 
 
+class SpringFrictionSeries(ForceElement):
+    """A spring in series with dry friction between two points, a Jenkins element.
+
+    With the distance L of the points and the elongation z of the friction, the tension is
+    T = stiffness (L - length - z). The friction sticks while |T - parallel z| is below `friction`,
+    and slides with that force otherwise. The element does not depend on the rate: a cycle of the
+    amplitude X, without a parallel spring, takes 4 friction (X - friction / stiffness). In
+    simulations and FMUs it changes between sticking and sliding at events.
+
+    Source: Pfeiffer and Glocker 1996, chapter 5.
+
+    Attributes:
+        a, b: the points, or bodies for their reference frames.
+        stiffness: of the spring [N/m].
+        friction: the force at which it slides [N].
+        length: free length at z = 0 [m].
+        parallel: stiffness of a spring parallel to the friction [N/m].
+        elongation: z where it sticks [m].
+        direction: of sliding, 1 while it becomes longer, -1 while it becomes shorter, 0 where it
+            sticks.
+    """
+
+    a = custom.frame()
+    b = custom.frame()
+    stiffness = custom.parameter("N/m", positive=True)
+    friction = custom.parameter("N", positive=True)
+    length = custom.parameter("m", 0.0, min=0)
+    parallel = custom.parameter("N/m", 0.0, min=0)
+    elongation = custom.mode()
+    direction = custom.mode()
+    force = custom.output("N")
+    slip = custom.output("m")
+
+    def loads(self, at: Any) -> Mapping[str, Load]:
+        """The tension of both, each point towards the other."""
+        return custom.pull(at.a, at.b, self._tension(at))
+
+    def energy(self, at: Any) -> SX:
+        """Energy in the springs."""
+        z = self._elongation(at)
+        return SX(0.5 * (self._tension(at) ** 2 / at.stiffness + at.parallel * z**2))
+
+    def dissipation(self, at: Any) -> SX:
+        """What the friction takes while it slides."""
+        share = at.stiffness / (at.stiffness + at.parallel)
+        return SX(at.friction * share * at.direction * at.a.to(at.b).rate)
+
+    def events(self, at: Any) -> Mapping[str, custom.Event]:
+        """It slides where the force reaches the friction, and sticks where the motion turns."""
+        sticks, rate = at.direction == 0, at.a.to(at.b).rate
+        force = self._tension(at) - at.parallel * at.elongation
+        found = {}
+        for label, sign in (("longer", 1), ("shorter", -1)):
+            then = {
+                "elongation": self._sliding(at, sign),
+                "direction": casadi.if_else(sign * rate > 0, sign, 0),
+            }
+            when = casadi.if_else(sticks, at.friction - sign * force, at.friction)
+            found[label] = custom.Event(when, then)
+        turned = casadi.if_else(sticks, 1, at.direction * rate)
+        stop = {"elongation": self._elongation(at), "direction": SX(0)}
+        return {**found, "sticks": custom.Event(turned, stop)}
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The tension, and the elongation of the friction."""
+        return {"force": self._tension(at), "slip": self._elongation(at)}
+
+    def _sliding(self, at: Any, direction: SX | int) -> SX:
+        """The elongation at which the force on the friction is that of sliding."""
+        pull = at.stiffness * (at.a.to(at.b).length - at.length) - direction * at.friction
+        return SX(pull / (at.stiffness + at.parallel))
+
+    def _elongation(self, at: Any) -> SX:
+        return SX(casadi.if_else(at.direction == 0, at.elongation, self._sliding(at, at.direction)))
+
+    def _tension(self, at: Any) -> SX:
+        return SX(at.stiffness * (at.a.to(at.b).length - at.length - self._elongation(at)))
+
+
 # Bushings: elastic mounts between two frames.
 #
 # Source: Haug 1989 for forces between bodies; the angles are those of the unit quaternion.

@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from mbs.arguments import names_given, values_given
 from mbs.components.bodies import Mount, RigidBody, World, three
-from mbs.components.component import Component, Placement, Point, in_rotated_axes
+from mbs.components.component import (
+    Component,
+    Placement,
+    Point,
+    check_arguments,
+    in_rotated_axes,
+)
 from mbs.components.couplings import Coupling
 from mbs.components.custom import Custom, Flange, Signal
 from mbs.components.drives import flange_pair
@@ -18,7 +24,7 @@ from mbs.components.forces import Force
 from mbs.components.joints import Joint
 from mbs.components.locking import lock
 from mbs.components.motion_joint import MotionJoint
-from mbs.components.mounting import Mounting, mount_of
+from mbs.components.mounting import Mounting, mount_of, notes_on_degrees
 from mbs.components.notes import Note
 from mbs.components.sensors import Sensor
 from mbs.components.shapes import Shape
@@ -71,6 +77,8 @@ class Placed:
         return self.body("world")
 
 
+OUTER_WORLD = "outer_world"
+"""Name of the frame in which gravity and the mount of the base are given."""
 _SCOPE = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*", re.ASCII)
 
 
@@ -109,7 +117,7 @@ def place(outer: Mechanism, inner: Mechanism, name: str) -> Placed:
         (f"{scope}.{source}", replace(target, owner=placed[target.owner.name]))
         for source, target in inner.wires
     )
-    for frame, point in inner.frames.items():
+    for frame, point in _frames_of(inner).items():
         outer.frames[f"{scope}.{frame}"] = on_placed(point, placed, scope)
     outer.shapes.extend((on_placed(point, placed, scope), shape) for point, shape in inner.shapes)
     outer.cuts.extend(f"{scope}.{joint}" for joint in inner.cuts)
@@ -119,6 +127,18 @@ def place(outer: Mechanism, inner: Mechanism, name: str) -> Placed:
         if (scoped := f"{scope}.{symbol}") in used:  # not what only its gravity used
             outer.values[scoped] = replace(value, name=scoped)
     return Placed(outer, scope)
+
+
+def _frames_of(inner: Mechanism) -> dict[str, Point]:
+    """Return the named frames of a mechanism; a mount adds the frame of the outer world."""
+    if not inner.mount.steps:
+        return inner.frames
+    if OUTER_WORLD in inner.frames:
+        raise DescriptionError(
+            f"{inner.name}: the frame {OUTER_WORLD!r} has the name of the frame in which the mount"
+            " is given; rename it"
+        )
+    return {**inner.frames, OUTER_WORLD: Point(inner.world, placement=inner.mount.inverse())}
 
 
 def on_placed(point: Point, placed: Mapping[str, Component], scope: str) -> Point:
@@ -265,6 +285,7 @@ class Mechanism:
             placed = placed.then(*steps)
             if rotation is not None:
                 vector = in_rotated_axes(tuple(map(expression, vector)), rotation, place)
+            self.notes.extend(notes_on_degrees(steps))
         object.__setattr__(self.world, "gravity", tuple(vector))
         self.mount = placed
 
@@ -277,7 +298,9 @@ class Mechanism:
     def add(self, component: C | Mechanism, name: str | None = None) -> C | Placed:
         """Add a body, a joint or a whole mechanism, whose names are then scoped by its own.
 
-        A mechanism that is placed in another one moves in the gravity of the outer one.
+        A mechanism that is placed in another one moves in the gravity of the outer one. Its base is
+        at the position at which it is connected. A mount gives it the frame "outer_world":
+        `connect(outer.world, placed.point("outer_world"))` puts the base at its mount.
 
         Args:
             component: what to add.
@@ -642,6 +665,9 @@ class Mechanism:
             self._ports.update((p.owner.name, p.port) for p in pair)
         self._counted = len(self.connections)
         return (point.owner.name, point.port) in self._ports
+
+
+check_arguments(Mechanism)
 
 
 def _what(value: object) -> str:

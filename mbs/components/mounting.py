@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from mbs.components.bodies import three
-from mbs.components.component import Rotation, Step, displacement
+from mbs.components.component import ElementaryRotation, Rotation, Step, displacement
+from mbs.components.notes import Note
 from mbs.errors import DescriptionError
+from mbs.expressions import to_float
 from mbs.text import quoted
 
 Mounting = Rotation | Mapping[str, Any]
@@ -35,3 +38,19 @@ def mount_of(mount: Any, where: str) -> tuple[tuple[Step, ...], Rotation | None]
     x, y, z = three(mount.get("position", (0.0, 0.0, 0.0)), f"{where}, position")
     rotation = mount.get("rotation")
     return displacement(where, x, y, z, rotation), rotation
+
+
+_REVOLUTION = 2 * math.pi
+"""Angle [rad] beyond which the rotation of a mount looks like degrees: no base needs more."""
+
+
+def notes_on_degrees(steps: Iterable[Step]) -> list[Note]:
+    """Return a note on each angle of a mount that looks like degrees."""
+    angles = [
+        (step.axis, to_float(step.angle)) for step in steps if isinstance(step, ElementaryRotation)
+    ]
+    return [
+        Note("doubted", "mount", f"{axis} = {angle:g} rad may be degrees; give radians")
+        for axis, angle in angles
+        if angle is not None and abs(angle) > _REVOLUTION
+    ]

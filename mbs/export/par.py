@@ -16,9 +16,10 @@ from mbs.assembly.tree import Link
 from mbs.components import Mechanism
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
-from mbs.export.robot_files import shapes_left_out, system_of
+from mbs.export.robot_files import base_pose, mount_left_out, shapes_left_out, system_of
 from mbs.files import path_of
 from mbs.formats import CutRow, FrameRow, InertiaRow, RobotTable, write_par
+from mbs.formats.base_pose import POSE, base_pose_texts
 from mbs.formats.table import BODY_SCALARS, GEOMETRY
 from mbs.operations.graph import graph_of
 from mbs.spatial import Khalil, Pose, align_z, frames_to
@@ -38,7 +39,7 @@ def par(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
     Link j of the system is frame j of the file, its joint variable q<j>; where fixed frames lead
     to a link they come before it. Bodies that are welded together are one link. Symbols stay
     symbols, and their values are in comments that `mbs.load` reads. Names of joints and bodies and
-    limits are lost.
+    limits are lost. A mount is the vector Z, with symbols at their defaults.
 
     Args:
         system: of revolute and prismatic motions; cut joints are one of the two. A Mechanism is
@@ -51,7 +52,8 @@ def par(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
         ExportError: the file cannot be written.
     """
     system = system_of(system)
-    write_par(robot_table(system), path_of(path), note=shapes_left_out(system))
+    note = " ".join(filter(None, (shapes_left_out(system), mount_left_out(system))))
+    write_par(robot_table(system), path_of(path), note=note)
 
 
 def robot_table(system: System, file: str = ".par") -> RobotTable:
@@ -101,6 +103,7 @@ def robot_table(system: System, file: str = ".par") -> RobotTable:
     ]
     names = [f"q{number[j]}" for j in range(len(system.tree.links))]
     configuration = dict(zip(names, system.configuration, strict=True)) if system.cuts else {}
+    base = base_pose(system)
     table = RobotTable(
         name=system.name,
         frames=(*frames, *moving, *fixed),
@@ -109,6 +112,7 @@ def robot_table(system: System, file: str = ".par") -> RobotTable:
         gravity=tuple(text(system.tree.gravity[k]) for k in range(3)),
         source=system.source,
         guess={name: value for name, value in configuration.items() if value},
+        extras={} if base is None else {POSE: base_pose_texts(base)},
     )
     # symbols may have cancelled, such as a length along the axis of the last link
     defaults = {p.name: p.default for p in system.parameters if p.name in table.symbols}

@@ -6,17 +6,22 @@ import os
 from collections.abc import Sequence
 from xml.etree.ElementTree import Comment, Element, indent, tostring
 
+import casadi
 import numpy as np
-from casadi import DM, SX
+from casadi import DM, SX, Function
+from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.components import Mechanism
 from mbs.components.joints import Motion
+from mbs.components.mechanism import OUTER_WORLD
 from mbs.errors import ModelError
 from mbs.files import path_of, write_bytes
 from mbs.recursions.poses import link_poses
 from mbs.spatial import origin
 from mbs.text import quoted
+
+Array = NDArray[np.float64]
 
 
 def system_of(system: object) -> System:
@@ -73,6 +78,27 @@ def shapes_left_out(system: System) -> str:
     names = {-1: "the base", **{j: link.name for j, link in enumerate(system.tree.links)}}
     owners = ", ".join(dict.fromkeys(names[row.link] for row in system.shapes))
     return f"Shapes that are not in this file: {len(system.shapes)}, on {owners}."
+
+
+def base_pose(system: System) -> Array | None:
+    """Return the pose (4, 4) of the base in the outer world, symbols at their defaults.
+
+    None without a mount, and if one of its symbols has no value.
+    """
+    if OUTER_WORLD not in system.frames:
+        return None
+    _, pose = system.frames[OUTER_WORLD]
+    matrix = Function("base", [system.p], [casadi.densify(pose.inverse().matrix)])
+    found = np.array(matrix(system.p_default))
+    return found if np.isfinite(found).all() else None
+
+
+def mount_left_out(system: System) -> str:
+    """Return the note about a mount that a file in numbers cannot have; empty if it has it."""
+    lost = OUTER_WORLD in system.frames and base_pose(system) is None
+    return (
+        "The mount of the base has symbols without a value; it is not in this file." if lost else ""
+    )
 
 
 def write_xml(root: Element, path: str | os.PathLike[str], note: str = "") -> None:

@@ -18,8 +18,10 @@ from mbs.assembly import System
 from mbs.assembly.tree import Link
 from mbs.components import Mechanism
 from mbs.components.joints import Motion
+from mbs.components.mechanism import OUTER_WORLD
 from mbs.errors import ModelError
 from mbs.export.robot_files import (
+    base_pose,
     check_backward_drives,
     shapes_left_out,
     system_of,
@@ -32,6 +34,8 @@ Array = NDArray[np.float64]
 
 _ON_AXIS = 1e-14
 """How far a body may be from the axis that its joint is written on [m]: rounding, no more."""
+_SAME = 1e-12
+"""Difference of gravity [m/s^2] or of a transform [m] that is rounding, which is below 1e-14."""
 _DOWN = (0.0, 0.0, -9.81)  # [m/s^2] what readers of URDF files suppose, which cannot say it
 
 
@@ -42,7 +46,7 @@ def urdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
     joint. Of bodies that are welded together one has the whole inertia. Couplings of degree one
     are mimics, rotor inertia Ia is that of a transmission of ratio one. Which joints have motors,
     the width of Coulomb friction and one-sided ranges of a motor the format cannot say; they are
-    lost, the last are refused.
+    lost, the last are refused. A rotated mount makes the frame "outer_world" the world of the file.
 
     Args:
         system: of revolute, prismatic and free motions; a Mechanism is assembled first.
@@ -123,14 +127,11 @@ class _Writing:
     def robot(self) -> Element:
         system = self.system
         gravity = self.number(system.tree.gravity).ravel()
-        if not np.array_equal(gravity, _DOWN):
-            raise ModelError(
-                f"{system.name}: gravity is {quoted(gravity.tolist())}, but that of URDF is"
-                f" {_DOWN}; rotate the robot instead"
-            )
         root = Element("robot", name=system.name)
         SubElement(root, "link", name="world")
         self.frame[-1] = "world", np.eye(4)
+        if not np.array_equal(gravity, _DOWN):
+            self._mount(gravity)
         frames_by_name = {
             name: (link, self.number(pose.matrix))
             for name, (link, pose) in system.frames.items()
@@ -140,9 +141,33 @@ class _Writing:
             self._link(root, j, link, frames_by_name)
         written = {name for name, _ in self.frame.values()}
         for name, (number, pose) in frames_by_name.items():
-            if name not in written:
+            is_world = number < 0 and np.allclose(pose, self.frame[-1][1], rtol=0, atol=_SAME)
+            if name not in written and not (name == OUTER_WORLD and is_world):
                 self._add_fixed_joint(root, name, number, pose)
         return root
+
+    def _mount(self, gravity: Array) -> None:
+        """Make the world of the file the one in which the gravity of a mounted robot is given.
+
+        Raises:
+            ModelError: the robot has no mount that makes its gravity that of URDF, or it has a
+                free joint, whose coordinates are relative to the base.
+        """
+        system = self.system
+        pose = base_pose(system)
+        R = np.eye(3) if pose is None else pose[:3, :3]
+        if pose is None or np.max(np.abs(R @ gravity - _DOWN)) > _SAME:
+            raise ModelError(
+                f"{system.name}: gravity is {quoted(gravity.tolist())}, but that of URDF is"
+                f" {_DOWN}; give the robot a mount instead"
+            )
+        for link in system.tree.links:
+            if link.motion is Motion.FREE and link.antecedent < 0:
+                raise ModelError(
+                    f"{system.name}/{link.name}: a free joint on a rotated base has other"
+                    " coordinates in a URDF file; write the robot without its mount"
+                )
+        self.frame[-1] = "world", inverse(pose)
 
     def _link(
         self, root: Element, j: int, link: Link, frames_by_name: Mapping[str, tuple[int, Array]]

@@ -30,6 +30,7 @@ from mbs.components import (
 from mbs.components.joints import motor_range
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, number, parameters_of, to_float
+from mbs.formats.base_pose import base_placement
 from mbs.formats.files import component_name
 from mbs.spatial.inertia import TEN_PARAMETERS
 from mbs.text import did_you_mean, quoted
@@ -177,7 +178,8 @@ class RobotTable:
         source: where the data come from.
         guess: joint positions near which the loops are closed, by the names of joints that
             `joint_name` gives [rad or m].
-        extras: what a file says beyond the mechanism, as texts, kept for writing it again.
+        extras: what a file says beyond the mechanism, as texts, kept for writing it again. "Z" has
+            the 16 elements, row by row, of the pose of the base in the world: the mount.
 
     Raises:
         DescriptionError: a row contradicts itself or the others; the message names the row.
@@ -468,6 +470,8 @@ def to_mechanism(table: RobotTable) -> Mechanism:
         keep_order=True,
         guess=table.guess,
     )
+    mechanism.mount, notes = base_placement(table.extras)
+    mechanism.notes.extend(notes)
     rows = {row.frame: row for row in table.bodies}
     links: dict[int, RigidBody] = {0: mechanism.world}
     for j, frame in enumerate(table.frames, 1):

@@ -6,15 +6,14 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import casadi
 import numpy as np
-from casadi import DM, SX, Function
+from casadi import DM, SX
 from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import ConfigurationCheck
 from mbs.errors import SingularPosture
-from mbs.loops.closing import distance_units, mechanism_size, relative_rows
+from mbs.loops.closing import Closing, distance_units
 from mbs.loops.examine import LEAST_SINE, configuration_health, loop_rows, require_determined
 from mbs.loops.velocity import scales
 
@@ -33,8 +32,6 @@ _PLANE = 2
 _TRIALS, _SEED = 3, 20261128
 _NEWTON = 3
 """Newton steps onto the loops after a move: they converge quadratically."""
-_DEPENDENT = 1e-9
-"""Part of the largest singular value below which a row of the loops is redundant."""
 _ROUNDING = 1e-5
 """Largest effect of rounding on second derivatives, part of the largest element of a row."""
 _ROUNDING_OF_SPEEDS = 1e-10
@@ -74,12 +71,14 @@ def require_accurate(
         return
     numbers = {name: DM(value) for name, value in inputs.items()}
     floors = _floors(system, names, v, outputs, tested)
-    rng, units = np.random.default_rng(_SEED), _units(system, p[:, near[0]])
+    size = Closing(system, p[:, near[0]]).size
+    units = distance_units((coordinate.unit for coordinate in system.coordinates), size)
+    rng = np.random.default_rng(_SEED)
     for _ in range(_TRIALS):
         moved = q.copy()
         for k in near:
             start = q[:, k] + _MOVE * units * rng.uniform(-1, 1, system.nq)
-            moved[:, k] = _closed(system, start, p[:, k])
+            moved[:, k] = Closing(system, p[:, k]).polished(start, _NEWTON)
         others = evaluate({**numbers, "q": DM(moved)})
         for k, number in [(k, number) for k in near for number in tested]:
             found, other = (_column(x[number], k, count) for x in (outputs, others))
@@ -153,40 +152,15 @@ def _columns(value: Any, size: int) -> Array:
     return full.T if full.shape[0] != size and full.shape == (1, size) else full
 
 
-def _units(system: System, p: Array) -> Array:
-    """Sizes of positions [rad or m]."""
-    function: Function = system.cached(
-        "mechanism size of p", lambda: Function("size", [system.p], [mechanism_size(system)])
-    )
-    size = float(function(p))
-    return distance_units((coordinate.unit for coordinate in system.coordinates), size)
-
-
-def _closed(system: System, q: Array, p: Array) -> Array:
-    """The configuration nearest to q that closes the loops."""
-    for _ in range(_NEWTON):
-        rows, slopes = (x.full() for x in _closure(system).call([DM(q), DM(p)]))
-        if rows.size:
-            q = q - np.linalg.lstsq(slopes, rows.ravel(), rcond=_DEPENDENT)[0]
-    return q
-
-
-def _closure(system: System) -> Function:
-    """``closure(q, p) -> rows, slopes`` of all rows in parts of the size of the mechanism."""
-
-    def build() -> Function:
-        q = SX.sym("q", system.nq)
-        rows = relative_rows(system, q)
-        slopes = casadi.jacobian(rows, q)
-        return Function("closure", [q, system.p], [rows, slopes], {"cse": True})
-
-    function: Function = system.cached("relative closure with slopes", build)
-    return function
+def _delicate(system: System, q: SX) -> SX:
+    """1 at configurations at which rounding is tested, else 0."""
+    return SX(configuration_health(system)(q, system.p)[1] < _ROUNDED)
 
 
 DIFFERENTIABLE = ConfigurationCheck(
     functools.partial(loop_rows, least=LEAST_SINE),
     functools.partial(require_determined, least=LEAST_SINE),
     require_accurate,
+    _delicate,
 )
 """Closed loops whose second derivatives are accurate."""

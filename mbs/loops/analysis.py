@@ -6,7 +6,7 @@ configuration where rows that are independent elsewhere coincide.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 
@@ -16,11 +16,23 @@ from numpy.typing import NDArray
 
 from mbs.assembly import Closure, Coordinate, LoopRow, System
 from mbs.components import MotionJoint
+from mbs.errors import LoopError
 from mbs.loops.assembled import assembled_configuration
-from mbs.loops.closing import Closing, closure_parameters, constraint_sizes, mechanism_size
+from mbs.loops.closing import (
+    Closing,
+    candidates,
+    closure_parameters,
+    constraint_sizes,
+    difference,
+    mechanism_size,
+    unwound,
+)
 from mbs.loops.closure import row_groups
 from mbs.loops.cut_positions import cut_positions
+from mbs.loops.guess_target import GuessTarget
+from mbs.loops.nearest import nearest_of
 from mbs.loops.velocity import constraint_jacobian
+from mbs.solvers.least_squares import MANY
 from mbs.solvers.rank import dense, independent_rows, null_space_of, rank
 
 Matrix = NDArray[np.float64]
@@ -35,6 +47,18 @@ root of its tolerance, 1e-6, away from a singular configuration, where they are 
 regular configurations of the catalogue those that count are above 1e-2 and the others below 1e-13,
 in lengths of the size of the mechanism. A loop that holds a motion by less than 1e-5 of it counts
 as free."""
+_FEWEST, _RIGID = 3, 1e-3
+"""Closed configurations from random starts that show whether there is a motion, and their distance
+[rad or m] without one: iterations end 1e-6 away from a singular configuration that is the only one,
+and motions lead 0.1 away."""
+_BRANCH = 0.1
+"""Distance of independent positions from a singular configuration [rad, or sizes of the mechanism]:
+models are accurate there, and branches differ by about as much."""
+_CLEAR = 1e-4
+"""Difference of distances that decides on which side of a singular configuration: it is accurate to
+1e-6."""
+_MODES = 64
+"""Configurations of a search for branches; four-bars have two."""
 _SAME_SHARE = 1e-6
 """Difference of the shares that kept rows have in a dropped one, above which they change with the
 configuration: closing leaves 1e-12 in rows, and singular values of `_GAP` make 1e-7 of it."""
@@ -70,8 +94,23 @@ def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] 
     if positions < len(rows):
         held = max(_ranks([(m / rows * columns)[:positions] for m in regular])) if positions else 0
     kept = _kept_rows(regular, positions, held, generic - held)
+    if generic < system.nv:
+        _require_mobile(system, configurations)
     drive = _drive(system, chosen, regular, system.nv - generic)
-    active = drive.active
+    active, others = drive.active, assembled.others
+    if ranks[0] < generic:
+
+        def is_regular(q: Matrix) -> bool:
+            found = _ranks([m / rows * columns for m in (dense(J(q, p)), regular[0])])
+            return found[0] == generic
+
+        target = _target_near(system, guess, assembled.q, p)
+        branches = _branches(target, assembled.q, active, is_regular)
+        if branches:
+            given = {row.name: guess[row.name] for row in system.coordinates if row.name in guess}
+            start = np.array(system.position(given))
+            branches = [unwound(Closing(system, p), q, start) for q in branches]
+            configuration, *others = branches
     closure = Closure(
         rows=kept.positions,
         slips=kept.slips,
@@ -83,8 +122,9 @@ def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] 
         gruebler=system.nv - sum(len(rows) + len(slips) for rows, slips in labels),
         guess=tuple((name, float(guess[name])) for name in _names(system) if name in guess),
         at_cut=_at_cut(system, guess, configuration, p),
-        others=tuple(tuple(q.tolist()) for q in assembled.others),
+        others=tuple(tuple(q.tolist()) for q in others),
         meets=ranks[0] < generic,
+        dead=ranks[0] == generic and drive.leads < _GAP,
         residual=float(np.max(np.abs(Closing(system, p).rows(configuration)[0]), initial=0.0)),
     )
     return replace(
@@ -96,6 +136,77 @@ def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] 
         loops=_with_rows(system.loops, labels, kept),
         _cache={},
     )
+
+
+def _require_mobile(system: System, configurations: Sequence[Matrix]) -> None:
+    """Raise an error for loops with velocities but no motion, such as bars in one line.
+
+    Args:
+        system: with open loops.
+        configurations: the assembled one, and closed ones from random starts around it.
+    """
+    first, *others = configurations
+    apart = [float(np.max(np.abs(difference(system, q, first)))) for q in others]
+    if len(apart) < _FEWEST or max(apart) > _RIGID:
+        return
+    names = [coordinate.name for coordinate in system.coordinates]
+    at = ", ".join(f"{name} = {x:.4g}" for name, x in zip(names, first, strict=True))
+    raise LoopError(
+        f"{system.name}: the loops close in one configuration only, {at}, and are singular there,"
+        " as bars that are stretched in one line: they allow a velocity but no motion, and their"
+        " forces have no finite value; change lengths or positions of joints"
+    )
+
+
+def _target_near(system: System, guess: Mapping[str, float], q: Matrix, p: Matrix) -> GuessTarget:
+    """The target of a guess and, for other positions, of a configuration q (nq,)."""
+    names = [coordinate.name for coordinate in system.coordinates]
+    start = np.array([guess.get(name, x) for name, x in zip(names, q, strict=True)])
+    return GuessTarget.of(system, p, start, guess, np.array(cut_positions(system)(q, p)).ravel())
+
+
+def _branches(
+    target: GuessTarget,
+    q: Matrix,
+    active: Sequence[int],
+    is_regular: Callable[[Matrix], bool],
+) -> list[Matrix]:
+    """Regular configurations on the branches that meet at q, the nearest to a target first.
+
+    The independent positions of all of them are those of the first one. Empty if none is found, or
+    if independent velocities have no positions of their own.
+
+    Args:
+        target: the guess, and q for other positions.
+        q: (nq,) singular configuration.
+        active: numbers of the independent velocities.
+        is_regular: whether a configuration has the general rank.
+    """
+    system = target.system
+    names = {coordinate.name: k for k, coordinate in enumerate(system.coordinates)}
+    if not all(system.speeds[k].name in names for k in active) or system.nq >= MANY:
+        return []
+    locked = tuple(sorted(names[system.speeds[k].name] for k in active))
+    closing = Closing(system, target.p, locked)
+    steps = _BRANCH * closing.position_units[list(locked)]
+    best, found = list[Matrix](), list[Matrix]()
+    for sign in (1.0, -1.0):
+        start = q.copy()
+        start[list(locked)] += sign * steps
+        options = [x for x in candidates(closing, start, _MODES) if is_regular(x)]
+        nearest = nearest_of(closing, options, target)[:1]
+        if nearest and (not best or _is_clearly_nearer(closing, target, nearest[0], best[0])):
+            best, found = nearest, options
+    return best + [x for x in found if x is not best[0]]
+
+
+def _is_clearly_nearer(closing: Closing, target: GuessTarget, q: Matrix, other: Matrix) -> bool:
+    """Whether q is nearer to a target than another configuration by more than rounding."""
+    pairs = [(target.miss(closing, x), target.distances(closing, x)[1]) for x in (q, other)]
+    for distance, least in zip(*pairs, strict=True):
+        if abs(distance - least) > _CLEAR:
+            return distance < least
+    return False
 
 
 def _names(system: System) -> list[str]:
@@ -209,11 +320,14 @@ class _Drive:
         active: the independent ones.
         motors: those whose efforts drive the mechanism.
         named: names of those that the user named as active beyond the mobility.
+        leads: smallest singular value of the independent velocities in an orthonormal basis of all
+            velocities at the first configuration, 0 at a dead centre.
     """
 
     active: tuple[int, ...]
     motors: tuple[int, ...]
     named: tuple[str, ...] = ()
+    leads: float = 1.0
 
 
 def _drive(
@@ -234,14 +348,20 @@ def _drive(
         if len(known) < system.nv:
             first = _independent(free, first, known)
         active = tuple(independent_rows(free, mobility, first))
-        return _Drive(active, active)
+        return _Drive(active, active, leads=_hold(free[0], active))
     own = _independent(free, (), chosen)
     active = _independent(free, _independent(free, own, motors), range(system.nv))
     surplus = chosen if len(own) < len(chosen) else ()
     driving = tuple(sorted({*motors, *surplus}))
     rest = _independent(free, _independent(free, (), driving), active)
     names = tuple(system.speeds[k].name for k in surplus)
-    return _Drive(tuple(sorted(active)), tuple(sorted({*driving, *rest})), names)
+    leads = _hold(free[0], active)
+    return _Drive(tuple(sorted(active)), tuple(sorted({*driving, *rest})), names, leads)
+
+
+def _hold(free: Matrix, active: Sequence[int]) -> float:
+    """Smallest singular value of the independent velocities in a basis of all velocities."""
+    return float(np.min(np.linalg.svd(free[list(active)], compute_uv=False), initial=1.0))
 
 
 def _own_velocities(system: System) -> list[int]:

@@ -48,7 +48,7 @@ def assemble(
     chosen = _choose(system, active)
     system = with_balance(system, mechanism)
     bound = system.cuts or system.couplings or any(p.element.binds for p in system.parts)
-    if bound or system.balanced:
+    if bound or system.nodes:
         return _analysed(system, guess, chosen)
     known = [coordinate.name for coordinate in system.coordinates]
     start = {name: value for name, value in guess.items() if name in known}
@@ -60,7 +60,7 @@ def _analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...
     try:
         return analyse(system, guess, chosen)
     except Unclosable as error:
-        note = like_degrees(system.coordinates, guess)
+        note = like_degrees([*system.coordinates, *system.cut_coordinates], guess)
         raise (Unclosable(f"{error}; {note}") if note else error) from None
 
 

@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
-import casadi
 import numpy as np
-from casadi import SX, Function
+from casadi import Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.components.joints import Motion
 from mbs.errors import Unclosable
-from mbs.loops.closing import Closing, candidates, unwound
+from mbs.loops.closing import Closing, unwound
 from mbs.loops.configuration import closed_configuration
-from mbs.loops.cut_positions import cut_positions
+from mbs.loops.guess_target import GuessTarget
 from mbs.loops.nearest import (
     Assembled,
-    GuessTarget,
     closes,
+    moved_to_guess,
     nearest_configuration,
-    nearest_found,
     nearest_of,
 )
-from mbs.solvers.least_squares import gauss_newton
 
 Vector = NDArray[np.float64]
 
@@ -65,55 +62,24 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
     rest = rest_positions(system, p)
     start = np.array(system.position({**{names[k]: x for k, x in rest.items()}, **known}))
     target = GuessTarget.of(system, p, start, guess)
-    if closes(Closing(system, p), given) and target.meets_cuts(given):
+    whole = target.closing({k for k in target.guessed if k >= system.nq})
+    if closes(whole, given):
         return Assembled(given)
     unknown = _unknowns(system)
-    guessed = {k for k, name in enumerate(names) if name in known} - unknown
-    stages = list(_stages(system, unknown, guessed, set(rest)))
-    for group in stages:
-        closings = (Closing(system, p, tuple(sorted(locked))) for locked in group)
+    for group in _stages(system, unknown, set(target.guessed) - unknown, set(rest)):
+        closings = (target.closing(held) for held in group)
         found = [one for c in closings if (one := nearest_configuration(c, target)) is not None]
         if found:
             first = nearest_of(Closing(system, p), [one.q for one in found], target)[0]
-            best = next(one for one in found if one.q is first)
-            return _with_cuts_met(best, target, [locked for group in stages for locked in group])
-    motors = tuple(k for k, c in enumerate(system.coordinates) if c.actuated)
+            return next(one for one in found if one.q is first)
+    motors = {k for k, c in enumerate(system.coordinates) if c.actuated}
+    held = target.closing(set(target.guessed) & motors)
     try:
-        q = closed_configuration(Closing(system, p, motors), start, restarts=10)
+        q = closed_configuration(target.closing(motors), start, restarts=10)
     except Unclosable:
-        q = closed_configuration(Closing(system, p), start)
-    return Assembled(unwound(Closing(system, p), q, start))
-
-
-def _with_cuts_met(found: Assembled, target: GuessTarget, stages: Iterable[set[int]]) -> Assembled:
-    """The configuration with guessed positions of cut joints, if the others can follow."""
-    if target.meets_cuts(found.q):
-        return found
-    system, p, guessed = target.system, target.p, target.guessed_cuts
-    q, given = SX.sym("q", system.nq), SX.sym("p", system.p.numel())
-    own = cut_positions(system)(q, given)[guessed]
-    slopes = Function("cut_slopes", [q, given], [casadi.densify(casadi.jacobian(own, q))])
-    for locked in stages:
-        closing = Closing(system, p, tuple(sorted(locked)))
-        free = closing.free
-
-        def residual(x: Vector, closing: Closing = closing) -> tuple[Vector, Vector]:
-            at = found.q.copy()
-            at[closing.free] = x
-            r, J = closing.rows(at)
-            more = np.array(slopes(at, p))[:, closing.free]
-            return np.concatenate([r, target.cut_moves(at)[guessed]]), np.vstack([J, more])
-
-        met = list[Vector]()
-        for start in (found.q, *candidates(closing, target.start)):
-            root = gauss_newton(residual, start[free])
-            at = found.q.copy()
-            at[free] = root.x
-            if root.converged and closing.faces(at):
-                met.append(unwound(closing, at, target.start))
-        if met:
-            return nearest_found(closing, met, target)
-    return found
+        held = Closing(system, p)
+        q = closed_configuration(held, start)
+    return Assembled(moved_to_guess(held, target, [unwound(held, q, start)])[0])
 
 
 def rest_positions(system: System, p: Vector) -> dict[int, float]:
@@ -138,27 +104,29 @@ def _unknowns(system: System) -> set[int]:
         f"{part.name}.{name}" for part in system.parts for name in part.element.names_of("unknown")
     }
     found = {k for k, coordinate in enumerate(system.coordinates) if coordinate.name in names}
-    return found | {position for position, _, _ in system.balanced}
+    return found | {position for position, _ in system.nodes}
 
 
 def _stages(
     system: System, unknown: set[int], guessed: set[int], rest: set[int]
 ) -> Iterator[list[set[int]]]:
-    """Indices of locked positions, fewer in each stage; sets of one stage are compared."""
+    """Indices of held positions, fewer in each stage; sets of one stage are compared.
+
+    Indices from nq are those of positions of cut joints.
+    """
     motors = {k for k, c in enumerate(system.coordinates) if c.actuated}
     stages = list[list[set[int]]]()
     if unknown and guessed:
-        stages.append([set(range(system.nq)) - unknown])
+        cut = {k for k in guessed if k >= system.nq}
+        stages.append([(set(range(system.nq)) | cut) - unknown])
     stages += [[guessed | motors | rest], [guessed | rest]]
     if 1 < len(guessed) <= _FEW_GUESSES and not guessed & motors:
         stages.append([(guessed - {k}) | rest for k in sorted(guessed)])
     stages += [
         [(guessed & motors) | rest],
-        [motors | rest],
         [rest],
         [guessed],
         [guessed & motors],
-        [motors],
         [set()],
     ]
     for number, group in enumerate(stages):

@@ -1,24 +1,31 @@
-"""Massless nodes between springs: their positions follow from the balance of forces.
+"""Massless nodes between springs and dampers: their motion follows from the balance of forces.
 
 The equation of motion of a coordinate that moves no inertia is the balance of the forces on it. If
 these depend on positions alone, the balance is a row of the loops: the analysis makes the position
 dependent, and no force acts through the row, since the row is zero where the forces balance.
+
+Where dampers act, the balance D v + f(q) = 0 is a row on velocities with a constant part: the
+position is a state, and its velocity follows. Dampers between nodes leave sums of forces without
+velocities; these are rows of positions. Dry friction beside a damper on a node holds the node up to
+a limit of the other forces: D v = f - limit sign(f), or v = 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import casadi
 import numpy as np
 from casadi import SX, Function
+from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.tables import LoopRow
+from mbs.assembly.parts import AttachedPart
+from mbs.assembly.tables import Balance, LoopRow
 from mbs.assembly.tree import Link
 from mbs.components import Mechanism
-from mbs.components.custom import Row
+from mbs.components.custom import Friction, OneWay, Row, Stop
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
 from mbs.recursions.force_elements import element_efforts
@@ -26,10 +33,16 @@ from mbs.recursions.newton_euler import joint_efforts, newton_euler
 from mbs.recursions.parts import PartsAt
 from mbs.recursions.poses import link_poses
 from mbs.recursions.velocities import resting_base
-from mbs.solvers.rank import rank
+from mbs.solvers.block_triangular import solve_large
+from mbs.solvers.rank import independent_rows, rank
+from mbs.text import listed
 
 GROUP = "balance of forces"
-"""Name of the rows of massless nodes."""
+"""Name of the rows of positions of massless nodes."""
+DAMPED = "balance of forces with dampers"
+"""Name of their rows of velocities."""
+_DEPTH = 20
+"""Operations deep in which expressions are compared: laws of friction have few of them."""
 _SEED, _REACH = 20261128, 0.3
 """Random configurations at which the stiffness of nodes is examined, and their distance from the
 assembled one [rad or m]: springs are stretched there, also those that are relaxed as assembled."""
@@ -46,20 +59,26 @@ def with_balance(system: System, mechanism: Mechanism) -> System:
     if not any(part.element.acts for part in parts) and all(k.stiffness.is_zero() for k in links):
         return system
     driven = {joint.name for joint in mechanism.joints() if joint.actuated}
-    nodes = [j for j in _massless_links(system) if _joint(system, j) not in driven]
-    velocities = tuple(links[j].v.start for j in nodes)
-    stiffness = _stiffness(system, velocities) if velocities else None
-    if stiffness is None:
+    found = [j for j in _massless_links(system) if _joint(system, j) not in driven]
+    nodes = tuple((links[j].q.start, links[j].v.start) for j in found)
+    balances = _balances(system, nodes) if nodes else None
+    if balances is None:
         return system
-    positions = tuple(links[j].q.start for j in nodes)
-    names = tuple(system.coordinates[k].name for k in positions)
+    names = [system.coordinates[k].name for k, _ in nodes]
     first = len(system.cuts) + len(system.couplings)
     first += sum(part.element.has("rows") for part in parts)
-    row = LoopRow(GROUP, "balance", names, ())
+    loops = list(system.loops)
+    for is_damped, where in ((False, first), (True, len(loops) + 1)):
+        own = [b for b in balances if b.is_damped is is_damped]
+        if own:
+            bound = tuple(system.speeds[balance.velocity].name for balance in own)
+            kind = (DAMPED, "damped balance") if is_damped else (GROUP, "balance")
+            loops.insert(where, LoopRow(*kind, bound, ()))
     return replace(
         system,
-        balanced=tuple(zip(positions, velocities, stiffness, strict=True)),
-        loops=(*system.loops[:first], row, *system.loops[first:]),
+        nodes=nodes,
+        balances=balances,
+        loops=tuple(loops),
         coordinates=tuple(
             replace(c, actuated=False) if c.name in names else c for c in system.coordinates
         ),
@@ -69,21 +88,86 @@ def with_balance(system: System, mechanism: Mechanism) -> System:
 
 
 def balance_rows(system: System, q: SX) -> list[tuple[str, list[tuple[str, Row]]]]:
-    """Return the rows of the massless nodes: forces divided by typical stiffnesses.
+    """Return the rows of positions of the massless nodes: forces divided by typical stiffnesses.
 
     Args:
         system: with or without such nodes.
         q: (nq, 1) symbols of positions.
     """
-    if not system.balanced:
+    return _rows(system, q, SX.zeros(system.nv), is_damped=False)
+
+
+def velocity_balance_rows(system: System, q: SX, v: SX) -> list[tuple[str, list[tuple[str, Row]]]]:
+    """Return the rows of velocities of the massless nodes: forces divided by typical dampings.
+
+    They are linear in v, with a constant part.
+
+    Args:
+        system: with or without such nodes.
+        q: (nq, 1) symbols of positions.
+        v: (nv, 1) velocities.
+    """
+    return _rows(system, q, v, is_damped=True)
+
+
+def _rows(
+    system: System, q: SX, v: SX, *, is_damped: bool
+) -> list[tuple[str, list[tuple[str, Row]]]]:
+    """Balances of positions, or of velocities, with their names."""
+    own = [balance for balance in system.balances if balance.is_damped is is_damped]
+    if not own:
         return []
-    efforts = _static_efforts(system, q, SX.zeros(system.nv))
+    numbers = [balance.velocity for balance in own]
+    if is_damped:
+        efforts = _static_efforts(system, q, v)[numbers]
+        still = _static_efforts(system, q, 0 * v)[numbers]
+        for k, balance in enumerate(own):
+            if balance.frictions:
+                limit = _limit(system, balance.frictions, q)
+                pushed = casadi.fmax(still[k] - limit, 0) + casadi.fmin(still[k] + limit, 0)
+                efforts[k] += pushed - still[k]
+    else:
+        every, speed = [balance.velocity for balance in system.balances], SX.sym("v", system.nv)
+        moving = _static_efforts(system, q, speed)[every]
+        still, D = casadi.substitute(moving, speed, v), casadi.jacobian(moving, speed)[:, every]
+        n = len(every)
+        efforts = _without_velocities(still, D, range(len(own), n), range(len(own)))
     rows = []
-    for position, velocity, stiffness in system.balanced:
-        coordinate = system.coordinates[position]
-        unit = "m" if coordinate.unit == "m" else "1"
-        rows.append((coordinate.name, Row(efforts[velocity] / stiffness, unit)))
-    return [(GROUP, rows)]
+    for k, balance in enumerate(own):
+        node = system.speeds[balance.velocity]
+        unit = "m" if node.unit.startswith("m") else "1"
+        rows.append((node.name, Row(efforts[k] / balance.size, unit)))
+    return [(DAMPED if is_damped else GROUP, rows)]
+
+
+def require_no_drift(system: System, what: str, velocities: Iterable[int]) -> None:
+    """Refuse a matrix of the independent velocities where massless nodes move without them.
+
+    Args:
+        system: with or without massless nodes that dampers hold.
+        what: the matrix, for the message.
+        velocities: indices in v of the velocities that belong to it.
+
+    Raises:
+        ModelError: a node with a damper is among them.
+    """
+    nodes = {k for _, k in system.nodes} if any(b.is_damped for b in system.balances) else set()
+    for velocity in velocities:
+        if velocity in nodes:
+            raise ModelError(
+                f"{system.name}: {what} in independent coordinates does not give the velocity of"
+                f" {system.speeds[velocity].name}, which moves no mass and which springs move while"
+                " the independent joints rest; use coordinates='tree', or give it a mass"
+            )
+
+
+def _limit(system: System, names: Sequence[str], q: SX) -> SX:
+    """(1, 1) the sum of the limits of dry frictions [N or N m]."""
+    at, total = PartsAt(system, q, SX.zeros(system.nv)), SX(0)
+    for part in system.parts:
+        if part.name in names:
+            total += sum((SX(law.limit) for law in part.element.frictions(at.at(part)).values()), 0)
+    return total
 
 
 def require_no_balance(
@@ -101,12 +185,79 @@ def require_no_balance(
         ModelError: a massless node moves one of the links, or along one of the velocities.
     """
     paths = [system.tree.links[j].v.start for link in links for j in system.tree.path(link)]
-    for position, velocity, _ in system.balanced:
+    for position, velocity in system.nodes:
         if velocity in (*paths, *velocities):
             raise ModelError(
                 f"{system.name}: {what} acts on {system.coordinates[position].name}, which moves no"
                 " mass and follows from the balance of the forces of components; give it a mass"
             )
+
+
+def without_values(system: System) -> str:
+    """Return which parameters without value keep massless nodes from being found; else nothing."""
+    missing = [parameter.name for parameter in system.parameters if parameter.default is None]
+    nodes = [system.speeds[system.tree.links[j].v.start].name for j in _massless_links(system)]
+    if system.nodes or not nodes or not missing:
+        return ""
+    verb = "moves" if len(nodes) == 1 else "move"
+    return (
+        f"; {listed(nodes)} {verb} no mass, and the balance of forces needs values of"
+        f" {listed(missing)}: give Mechanism(parameters=)"
+    )
+
+
+def obstacles(system: System, velocity: int) -> str:
+    """Return the elements that keep the balance of forces from giving a coordinate, in words.
+
+    Args:
+        system: a system in which the coordinate moves no inertia.
+        velocity: its index in v.
+    """
+    link = next(
+        j for j, one in enumerate(system.tree.links) if one.v.start <= velocity < one.v.stop
+    )
+    node, name = system.tree.links[link], system.speeds[velocity].name
+    if link not in _massless_links(system):
+        return ""
+    found = []
+    if not SX(node.Fs).is_zero():
+        found.append(
+            f"the friction Fs of {_joint(system, link)}, which is not linear in velocities"
+        )
+    acts = not node.stiffness.is_zero() or not SX(node.Fv).is_zero()
+    for part in system.parts:
+        levers = [lever.velocity for port in part.coordinates.values() for lever in port]
+        links = {k for one, _ in part.frames if one >= 0 for k in system.tree.path(one)}
+        if velocity in levers or link in links:
+            acts = acts or part.element.acts
+            reason = _obstacle(system, part, velocity)
+            if reason:
+                found.append(f"{type(part.element).__name__} {part.name}, {reason}")
+    if found:
+        return f"; the balance of forces does not give {name} because of {listed(found)}"
+    if not acts:
+        return f"; no spring and no damper acts on {name}"
+    return f"; the springs and dampers on {name} do not determine its motion, or it has a motor"
+
+
+def _obstacle(system: System, part: AttachedPart, velocity: int) -> str:
+    """Reason why the balance of forces on a node excludes a component; empty if there is none."""
+    q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
+    if part.element.has("stops"):
+        return "which locks and releases"
+    if part.element.has("frictions"):
+        return (
+            "which needs viscous damping of the node alone, such as Fv of its joint, and sticking ="
+            " sliding; a SpringFrictionSeries has a spring and friction alone"
+        )
+    if not part.element.acts:
+        return ""
+    if part.inputs or part.states:
+        return "which has inputs or states"
+    alone = replace(system, parts=(part,), _cache={})
+    effort = element_efforts(PartsAt(alone, q, v), link_poses(system.tree, q))[velocity]
+    is_linear = not casadi.depends_on(casadi.jacobian(effort, v), v)
+    return "" if is_linear else "which is not linear in velocities"
 
 
 def _joint(system: System, link: int) -> str:
@@ -121,17 +272,25 @@ def _massless_links(system: System) -> list[int]:
     bound = {name for loop in system.loops for name in loop.joints}
     found = set(range(len(links)))
     for j in reversed(range(len(links))):
-        link = links[j]
-        in_loop = link.name in bound or _joint(system, j) in bound
-        if j in found and (in_loop or not _is_massless(link)):
-            found -= set(system.tree.path(j))
+        link, path = links[j], system.tree.path(j)
+        if link.name in bound or _joint(system, j) in bound or not _is_plain(link):
+            found -= set(path)
+        elif not link.inertia.parameters.is_zero():
+            # moments of inertia alone do not resist displacements
+            turns = {k for k in path if links[k].motion is Motion.REVOLUTE}
+            found -= set(path) if _has_mass(link) else turns
     return [] if len(found) == len(links) else sorted(found)
 
 
-def _is_massless(link: Link) -> bool:
-    """Whether a link has no inertia by its description, whatever the parameters are."""
-    is_plain = link.motion in (Motion.REVOLUTE, Motion.PRISMATIC) and link.rotor is None
-    return is_plain and link.Ia.is_zero() and link.inertia.parameters.is_zero()
+def _is_plain(link: Link) -> bool:
+    """Whether a link moves along one coordinate without a rotor."""
+    is_one = link.motion in (Motion.REVOLUTE, Motion.PRISMATIC)
+    return is_one and link.rotor is None and link.Ia.is_zero()
+
+
+def _has_mass(link: Link) -> bool:
+    """Whether a link has a mass or a first moment by its description."""
+    return not (link.inertia.m.is_zero() and link.inertia.ms.is_zero())
 
 
 def _static_efforts(system: System, q: SX, v: SX) -> SX:
@@ -142,27 +301,133 @@ def _static_efforts(system: System, q: SX, v: SX) -> SX:
     return weight.efforts + own + element_efforts(PartsAt(system, q, v), poses)
 
 
-def _stiffness(system: System, velocities: tuple[int, ...]) -> tuple[float, ...] | None:
-    """Typical stiffness of each node [N/m or N m/rad]; None if forces do not determine the nodes.
+def _balances(system: System, nodes: Sequence[tuple[int, int]]) -> tuple[Balance, ...] | None:
+    """Balances of the forces on nodes; None if forces do not determine the nodes.
 
-    Forces on a node that depend on velocities, states, inputs or contacts do not.
+    Forces on nodes must be linear in velocities, and depend on positions and parameters beside.
     """
-    for part in system.parts:
-        levers = [lever for port in part.coordinates.values() for lever in port]
-        if part.element.switches and any(lever.velocity in velocities for lever in levers):
-            return None
+    positions, velocities = [k for k, _ in nodes], [k for _, k in nodes]
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
-    efforts = _static_efforts(system, q, v)[list(velocities)]
-    known = Function("known", [q, system.p], [efforts], {"allow_free": True})
-    if known.has_free():  # velocities, states, inputs, time
+    frictions = _frictions(system, nodes, q, v)
+    if frictions is None:
         return None
-    positions = [link.q.start for link in system.tree.links if link.v.start in velocities]
-    slopes = Function("slopes", [q, system.p], [casadi.jacobian(efforts, q)[:, positions]])
+    efforts = _static_efforts(system, q, v)[velocities]
+    still, damping = casadi.substitute(efforts, v, 0 * v), casadi.jacobian(efforts, v)
+    limits = [law.limit for laws in frictions.values() for _, law in laws]
+    known = Function("known", [q, system.p], [still, damping, *limits], {"allow_free": True})
+    if known.has_free():  # states, inputs, time, or velocities with a law that is not linear
+        return None
+    every = _samples(system, q, damping)
+    if not every:
+        return None
+    sizes = _typical([M[:, velocities] for M in every])
+    sizes[sizes == 0] = 1.0
+    whole = [M / sizes[:, None] for M in every]
+    count = max((rank(M) if M.any() else 0 for M in whole), default=0)
+    damped = independent_rows([M[:, velocities] for M in every], count)  # the strongest first
+    D = [M[:, velocities] for M in whole]
+    if any(rank(M[np.ix_(damped, damped)]) < count for M in D if count):
+        return None
+    if any(not _is_alone(damping, velocities, k) or k not in damped for k in frictions):
+        return None
+    others = [k for k in range(len(nodes)) if k not in damped]
+    left = _without_velocities(still, damping[:, velocities], damped, others)
+    slopes = casadi.jacobian(left, q)[:, positions]
+    K = _samples(system, q, slopes)
+    stiffness = _typical([M[:, others] for M in K])
+    if len(K) < len(D) or not D or not stiffness.all():
+        return None
+    whole = [np.vstack([M[damped], k / stiffness[:, None]]) for M, k in zip(D, K, strict=True)]
+    if any(rank(M) < len(nodes) for M in whole):
+        return None
+    free = [Balance(velocities[k], float(x), False) for k, x in zip(others, stiffness, strict=True)]
+    names = {k: tuple(name for name, _ in laws) for k, laws in frictions.items()}
+    held = (Balance(velocities[k], float(sizes[k]), True, names.get(k, ())) for k in damped)
+    return (*free, *held)
+
+
+_Frictions = dict[int, list[tuple[str, Friction]]]
+"""For the number of each node with dry friction the components, and their laws."""
+
+
+def _frictions(system: System, nodes: Sequence[tuple[int, int]], q: SX, v: SX) -> _Frictions | None:
+    """Dry frictions on nodes; None if a node has another contact, or one with more than a node."""
+    at, found = PartsAt(system, q, v), _Frictions()
+    own = casadi.vertcat(*(x for k, j in nodes for x in (q[k], v[j])))
+    for part in system.parts:
+        if not part.element.switches:
+            continue
+        seen = at.at(part)
+        laws = [*part.element.stops(seen).values(), *part.element.frictions(seen).values()]
+        touched = [law for law in laws if casadi.depends_on(casadi.vertcat(*_motion(law)), own)]
+        for law in touched:
+            if not isinstance(law, Friction) or len(laws) > 1 or not _sticks_as_it_slides(law):
+                return None
+            number = next((n for n, (_, j) in enumerate(nodes) if _same(SX(law.slip), v[j])), None)
+            if number is None:
+                return None
+            found.setdefault(number, []).append((part.name, law))
+    return found
+
+
+def _same(one: SX, other: SX) -> bool:
+    """Whether two expressions are equal by their operations."""
+    return bool(casadi.is_equal(casadi.simplify(one), casadi.simplify(other), _DEPTH))
+
+
+def _motion(law: Friction | Stop | OneWay) -> list[SX]:
+    """The gap of a stop, or the velocity of another contact."""
+    if isinstance(law, Stop):
+        return [SX(law.gap)]
+    return [SX(law.slip if isinstance(law, Friction) else law.velocity)]
+
+
+def _sticks_as_it_slides(law: Friction) -> bool:
+    """Whether no more friction acts at rest than while it slides."""
+    return law.sticking is None or _same(SX(law.sticking), SX(law.limit))
+
+
+def _is_alone(damping: SX, velocities: Sequence[int], node: int) -> bool:
+    """Whether a node and the others have no damper in common.
+
+    Args:
+        damping: (n, nv) slopes of the efforts on nodes.
+        velocities: indices in v of the nodes.
+        node: number of the node.
+    """
+    row, column = SX(damping[node, :]), SX(damping[:, velocities[node]])
+    row[velocities[node]], column[node] = 0, 0
+    return bool(casadi.sparsify(row).nnz() == 0 and casadi.sparsify(column).nnz() == 0)
+
+
+def _without_velocities(efforts: SX, D: SX, damped: Sequence[int], others: Sequence[int]) -> SX:
+    """Sums of efforts on which no velocity acts, one for each of the others.
+
+    Args:
+        efforts: (n, 1) at rest.
+        D: (n, n) their slopes for velocities, of the rank of its damped rows.
+        damped: numbers of rows.
+        others: numbers of all other rows.
+    """
+    left = efforts[list(others)]
+    if damped and others and not D[list(others), list(damped)].is_zero():
+        share = solve_large(D[list(damped), list(damped)], efforts[list(damped)])
+        left -= casadi.mtimes(D[list(others), list(damped)], share)
+    return left
+
+
+def _samples(system: System, q: SX, matrix: SX) -> list[NDArray[np.float64]]:
+    """Values of a matrix at random configurations, as far as they are finite."""
+    function = Function("matrix", [q, system.p], [casadi.densify(matrix)])
     rng = np.random.default_rng(_SEED)
     at = np.array(system.configuration) + rng.uniform(-_REACH, _REACH, (8, system.nq))
-    every = [np.array(slopes(one, system.p_default)) for one in at]
-    every = [K for K in every if np.isfinite(K).all()]
-    typical = np.median([np.abs(np.diag(K)) for K in every], axis=0) if every else np.zeros(1)
-    if not typical.all() or any(rank(K / typical) < len(K) for K in every):
-        return None
-    return tuple(map(float, typical))
+    found = [np.array(function(one, system.p_default)) for one in at]
+    return [M for M in found if np.isfinite(M).all()]
+
+
+def _typical(matrices: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """(n,) typical sizes of the diagonal of (n, n) matrices; zeros without any matrix."""
+    if not matrices:
+        return np.zeros(1)
+    found: NDArray[np.float64] = np.median([np.abs(np.diag(M)) for M in matrices], axis=0)
+    return found

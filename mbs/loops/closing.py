@@ -17,6 +17,7 @@ from mbs.assembly.tables import Coordinate
 from mbs.assembly.tree import norm_rows, quaternion_slices
 from mbs.errors import Unclosable
 from mbs.loops.closure import closure_rows, facing, position_rows, velocity_row_units
+from mbs.loops.cut_positions import cut_positions
 from mbs.numbers import OnArrays, on_arrays
 from mbs.solvers.least_squares import MANY, NewtonEquations
 
@@ -122,6 +123,9 @@ CLOSED = 1e-10
 """The same of configurations that formulas or others give: hundreds of roundings, no missing
 step."""
 
+_DEPENDENT = 1e-9
+"""Part of the largest singular value below which a row of the loops is redundant."""
+
 OPEN = 1e-6
 """The same of configurations that a user gives, with seven digits; forces are wrong by as
 little."""
@@ -156,6 +160,9 @@ class Closing:
         locked: positions that must not change.
         kept: indices of the rows that count; None for all rows.
         axes: indices of the cosines that count; None for all.
+        aims: indices in `system.cut_coordinates` of positions that must have a value. Each adds a
+            row.
+        cut: (c,) values of `system.cut_coordinates`, of which those of the aims count.
     """
 
     system: System
@@ -163,6 +170,8 @@ class Closing:
     locked: tuple[int, ...] = ()
     kept: tuple[int, ...] | None = None
     axes: tuple[int, ...] | None = None
+    aims: tuple[int, ...] = ()
+    cut: Vector | None = None
 
     @property
     def free(self) -> list[int]:
@@ -172,7 +181,7 @@ class Closing:
 
     def rows(self, q: Vector) -> tuple[Vector, Vector]:
         """Residual (m,) and its derivative by the free positions (m, n)."""
-        r, J = self._functions().equations(q, self.p)
+        r, J = self._functions().equations(q, self._given)
         if self.kept is not None:
             r, J = r[list(self.kept)], J[list(self.kept)]
         return r.ravel(), J[:, self.free] if self.locked else J
@@ -189,13 +198,19 @@ class Closing:
         return sizes if self.kept is None else sizes[list(self.kept)]
 
     @property
+    def position_units(self) -> Vector:
+        """(nq,) what differences of positions are divided by: 1, or the size of the mechanism."""
+        return distance_units((row.unit for row in self.system.coordinates), self.size)
+
+    @property
     def _sizes(self) -> list[Vector]:
         """The size of the mechanism and those of the rows; starts have the same p as a rule."""
 
         def build() -> list[Vector]:
-            return self._functions().sizes(self.p)
+            return self._functions().sizes(self._given)
 
-        found: list[Vector] = self.system.recent("closing sizes", self.p.tobytes(), build, _KEPT)
+        key = self.p.tobytes(), self.aims
+        found: list[Vector] = self.system.recent("closing sizes", key, build, _KEPT)
         return found
 
     def openness(self, q: Vector) -> float:
@@ -205,8 +220,22 @@ class Closing:
     def nearest(self, q: Vector) -> Closed:
         """The configuration that Gauss-Newton reaches from q (nq,)."""
         tolerance = TOLERANCE * self.sizes
-        found, root = self._newton().near(q, self.p, self.free, tolerance)
+        found, root = self._newton().near(q, self._given, self.free, tolerance)
         return Closed(found, root.residual, root.converged and self.faces(found))
+
+    def polished(self, q: Vector, steps: int) -> Vector:
+        """The configuration (nq,) after the least Newton steps onto the loops, closed to rounding.
+
+        `nearest` ends at `TOLERANCE`, above the rounding of the rows.
+        """
+        found, free = np.array(q, dtype=float), self.free
+        for _ in range(steps):
+            r, J = self.rows(found)
+            if r.size:
+                sizes = self.sizes
+                move = np.linalg.lstsq(J / sizes[:, None], r / sizes, rcond=_DEPENDENT)[0]
+                found[free] -= move
+        return found
 
     def nearby(self, q: Vector, reach: float, tries: int, seed: int) -> Iterator[Vector]:
         """Closed configurations that Gauss-Newton reaches from random ones around q (nq,).
@@ -223,24 +252,20 @@ class Closing:
             if closed.is_closed:
                 yield closed.q
 
-    @property
-    def acting(self) -> NDArray[np.bool_]:
-        """(nq,) whether a closure row depends on each position."""
-        acting = np.zeros(self.system.nq, dtype=bool)
-        acting[self._functions().places[1]] = True
-        return acting
+    def acting(self, *, norms: bool) -> NDArray[np.bool_]:
+        """(nq,) whether a closure row depends on each position.
 
-    @property
-    def bound(self) -> NDArray[np.bool_]:
-        """(nq,) whether a loop depends on each position; norms of quaternions are no loops."""
-        bound = np.zeros(self.system.nq, dtype=bool)
+        Args:
+            norms: whether rows that keep the norms of quaternions count; they are no loops.
+        """
+        acting = np.zeros(self.system.nq, dtype=bool)
         rows, columns = self._functions().places
-        bound[columns[rows < len(position_rows(self.system))]] = True
-        return bound
+        acting[columns if norms else columns[rows < len(position_rows(self.system))]] = True
+        return acting
 
     def faces(self, q: Vector) -> bool:
         """Whether no axis of a closing joint is opposed at q (nq,)."""
-        cosines = self._functions().facing(q, self.p)[0]
+        cosines = self._functions().facing(q, self._given)[0]
         return bool(np.all((cosines if self.axes is None else cosines[list(self.axes)]) > 0))
 
     def gap(self, q: Vector) -> str:
@@ -267,21 +292,29 @@ class Closing:
             return self._functions().newton
 
         def build() -> NewtonEquations:
-            return _equations_of(self.system, kept)
+            return _equations_of(self.system, self.aims, kept)
 
-        found: NewtonEquations = self.system.cached(f"closing rows {kept}", build)
+        found: NewtonEquations = self.system.cached(("closing rows", self.aims, kept), build)
         return found
 
     def _functions(self) -> ClosingFunctions:
-        functions: ClosingFunctions = self.system.cached("closing", lambda: _functions(self.system))
+        functions: ClosingFunctions = self.system.cached(
+            ("closing", self.aims), lambda: _functions(self.system, self.aims)
+        )
         return functions
+
+    @property
+    def _given(self) -> Vector:
+        """Second argument of the functions: the parameters, then the values of cut positions."""
+        return self.p if self.cut is None or not self.aims else np.concatenate([self.p, self.cut])
 
 
 class ClosingFunctions(NamedTuple):
     """What is computed of the closure of a system.
 
     Attributes:
-        equations: ``(q, p) -> r, J``: all rows, and their derivative by q.
+        equations: ``(q, p) -> r, J``: all rows, then differences of positions of cut joints that
+            have aims, and their derivative by q.
         places: rows and columns of the elements of the derivative that need not be zero.
         facing: ``(q, p)``, positive where no axis is opposed.
         sizes: ``(p)``, the size of the mechanism and what each row is measured by.
@@ -310,34 +343,58 @@ def closure_parameters(system: System, values: Mapping[str, float] | None = None
     return np.array(system.parameter_values(values, needed), dtype=float)
 
 
-def _equations_of(system: System, kept: Sequence[int]) -> NewtonEquations:
-    """Some rows of the loops and of quaternions, as equations for positions."""
-    q = SX.sym("q", system.nq)
-    r = casadi.vertcat(closure_rows(system, q), norm_rows(system.tree, q))
-    r, point = casadi.densify(r)[list(kept)], [q, system.p]
-    equations = Function("equations", point, [r, casadi.jacobian(r, q)])
-    return NewtonEquations(equations, Function("values", point, [r]))
-
-
-def _functions(system: System) -> ClosingFunctions:
-    q = SX.sym("q", system.nq)
-    r = casadi.densify(casadi.vertcat(closure_rows(system, q), norm_rows(system.tree, q)))
+def _symbolic_rows(system: System, aims: tuple[int, ...]) -> tuple[SX, SX, SX, SX]:
+    """Positions q, given values p, all rows, and the sizes that rows are measured by."""
+    q, p = SX.sym("q", system.nq), system.p
     norms = norm_rows(system.tree, q)
     sizes = casadi.vertcat(row_sizes(system), SX.ones(norms.shape))
+    more = SX(0, 1)
+    if aims:
+        target = SX.sym("c", len(system.cut_coordinates))
+        p = casadi.vertcat(p, target)
+        more = _cut_moves(system, q, target)[list(aims)]
+        lengths = [system.cut_coordinates[k].unit.startswith("m") for k in aims]
+        own = (mechanism_size(system) if is_length else SX(1) for is_length in lengths)
+        sizes = casadi.vertcat(sizes, *own)
+    return q, p, casadi.densify(casadi.vertcat(closure_rows(system, q), norms, more)), sizes
+
+
+def _equations_of(system: System, aims: tuple[int, ...], kept: Sequence[int]) -> NewtonEquations:
+    """Some of the rows, as equations for positions."""
+    q, p, r, _ = _symbolic_rows(system, aims)
+    r = r[list(kept)]
+    equations = Function("equations", [q, p], [r, casadi.jacobian(r, q)])
+    return NewtonEquations(equations, Function("values", [q, p], [r]))
+
+
+def _functions(system: System, aims: tuple[int, ...]) -> ClosingFunctions:
+    q, p, r, sizes = _symbolic_rows(system, aims)
     J = casadi.jacobian(r, q)
 
     def arrays(name: str, inputs: list[SX], outputs: list[SX]) -> OnArrays:
         return on_arrays(Function(name, inputs, outputs))
 
-    equations = Function("equations", [q, system.p], [r, J])
-    values = Function("values", [q, system.p], [r])
+    equations = Function("equations", [q, p], [r, J])
     return ClosingFunctions(
         equations=on_arrays(equations),
         places=np.array(J.sparsity().get_triplet(), dtype=np.int64).reshape(2, -1),
-        facing=arrays("facing", [q, system.p], [facing(system, q)]),
-        sizes=arrays("sizes", [system.p], [mechanism_size(system), sizes]),
-        newton=NewtonEquations(equations, values),
+        facing=arrays("facing", [q, p], [facing(system, q)]),
+        sizes=arrays("sizes", [p], [mechanism_size(system), sizes]),
+        newton=NewtonEquations(equations, Function("values", [q, p], [r])),
     )
+
+
+def _cut_moves(system: System, q: SX, target: SX) -> SX:
+    """(c, 1) differences of positions of cut joints from a target, as `row_difference`."""
+    found, rows = cut_positions(system)(q, system.p), system.cut_coordinates
+    for first in [k for k, row in enumerate(rows) if row.kind == "quaternion"][::4]:
+        part = slice(first, first + 4)
+        found[part] *= casadi.if_else(casadi.dot(found[part], target[part]) < 0, -1, 1)
+    moves = found - target
+    for k, row in enumerate(rows):
+        if row.unit == "rad":
+            moves[k] -= 2 * casadi.pi * casadi.floor(moves[k] / (2 * casadi.pi) + 0.5)
+    return moves
 
 
 def _replace(q: Vector, indices: Sequence[int], values: Vector) -> Vector:
@@ -371,8 +428,9 @@ def within_half_turn(system: System, q: Vector) -> Vector:
 
 def _within_half_turn(rows: Sequence[Coordinate], q: Vector) -> Vector:
     turned = np.array(q, dtype=float)
-    turns = [row.unit == "rad" for row in rows]
+    turns = np.array([row.unit == "rad" for row in rows], dtype=bool)
     turned[turns] = np.remainder(turned[turns] + np.pi, 2 * np.pi) - np.pi
+    turned[turns & (turned < _HALF_TURN - np.pi)] += 2 * np.pi  # rounding decides no sign
     return turned
 
 
@@ -668,7 +726,7 @@ def _line(
     size = closing.size
     lengths = np.array([c.unit.startswith("m") for c in system.coordinates])
     scales = np.where(lengths, size, 1.0)
-    acting = closing.acting
+    acting = closing.acting(norms=True)
     first = np.where(acting, ends[0], ends[1])
     change = np.zeros(system.nq)
     change[list(locked)] = np.abs(ends[1] - first)[list(locked)]
@@ -769,7 +827,7 @@ def candidates(closing: Closing, start: Vector, most: int = _CANDIDATES) -> list
             it.
         most: number of configurations at which the search ends.
     """
-    rng, bound = np.random.default_rng(_SEED), closing.bound
+    rng, bound = np.random.default_rng(_SEED), closing.acting(norms=False)
     free = [k for k in closing.free if bound[k]]
     lengths = [closing.system.coordinates[k].unit.startswith("m") for k in free]
     reach = np.where(lengths, closing.size, np.pi)
@@ -800,6 +858,7 @@ def candidates(closing: Closing, start: Vector, most: int = _CANDIDATES) -> list
 
 
 _HALF_TURN = 1e-6
-"""Elements and scalar products of unit quaternions that decide no sign: rounding is below."""
+"""Elements and scalar products of unit quaternions that decide no sign, and differences from half a
+turn [rad] that do not: rounding is below. Bars in one line have angles of half a turn."""
 _OTHER = 1e-4
 """Smallest difference of two listed configurations [rad or m]; iterations leave 1e-10."""

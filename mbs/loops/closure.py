@@ -22,7 +22,7 @@ from mbs.components import Fixed, RollingDisc
 from mbs.components.constraints import SLIPS
 from mbs.components.custom import Row
 from mbs.errors import ModelError
-from mbs.loops.balance import balance_rows
+from mbs.loops.balance import balance_rows, velocity_balance_rows
 from mbs.recursions.parts import PartsAt, part_rows
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose, cross
@@ -64,7 +64,16 @@ def slip_rows(system: System, q: SX) -> list[tuple[str, SX]]:
     for name, rows in part_rows(PartsAt(system, q, v), velocities=True):
         values = casadi.vertcat(*(row.value for _, row in rows))
         result.append((name, casadi.jacobian(values, v)))
+    for name, rows in velocity_balance_rows(system, q, v):
+        values = casadi.vertcat(*(row.value for _, row in rows))
+        result.append((name, casadi.jacobian(values, v)))
     return result
+
+
+def drift_rows(system: System, q: SX) -> SX | None:
+    """What the last velocity rows are at rest, those of massless nodes; None without such rows."""
+    rows = velocity_balance_rows(system, q, SX.zeros(system.nv))
+    return casadi.vertcat(*(row.value for _, row in rows[0][1])) if rows else None
 
 
 def least_upright(system: System) -> Function:
@@ -167,6 +176,8 @@ def row_groups(system: System) -> tuple[RowGroup, ...]:
         }
         q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
         for name, rows in part_rows(PartsAt(system, q, v), velocities=True):
+            slips[name] = tuple((label, row.unit) for label, row in rows)
+        for name, rows in velocity_balance_rows(system, q, v):
             slips[name] = tuple((label, row.unit) for label, row in rows)
         groups = [
             RowGroup(name, tuple(rows), slips.pop(name, ()))

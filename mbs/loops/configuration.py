@@ -12,6 +12,7 @@ from mbs.assembly.model_function import require_system
 from mbs.assembly.validity import plain_fault
 from mbs.assembly.variable_names import GUESSES, POSITIONS, VELOCITIES
 from mbs.errors import LoopError, ModelError, Unclosable
+from mbs.loops.balance import GROUP
 from mbs.loops.closing import (
     OPEN,
     Closed,
@@ -22,13 +23,16 @@ from mbs.loops.closing import (
     follow_configuration,
     unwound,
 )
+from mbs.loops.closure import position_rows
+from mbs.loops.cut_positions import cut_positions_and_slopes
 from mbs.loops.function import configuration_on, fixed_positions, independent_names
-from mbs.loops.nearest import GuessTarget, nearest_configuration
-from mbs.loops.velocity import closure_jacobian
+from mbs.loops.guess_target import GuessTarget
+from mbs.loops.nearest import nearest_configuration
+from mbs.loops.velocity import closure_jacobian, constraint_drift_at
 from mbs.result import Result, State, positions_of, state_of, velocities_of
 from mbs.solvers.least_squares import smallest_solution
 from mbs.solvers.rank import RELATIVE_GAP, null_space
-from mbs.text import quoted
+from mbs.text import did_you_mean, quoted
 
 Values = Mapping[str, float] | Sequence[float] | None
 """Positions or velocities by name, or all of them in their order."""
@@ -66,7 +70,8 @@ def solve(
             out staying as in the assembled configuration; or positions of any joints by name; or a
             `State`. Beside all independent joints, positions of others choose the branch and are
             checked.
-        guess: approximate positions of other joints, which choose the branch.
+        guess: approximate positions of other joints, which choose the branch; also of joints that
+            are cut. They keep their values if the loops leave a motion for that.
         branch: labels of `mbs.loops.modes` instead, such as "j3:+"; a loop that no label names
             stays as it was assembled. Positions are then those of independent joints.
         parameters: values of symbols, the others at their defaults.
@@ -96,7 +101,8 @@ def solve(
     try:
         return _closed(system, fixed, guess or {}, parameters)
     except Unclosable as error:
-        note = like_degrees(system.coordinates, {**(guess or {}), **fixed})
+        rows = [*system.coordinates, *system.cut_coordinates]
+        note = like_degrees(rows, {**(guess or {}), **fixed})
         raise (Unclosable(f"{error}; {note}") if note else error) from None
 
 
@@ -108,7 +114,15 @@ def _closed(
 ) -> Vector:
     """The configuration (nq,) of `solve` with positions by name."""
     p = closure_parameters(system, parameters)
-    target = np.array(system.position({**guess, **fixed}))
+    at_cut = system.positions_at_cuts(guess)
+    own = {name: value for name, value in guess.items() if name not in at_cut}
+    known = [row.name for row in (*system.coordinates, *system.cut_coordinates)]
+    for name in own:
+        if name not in known:
+            raise ModelError(
+                f"{system.name}: there is no coordinate {name!r}; {did_you_mean(name, known)}"
+            )
+    target = np.array(system.position({**own, **fixed}))
     if not system.is_closed:
         return target
     if len(fixed) == system.nq:
@@ -118,15 +132,16 @@ def _closed(
     if all(name in names for name in fixed):
         fixed = {**dict.fromkeys(names, 0.0), **fixed}
     elif set(names) <= set(fixed):
-        return _with_dependent_positions(system, target, fixed, guess, p)
+        return _with_dependent_positions(system, target, fixed, {**guess, **at_cut}, p)
     locked = tuple(_indices(system, fixed))
     if not guess:
         return follow_configuration(system, target, locked, p)
     if set(_coordinate_names(system)) <= set(guess):
-        origin = np.array(system.position(guess))
+        origin = np.array(system.position(own))
         if Closing(system, p).openness(origin) <= OPEN:
             return follow_configuration(system, target, locked, p, (origin, p))
-    return _guessed_configuration(Closing(system, p, locked), target, _indices(system, guess))
+    named = {name: x for name, x in guess.items() if name not in fixed}
+    return _guessed_configuration(Closing(system, p, locked), target, {**named, **at_cut})
 
 
 def _coordinate_names(system: System) -> list[str]:
@@ -153,7 +168,8 @@ def _with_dependent_positions(
     names = independent_names(system)
     independent, surplus = _indices(system, names), [name for name in fixed if name not in names]
     closing = Closing(system, p, tuple(independent))
-    q = _guessed_configuration(closing, target, _indices(system, {*surplus, *guess}))
+    given_names = {**guess, **{name: fixed[name] for name in surplus}}
+    q = _guessed_configuration(closing, target, given_names)
     given = _indices(system, surplus)
     missed = np.abs(q - target)[given]
     scales = distance_units((system.coordinates[k].unit for k in given), closing.size)
@@ -181,12 +197,15 @@ def _with_positions(q: Vector, target: Vector, indices: Sequence[int]) -> Vector
     return result
 
 
-def _guessed_configuration(closing: Closing, start: Vector, named: list[int]) -> Vector:
-    """The configuration whose named positions are nearest to those of `start`, (nq,).
+def _guessed_configuration(closing: Closing, start: Vector, guess: Mapping[str, float]) -> Vector:
+    """The configuration whose guessed positions are nearest to their guesses, (nq,).
 
-    The search is that of `mbs.loops.assembled`.
+    The search is that of `mbs.loops.assembled`. Positions of cut joints without a guess are
+    compared with those of the assembled configuration.
     """
-    found = nearest_configuration(closing, GuessTarget.at(closing, start, named))
+    system, p = closing.system, closing.p
+    cut = cut_positions_and_slopes(system)(np.array(system.configuration), p)[0].ravel()
+    found = nearest_configuration(closing, GuessTarget.of(system, p, start, guess, cut))
     if found is not None:
         return found.q
     return unwound(closing, closed_configuration(closing, start), start)
@@ -244,7 +263,17 @@ def _require_joined(closing: Closing, q: Vector) -> None:
     """Raise LoopError if the configuration q (nq,) leaves the loops open."""
     name = closing.system.name
     if closing.openness(q) > OPEN:
-        worst = float(np.max(np.abs(closing.rows(q)[0]), initial=0.0))
+        missed = np.abs(closing.rows(q)[0])
+        row = int(np.argmax(missed / closing.sizes))
+        groups = position_rows(closing.system)
+        if row < len(groups) and groups[row][0] == GROUP:
+            node = groups[row][1]
+            raise LoopError(
+                f"{name}: the forces on {node}, which moves no mass, are not balanced at"
+                f" {node} = {q[_coordinate_names(closing.system).index(node)]:.6g}; leave {node}"
+                " out, so that it follows from the other positions"
+            )
+        worst = float(np.max(missed, initial=0.0))
         raise LoopError(
             f"{name}: the configuration leaves the loops open by {worst:.3g};"
             " use mbs.loops.solve to get one that closes them, or give the independent positions"
@@ -340,12 +369,15 @@ def start_velocity(
         return np.array(system.velocity(v0))
     p = [system.parameter_values(parameters)] if system.parameters else []
     J = np.array(closure_jacobian(system)(q, *p))
+    own = node_velocities(system, J, q, np.array(system.parameter_values(parameters)))
     if isinstance(v0, Mapping) and v0:
         at_rest = dict.fromkeys(_spring_speeds(system), 0.0)
-        v, missed = smallest_velocity(system, J, {**at_rest, **v0}) if at_rest else (J, "none")
+        v, missed = (J, "none")
+        if at_rest:
+            v, missed = smallest_velocity(system, J, {**at_rest, **v0}, own)
         if not missed:
             return v
-    v, missed = smallest_velocity(system, J, v0)
+    v, missed = smallest_velocity(system, J, v0, own)
     if missed:
         names = ", ".join(system.speeds[k].name for k in system.active)
         remedy = f"give those of independent joints: {names}" if names else "leave them out"
@@ -360,22 +392,47 @@ def _spring_speeds(system: System) -> list[str]:
     return [
         system.speeds[link.v.start].name
         for link in system.tree.links
-        if link.v.stop - link.v.start == 1 and not link.stiffness.is_zero()
+        if link.v.stop - link.v.start == 1
+        and not link.stiffness.is_zero()
+        and link.v.start not in {velocity for _, velocity in system.nodes}
     ]
 
 
-def smallest_velocity(system: System, J: Vector, v0: Values) -> tuple[Vector, str]:
+def node_velocities(system: System, J: Vector, q: Vector, p: Vector) -> Vector | None:
+    """(nv,) velocities of massless nodes that dampers hold while all else rests; None without any.
+
+    Args:
+        system: any.
+        J: (m, nv) every row.
+        q: (nq,) positions.
+        p: (np,) parameters.
+    """
+    drift = constraint_drift_at(system)
+    if drift is None:
+        return None
+    v, nodes = np.zeros(system.nv), [velocity for _, velocity in system.nodes]
+    v[nodes] = np.linalg.lstsq(J[:, nodes], -np.array(drift(q, p)).ravel(), rcond=None)[0]
+    return v
+
+
+def smallest_velocity(
+    system: System, J: Vector, v0: Values, own: Vector | None = None
+) -> tuple[Vector, str]:
     """The smallest velocities with J v = 0 that give the joints named in v0 theirs.
 
     Args:
         system: any.
         J: (m, nv) rows, dependent ones included.
         v0: velocities by name [rad/s or m/s], or all of them.
+        own: (nv,) velocities to which these are added, of which v0 has the sum.
 
     Returns:
         v (nv,); the velocities of v0 as text where no v has them, else an empty one.
     """
     target = np.array(system.velocity(v0))
+    if own is not None:
+        v, missed = smallest_velocity(system, J, _less(system, v0, own))
+        return v + own, missed
     names = [speed.name for speed in system.speeds]
     named = v0 is None or isinstance(v0, Mapping)
     rows = [k for k, name in enumerate(names) if not named or name in (v0 or {})]
@@ -389,6 +446,16 @@ def smallest_velocity(system: System, J: Vector, v0: Values) -> tuple[Vector, st
     if _fit(near[rows], target[rows]):
         return v, ""
     return near, ", ".join(f"{names[k]} = {target[k]:g}" for k in rows)
+
+
+def _less(system: System, v0: Values, own: Vector) -> Values:
+    """Return velocities as they are given, less others (nv,)."""
+    less = np.array(system.velocity(v0)) - own
+    if v0 is None:
+        return None
+    if not isinstance(v0, Mapping):
+        return list(map(float, less))
+    return {s.name: float(x) for s, x in zip(system.speeds, less, strict=True) if s.name in v0}
 
 
 def _fit(v: Vector, target: Vector) -> bool:

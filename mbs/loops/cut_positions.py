@@ -11,6 +11,7 @@ from mbs.closed_forms.spatial import unit_quaternion
 from mbs.components import Universal
 from mbs.components.component import in_plane
 from mbs.components.joints import Motion
+from mbs.numbers import OnArrays, on_arrays
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose, cross
 
@@ -40,6 +41,19 @@ def cut_positions(system: System) -> Function:
         return Function("cut_positions", [q, system.p], outputs, ["q", "p"], ["c"])
 
     function: Function = system.cached("cut positions", build)
+    return function
+
+
+def cut_positions_and_slopes(system: System) -> OnArrays:
+    """``(q, p) -> c, s``: positions of `system.cut_coordinates`, and their derivative (c, nq)."""
+
+    def build() -> OnArrays:
+        q, p = SX.sym("q", system.nq), SX.sym("p", system.p.numel())
+        found = cut_positions(system)(q, p)
+        slopes = casadi.densify(casadi.jacobian(found, q))
+        return on_arrays(Function("cut_slopes", [q, p], [found, slopes]))
+
+    function: OnArrays = system.cached("slopes of cut positions", build)
     return function
 
 

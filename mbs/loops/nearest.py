@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,17 +11,11 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.tree import quaternion_slices
-from mbs.loops.closing import (
-    CLOSED,
-    Closing,
-    candidates,
-    difference,
-    distance_units,
-    row_difference,
-    unwound,
-)
+from mbs.loops.closing import CLOSED, Closing, candidates, difference, distance_units, unwound
 from mbs.loops.closure import facing, position_rows
-from mbs.loops.cut_positions import cut_positions
+from mbs.loops.guess_target import EQUAL, GuessTarget
+from mbs.loops.least_distance import MET, is_movable, least_distance, nearest_in_all
+from mbs.solvers.least_squares import MANY
 from mbs.solvers.rank import rank
 
 Vector = NDArray[np.float64]
@@ -32,9 +26,6 @@ takes sixty starts. Larger mechanisms are searched block by block."""
 _NEAR = 0.1
 """Distance of a configuration from its start below which no other one is searched [rad, or sizes of
 the mechanism]: branches that are nearer to each other meet there."""
-EQUAL = 1e-6
-"""Difference of distances that are equal: configurations are closed to 1e-12, and branches of
-symmetric mechanisms are equally near up to rounding."""
 _MODES = 64  # configurations of a search, of which the nearest is taken
 _LOOPS = 3  # that one block may have
 _MOST = 400
@@ -62,6 +53,9 @@ def nearest_configuration(closing: Closing, target: GuessTarget) -> Assembled | 
     Guessed positions are compared first, then all positions, by the largest difference. Lengths are
     divided by the size of the mechanism. If two configurations are at the same distance, the first
     position that differs decides, in the order of the description: the larger value is taken.
+    If the loops leave motions, and guessed positions are not met, the configuration moves along the
+    manifold of closed ones until the sum of squares of the differences of guessed positions is
+    minimal (`mbs.loops.least_distance`).
     Mechanisms with many free positions are searched block by block. A block is the least number of
     loops that determine their positions, once the blocks before it are closed. There positions of
     joints that are cut do not count.
@@ -78,16 +72,72 @@ def nearest_configuration(closing: Closing, target: GuessTarget) -> Assembled | 
     many = len(closing.free) > _FEW
     own = range(closing.system.nq) if many else None
     if q is not None and target.distances(closing, q, own)[1] < _NEAR:
-        return Assembled(q)
+        return Assembled(moved_to_guess(closing, target, [q])[0])
     if many:
         reached = _by_blocks(closing, target, q)
-        return None if reached is None else Assembled(reached)
+        return None if reached is None else Assembled(_met(closing, target, [reached]))
+    if q is None:
+        found = candidates(closing, start, _MODES)
+        if not found:
+            return None
+        q = nearest_of(closing, found, target)[0]
+        if is_movable(closing, q):
+            q = nearest_in_all(closing, target, q)
+            found = _modes(closing, target, q)
+    else:
+        found = _modes(closing, target, q)
+    best = nearest_of(closing, found, target)[0]
+    met = _met(closing, target, [best, *found])
+    if met is not best:
+        best, found = met, _modes(closing, target, met)
+    return Assembled(best, _others(closing, best, found))
+
+
+def moved_to_guess(closing: Closing, target: GuessTarget, starts: list[Vector]) -> list[Vector]:
+    """Configurations nearest to guessed positions that are not met, from closed starts."""
+    if not target.guessed:
+        return starts
+    missed = [q for q in starts if target.miss(closing, q) > MET]
+    if len(missed) < len(starts) or not any(is_movable(closing, q) for q in starts):
+        return starts
+    return least_distance(closing, target, starts)
+
+
+def _met(closing: Closing, target: GuessTarget, found: list[Vector]) -> Vector:
+    """The first configuration, or one nearer to guessed positions that it does not meet.
+
+    Args:
+        closing: the rows, and the positions that must not change.
+        target: first guess.
+        found: (nq,) closed configurations, the nearest one first.
+    """
+    q = found[0]
+    if not target.guessed or target.miss(closing, q) <= MET or not is_movable(closing, q):
+        return q
+    if len(closing.free) < MANY:
+        found = [*found, *candidates(closing, target.start, _MODES)]
+    best = nearest_of(closing, moved_to_guess(closing, target, found), target)[0]
+    # random starts have other branches of loops that the guess does not depend on
+    reached = _by_blocks(closing, target, best)
+    if reached is None or target.miss(closing, reached) > target.miss(closing, best) + EQUAL:
+        return best
+    return nearest_of(closing, [best, reached], target)[0]
+
+
+def _modes(closing: Closing, target: GuessTarget, q: Vector | None) -> list[Vector]:
+    """The configuration q, and others with the same independent positions.
+
+    Args:
+        closing: the rows, and the positions that must not change.
+        target: first guess.
+        q: (nq,) a closed configuration; None if Newton's method found none.
+    """
     held, at = _held(closing, target, q)
     found = [] if q is None else [q]
     for other in candidates(held, at, _MODES):
         if not any(np.abs(difference(closing.system, other, x)).max() < EQUAL for x in found):
             found.append(other)
-    return nearest_found(closing, found, target) if found else None
+    return found
 
 
 def _held(closing: Closing, target: GuessTarget, q: Vector | None) -> tuple[Closing, Vector]:
@@ -109,9 +159,8 @@ def _held(closing: Closing, target: GuessTarget, q: Vector | None) -> tuple[Clos
     return held, at
 
 
-def nearest_found(closing: Closing, found: list[Vector], target: GuessTarget) -> Assembled:
-    """Return the nearest of some configurations to a target, and the others."""
-    best = nearest_of(closing, found, target)[0]
+def _others(closing: Closing, best: Vector, found: list[Vector]) -> tuple[Vector, ...]:
+    """Configurations that differ from the best one and from each other."""
     turning = np.zeros(closing.system.nq, dtype=bool)
     for part in quaternion_slices(closing.system.tree):
         turning[part] = True
@@ -120,7 +169,7 @@ def nearest_found(closing: Closing, found: list[Vector], target: GuessTarget) ->
         apart = (np.abs(difference(closing.system, x, one))[~turning] for one in (best, *others))
         if all(np.max(moves, initial=0.0) > EQUAL for moves in apart):
             others.append(x)
-    return Assembled(best, tuple(others))
+    return tuple(others)
 
 
 def closes(closing: Closing, q: Vector) -> bool:
@@ -165,95 +214,10 @@ def _is_nearer(
             return distance < least
     system = closing.system
     order = {row.name: number for number, row in enumerate(system.joints)}
-    moves = difference(system, q, other)
-    apart = [k for k in range(system.nq) if abs(moves[k]) > EQUAL]
-    first = min(apart, key=lambda k: order.get(system.coordinates[k].joint, k), default=None)
+    rows, moves = target.rows, target.moves_between(q, other)
+    apart = [k for k in range(len(rows)) if abs(moves[k]) > EQUAL]
+    first = min(apart, key=lambda k: order.get(rows[k].joint, k), default=None)
     return first is not None and bool(moves[first] > 0)
-
-
-# Comparison of configurations with the guess.
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class GuessTarget:
-    """Positions of all joints that an assembled configuration is to be near to.
-
-    All positions are q, then the positions of joints that are cut. Therefore the comparison does
-    not depend on the joint of a loop that is cut.
-
-    Attributes:
-        system: its loops need not be closed yet.
-        p: (np,) parameters.
-        start: (nq,) positions.
-        cut: (c,) positions of `system.cut_coordinates`; None if they do not count.
-        guessed: indices of the guessed positions among all positions.
-    """
-
-    system: System
-    p: Vector
-    start: Vector
-    cut: Vector | None
-    guessed: tuple[int, ...]
-
-    @staticmethod
-    def at(closing: Closing, start: Vector, guessed: Sequence[int]) -> GuessTarget:
-        """The target of a start, and indices in q of its guessed positions.
-
-        Positions of joints that are cut do not count, as in the C code of FMUs.
-        """
-        return GuessTarget(closing.system, closing.p, start, None, tuple(guessed))
-
-    @staticmethod
-    def of(system: System, p: Vector, start: Vector, guess: Mapping[str, float]) -> GuessTarget:
-        """The target of a start and a guess by coordinate name."""
-        rows = system.cut_coordinates
-        cut = [guess.get(row.name, float(row.name.endswith(".qw"))) for row in rows]
-        names = [row.name for row in (*system.coordinates, *rows)]
-        guessed = tuple(k for k, name in enumerate(names) if name in guess)
-        return GuessTarget(system, p, start, np.array(cut, dtype=float), guessed)
-
-    @property
-    def guessed_cuts(self) -> list[int]:
-        """Indices of guessed positions in `system.cut_coordinates`."""
-        return [k - self.system.nq for k in self.guessed if k >= self.system.nq]
-
-    def cut_moves(self, q: Vector) -> Vector:
-        """(c,) differences of positions of cut joints from the target [rad, m or 1]."""
-        assert self.cut is not None
-        found = np.array(cut_positions(self.system)(q, self.p)).ravel()
-        return row_difference(self.system.cut_coordinates, found, self.cut)
-
-    def meets_cuts(self, q: Vector) -> bool:
-        """Whether guessed positions of cut joints have their values."""
-        guessed = self.guessed_cuts
-        return not guessed or _largest(self.cut_moves(q)[guessed]) < EQUAL
-
-    def distances(
-        self, closing: Closing, q: Vector, own: Sequence[int] | None = None
-    ) -> tuple[float, float, float]:
-        """Largest move of a guessed position, of any, and of a massless node.
-
-        They are in rad, or in sizes of the mechanism.
-
-        Args:
-            closing: the loops.
-            q: (nq,) configuration.
-            own: indices in q of the positions that count; all positions, also of joints that are
-                cut, if left out.
-        """
-        rows, moves = [*self.system.coordinates], difference(self.system, q, self.start)
-        if own is None and self.cut is not None:
-            rows += self.system.cut_coordinates
-            moves = np.concatenate([moves, self.cut_moves(q)])
-        moves = np.abs(moves) / distance_units((row.unit for row in rows), closing.size)
-        count = range(len(rows)) if own is None else own
-        guessed = sorted(set(self.guessed) & set(count))
-        nodes = [k for k, _, _ in self.system.balanced if k in count]
-        return _largest(moves[guessed]), _largest(moves[list(count)]), _largest(moves[nodes])
-
-
-def _largest(values: Vector) -> float:
-    return float(np.max(np.abs(values), initial=0.0))
 
 
 # Mechanisms with many free positions, block by block.

@@ -1,4 +1,4 @@
-"""Reduction of a closed system to its independent velocities: v = G v_a, a = G a_a + gamma.
+"""Reduction of a closed system to its independent velocities: v = G v_a + g, a = G a_a + gamma.
 
 Source: Kleinfinger & Khalil 1986; Khalil & Creusot 1997, eq. 13, 14 and 22.
 """
@@ -23,16 +23,25 @@ class Reduction:
     """Velocities and accelerations of the tree from the independent ones.
 
     Attributes:
-        G: (nv, m), v = G v_a.
+        G: (nv, m), v = G v_a + g.
         gamma: (nv, 1), a = G a_a + gamma; None unless velocities were given.
+        drift: (nv, 1) g, velocities of massless nodes that dampers hold; None where it is zero.
     """
 
     G: SX
     gamma: SX | None
+    drift: SX | None = None
+
+    def velocities(self, v_a: SX) -> SX:
+        """(nv, 1) velocities of the tree for the independent ones, (m, 1)."""
+        v = casadi.mtimes(self.G, v_a)
+        return casadi.densify(v if self.drift is None else v + self.drift)
 
 
 def reduction_matrix(system: System) -> Function:
     """``reduction_matrix(q) -> G``: velocities of the tree from the independent ones, v = G v_a.
+
+    Massless nodes that dampers hold move besides, v = G v_a + g; G has the slopes.
 
     Returns:
         Function of q (nq, 1) that closes the loops; G (nv, m).
@@ -61,13 +70,18 @@ def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
     active, rows = list(closure.active), determining_rows(system, q)
     W = -solve_large(rows.square, casadi.mtimes(rows.mixed, rows.J[:, active]))
     G = tree_rows(system, W, SX(DM.eye(len(active))))
+    drift = None
+    if rows.drift is not None:
+        own = -solve_large(rows.square, casadi.mtimes(rows.mixed, rows.drift))
+        drift = tree_rows(system, own, zeros(len(active)))
     if v_a is None:
-        return Reduction(G, None)
-    v = casadi.densify(casadi.mtimes(G, v_a))
+        return Reduction(G, None, drift)
+    v = Reduction(G, None, drift).velocities(v_a)
     speed = SX.sym("v", system.nv)
-    psi = casadi.substitute(acceleration_bias(system, q, speed, rows.J), speed, v)
+    bias = acceleration_bias(system, q, speed, rows.J, rows.drift)
+    psi = casadi.substitute(bias, speed, v)
     a_p = -solve_large(rows.square, casadi.mtimes(rows.mixed, psi))
-    return Reduction(G, tree_rows(system, a_p, zeros(len(active))))
+    return Reduction(G, tree_rows(system, a_p, zeros(len(active))), drift)
 
 
 def tree_rows(system: System, passive: SX, active: SX) -> SX:

@@ -20,12 +20,14 @@ from mbs.assembly.tree import position_rate
 from mbs.loops.closing import mechanism_size
 from mbs.loops.closure import (
     closure_rows,
+    drift_rows,
     independent_closure,
     pose_on_plane,
     position_rows,
     rolling_discs,
     row_groups,
     slip_rows,
+    velocity_row_units,
 )
 from mbs.recursions.force_elements import sum_wrenches
 from mbs.recursions.parts import PartsAt
@@ -51,6 +53,33 @@ def constraint_rows(system: System, q: SX) -> SX:
     """J (m, nv), every row, at the symbols q."""
     slips = [rows for _, rows in slip_rows(system, q)]
     return casadi.vertcat(velocity_rows(system, q, closure_rows(system, q)), *slips)
+
+
+def constraint_drift(system: System, q: SX) -> SX | None:
+    """G (m, 1) of J v + g = 0, every row, at the symbols q; None where rows are J v = 0."""
+    drift = drift_rows(system, q)
+    if drift is None:
+        return None
+    others = len(position_rows(system)) + len(velocity_row_units(system)) - drift.numel()
+    return casadi.vertcat(SX.zeros(others), drift)
+
+
+def constraint_drift_at(system: System) -> Function | None:
+    """``drift(q, p) -> g``: g of every row; None where rows are J v = 0."""
+
+    def build() -> Function | None:
+        q = SX.sym("q", system.nq)
+        drift = constraint_drift(system, q)
+        return None if drift is None else Function("drift", [q, system.p], [drift])
+
+    function: Function | None = system.cached("constraint drift", build)
+    return function
+
+
+def independent_drift(system: System, q: SX) -> SX | None:
+    """G (r, 1) of the rows that the analysis kept; None where rows are J v = 0."""
+    drift = constraint_drift(system, q)
+    return None if drift is None else drift[kept_rows(system)]
 
 
 def independent_constraint_rows(system: System, q: SX) -> SX:
@@ -93,11 +122,13 @@ class DeterminingRows:
         J: (m, nv).
         mixed: (r, m) combinations of the rows, as many as there are passive velocities.
         square: (r, r) their columns of the passive velocities.
+        drift: (m, 1) g of the rows J v + g = 0; None where they are J v = 0.
     """
 
     J: SX
     mixed: SX
     square: SX
+    drift: SX | None = None
 
 
 def determining_rows(system: System, q: SX) -> DeterminingRows:
@@ -105,9 +136,10 @@ def determining_rows(system: System, q: SX) -> DeterminingRows:
     closure = system.closure
     assert closure is not None
     J = constraint_rows(system, q) if closure.varies else independent_constraint_rows(system, q)
+    drift = (constraint_drift if closure.varies else independent_drift)(system, q)
     J_p = J[:, list(closure.passive)]
     mixed = J_p.T if closure.varies else SX(DM.eye(J.shape[0]))
-    return DeterminingRows(J, mixed, casadi.mtimes(mixed, J_p))
+    return DeterminingRows(J, mixed, casadi.mtimes(mixed, J_p), drift)
 
 
 def velocity_rows(system: System, q: SX, phi: SX) -> SX:
@@ -116,9 +148,12 @@ def velocity_rows(system: System, q: SX, phi: SX) -> SX:
     return casadi.jacobian(casadi.jtimes(phi, q, position_rate(system.tree, q, v)), v)
 
 
-def acceleration_bias(system: System, q: SX, v: SX, J: SX) -> SX:
-    """Psi = dJ/dt v, (m, 1), for J that depends on the symbols q."""
-    return casadi.jtimes(casadi.mtimes(J, v), q, position_rate(system.tree, q, v))
+def acceleration_bias(system: System, q: SX, v: SX, J: SX, drift: SX | None = None) -> SX:
+    """Psi = dJ/dt v + dg/dt, (m, 1), for J and the drift g that depend on the symbols q."""
+    speeds = casadi.mtimes(J, v)
+    if drift is not None:
+        speeds += drift
+    return casadi.jtimes(speeds, q, position_rate(system.tree, q, v))
 
 
 # The wrenches of cut joints: what the efforts of their closure rows are between two bodies.

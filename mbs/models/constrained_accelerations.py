@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.tree import Link
 from mbs.components.joints import Motion
-from mbs.loops.velocity import acceleration_bias, independent_constraint_rows
+from mbs.loops.velocity import (
+    acceleration_bias,
+    independent_constraint_rows,
+    independent_drift,
+)
 from mbs.models.inverse_dynamics import tree_efforts
 from mbs.models.symbols import ModelSymbols, Surroundings
 from mbs.recursions.composite_body import inertia_matrix
@@ -95,7 +99,7 @@ def loop_rows(system: System, s: ModelSymbols) -> tuple[SX, SX]:
     if not system.is_closed:
         return SX(0, system.nv), SX(0, 1)
     J = independent_constraint_rows(system, s.q)
-    return J, acceleration_bias(system, s.q, s.v, J)
+    return J, acceleration_bias(system, s.q, s.v, J, independent_drift(system, s.q))
 
 
 def inertia_size(system: System, A: SX, s: ModelSymbols) -> float:

@@ -367,7 +367,7 @@ def _contacts(system: System) -> Contacts:
     at = PartsAt(system, q, v)
     found = list[_ContactRow]()
     for part in system.parts:
-        if part.element.switches:
+        if part.element.switches and part.name not in system.node_frictions:
             seen = at.at(part)
             laws = [*part.element.stops(seen).items(), *part.element.frictions(seen).items()]
             for label, law in laws:

@@ -22,8 +22,13 @@ from mbs.loops.closure import independent_closure, row_groups
 from mbs.loops.configuration import Guess, Start, Values, start
 from mbs.loops.function import function
 from mbs.loops.plan import branches_at, plan
-from mbs.loops.reduction import reduction_matrix
-from mbs.loops.velocity import acceleration_bias, independent_constraint_rows
+from mbs.loops.reduction import reduction, reduction_matrix
+from mbs.loops.velocity import (
+    acceleration_bias,
+    constraint_drift,
+    independent_constraint_rows,
+    independent_drift,
+)
 from mbs.models.contacts import require_no_contacts
 from mbs.models.direct_dynamics import direct_dynamics, independent_dynamics
 from mbs.models.inverse_dynamics import inverse_dynamics, own_efforts
@@ -84,14 +89,16 @@ class Rows:
 
 def rows_of(system: System, q: SX, v: SX, a: SX) -> Rows:
     """The independent rows at the symbols q (nq, 1), v (nv, 1), a (nv, 1)."""
-    phi, J = SX(0, 1), SX(0, system.nv)
+    phi, J, drift = SX(0, 1), SX(0, system.nv), None
     if system.is_closed:
         phi, J = independent_closure(system, q), independent_constraint_rows(system, q)
+        drift = independent_drift(system, q)
+    speeds = casadi.mtimes(J, v)
     return Rows(
         J=J,
         positions=phi,
-        velocities=casadi.mtimes(J, v),
-        accelerations=casadi.mtimes(J, a) + acceleration_bias(system, q, v, J),
+        velocities=speeds if drift is None else speeds + drift,
+        accelerations=casadi.mtimes(J, a) + acceleration_bias(system, q, v, J, drift),
         norms=norm_rows(system.tree, q),
     )
 
@@ -249,6 +256,8 @@ def _independent_motion(system: System, q: SX, v_a: SX) -> tuple[SX, SX, SX, SX]
     """Symbols u, velocities of the tree, accelerations of the independent joints, rates of z."""
     (G,) = outputs_of(system, reduction_matrix(system), q)
     v = casadi.densify(casadi.mtimes(G, v_a))
+    if system.closure is not None and constraint_drift(system, q) is not None:
+        v = reduction(system, q).velocities(v_a)
     u, tau, rates = driving(system, q, v)
     pushed = casadi.mtimes(G.T, tau) if system.motors != system.active else tau[list(system.active)]
     (a,) = outputs_of(system, independent_dynamics(system), q, v_a, pushed)

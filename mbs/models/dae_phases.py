@@ -20,7 +20,7 @@ from mbs.components.custom import RelativeMotion
 from mbs.errors import ModelError, Unclosable
 from mbs.loops.closure import closure_rows
 from mbs.loops.configuration import Values, smallest_velocity
-from mbs.loops.velocity import acceleration_bias, constraint_rows, kept_rows
+from mbs.loops.velocity import acceleration_bias, constraint_drift, constraint_rows, kept_rows
 from mbs.models.dae import (
     FORMS,
     ConstraintRows,
@@ -427,7 +427,7 @@ def _numbers(standing: Standing) -> Function:
         J, psi = SX(0, system.nv), SX(0, 1)
         if system.is_closed:
             J = constraint_rows(system, s.q)
-            psi = acceleration_bias(system, s.q, s.v, J)
+            psi = acceleration_bias(system, s.q, s.v, J, constraint_drift(system, s.q))
         A = inertia_matrix(system.tree, s.poses)
         H = tree_efforts(system, s, SX.zeros(system.nv), surroundings(system))
         outputs = [casadi.densify(x) for x in (A, H, J, psi, rows.J, rows.bias)]

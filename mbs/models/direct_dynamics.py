@@ -15,7 +15,7 @@ from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tree import normalised
 from mbs.errors import ModelError
 from mbs.loops.analysis import rows_at
-from mbs.loops.balance import require_no_balance
+from mbs.loops.balance import obstacles, require_no_balance
 from mbs.loops.velocity import closure_jacobian, constraint_jacobian, kept_rows
 from mbs.models.actuation import effort_input
 from mbs.models.constrained_accelerations import constrained_accelerations
@@ -221,11 +221,12 @@ def require_inertia(system: System) -> None:
             return True
         loose = _loose_in_loops(system) if system.is_closed else _loose_in_tree(system)
         if loose is not None:
-            name = system.speeds[system.active[loose]].name
+            number = system.active[loose]
+            name = system.speeds[number].name
             raise ModelError(
                 f"{system.name}: {name} can move without moving any inertia, so its acceleration"
                 " is not determined; give mass to what it carries, or a rotor inertia Ia; a mass of"
-                " zero needs springs, and no damper, friction or motor"
+                f" zero needs springs or dampers, and no motor{obstacles(system, number)}"
             )
         return True
 

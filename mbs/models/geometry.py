@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, default_in, model_function, require_system
+from mbs.components.mechanism import OUTER_WORLD
 from mbs.errors import NoClosedForm, Unclosable
 from mbs.loops.configuration import solve
 from mbs.loops.function import LoopFunction, follow_active
@@ -54,10 +55,11 @@ def _pose(
 def terminal_frame(system: System) -> str | int:
     """The frame that a robot is asked for when none is named.
 
-    It is the frame or body named "tool", else the only frame that was given a name, else the last
+    It is the frame or body named "tool", else the only frame that was given a name, not counting
+    those in which mounts are given ("outer_world"), else the last
     link at the end of a chain that no loop goes through, else the last link.
     """
-    named = system.named_frames
+    named = [name for name in system.named_frames if name.rpartition(".")[2] != OUTER_WORLD]
     if "tool" in system.frames:
         return "tool"
     if len(named) == 1:

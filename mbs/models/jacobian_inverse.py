@@ -11,6 +11,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import ConfigurationCheck, Named, model_function, require_system
 from mbs.errors import ModelError
+from mbs.loops.balance import require_no_drift
 from mbs.loops.examine import DETERMINED
 from mbs.loops.reduction import reduction
 from mbs.models.symbols import check_coordinates, is_reduced
@@ -61,6 +62,9 @@ class Selection:
         q = SX.sym("q", system.nq)
         frame, axes = system.frame(self.frame), system.frame(self.expressed_in)
         target = VelocityTarget(system.tree, q, system.p, frame, axes)
+        if self.reduced:
+            path = system.tree.path(frame[0])
+            require_no_drift(system, "a Jacobian", [system.tree.links[k].v.start for k in path])
         G = reduction(system, q).G if self.reduced else None
         return q, square_jacobian(target, self.rows, self.columns, G)
 

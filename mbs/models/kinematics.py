@@ -8,6 +8,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.errors import ModelError
+from mbs.loops.balance import require_no_drift
 from mbs.loops.reduction import reduction
 from mbs.models.symbols import (
     ModelSymbols,
@@ -98,6 +99,8 @@ def jacobian(
 def in_coordinates(system: System, q: SX, J: SX, coordinates: str) -> SX:
     """A Jacobian of the tree as one of the velocities that are input: J G in a closed system."""
     if is_reduced(system, coordinates):
+        columns = set(casadi.sparsify(J).sparsity().get_triplet()[1])
+        require_no_drift(system, "a Jacobian", sorted(columns))
         return casadi.mtimes(J, reduction(system, q).G)
     return J
 

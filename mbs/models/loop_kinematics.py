@@ -14,11 +14,17 @@ from mbs.assembly.tree import position_rate
 from mbs.components import Free, Spherical, Universal
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
+from mbs.loops.balance import require_no_drift
 from mbs.loops.closure import cut_twist
 from mbs.loops.cut_positions import cut_position
 from mbs.loops.examine import DETERMINED
 from mbs.loops.reduction import reduction, tree_rows
-from mbs.loops.velocity import acceleration_bias, determining_rows, independent_constraint_rows
+from mbs.loops.velocity import (
+    acceleration_bias,
+    determining_rows,
+    independent_constraint_rows,
+    independent_drift,
+)
 from mbs.models.symbols import ModelSymbols, symbols_of
 from mbs.recursions.route import relative_pose
 from mbs.solvers.linear import solve_square
@@ -95,7 +101,10 @@ def acceleration_closure(system: System, coordinates: str = "independent") -> Fu
         rows = _loop_rows(system, s.q)
         speed = SX.sym("v", system.nv)
         both = casadi.vertcat(rows.tree, rows.cut)
-        bias = acceleration_bias(system, s.q, speed, both)
+        drift = independent_drift(system, s.q)
+        if drift is not None:
+            drift = casadi.vertcat(drift, SX.zeros(rows.cut.shape[0]))
+        bias = acceleration_bias(system, s.q, speed, both, drift)
         r, every = rows.tree.shape[0], determining_rows(system, s.q)
         turned = casadi.mtimes(_rate(system, every.J, s.q, speed), reduction(system, s.q).G)
         W_dot = -solve_square(every.square, casadi.mtimes(every.mixed, turned))
@@ -124,6 +133,7 @@ class _LoopRows:
 
 
 def _require_loops(system: System) -> None:
+    require_no_drift(system, "the closure of velocities", range(system.nv))
     if system.closure is None:
         raise ModelError(
             f"{system.name}: an open chain has no loops whose velocities could be tied; use the"

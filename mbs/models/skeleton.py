@@ -17,6 +17,7 @@ from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tables import JointRow
 from mbs.assembly.tree import Frame, normalised
 from mbs.components.joints import Motion
+from mbs.components.mechanism import OUTER_WORLD
 from mbs.models.geometry import terminal_frame
 from mbs.recursions.poses import base_poses, link_poses
 from mbs.spatial import Pose
@@ -302,7 +303,8 @@ def _axis(marks: _Marks, link: int, motion: Motion, axis: SX) -> SkeletonAxis:
 
 
 def _shown_frames(system: System) -> list[str | int]:
-    return list(dict.fromkeys([*system.named_frames, terminal_frame(system)]))
+    outer = [OUTER_WORLD] if OUTER_WORLD in system.frames else []
+    return list(dict.fromkeys([*outer, *system.named_frames, terminal_frame(system)]))
 
 
 def _frame(marks: _Marks, name: str | int) -> SkeletonFrame:

@@ -125,7 +125,7 @@ def symbols_of(system: System, coordinates: str = "independent") -> ModelSymbols
     reduced = reduction(system, q, v)
     # dense: joints of a sub-loop that cannot move have structural zeros in G, and `substitute`
     # takes vectors of one pattern only
-    v_tree = casadi.densify(casadi.mtimes(reduced.G, v))
+    v_tree = reduced.velocities(v)
     return ModelSymbols(q, v, v_tree, "_a", reduced, poses)
 
 

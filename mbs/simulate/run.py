@@ -31,6 +31,7 @@ from mbs.components.custom import OneWay, Signal
 from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.files import read_sealed, write_sealed
 from mbs.loops.analysis import rows_at
+from mbs.loops.balance import without_values
 from mbs.loops.closure import least_upright, rolling_discs
 from mbs.loops.configuration import Guess, Start, Values, start, start_position, start_velocity
 from mbs.loops.examine import row_independence
@@ -61,7 +62,7 @@ from mbs.models.state.tree import FullState, full_state
 from mbs.models.symbols import part_equations
 from mbs.native import compiled
 from mbs.native.compiler import cache_dir
-from mbs.numbers import OnArrays, has_boolean, numbers_given, on_arrays
+from mbs.numbers import OnArrays, has_boolean, is_vector, numbers_given, on_arrays
 from mbs.progress import progress
 from mbs.recursions.parts import part_event_names
 from mbs.result import (
@@ -287,7 +288,8 @@ def device_states(system: System, z0: Mapping[str, float] | Sequence[float] | No
 
 def _numbers(system: System, what: str, values: Any) -> list[float]:
     array = numbers_given(values)
-    if isinstance(array, str) or not np.isfinite(array).all() or array.ndim == 0:
+    vector = not isinstance(array, str) and array.ndim > 0 and is_vector(array.shape)
+    if isinstance(array, str) or not vector or not np.isfinite(array).all():
         raise ModelError(f"{system.name}: {what} is {quoted(values)}; give finite numbers")
     return [float(value) for value in array.ravel()]
 
@@ -427,6 +429,8 @@ def integrate_legs(
         lost = _lost(system, q, p) if stop.singular and system.is_closed else ""
         cause = stop.__cause__
         reason = lost if lost or stop.singular else _without_inertia(system)
+        if stop.singular:
+            reason += _at_stops(system, np.array(stop.state), _own(system, p))
         stop = SolverError(
             f"{system.name}: {_with_names(system, stop)}; the configuration is {where}{reason}",
             state=stop.state,
@@ -449,7 +453,30 @@ def _without_inertia(system: System) -> str:
         require_inertia(system)
     except ModelError as error:
         return "; " + str(error).removeprefix(f"{system.name}: ")
-    return ""
+    return without_values(system)
+
+
+_TOUCHED = 1e-6
+"""Distance from a limit [rad or m] at which a rigid stop is closed; impacts are found to 1e-9."""
+
+
+def _at_stops(system: System, x: Array, p: Array) -> str:
+    """The rigid stops that are closed at a singular state, and the remedy; empty if none is."""
+    contacts = contacts_of(system)
+    if not len(contacts):
+        return ""
+    q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
+    limits = Function("limits", [q, v, system.p], [*contacts.bounds, contacts.at(q, v).measure])
+    found = limits(x[: system.nq], x[system.nq : system.nq + system.nv], p)
+    lower, upper, value = (np.array(row)[:, 0] for row in found)
+    gaps = np.minimum(np.abs(value - lower), np.abs(upper - value))
+    closed = [name for name, gap in zip(contacts.names, gaps, strict=True) if gap < _TOUCHED]
+    if not closed:
+        return ""
+    return (
+        f"; the rigid stop at {' and '.join(closed)} is closed there: move its limit away from the"
+        " singular configuration, or use an elastic JointStop"
+    )
 
 
 def _with_names(system: System, stop: SolverError) -> str:
@@ -1462,7 +1489,7 @@ def _degrees_given(system: System, q0: Start, guess: Guess) -> str:
     elif q0 is not None:
         names = (coordinate.name for coordinate in system.coordinates)
         given.update(zip(names, system.position(q0), strict=True))
-    return like_degrees(system.coordinates, given)
+    return like_degrees([*system.coordinates, *system.cut_coordinates], given)
 
 
 def _started(

@@ -97,6 +97,13 @@ def tolerances_of(system: System, given: Tolerance) -> Tolerances:
     numbers = dict[str, tuple[float, float]]()
     for key, value in given.items():
         if key not in known:
+            base = str(key).removesuffix(".q").removesuffix(".v")
+            if base in [coordinate.name for coordinate in system.cut_coordinates]:
+                raise ModelError(
+                    f"{system.name}: tolerance names {quoted(key)}, which is no state, since its"
+                    " joint was cut to open a loop; name another joint of the loop, or cut another"
+                    " one with m.cut(joint)"
+                )
             raise ModelError(
                 f"{system.name}: tolerance names {quoted(key)}, which is no unit and no state;"
                 f" {did_you_mean(str(key), known)}"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.assembly.tree import normalised
+from mbs.components.mechanism import OUTER_WORLD
 from mbs.models.skeleton import Skeleton, skeleton
 from mbs.recursions.poses import base_poses, link_poses
 from mbs.view.primitives import Rows, Vector
@@ -32,7 +33,7 @@ class PosedLinks:
         points: (n, 3) of the skeleton, in the base frame [m].
         directions: (m, 3) of the skeleton, in the base frame.
         poses: (links + 1, 3, 4) R|p of the base and every link.
-        up: unit vector against gravity; z where there is none.
+        up: unit vector against gravity; z of the outer world if there is no gravity.
     """
 
     system: System
@@ -90,6 +91,7 @@ def pose_links(
     poses = pose_rows(system, np.array(given[0]).reshape(-1, 1), p)[:, 0]
     gravity = Function("gravity", [system.p], [casadi.densify(system.tree.gravity)])
     names = [parameter.name for parameter in system.parameters]
+    world = [directions[f.directions[2]] for f in parts.frames if f.name == OUTER_WORLD]
     return PosedLinks(
         system,
         dict(zip(names, p, strict=True)),
@@ -97,7 +99,7 @@ def pose_links(
         points,
         directions,
         poses.reshape(-1, 3, 4),
-        _up(np.array(gravity(p)).ravel()),
+        _up(np.array(gravity(p)).ravel(), world[0] if world else np.array([0.0, 0.0, 1.0])),
     )
 
 
@@ -119,10 +121,15 @@ def picture_symbols(system: System) -> frozenset[str]:
     return answer
 
 
-def _up(gravity: Array) -> Array:
-    """The direction against gravity; z without gravity, or if its symbol has no value."""
+def _up(gravity: Array, z: Array) -> Array:
+    """The direction against gravity; z without gravity, or if its symbol has no value.
+
+    Args:
+        gravity: acceleration in the base frame [m/s^2].
+        z: axis of the outer world in the base frame.
+    """
     size = float(np.linalg.norm(gravity))
-    return -gravity / size if size > 0 else np.array([0.0, 0.0, 1.0])
+    return -gravity / size if size > 0 else z
 
 
 def pose_rows(system: System, q: Array, p: Sequence[float]) -> Array:
@@ -217,7 +224,9 @@ def measures(scene: PosedLinks, solid_points: Array) -> Measures:
         scene: where it is.
         solid_points: (k, 3) corners of solids, in the base frame [m].
     """
-    every = np.vstack([np.zeros((1, 3)), scene.points, solid_points])
+    world = [frame.origin for frame in scene.parts.frames if frame.name == OUTER_WORLD]
+    own = np.delete(scene.points, world, axis=0)  # a mount far away leaves the sizes as they are
+    every = np.vstack([np.zeros((1, 3)), own, solid_points])
     size = float(np.linalg.norm(np.ptp(every, axis=0)))
     lengths = [
         float(np.linalg.norm(scene.points[a] - scene.points[b]))

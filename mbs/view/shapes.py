@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from mbs.assembly.khalil_frames import Cut
 from mbs.components import Box, Cylinder, RollingDisc
 from mbs.components.joints import Motion
+from mbs.components.mechanism import OUTER_WORLD
 from mbs.components.shapes import Shape
 from mbs.errors import ModelError
 from mbs.expressions import Scalar, to_float
@@ -452,9 +453,12 @@ def _column(
     scene: PosedLinks, sizes: Measures, top: Array, floor: float
 ) -> Iterator[CylinderShape]:
     foot = top + (floor - float(top @ scene.up)) * scene.up
+    if OUTER_WORLD in scene.system.frames:  # a mounted base need not be above the ground
+        foot = np.zeros(3)
+    height = float(np.linalg.norm(top - foot))
     # as thick as a joint, on a foot three times as wide; none where the joint is on the ground
-    pad = foot + 0.5 * sizes.joint * scene.up
-    if np.linalg.norm(top - foot) > 1e-9 * sizes.size:
+    if height > 1e-9 * sizes.size:
+        pad = foot + min(0.5 * sizes.joint / height, 1.0) * (top - foot)
         yield CylinderShape("base", 0, "base", three(foot), three(top), 0.8 * sizes.joint)
         yield CylinderShape("base", 0, "base", three(foot), three(pad), 2.4 * sizes.joint)
 

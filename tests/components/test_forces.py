@@ -16,16 +16,19 @@ from mbs.components import (
     Attraction,
     Body,
     Bushing,
+    CoulombFriction,
     Damper,
     FixedTendon,
     Force,
     Free,
     JointFriction,
     JointStop,
+    PointMass,
     Prismatic,
     Revolute,
     Spherical,
     Spring,
+    SpringFrictionSeries,
     Torque,
 )
 from mbs.errors import AssemblyError, DescriptionError
@@ -426,3 +429,68 @@ def test_a_fixed_tendon_that_is_none_is_refused(options, message):
     given = {"levers": (("a", 1.0),), "stiffness": 1.0, **options}
     with pytest.raises(DescriptionError, match=message):
         FixedTendon("t", **given)
+
+
+def jenkins(parallel=0.0, *, node=None):
+    """A mass on a spring that ends at dry friction: as one element, or with a node of a mass."""
+    m = mbs.Mechanism("jenkins")
+    body = m.add(PointMass("body", mass=2.0))
+    m.connect(m.world, Prismatic("x", axis="x"), body)
+    m.add(Spring("side", m.world.at(-1), body, stiffness=100.0, length=1.0))
+    both = {"stiffness": 600.0, "length": 1.0}
+    if node is None:
+        m.add(
+            SpringFrictionSeries("e", m.world.at(-1), body, friction=5.0, parallel=parallel, **both)
+        )
+        return m
+    knot = m.add(PointMass("knot", mass=node))
+    m.connect(m.world, Prismatic("n", axis="x", stiffness=parallel), knot)
+    m.add(Spring("s", knot, body.at(1.0), **both))
+    m.add(CoulombFriction("f", "n", sliding=5.0))
+    return m
+
+
+@pytest.mark.parametrize("parallel", [0.0, 60.0])
+def test_a_spring_in_series_with_friction_has_the_loop_of_a_jenkins_element(parallel):
+    amplitude, k, limit = 0.05, 600.0, 5.0
+    result = mbs.simulate.run(
+        jenkins(parallel).assemble(),
+        2.0,
+        motion={"x.q": lambda t: amplitude * casadi.sin(2 * np.pi * t)},
+        step=1e-3,
+        tolerance=1e-9,
+    )
+    force, x, z = result["e.force"][1000:], result["x.q"][1000:], result["e.slip"][1000:]
+    area = np.sum((force[1:] + force[:-1]) / 2 * np.diff(x))
+    # while it sticks, x moves by 2 limit / k; while it slides, z moves by k / (k + K) of x
+    travel = (2 * amplitude - 2 * limit / k) * k / (k + parallel)
+    assert area == pytest.approx(2 * limit * travel, rel=1e-4)
+    assert np.ptp(z) == pytest.approx(travel, rel=1e-4)
+    assert np.abs(force - parallel * z).max() == pytest.approx(limit, abs=1e-9)
+
+
+def test_a_spring_in_series_with_friction_is_as_a_node_of_little_mass(tmp_path):
+    system = jenkins(60.0).assemble()
+    result = mbs.simulate.run(system, 1.0, v0={"x": 1.0}, tolerance=1e-9)
+    assert np.unique(np.sign(np.diff(result["e.slip"]))).tolist() == [-1, 0, 1]
+    small = jenkins(60.0, node=1e-5).assemble()
+    other = mbs.simulate.run(small, 1.0, v0={"x": 1.0}, tolerance=1e-6, method="rodas")
+    np.testing.assert_allclose(result["x.q"], other["x.q"], atol=1e-4)
+    # the little mass oscillates by the speed times sqrt(1e-5 / 600)
+    np.testing.assert_allclose(result["e.slip"], other["n.q"], atol=2e-4)
+    path = mbs.export.fmu(system, tmp_path / "jenkins.fmu")
+    for kind in ("CoSimulation", "ModelExchange"):
+        options = {"start": {"x.v": 1.0}, "tolerance": 1e-9, "quiet": True}
+        found = mbs.simulate.fmu(path, 1.0, kind=kind, **options)
+        at = np.interp(found.time, result.time, result["x.q"])
+        assert np.abs(found["x.q"][-1] - at[-1]) < 1e-6
+
+
+def test_friction_behind_a_spring_slides_from_the_start_where_it_is_stretched_too_far():
+    """It begins with the force of sliding, and the energy falls by what it takes."""
+    result = mbs.simulate.run(
+        jenkins().assemble(), 0.5, q0={"x": 0.1}, v0={"x": 0.2}, tolerance=1e-9
+    )
+    assert result["e.force"][1] == pytest.approx(5.0, abs=1e-9)
+    energy = result["kinetic_energy"] + result["potential_energy"]
+    assert (np.diff(energy[1:]) < 1e-8).all()

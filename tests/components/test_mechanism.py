@@ -449,6 +449,52 @@ def test_a_frame_with_the_name_of_the_outer_world_raises():
         m.assemble()
 
 
+def test_a_mounted_mechanism_in_another_one_keeps_its_mount():
+    """Robots that hang in a cell have the weight and poses of the same robots loaded alone."""
+    cell = mbs.Mechanism("cell")
+    arm = cell.add(mbs.load("puma560", mount=HUNG), "arm")
+    cell.connect(cell.world, arm.point("outer_world"))
+    outer = mbs.Mechanism("plant")
+    inner = outer.add(cell, "cell")
+    outer.connect(outer.world, inner.base)
+    alone = mbs.load("puma560", mount=HUNG).assemble()
+    tool = "link6"
+    q = 0.1 * np.arange(1, 7)
+    expected = pose(alone, q, tool, "outer_world")
+    np.testing.assert_allclose(pose(cell.assemble(), q, f"arm.{tool}"), expected, atol=1e-14)
+    system = outer.assemble()
+    np.testing.assert_allclose(pose(system, q, f"cell.arm.{tool}"), expected, atol=1e-14)
+    np.testing.assert_allclose(pose(system, q, "cell.arm.outer_world"), np.eye(4), atol=1e-15)
+    weights = weight_efforts(outer, q), weight_efforts(mbs.load("puma560", mount=HUNG), q)
+    np.testing.assert_allclose(*weights, atol=1e-12)
+
+
+def test_the_mount_of_a_mechanism_in_another_one_has_its_own_symbols():
+    cell = mbs.Mechanism("cell")
+    arm = mbs.load("planar_2r", mount={"position": (0, 0, "H")}, parameters={"H": 1.5})
+    placed = cell.add(arm, "arm")
+    cell.connect(cell.world, placed.point("outer_world"))
+    system = cell.assemble()
+    H = [p.name for p in system.parameters].index("arm.H")
+    p = np.array(system.p_default)
+    assert p[H] == 1.5
+    assert mbs.models.transform(system, "arm.world")([0, 0], p).full()[2, 3] == 1.5
+
+
+def test_a_frame_with_the_name_of_the_outer_world_is_refused_in_another_mechanism():
+    arm = mbs.load("planar_2r", mount={"position": (0, 0, 1)})
+    arm.add_frame("outer_world", next(iter(arm.bodies())))
+    with pytest.raises(DescriptionError, match=r"planar_2r: the frame 'outer_world'.*rename it"):
+        mbs.Mechanism("cell").add(arm)
+
+
+@pytest.mark.parametrize("mount", [("x", 180), {"rotation": [("z", 0.1), ("x", 180)]}])
+def test_a_mount_in_degrees_has_a_note(mount):
+    notes = mbs.load("planar_2r", mount=mount).notes
+    assert list(map(str, notes)) == ["mount: x = 180 rad may be degrees; give radians"]
+    assert mbs.load("planar_2r", mount=("x", "2*pi")).notes == []
+
+
 def test_gravity_of_a_file_that_compensates_it_stays(tmp_path):
     path = tmp_path / "arm.xml"
     path.write_text(

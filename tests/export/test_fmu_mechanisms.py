@@ -190,6 +190,18 @@ def test_a_start_is_the_configuration_of_solve(slider_fmu, seed):
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8)
 
 
+def test_rounding_decides_no_sign_of_half_a_turn(tmp_path):
+    """Crank and rod are in one line: the rod is half a turn from its start."""
+    system = slider_crank().assemble(guess={"main": 0.0})
+    path = mbs.export.fmu(system, tmp_path / "line.fmu")
+    for main in (0.0, 1e-12, -1e-12):
+        start = {"main.q": main, "slide.solved": -0.3}
+        result = mbs.simulate.fmu(path, 0.001, start=start, step=0.001, quiet=True)
+        solved = mbs.loops.solve(system, {"main": main}, guess={"slide": -0.3})
+        for big in (result["big.q"][0], solved[1]):
+            assert big == pytest.approx(np.pi, abs=1e-9)
+
+
 def test_a_start_that_the_loops_cannot_take_is_one_error(tmp_path):
     m = mbs.Mechanism("short", gravity=(0, 0, 0))
     crank = m.add(Box("crank", length=0.4, width=0.04, density=7850))

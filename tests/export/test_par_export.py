@@ -195,3 +195,39 @@ def test_other_arguments_are_refused(tmp_path):
         mbs.export.par(casadi.SX(1), tmp_path / "m.par")
     with pytest.raises(ExportError, match="not a path"):
         mbs.export.par(mbs.load("planar_2r"), 3)
+
+
+MOUNT = {"position": (0.1, 0.2, 2.5), "rotation": [("x", "pi"), ("z", 0.3)]}
+
+
+@pytest.mark.parametrize("robot", ["puma560", "five_bar"])
+def test_the_mount_is_in_the_file(robot, tmp_path):
+    system = mbs.load(robot, mount=MOUNT).assemble()
+    mbs.export.par(system, tmp_path / "robot.par")
+    again = mbs.load(tmp_path / "robot.par").assemble()
+    found = [
+        np.array(mbs.models.transform(s, "base", "outer_world")(s.configuration))
+        for s in (system, again)
+    ]
+    np.testing.assert_allclose(found[0], found[1], atol=1e-15)
+    assert found[0][2, 3] == 2.5
+
+
+def test_a_mount_whose_symbols_have_no_value_is_named_in_the_file(tmp_path):
+    path = tmp_path / "robot.par"
+    mbs.export.par(mbs.load("planar_2r", mount={"position": (0, 0, "H")}), path)
+    assert "The mount of the base has symbols without a value" in path.read_text()
+    mbs.export.par(mbs.load("planar_2r", mount={"position": (0, 0, 1)}), path)
+    assert "The mount" not in path.read_text()
+
+
+def test_a_vector_that_is_no_pose_leaves_a_note(tmp_path):
+    path = tmp_path / "robot.par"
+    mbs.export.par(mbs.load("planar_2r", mount={"position": (0, 0, 1)}), path)
+    text = path.read_text()
+    assert "Z = {1,0,0,0," in text
+    path.write_text(text.replace("Z = {1,0,0,0,", "Z = {1,0.5,0,0,"))
+    mechanism = mbs.load(path)
+    assert "outer_world" not in mechanism.assemble().frames
+    (note,) = mechanism.notes
+    assert str(note) == "vector Z: is no pose of the base in numbers; the base has no mount"

@@ -131,3 +131,28 @@ def test_all_symbols_without_value_are_named(tmp_path):
     text = r"parameters 'M' and 'L' have no value.*parameters=\{'M': 1.0, 'L': 1.0\}"
     with pytest.raises(ModelError, match=text):
         m.assemble().parameter_values()
+
+
+def test_a_robot_that_hangs_is_written_in_the_world_of_its_mount(tmp_path):
+    """The file's world is the frame of the mount: gravity points down in it."""
+    mount = {"position": (0.1, 0.2, 2.5), "rotation": [("x", "pi"), ("z", 0.3)]}
+    system = mbs.load("puma560", mount=mount).assemble()
+    read = again(system, tmp_path).assemble()
+    assert [float(g) for g in np.array(casadi.DM(read.tree.gravity)).ravel()] == [0, 0, -9.81]
+    q, v, a = np.random.default_rng(3).uniform(-1, 1, (3, 6))
+    expected = np.array(mbs.models.transform(system, "link6", "outer_world")(q))
+    found = np.array(mbs.models.transform(read, "link6")(q))
+    np.testing.assert_allclose(found, expected, atol=1e-14)
+    efforts = [np.array(mbs.models.inverse_dynamics(s)(q, v, a)) for s in (system, read)]
+    np.testing.assert_allclose(*efforts, atol=1e-11)
+    assert "outer_world" not in read.frames
+
+
+def test_free_joints_on_a_rotated_base_and_other_gravities_are_refused(tmp_path):
+    m = Mechanism("m", mount=("x", "pi"))
+    m.connect(m.world, Free("free"), m.add(Body("b", mass=1.0)))
+    with pytest.raises(ModelError, match="m/free: a free joint on a rotated base"):
+        mbs.export.urdf(m, tmp_path / "m.urdf")
+    tilted = mbs.load("planar_2r", gravity=(1, 0, -9), mount=("x", "pi"))
+    with pytest.raises(ModelError, match=r"gravity is .*give the robot a mount instead"):
+        mbs.export.urdf(tilted, tmp_path / "m.urdf")

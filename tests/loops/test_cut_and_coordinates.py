@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from support.ring_loops import ring_loop
 
+import mbs
 from mbs import models
 from mbs.assembly.tables import ANGULAR, QUATERNION
-from mbs.components import JointSensor, WrenchSensor
+from mbs.components import Body, JointSensor, Revolute, Spherical, WrenchSensor
+from mbs.errors import AssemblyError
 from mbs.loops.cut_positions import cut_positions
 
 LOOPS = ["RSUR", "RRSRR", "RCSR", "RSRU", "RRSC"]
@@ -87,3 +89,62 @@ def test_the_tree_passes_spherical_joints_both_ways():
         if link.motion.nq == 4
     }
     assert directions == {True, False}
+
+
+FLAT = 0.3, 0.6, 0.5, 0.7
+"""Lengths of crank, coupler, rocker and ground of a plane loop [m]."""
+
+
+def flat(kinds, cut, turned):
+    """A four-bar in a plane with a spherical joint: it holds one direction twice.
+
+    Args:
+        kinds: "R" or "S" for each of the four joints.
+        cut: number of the joint that closes the loop.
+        turned: numbers of the joints that connect b to a.
+    """
+    m = mbs.Mechanism("flat", gravity=(0, -9.81, 0))
+    links = [
+        m.add(Body(n, mass=1.0 + k, com=(x / 2, 0.02 * k, 0), inertia=(0.03, 0.05, 0.06)))
+        for k, (n, x) in enumerate(zip(("crank", "coupler", "rocker"), FLAT, strict=False))
+    ]
+    ends = [m.world.at(0, 0, 0), *(link.at(x, 0, 0) for link, x in zip(links, FLAT, strict=False))]
+    starts = [*(link.at(0, 0, 0) for link in links), m.world.at(FLAT[3], 0, 0)]
+    for k, (kind, a, b) in enumerate(zip(kinds, ends, starts, strict=True)):
+        joint = Spherical(f"j{k}")
+        if kind == "R":
+            joint = Revolute(f"j{k}", axis="z", actuated=k == 0)
+        m.connect(*((b, joint, a) if k in turned else (a, joint, b)))
+        m.add(WrenchSensor(f"w{k}", f"j{k}", axes="world"))
+        if k == cut:
+            m.cut(joint)
+    start = {"j0": 1.0, "j3": -0.7106 if 3 not in turned else 0.7106}
+    return m.assemble(guess=start)
+
+
+@pytest.mark.parametrize("turned", [(), (2,), (1, 2, 3)])
+@pytest.mark.parametrize("kinds", ["RRSR", "RSRR"])
+def test_an_over_constrained_loop_has_the_same_wrenches_for_every_cut(kinds, turned):
+    """Gravity and inertia act in the plane, and so do the wrenches that the loop determines."""
+    found, directions = [], set()
+    for cut in (1, 2, 3):
+        system = flat(kinds, cut, turned)
+        (loop,) = system.loops
+        assert loop.dropped
+        directions |= {link.backward for link in system.tree.links if link.motion.nq == 4}
+        f = models.measurements(system)
+        q = mbs.loops.solve(system, {"j0": 1.0})
+        values = f.call([q, [0.7], [0.3]])
+        found.append(np.concatenate([value.full().ravel() for value in values]))
+    assert len(directions) == (2 if kinds == "RRSR" else 1)  # both ways, or one way
+    assert np.abs(found[0]).max() > 10
+    for other in found[1:]:
+        np.testing.assert_allclose(other, found[0], atol=1e-10)
+
+
+@pytest.mark.parametrize("cut", [1, 2])
+def test_suggested_names_of_readings_do_not_depend_on_the_cut(cut):
+    m = ring_loop(1, "RSUR", cut=cut)
+    m.add(JointSensor("s", "j1.w"))
+    with pytest.raises(AssemblyError, match=r"did you mean 'j1.wz' or 'j1.wy' or 'j1.wx'"):
+        m.assemble()

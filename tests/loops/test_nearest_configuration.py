@@ -144,3 +144,15 @@ def test_loops_in_sequence_are_each_nearest(seed):
         for name, value in zip(names, q, strict=True):
             assert wrapped(value - wanted[name]) == pytest.approx(0, abs=1e-8), name
     assert mbs.loops.examine(again, again.configuration).is_closed
+
+
+def test_a_loop_of_a_large_mechanism_moves_to_the_end_of_its_range():
+    """The crank and the rod of one loop are in one line; the others follow their own guesses."""
+    guess = {f"main{k}": 0.3 for k in range(9) if k != 4}
+    system = slider_cranks(9).assemble(guess={**guess, "slide4": -0.9})
+    at = dict(zip((c.name for c in system.coordinates), system.configuration, strict=True))
+    assert at["slide4"] == pytest.approx(-CRANK - ROD, abs=1e-9)
+    for k in set(range(9)) - {4}:
+        assert at[f"main{k}"] == 0.3
+        big, slide = min(modes(0.3), key=lambda mode: abs(mode[0]))
+        assert (at[f"big{k}"], at[f"slide{k}"]) == pytest.approx((big, slide), abs=1e-9)

@@ -309,6 +309,21 @@ def test_second_derivatives_at_any_size_and_speed(size):
     assert not answered & {(0.01, 100.0), (0.012, 100.0), (0.008, 100.0)}
 
 
+def test_rounding_is_tested_near_singular_configurations_alone(monkeypatch):
+    """One evaluation of the loops decides: at a sine of 0.05, one column or several."""
+    system = catalogue_system("n_four_bar")
+    ddm = mbs.models.direct_dynamics_derivatives(system)
+    calls = []
+    monkeypatch.setattr(type(ddm), "_verify", lambda *given: calls.append(given))
+    near, far = (mbs.loops.solve(system, {"a0": e}) for e in (0.02, 0.5))
+    for columns, expected in (([far], 0), ([near], 1), ([far, far], 0), ([far, near], 1)):
+        calls.clear()
+        count = len(columns)
+        call = ddm if count == 1 else ddm.map(count)
+        call(casadi.DM(np.transpose(columns)), casadi.DM.ones(1, count), casadi.DM.zeros(1, count))
+        assert len(calls) == expected
+
+
 def test_every_column_of_a_map_is_tested_for_rounding():
     system = catalogue_system("n_four_bar")
     ddm = mbs.models.direct_dynamics_derivatives(system)

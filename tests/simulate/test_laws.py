@@ -469,6 +469,60 @@ def test_laws_of_closed_systems_have_the_efforts_of_their_models():
         mbs.simulate.run(system, 0.3, tau=lambda t, q, v: casadi.vertcat(1, 2, 3), **options)
 
 
+SCALARS = [
+    lambda t, q, v: 1.0,
+    lambda t, q, v: casadi.sin(t),
+    lambda t, q, v: casadi.DM(1),
+    lambda t, q, v: np.array(0.5),
+    lambda t, q, v: [1.0],
+]
+
+
+@pytest.mark.parametrize("law", SCALARS)
+@pytest.mark.parametrize("name", ["planar_2r", "cart_pole", "five_bar"])
+def test_one_effort_for_several_joints_is_refused(name, law):
+    """Also if only one of the joints of an open system has a motor."""
+    system = mbs.load(name).assemble()
+    names = ", ".join(speed.name for speed in system.speeds)
+    message = f"{name}: tau has 1 values, the system has {system.nv}: {names}"
+    for call in (
+        lambda: mbs.simulate.run(system, 0.1, tau=law, quiet=True),
+        lambda: mbs.simulate.Simulator(system, tau=law),
+        lambda: mbs.simulate.sweep(system, {"q1.v": [0.0, 1.0]}, 0.1, tau=law),
+    ):
+        with pytest.raises(ModelError, match=message):
+            call()
+
+
+def test_one_effort_of_a_closed_system_with_one_motor_is_that_of_its_models():
+    system = mbs.load("four_bar").assemble()
+    options = {"quiet": True, "step": 0.1}
+    named = mbs.simulate.run(system, 0.1, tau=lambda t, q, v: {"j1": casadi.sin(t)}, **options)
+    for law in (lambda t, q, v: casadi.sin(t), lambda t, q, v: [casadi.sin(t)]):
+        result = mbs.simulate.run(system, 0.1, tau=law, **options)
+        np.testing.assert_allclose(result.values, named.values, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "matrix", [np.zeros((2, 2)), [[0, 0], [0, 0]], casadi.DM(2, 2), casadi.SX(2, 2)]
+)
+def test_matrices_are_no_efforts_and_no_positions(matrix):
+    """Four elements of a matrix would be taken by rows from NumPy, by columns from CasADi."""
+    system = mbs.load("five_bar").assemble()
+    shape = r"\(2, 2\)"
+    with pytest.raises(
+        ModelError, match=rf"tau\(t, q, v\) returns the shape {shape}.*: q1, q2, q3"
+    ):
+        mbs.simulate.run(system, 0.1, tau=lambda t, q, v: matrix, quiet=True)
+    if isinstance(matrix, casadi.SX):
+        return
+    for given in ({"tau": matrix}, {"q0": matrix}, {"v0": matrix}):
+        with pytest.raises(ModelError, match=rf"five_bar: the \w+ has the shape {shape}; give a"):
+            mbs.simulate.run(system, 0.1, quiet=True, **given)
+    with pytest.raises(ModelError, match=f"five_bar: the effort has the shape {shape}"):
+        mbs.models.linearise(system).at(tau0=matrix)
+
+
 def test_a_law_that_needs_numbers_is_refused():
     system = mbs.load("planar_2r").assemble()
     for law in (lambda t, q, v: [float(q[0]), 0.0], lambda t, q, v: float(q[0]) * q):

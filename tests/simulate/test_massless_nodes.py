@@ -8,6 +8,7 @@ import pytest
 
 import mbs
 from mbs.components import (
+    Body,
     Cartesian,
     CoulombFriction,
     Custom,
@@ -21,6 +22,7 @@ from mbs.components import (
     ShaftSpringDamperSeries,
     Spring,
     SpringDamperSeries,
+    WrenchSensor,
     custom,
 )
 from mbs.errors import ModelError, SolverError
@@ -172,18 +174,10 @@ def test_a_node_that_rotates():
     assert system.closure is None  # the hub carries the body: no coordinate is without inertia
 
 
-@pytest.mark.parametrize(
-    "load",
-    [
-        lambda m, knot: Damper("d", m.world.at(-1), knot.at(), damping=5.0),
-        lambda m, knot: ForceInput("push", knot.at()),
-    ],
-    ids=["damper", "input"],
-)
-def test_other_forces_on_a_massless_node_raise(load):
-    """Its velocity would have to be solved for."""
-    system = assembled(load)
-    with pytest.raises(ModelError, match=r"n can move without .* needs springs, and no damper"):
+def test_an_input_on_a_massless_node_raises():
+    """The balance of forces would have to know it."""
+    system = assembled(lambda m, knot: ForceInput("push", knot.at()))
+    with pytest.raises(ModelError, match=r"n can move without .* needs springs"):
         mbs.simulate.run(system, 0.1, q0={"x": 1.1})
 
 
@@ -253,3 +247,109 @@ def test_friction_on_a_node_is_one_error():
     m.add(CoulombFriction("f", "n", sliding=3.0))
     with pytest.raises(SolverError, match=r"n can move without moving any inertia.*needs springs"):
         mbs.simulate.run(m.assemble(guess={"x": 1.0}), 0.1, q0={"x": 1.05}, quiet=True)
+
+
+def with_inertia(*joints):
+    """A mass on a spring that ends at a part with moments of inertia and no mass."""
+    m = mbs.Mechanism("inertia", gravity=(0, 0, 0))
+    node, body = m.add(Body("node", mass=0, inertia=(0.1, 0.1, 0.1))), m.add(PointMass("body", 2.0))
+    place = m.world
+    for joint in joints[:-1]:
+        m.connect(place, joint, between := m.add(PointMass(f"at_{joint.name}", mass=0)))
+        place = between
+    m.connect(place, joints[-1], node)
+    m.connect(m.world, Prismatic("x", axis="x"), body)
+    m.add(Spring("s1", m.world.at(-1), node.at(), stiffness=K1, length=1.0))
+    m.add(Spring("s2", node.at(), body.at(), stiffness=K2, length=1.0))
+    return m.assemble(guess={"x": 1.0})
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_moments_of_inertia_do_not_resist_displacements(turns):
+    """A node on a slide has no inertia along it; the angle behind it keeps its own."""
+    joints = [Prismatic("n", axis="x"), *([Revolute("r", axis="x")] if turns else [])]
+    system = with_inertia(*joints)
+    assert [system.speeds[k].name for k in system.active] == ["r", "x"][not turns :]
+    v0 = {"r": 0.5} if turns else None
+    result = mbs.simulate.run(system, 1.0, q0={"x": 1.1}, v0=v0, tolerance=1e-10)
+    exact = 0.1 * np.cos(np.sqrt(SERIES / MASS) * result.time)
+    np.testing.assert_allclose(result["x.q"], 1 + exact, atol=1e-9)
+    np.testing.assert_allclose(result["n.q"], exact * K2 / (K1 + K2), atol=1e-9)
+    if turns:
+        np.testing.assert_allclose(result["r.q"], 0.5 * result.time, atol=1e-9)
+
+
+def structure(*elements):
+    """A triangle of bars that cannot move, a node on a slide, and a sensor at a foot."""
+    m = mbs.Mechanism("structure", gravity=(0, -9.81, 0))
+    own = {"mass": 1.0, "com": (0.25, 0, 0), "inertia": (0.1, 0.1, 0.1)}
+    left, right = m.add(Body("left", **own)), m.add(Body("right", **own))
+    m.connect(m.world, Revolute("a", axis="z"), left)
+    m.connect(left.at(0.5), Revolute("c", axis="z"), right.at(0.5))
+    m.connect(m.world.at(0.6), Revolute("b", axis="z"), right)
+    knot = m.add(PointMass("knot", mass=0))
+    m.connect(m.world, Prismatic("n", axis="x"), knot)
+    m.add(WrenchSensor("foot", "a", axes="world"))
+    for element in elements:
+        m.add(element(m, left, knot))
+    guess = {"a": np.arccos(0.6), "b": np.pi - np.arccos(0.6)}
+    return m.assemble(guess=guess)
+
+
+BETWEEN = (
+    lambda m, left, knot: Spring("s1", m.world.at(-1), knot, stiffness=300, length=0.8),
+    lambda m, left, knot: Spring("s2", knot, left.at(0.5), stiffness=100, length=0.1),
+)
+
+
+def damper(m, left, knot):
+    return Damper("d", m.world.at(-1), knot, damping=20.0)
+
+
+@pytest.mark.parametrize("method", ["dopri5", "rodas"])
+def test_a_node_of_a_structure_rests_where_its_springs_balance(method):
+    system = structure(*BETWEEN)
+    assert system.closure.active == ()
+    result = mbs.simulate.run(system, 0.1, method=method, tolerance=1e-9)
+    n = result["n.q"]
+    assert np.ptp(n) < 1e-12
+    first = 300 * (n[0] + 0.2)
+    stretched = np.hypot(0.3 - n[0], 0.4)
+    assert first == pytest.approx(100 * (stretched - 0.1) * (0.3 - n[0]) / stretched)
+    assert result["s1.force"][-1] == pytest.approx(first)
+    # the wrench at the foot is that of one spring in the place of both
+    alone = structure(
+        BETWEEN[0],
+        lambda m, left, knot: Spring(
+            "pull", m.world.at(n[0]), left.at(0.5), stiffness=100, length=0.1
+        ),
+    )
+    other = mbs.simulate.run(alone, 0.1, method=method, tolerance=1e-9)
+    np.testing.assert_allclose(result["foot.f.x"], other["foot.f.x"], rtol=1e-9)
+
+
+def test_a_damped_node_of_a_structure_creeps():
+    """Nothing else moves: the rate is that of the spring over the damping."""
+    system = structure(BETWEEN[0], damper)
+    assert system.closure.active == ()
+    for method in ("dopri5", "rodas"):
+        result = mbs.simulate.run(system, 1.0, q0={"n": 0.3}, method=method, tolerance=1e-9)
+        exact = -0.2 + 0.5 * np.exp(-15 * result.time)
+        np.testing.assert_allclose(result["n.q"], exact, atol=1e-8)
+        assert np.ptp(result["foot.f.y"]) < 1e-9
+    np.testing.assert_allclose(mbs.models.linearise(system).at().A, [[-15]], atol=1e-9)
+
+
+def test_an_fmu_of_a_structure_with_a_damped_node(tmp_path):
+    path = mbs.export.fmu(structure(BETWEEN[0], damper), tmp_path / "structure.fmu")
+    for kind in ("CoSimulation", "ModelExchange"):
+        options = {"start": {"n": 0.3}, "kind": kind, "tolerance": 1e-8, "quiet": True}
+        result = mbs.simulate.fmu(path, 1.0, **options)
+        exact = -0.2 + 0.5 * np.exp(-15 * result.time)
+        np.testing.assert_allclose(result["n.q"], exact, atol=1e-6)
+
+
+@pytest.mark.parametrize("q0", [{"n": 0.2, "x": 1.1}, [0.2, 1.1]])
+def test_a_position_of_a_node_out_of_balance_names_the_node(q0):
+    with pytest.raises(mbs.errors.LoopError, match=r"forces on n, .* at n = 0.2; leave n out"):
+        mbs.simulate.run(assembled(), 0.01, q0=q0, quiet=True)

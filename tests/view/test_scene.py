@@ -28,6 +28,7 @@ from mbs.components import (
     custom,
 )
 from mbs.errors import AssemblyError, ModelError
+from mbs.models.geometry import terminal_frame
 from mbs.models.skeleton import skeleton
 from mbs.view.primitives import BallShape, BarShape, LabelShape, RingShape
 from mbs.view.primitives import BoxShape as BoxShape
@@ -330,3 +331,33 @@ def test_a_picture_needs_values_of_lengths_only():
     rows = np.reshape(drawn.poses([np.pi / 2, 0.0]), (3, 3, 4))
     np.testing.assert_allclose(rows[2, :, 3], [0, 0.4, 0], atol=1e-12)
     assert np.isfinite(drawn.motion(np.zeros((3, 2)))).all()
+
+
+HUNG = {"position": (0.3, 0.0, 2.2), "rotation": ("x", "pi")}
+
+
+@pytest.mark.parametrize("gravity", [(0, 0, -9.81), (0, 0, 0)])
+def test_a_mounted_robot_is_drawn_above_the_ground_of_the_world(gravity):
+    """Up and the ground are those of the outer world; sizes are those of the robot alone."""
+    system = mbs.load("puma560", gravity=gravity, mount=HUNG).assemble()
+    found, alone = mbs.view.scene(system), mbs.view.scene(mbs.load("puma560").assemble())
+    np.testing.assert_allclose(found.up, [0, 0, -1], atol=1e-15)
+    below = np.array(found.floor.center) @ found.up  # height of the ground relative to the base
+    joint = found.size * 0.028
+    assert -2.2 - 4 * joint - 1e-12 < below <= -2.2
+    assert found.size == pytest.approx(alone.size)
+    columns = [sum(item.role == "base" for item in one.primitives) for one in (found, alone)]
+    assert columns == [0, 2]
+    frames = [np.reshape(i.pose, (3, 4)) for i in found.primitives if i.role == "frame"]
+    assert any(np.allclose(T[:, 3], [-0.3, 0, 2.2], atol=1e-12) for T in frames)
+
+
+def test_the_frame_of_a_mount_is_no_tool(tmp_path):
+    """Robots in a cell, and robots in files that were written with a mount, keep their tool."""
+    cell = mbs.Mechanism("cell")
+    placed = cell.add(mbs.load("puma560", mount=HUNG), "arm")
+    cell.connect(cell.world, placed.point("outer_world"))
+    assert terminal_frame(cell.assemble()) == 6
+    path = tmp_path / "arm.xml"
+    mbs.export.mjcf(mbs.load("puma560", mount=HUNG), path)
+    assert terminal_frame(mbs.load(path).assemble()) == 6

@@ -18,7 +18,7 @@ from mbs.assembly.model_function import ModelFunction, Named, model_function, re
 from mbs.closed_forms.arm_core import general_function
 from mbs.closed_forms.sequence import Leaf, Problem, SequenceStep, StepSequence
 from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
+from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose, target_poses
 from mbs.numbers import NONZERO
 from mbs.operations.counts import count
 from mbs.operations.graph import Graph, Node, function_of, graph_of
@@ -295,12 +295,41 @@ class InverseGeometry(ModelFunction):
 
 
 class AllBranches(InverseGeometry):
-    """A closed form ``igm_all(T) -> q, valid`` of all branches, a column each."""
+    """A closed form ``igm_all(T) -> q, valid`` of all branches, a column each.
+
+    Next to singular configurations rounding of T decides whether branches are valid: see `certain`.
+    """
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Evaluate it as any model; a pose given in numbers must be one."""
         _require_pose(self.system, args, kwargs)
         return ModelFunction.__call__(self, *args, **kwargs)
+
+    def certain(
+        self, T: Any, parameters: Mapping[str, float] | None = None
+    ) -> bool | NDArray[np.bool_]:
+        """Return whether rounding of a pose cannot change which branches are valid.
+
+        It may next to a singular configuration: branches meet there, or a joint is left
+        undetermined. `solve` and `solve_many` list all configurations there.
+
+        Args:
+            T: (4, 4) pose, or (N, 4, 4) poses [m].
+            parameters: values of symbols, the others at their defaults.
+
+        Returns:
+            One value for one pose, else (N,).
+
+        Raises:
+            ModelError: a matrix is no rigid transform, or a symbol has no value.
+        """
+        from mbs.models.inverse_geometry.many import draft_solutions  # which calls closed forms
+
+        one = np.ndim(T) == 2
+        poses = target_poses(self.system, [T] if one else T)
+        p, none = np.array(self.system.parameter_values(parameters)), np.zeros((len(poses), 0))
+        found = ~draft_solutions(self._chain, self._sequence, p, poses, none).searched
+        return bool(found[0]) if one else found
 
 
 class AllConfigurations(ModelFunction):
@@ -374,7 +403,8 @@ def function(
         InverseGeometry, a Function of T (4, 4) [m], the pose of the frame seen from the base, and
         of the number of the branch; q (nq, 1) [rad or m], finite for every T, joints outside the
         chain as in the assembled configuration; valid, 1 where q gives T back within 1e-9 of the
-        size of the robot, else 0. AllBranches has no number; q (nq, branches), valid (branches, 1).
+        size of the robot, else 0. AllBranches has no number; q (nq, branches), valid (branches, 1);
+        its method `certain(T)` is False where rounding of T may change which branches are valid.
         AllConfigurations: q (nq, 16), each residual at most 1e-12 of max(1 m, the length), columns
         from `count` on NaN; valid (16, 1), 1 for the columns before; certain, 0 where a
         configuration may be missing, next to a singular one, or T is no rigid transform.

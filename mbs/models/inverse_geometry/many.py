@@ -405,6 +405,8 @@ class ManySolutions:
         labels: of the columns; empty texts where no closed form tells branches apart.
         searched: (N,) whether the pose was solved by itself, with some position of redundant
             joints: its configurations stand in the columns of the nearest branches.
+        undecided: (N,) whether double precision does not decide the list of the pose, as
+            `Solutions.undecided`; True if it does not with some position of redundant joints.
         samples: S, how many positions of redundant joints every pose was solved for; 1 without.
     """
 
@@ -413,6 +415,7 @@ class ManySolutions:
     residual: Array
     labels: tuple[str, ...]
     searched: Booleans
+    undecided: Booleans
     samples: int = 1
 
     def __len__(self) -> int:
@@ -462,7 +465,8 @@ def solve_many(
             it takes, from limit to limit or over a turn, or the positions: (S,) for every pose, or
             (N, S) for each [rad or m]. Several joints take all combinations, the last one fastest.
         parameters: values of symbols, the others at their defaults.
-        repair: what solves single poses of a serial robot, `solve` when left out.
+        repair: what solves single poses of a serial robot, `solve` when left out. Its lists are
+            not marked as undecided.
 
     Returns:
         ManySolutions: the solutions that `solve` finds for each pose.
@@ -498,10 +502,14 @@ def solve_many(
     r = samples.r.reshape(count * number, joints)
     many = poses if number == 1 else np.repeat(poses, number, axis=0)
     draft = robot.draft(many, r)
+    undecided = np.zeros(len(many), dtype=bool)
     for k in np.flatnonzero(draft.searched):
         chain, pose = robot.chain.locked_at(r[k]), many[k]
         arm = chain.arm(p)
-        q = repair(arm, pose) if repair else robot.solved(pose, r[k])
+        if repair:
+            q = repair(arm, pose)
+        else:
+            q, undecided[k] = robot.solved(pose, r[k])
         draft = with_configurations(draft, int(k), arm, q, pose)
     q, valid = robot.whole(draft.q, r), draft.valid
     if leaves_out(limits):
@@ -509,7 +517,7 @@ def solve_many(
         indices += [k for k, c in enumerate(system.coordinates) if c.name in names]
         q, within = _unwind(bounds(system, limits, indices), q)
         valid = valid & within
-    found = ManySolutions(q, valid, draft.residual, draft.labels, draft.searched)
+    found = ManySolutions(q, valid, draft.residual, draft.labels, draft.searched, undecided)
     return _gather_samples(found, samples)
 
 
@@ -526,6 +534,7 @@ def _gather_samples(many: ManySolutions, samples: LockedSamples) -> ManySolution
         many.residual.reshape(shape),
         many.labels * number,
         np.any(many.searched.reshape(count, number), axis=1),
+        np.any(many.undecided.reshape(count, number), axis=1),
         number,
     )
 
@@ -551,12 +560,12 @@ class _Robot:
                 return general_draft(general, T)
         return nothing(len(self.chain.names), len(T))
 
-    def solved(self, pose: Array, r: Array) -> Array:
-        """(m, n) all configurations at one pose, the varied joints at r, (k,)."""
+    def solved(self, pose: Array, r: Array) -> tuple[Array, bool]:
+        """(m, n) all configurations at one pose, the varied joints at r, (k,); undecided or not."""
         from mbs.models.inverse_geometry.solve import solve_at  # it takes drafts from here
 
         found = solve_at(self.chain, r, pose, self.method, self.p)
-        return found.q[:, list(self.chain.indices)]
+        return found.q[:, list(self.chain.indices)], found.undecided
 
     def whole(self, q: Array, r: Array) -> Array:
         """(N, branches, nq) positions of all joints, those outside the chain as assembled."""
@@ -596,7 +605,9 @@ def _stack(system: System, answers: list[Solutions]) -> ManySolutions:
         m = len(answer)
         q[k, :m], valid[k, :m] = answer.q, True
         residual[k, :m] = [solution.residual for solution in answer]
-    return ManySolutions(q, valid, residual, ("",) * columns, np.ones(len(answers), dtype=bool))
+    undecided = np.array([answer.undecided for answer in answers], dtype=bool)
+    searched = np.ones(len(answers), dtype=bool)
+    return ManySolutions(q, valid, residual, ("",) * columns, searched, undecided)
 
 
 def _unwind(allowed: CoordinateLimits, q: Array) -> tuple[Array, Booleans]:

@@ -71,6 +71,11 @@ class PoseAnswer:
         return self._solutions
 
     @property
+    def undecided(self) -> bool:
+        """Whether double precision does not decide the list, as `Solutions.undecided`."""
+        return self.singular and self.solutions.undecided
+
+    @property
     def reason(self) -> str:
         """Why there is no configuration, "" where there is one; looked for when asked for."""
         return "" if len(self.q) else self.solutions.reason

@@ -194,7 +194,7 @@ class TreeMotion:
         q: (nq, 1) the same on the loops, quaternions of unit length.
         v_a: (m, 1) independent velocities.
         v: (nv, 1) velocities of the tree.
-        G: (nv, m), v = G v_a; None in an open chain, where v is v_a.
+        G: (nv, m), the slopes of v; None in an open chain, where v is v_a.
         gamma: (nv, 1), a = G a_a + gamma.
     """
 
@@ -228,9 +228,9 @@ def tree_motion(system: System, raw: SX, q: SX, v_a: SX) -> TreeMotion:
     symbols, speeds = SX.sym("q", system.nq), SX.sym("v", v_a.numel())
     reduced = reduction(system, symbols, speeds)
     assert reduced.gamma is not None
-    G, gamma = casadi.substitute([reduced.G, reduced.gamma], [symbols, speeds], [q, v_a])
-    v = casadi.densify(casadi.mtimes(G, v_a))
-    return TreeMotion(raw, q, v_a, v, SX(G), SX(gamma))
+    parts = [reduced.G, reduced.gamma, reduced.velocities(speeds)]
+    G, gamma, v = casadi.substitute(parts, [symbols, speeds], [q, v_a])
+    return TreeMotion(raw, q, v_a, SX(v), SX(G), SX(gamma))
 
 
 def input_motions(motions: Sequence[InputMotion], u: SX) -> list[tuple[SX, SX, SX]]:

@@ -17,7 +17,7 @@ from mbs.assembly import System
 from mbs.assembly.variable_names import EFFORTS, by_coordinate
 from mbs.errors import ModelError
 from mbs.loops.balance import require_no_balance
-from mbs.numbers import has_boolean, numbers_given
+from mbs.numbers import has_boolean, is_vector, numbers_given
 from mbs.text import did_you_mean, error_text, quoted
 
 Array = NDArray[np.float64]
@@ -108,6 +108,12 @@ def _trace(
     by_name = isinstance(values, Mapping)
     if by_name:
         values = _in_order(system, signal, values)
+    if not is_vector(shape := _shape(values)):
+        raise ModelError(
+            f"{system.name}: {signal.name}(t, q, v) returns the shape {shape}; return"
+            f" {len(signal.elements)} {signal.noun} in a list or a column:"
+            f" {', '.join(signal.elements)}"
+        )
     try:
         result = None if has_boolean(values) else _column(values)
     except Exception:
@@ -123,6 +129,15 @@ def _trace(
             f"{system.name}: {signal.name}(t, q, v) has a part that is not a number{_SYMBOLS}"
         )
     return result, by_name
+
+
+def _shape(values: Any) -> tuple[int, ...]:
+    """Shape of an array, of an expression, or of nested lists; empty for anything else."""
+    if isinstance(values, (list, tuple)):
+        widths = [len(row) for row in values if isinstance(row, (list, tuple))]
+        return len(values), max(widths, default=1)
+    shape: tuple[int, ...] = getattr(values, "shape", ())
+    return shape
 
 
 def _has_nan(value: SX) -> bool:
@@ -245,7 +260,12 @@ def effort_function(system: System, tau: Effort) -> Function | None:
     given = system.plain_names(tau, EFFORTS)
     if not isinstance(tau, Mapping):
         array, short = numbers_given(tau), len(system.motors)
-        if not isinstance(array, str) and array.ndim and array.size == short != system.nv:
+        if (
+            not isinstance(array, str)
+            and array.ndim
+            and is_vector(array.shape)
+            and array.size == short != system.nv
+        ):
             motors = (names[k] for k in system.motors)
             given = dict(zip(motors, array.ravel().tolist(), strict=True))
     values = SX(DM(system.effort(given)))

@@ -23,6 +23,7 @@ from mbs.loops.velocity import (
     acceleration_bias,
     constraint_rows,
     independent_constraint_rows,
+    independent_drift,
     kept_rows,
     scales,
 )
@@ -109,12 +110,13 @@ def project_step(
         for motion, law in zip(motions, laws, strict=True)
         if motion.position is not None
     ]
-    loops, measures = SX(0, 1), SX(0, 1)
+    loops, measures, drift = SX(0, 1), SX(0, 1), None
     J = SX(0, system.nv)
     if system.is_closed:
         loops = independent_closure(system, symbols)
         measures = constraint_sizes(system)[kept_rows(system), :]  # (0, 1) where nothing is kept
         J = independent_constraint_rows(system, symbols)
+        drift = independent_drift(system, symbols)
     found = scales(system)
     q_scales, v_scales = (
         found.columns([row.unit for row in table]) for table in (system.coordinates, system.speeds)
@@ -126,8 +128,9 @@ def project_step(
         (m.velocity, law[1]) for m, law in zip(motions, laws, strict=True) if m.holds_speed
     ]
     E = SX(DM.eye(system.nv))[[k for k, _ in prescribed], :]
+    first_target = SX(J.shape[0], 1) if drift is None else -drift
     J = casadi.vertcat(J, E)
-    target = casadi.vertcat(SX(J.shape[0] - len(prescribed), 1), *(v_p for _, v_p in prescribed))
+    target = casadi.vertcat(first_target, *(v_p for _, v_p in prescribed))
     J = casadi.vertcat(J, casadi.jacobian(still, v))
     speed = casadi.vertcat(casadi.mtimes(J[: target.numel(), :], v) - target, still)
     first = found.rows[kept_rows(system)]

@@ -295,3 +295,34 @@ def test_the_first_robot_of_the_page_has_gravity_and_mount():
     assert gravity_of(document) == pytest.approx([0, 1.62, 0], abs=1e-15)
     with pytest.raises(MbsError, match="--mount: 'x' is no step"):
         robot_document("panda", mount=["x"])
+
+
+@pytest.mark.parametrize("suffix", [".toml", ".par"])
+@pytest.mark.parametrize(
+    "mount",
+    ["position=0.1,0,2.5", "x=pi; position=0,0,2.5", "z=0.3; y=-0.4; x=1.1; position=0,1,0"],
+)
+def test_saved_tables_keep_the_mount(suffix, mount):
+    """Opened again, the robot has the same pose, gravity and cells."""
+    document = changed(Document.of_name("panda"), "general", 5, "value", mount)
+    text = document.toml() if suffix == ".toml" else document.par()
+    again = Document.of_upload(text.encode(), suffix)
+    q = document.system().configuration
+    poses = [mbs.models.transform(d.system(), 7, "outer_world")(q) for d in (document, again)]
+    np.testing.assert_allclose(poses[0], poses[1], atol=1e-15)
+    assert gravity_of(again) == pytest.approx(gravity_of(document), abs=1e-14)
+    texts = again.tables.general
+    assert [float(g) for g in texts[1:4]] == pytest.approx([0, 0, -9.81], abs=1e-14)
+    assert texts[5] == mount or "0.3" in mount  # angles of a general rotation are rounded
+
+
+def test_the_position_of_a_mount_has_symbols():
+    document = changed(Document.of_name("panda"), "general", 5, "value", "position=0,0,H")
+    (row,) = [k for k, name in enumerate(document.tables.symbols) if name == "H"]
+    document = changed(document, "symbols", row, "value", "1.5")
+    assert document.problems == ()
+    system = document.system()
+    T = mbs.models.transform(system, "base", "outer_world")(system.configuration, system.p_default)
+    assert float(T[2, 3]) == 1.5
+    saved = Document.of_upload(document.toml().encode(), ".toml")
+    assert saved.tables.general[5] == "position=0,0,1.5"

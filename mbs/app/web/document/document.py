@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -291,13 +291,18 @@ class Document:
         if self.origin is None:
             mechanism = to_mechanism(self.table())
             mechanism.mount = self.tables.mount()
+            self._set_values(mechanism, {p.name for p in mechanism.parameters()})
             return mechanism
         mechanism = self.origin.mechanism()
         self._change_gravity(mechanism)
-        for name, text in self.tables.values:
-            if text.strip():
-                mechanism.values[name] = Parameter(name, number(text, f"symbol {name}"))
+        self._set_values(mechanism, {name for name, _ in self.tables.values})
         return mechanism
+
+    def _set_values(self, mechanism: Mechanism, names: Collection[str]) -> None:
+        """Set the values of symbols of these names that have one."""
+        for name, text in self.tables.values:
+            if name in names and text.strip():
+                mechanism.values[name] = Parameter(name, number(text, f"symbol {name}"))
 
     def _change_gravity(self, mechanism: Mechanism) -> None:
         """Give a mechanism the gravity and the mount of the cells, if they are other ones."""

@@ -31,6 +31,7 @@ from mbs.formats import (
     read_urdf,
     to_mechanism,
 )
+from mbs.formats.base_pose import POSE, base_pose_texts, placement_pose
 from mbs.formats.table import DRIVE, GEOMETRY, LOOP_JOINTS
 from mbs.formats.xml import parse_xml
 from mbs.spatial.inertia import TEN_PARAMETERS
@@ -188,19 +189,18 @@ def _table(mechanism: Mechanism) -> RobotTable:
     frames += [
         FrameRow(numbers[points[1].owner.name], 2, **_step(points[1])) for points in cuts.values()
     ]
+    known = {n: p.default for n, p in mechanism.given_values().items() if p.default is not None}
+    pose = placement_pose(mechanism.mount, known) if mechanism.mount.steps else None
     return RobotTable(
         name=mechanism.name,
         frames=tuple(frames),
         bodies=tuple(rows),
         loops=tuple(loops),
         gravity=mechanism.world.gravity,
-        parameters={
-            name: value.default
-            for name, value in mechanism.given_values().items()
-            if value.default is not None
-        },
+        parameters=known,
         source=mechanism.source,
         guess=mechanism.guess,
+        extras={} if pose is None else {POSE: base_pose_texts(pose)},
     )
 
 

@@ -8,14 +8,18 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from mbs.app.tasks.mounting import mounting_of
 from mbs.components import Rotor
 from mbs.components.component import Placement, in_rotated_axes
 from mbs.components.mounting import mount_of
 from mbs.errors import DescriptionError, ExpressionError, MbsError
-from mbs.expressions import Expression, Number, Scalar, expression, parameters_of
+from mbs.export.urdf import angles
+from mbs.expressions import Expression, Number, Scalar, expression, parameters_of, to_float
 from mbs.expressions import number as number_of
 from mbs.formats import CutRow, FrameRow, RobotTable
+from mbs.formats.base_pose import POSE, base_placement, base_pose_texts, placement_pose
 from mbs.formats.table import BODY_SCALARS, GEOMETRY, JOINTS, LOOP_JOINTS, InertiaRow
 from mbs.text import did_you_mean, quoted
 
@@ -348,8 +352,34 @@ class Tables:
         return Placement(mount_of(given, "mount")[0] if given else ())
 
 
+def _mounted_cells(table: RobotTable) -> tuple[Texts, tuple[tuple[str, Texts], ...]]:
+    """Return the cells of gravity in the world and of the mount, and the other extras."""
+    placement, notes = base_placement(table.extras)
+    pose = placement_pose(placement, {})
+    kept = tuple((k, v) for k, v in table.extras.items() if notes or k != POSE)
+    if pose is None or not placement.steps:
+        return (*map(written, table.gravity), table.source, ""), tuple(table.extras.items())
+    roll, pitch, yaw = angles(pose[:3, :3])
+    turns = [(a, v) for a, v in zip("zyx", (yaw, pitch, roll), strict=True) if v]
+    back: Any = [(axis, -value) for axis, value in reversed(turns)]
+    gravity = table.gravity
+    if turns:
+        gravity = in_rotated_axes(tuple(map(expression, gravity)), back, "mount")
+    size = max([abs(g) for g in map(to_float, gravity) if g is not None], default=0.0)
+    texts = [
+        # rounding of the rotation, which is some 1e-16 of the acceleration
+        "0" if (g := to_float(value)) is not None and abs(g) < 1e-15 * size else written(value)
+        for value in gravity
+    ]
+    steps = [f"{axis}={written(value)}" for axis, value in turns]
+    if np.any(pose[:3, 3]):
+        steps.append(f"position={','.join(written(float(x)) for x in pose[:3, 3])}")
+    return (*texts, table.source, "; ".join(steps)), kept
+
+
 def tables_of(table: RobotTable) -> Tables:
     """The cells that say a table of frames."""
+    general, extras = _mounted_cells(table)
     bodies = {body.frame: body for body in table.bodies}
     count = len(table.frames)
     rows = [bodies.get(j, InertiaRow(j)) for j in range(1, count + 1)]
@@ -361,11 +391,11 @@ def tables_of(table: RobotTable) -> Tables:
         ),
         inertia=tuple((*(written(getattr(b, s)) for s in BODY_SCALARS), b.name) for b in rows),
         loops=tuple((str(loop.cut[0]), str(loop.cut[1]), loop.joint) for loop in table.loops),
-        general=(table.name, *map(written, table.gravity), table.source, ""),
+        general=(table.name, *general),
         values=tuple((name, written(value)) for name, value in table.parameters.items()),
         attached=tuple((b.rotor, b.grouped) for b in rows),
         guess=tuple((name, value) for name, value in table.guess.items() if name not in names),
-        extras=tuple(table.extras.items()),
+        extras=extras,
     )
 
 
@@ -390,17 +420,23 @@ def robot_table(tables: Tables) -> RobotTable:
     symbols = zip(tables.symbols, range(len(tables.symbols)), strict=True)
     values = {name: read[Cell("symbols", k, "value")] for name, k in symbols}
     general = [read[Cell("general", k, "value")] for k in range(len(GENERAL_ROWS))]
-    return RobotTable(
+    extras = dict(tables.extras)
+    known = {name: value for name, value in values.items() if value is not None}
+    pose = placement_pose(tables.mount(), known)
+    if tables.mount().steps and pose is not None:
+        extras[POSE] = base_pose_texts(pose)
+    table = RobotTable(
         name=general[0],
         frames=tuple(frames),
         bodies=tuple(bodies),
         loops=tuple(_loop(tables, read, k) for k in range(len(tables.loops))),
         gravity=_rotated(general[1:4], general[5]),
-        parameters={name: value for name, value in values.items() if value is not None},
         source=general[4],
         guess=guess,
-        extras=dict(tables.extras),
+        extras=extras,
     )
+    # symbols of the position of the mount are in no row
+    return replace(table, parameters={k: v for k, v in known.items() if k in table.symbols})
 
 
 def _rotated(gravity: Sequence[Scalar], mounted: Mapping[str, Any]) -> tuple[Scalar, ...]:

@@ -171,10 +171,13 @@ static int any_guessed(const loops *l) {
     return 0;
 }
 
-/* Difference of two values of a dependent coordinate, of angles up to whole turns [rad or m]. */
+/* Difference of two values of a dependent coordinate, of angles up to whole turns [rad or m]. Rounding
+ * decides no sign of half a turn: bars in one line have such angles. */
 static real difference(int i, real z, real other) {
     real d = z - other;
-    return MODEL_TURNS[i] ? real_within_half_turn(d) : d;
+    if (!MODEL_TURNS[i]) return d;
+    d = real_within_half_turn(d);
+    return d < EQUAL - HALF_TURN ? d + REAL(2.0) * HALF_TURN : d;
 }
 
 /* Largest distance from the guesses, of guessed coordinates or of all [rad, or sizes of the mechanism]. */

@@ -1,0 +1,144 @@
+"""Distance of configurations from a guess, also of the positions of joints that are cut."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.tables import Coordinate
+from mbs.loops.closing import Closing, difference, distance_units, row_difference
+from mbs.loops.cut_positions import cut_positions_and_slopes
+
+Vector = NDArray[np.float64]
+
+EQUAL = 1e-6
+"""Difference of distances that are equal: configurations are closed to 1e-12, and branches of
+symmetric mechanisms are equally near up to rounding."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GuessTarget:
+    """Positions of all joints that an assembled configuration is to be near to.
+
+    All positions are q, then the positions of joints that are cut. Therefore the comparison does
+    not depend on the joint of a loop that is cut.
+
+    Attributes:
+        system: its loops need not be closed yet.
+        p: (np,) parameters.
+        start: (nq,) positions.
+        cut: (c,) positions of `system.cut_coordinates`; None if they do not count.
+        guessed: indices of the guessed positions among all positions.
+    """
+
+    system: System
+    p: Vector
+    start: Vector
+    cut: Vector | None
+    guessed: tuple[int, ...]
+
+    @staticmethod
+    def at(closing: Closing, start: Vector, guessed: Sequence[int]) -> GuessTarget:
+        """The target of a start, and indices in q of its guessed positions.
+
+        Positions of joints that are cut do not count.
+        """
+        return GuessTarget(closing.system, closing.p, start, None, tuple(guessed))
+
+    @staticmethod
+    def of(
+        system: System,
+        p: Vector,
+        start: Vector,
+        guess: Mapping[str, float],
+        cut: Vector | None = None,
+    ) -> GuessTarget:
+        """The target of a start and a guess by coordinate name.
+
+        Args:
+            system: its loops need not be closed yet.
+            p: (np,) parameters.
+            start: (nq,) positions.
+            guess: guessed positions by name, also of joints that are cut.
+            cut: (c,) positions of joints that are cut, if they are not guessed. Zero if left out.
+        """
+        rows = system.cut_coordinates
+        if cut is None:
+            cut = np.array([float(row.name.endswith(".qw")) for row in rows])
+        at_cut = [guess.get(row.name, x) for row, x in zip(rows, cut, strict=True)]
+        names = [row.name for row in (*system.coordinates, *rows)]
+        guessed = tuple(k for k, name in enumerate(names) if name in guess)
+        return GuessTarget(system, p, start, np.array(at_cut, dtype=float), guessed)
+
+    def closing(self, held: set[int]) -> Closing:
+        """The closure rows with some of all positions held at the target."""
+        nq = self.system.nq
+        locked = tuple(sorted(k for k in held if k < nq))
+        aims = () if self.cut is None else tuple(sorted(k - nq for k in held if k >= nq))
+        return Closing(self.system, self.p, locked, aims=aims, cut=self.cut)
+
+    @property
+    def rows(self) -> tuple[Coordinate, ...]:
+        """The coordinates of all positions."""
+        own = self.system.coordinates
+        return own if self.cut is None else (*own, *self.system.cut_coordinates)
+
+    def moves(self, q: Vector) -> Vector:
+        """Differences of all positions at q (nq,) from the target [rad, m or 1]."""
+        own = difference(self.system, q, self.start)
+        if self.cut is None or not len(self.cut):
+            return own
+        cut = self.system.cut_coordinates
+        return np.concatenate([own, row_difference(cut, self._at_cut(q), self.cut)])
+
+    def moves_between(self, q: Vector, other: Vector) -> Vector:
+        """Differences of all positions of two configurations (nq,) [rad, m or 1]."""
+        own = difference(self.system, q, other)
+        if self.cut is None or not len(self.cut):
+            return own
+        cut = self.system.cut_coordinates
+        return np.concatenate([own, row_difference(cut, self._at_cut(q), self._at_cut(other))])
+
+    def _at_cut(self, q: Vector) -> Vector:
+        """(c,) positions of the joints that are cut [rad, m or 1]."""
+        return cut_positions_and_slopes(self.system)(q, self.p)[0].ravel()
+
+    def units(self, closing: Closing) -> Vector:
+        """What differences of all positions are divided by: 1, or the size of the mechanism [m]."""
+        return distance_units((row.unit for row in self.rows), closing.size)
+
+    def miss(self, closing: Closing, q: Vector) -> float:
+        """Root of the sum of squares of the differences from guessed positions [rad, or sizes]."""
+        moves = self.moves(q) / self.units(closing)
+        return float(np.linalg.norm(moves[list(self.guessed)]))
+
+    def distances(
+        self, closing: Closing, q: Vector, own: Sequence[int] | None = None
+    ) -> tuple[float, float, float]:
+        """Largest move of a guessed position, of any, and of a massless node.
+
+        They are in rad, or in sizes of the mechanism.
+
+        Args:
+            closing: the loops.
+            q: (nq,) configuration.
+            own: indices in q of the positions that count; all positions, also of joints that are
+                cut, if left out.
+        """
+        if own is None:
+            moves = np.abs(self.moves(q)) / self.units(closing)
+        else:
+            units = distance_units((row.unit for row in self.system.coordinates), closing.size)
+            moves = np.abs(difference(self.system, q, self.start)) / units
+        count = range(len(moves)) if own is None else own
+        guessed = sorted(set(self.guessed) & set(count))
+        nodes = [k for k, _ in self.system.nodes if k in count]
+        return _largest(moves[guessed]), _largest(moves[list(count)]), _largest(moves[nodes])
+
+
+def _largest(values: Vector) -> float:
+    return float(np.max(np.abs(values), initial=0.0))

@@ -263,7 +263,7 @@ class ModelFunction(Function):
         return self._of_one
 
     def _state_of_one(self) -> Function | None:
-        """``state(..) -> valid, delicate`` of one column; what both contain is evaluated once."""
+        """``state(..) -> valid, delicate`` of one column; common parts are evaluated once."""
         if self._state is None and (valid := self._valid_of_one()) is not None:
             symbols = {"q": SX.sym("q", self._system.nq), "p": self._system.p}
             given, check = [symbols[name] for name in valid.name_in()], self._check_configuration

@@ -338,7 +338,7 @@ class System:
         shapes: what the links and the base look like.
         nodes: coordinates that move no mass and that the balance of forces determines: index in q
             and index in v.
-        balances: of the forces on them, those of positions first.
+        balances: balances of the forces on the nodes. Balances of positions come first.
     """
 
     name: str

@@ -182,7 +182,7 @@ class Balance:
 
     Attributes:
         velocity: index in v of the node.
-        size: what the force is divided by: a typical stiffness [N/m or N m/rad], or damping
+        size: divisor of the force: a typical stiffness [N/m or N m/rad], or damping
             [N s/m or N m s/rad].
         is_damped: whether dampers act, so that it determines a velocity.
         frictions: names of the components whose dry friction acts on the node.

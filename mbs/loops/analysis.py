@@ -110,7 +110,7 @@ def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] 
             given = {row.name: guess[row.name] for row in system.coordinates if row.name in guess}
             start = np.array(system.position(given))
             branches = [unwound(Closing(system, p), q, start) for q in branches]
-            configuration, *others = branches
+            configuration, others = branches[0], tuple(branches[1:])
     closure = Closure(
         rows=kept.positions,
         slips=kept.slips,
@@ -205,7 +205,7 @@ def _is_clearly_nearer(closing: Closing, target: GuessTarget, q: Matrix, other: 
     pairs = [(target.miss(closing, x), target.distances(closing, x)[1]) for x in (q, other)]
     for distance, least in zip(*pairs, strict=True):
         if abs(distance - least) > _CLEAR:
-            return distance < least
+            return bool(distance < least)
     return False
 
 

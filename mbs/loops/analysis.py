@@ -162,7 +162,7 @@ def _target_near(system: System, guess: Mapping[str, float], q: Matrix, p: Matri
     """The target of a guess and, for other positions, of a configuration q (nq,)."""
     names = [coordinate.name for coordinate in system.coordinates]
     start = np.array([guess.get(name, x) for name, x in zip(names, q, strict=True)])
-    return GuessTarget.of(system, p, start, guess, np.array(cut_positions(system)(q, p)).ravel())
+    return GuessTarget.of(system, p, start, guess, _cut_values(system, q, p))
 
 
 def _branches(
@@ -213,6 +213,11 @@ def _names(system: System) -> list[str]:
     return [row.name for row in (*system.coordinates, *system.cut_coordinates)]
 
 
+def _cut_values(system: System, q: Matrix, p: Matrix) -> Matrix:
+    """Positions of the joints that are cut."""
+    return np.array(cut_positions(system)(q, p)).ravel()
+
+
 def _at_cut(
     system: System, guess: Mapping[str, float], q: Matrix, p: Matrix
 ) -> tuple[tuple[str, float], ...]:
@@ -220,8 +225,7 @@ def _at_cut(
     names = [row.name for row in system.cut_coordinates]
     if not any(name in guess for name in names):
         return ()
-    values = np.array(cut_positions(system)(q, p)).ravel()
-    found = zip(names, map(float, values), strict=True)
+    found = zip(names, map(float, _cut_values(system, q, p)), strict=True)
     return tuple((name, value) for name, value in found if name in guess)
 
 

@@ -361,9 +361,20 @@ def _is_same(target: Target, other: ChainRoot, family: Family, q: Array) -> bool
     return len(distinct(target, np.array([other.q, q]))) == 1
 
 
+_SEEDED = 1e-6
+"""Difference of joints that do not move [rad or arm lengths]: singular solutions are accurate to
+that."""
+
+
 def _representative(question: Question, family: Family) -> Array:
-    """The configuration of a self-motion that is within limits, its free joint near the seed's."""
+    """The configuration of a self-motion that is within limits, its free joint near the seed's.
+
+    A seed that is one of its configurations stands for it.
+    """
     indices, near = list(question.chain.indices), question.wishes.near
+    if question.wishes.seeded and _is_of(question, family, near[indices]):
+        if not set(question.wishes.bounds.outside(near)) & set(question.chain.names):
+            return np.asarray(near[indices])
     value = float(near[indices[question.chain.names.index(family.free)]])
     first = family.nearest(value)
     for q in (first, *family.configurations_from(value)):
@@ -372,6 +383,22 @@ def _representative(question: Question, family: Family) -> Array:
         if not set(question.wishes.bounds.outside(whole)) & set(question.chain.names):
             return np.asarray(q)
     return first
+
+
+def _is_of(question: Question, family: Family, q: Array) -> bool:
+    """Whether a configuration (n,) takes the pose and belongs to a self-motion.
+
+    Of a self-motion with several freedoms one curve is known. Its configurations have the same
+    positions of the joints that do not move.
+    """
+    target = question.target
+    if not target.residual(q) < target.tolerance:
+        return False
+    if family.dimension == 1:
+        return bool(family.meets(q[None])[0])
+    still = [k for k, name in enumerate(question.chain.names) if name not in family.moving]
+    away = target.wrapped((family.chain_samples[:1] - q) / target.unit)[0, still]
+    return bool(np.max(np.abs(away), initial=0.0) < _SEEDED)
 
 
 def _whole(question: Question, found: Nearest) -> Nearest:

@@ -992,6 +992,8 @@ _TRAIL = 40
 _OFF = 1e-9
 """Largest row at a pose that was reached: solutions are found to 1e-12, and next to singular
 configurations rounding is larger."""
+_PARTS = 0.25, 0.5, 0.75, 1.0
+"""Parts of the way to the next pose at which the pose must be the present one, to stay there."""
 _AFTER_STOP, _AFTER_LEAP = 1e-3, 1e-2
 """First steps, in parts of the next segment: after a narrow passage ten doublings lead back to all
 of it; behind a singular configuration steps are short."""
@@ -1050,12 +1052,25 @@ class Walk:
         """Walk to the end of the path, or to where it cannot be followed; the reason of that."""
         while self.number < self.poses.count:
             at_pose = self.u == self.number - 1 and self.number > 0
-            if at_pose and (self._run() or self._smooth_step()):
+            if self._stays() or at_pose and (self._run() or self._smooth_step()):
                 continue
             reason = self._on()
             if reason:
                 return reason
         return ""
+
+    def _stays(self) -> bool:
+        """Stay at a singular configuration if the pose does not change to the next; else False."""
+        if smallest(self.tracker, self.point.J) > SINGULAR:
+            return False
+        way, x = self.number - self.u, self.point.x
+        for part in _PARTS:
+            rows = self.tracker.rows(x, self.curve(self.u + part * way))[0]
+            if np.max(np.abs(rows), initial=0.0) > _OFF:
+                return False
+        q = self.led.whole(self.start, x)
+        self._arrive(x[None], [self.led.residual(q, self.poses.poses[self.number])])
+        return True
 
     def _arrive(self, x: Array, residual: Array | list[float]) -> None:
         """Note configurations (k, n) at the next poses, and stand at the last one of them."""

@@ -68,6 +68,42 @@ def test_there_and_back(puma, seed):
         np.testing.assert_allclose(found.q, way, atol=1e-10)
 
 
+SHOULDER = np.array([0.3, 0.3, np.arcsin(np.cos(0.3)) - 0.3, 0.5, 0.4, 0.2])
+SINGULAR = {
+    "wrist": [0.3, 0.4, -0.2, 0.5, 0.0, 0.2],
+    "shoulder": SHOULDER,
+    "shoulder and wrist": [*SHOULDER[:4], 0.0, SHOULDER[5]],
+    "elbow": [0.3, 0.3, np.pi / 2, 0.5, 0.4, 0.2],
+    "elbow and wrist": [0.3, 0.3, np.pi / 2, 0.5, 0.0, 0.2],
+}
+
+
+@pytest.mark.parametrize("name", SINGULAR)
+def test_a_constant_path_stays_at_a_singular_configuration(name):
+    rx90, q = catalogue_system("rx90"), np.array(SINGULAR[name])
+    found = follow(rx90, poses(rx90, 6, [q] * 4), q, limits=False)
+    assert (found.reached, found.reason) == (3, "")
+    np.testing.assert_allclose(found.q, [q] * 4, rtol=0, atol=1e-15)
+    assert found.residual.max() < 1e-13
+
+
+@pytest.mark.parametrize("name", SINGULAR)
+def test_a_seed_on_a_self_motion_stands_for_it(name):
+    rx90, q = catalogue_system("rx90"), np.array(SINGULAR[name])
+    (T,) = poses(rx90, 6, [q])
+    first = mbs.models.inverse_geometry.solve(rx90, T, 6, seed=q, limits=False)[0]
+    np.testing.assert_allclose(first.q, q, rtol=0, atol=1e-14)
+
+
+def test_a_path_that_leaves_a_singular_configuration_stops_where_it_leaves(puma):
+    start = ELBOW_UP.copy()
+    start[4] = 0.0
+    way = [start, start, *line(start, ELBOW_UP, 10)]
+    found = follow(puma, poses(puma, 6, way), start, limits=False)
+    assert found.reached == 2
+    assert "between poses 2 and 3 of 12" in found.reason
+
+
 @pytest.mark.parametrize("count", [3, 20, 21])
 @pytest.mark.parametrize("function", [False, True])
 def test_through_a_straight_wrist_it_goes_on(puma, count, function):

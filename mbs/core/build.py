@@ -117,6 +117,6 @@ def _run(command: list[str]) -> None:
 
 
 _REMEDY = (
-    "install gcc or clang, or run: pip install ziglang, or name a C compiler by the environment"
+    "install gcc, clang or the Python package ziglang, or name a C compiler in the environment"
     " variable CC"
 )

@@ -25,7 +25,7 @@ typedef struct {
                                 lengths in arm lengths */
 } configuration;
 
-void arm_copy(const arm *a, configuration *to, const configuration *from);
+void configuration_copy(const arm *a, configuration *to, const configuration *from);
 
 void arm_pose(const arm *a, const double *q, double *T);
 

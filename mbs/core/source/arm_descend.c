@@ -19,7 +19,7 @@ static const double STRAIGHT = 0.9;    /* cosine of 26 degrees, by which a step 
 static const double FINISHED = 1e-14;  /* step that is rounding of angles of about one */
 static const double SETTLED = 1e-12;   /* step that is hardly more than rounding, likewise */
 
-void arm_copy(const arm *a, configuration *to, const configuration *from) {
+void configuration_copy(const arm *a, configuration *to, const configuration *from) {
     size_t n = (size_t)a->n;
     memcpy(to->T, from->T, sizeof to->T);
     memcpy(to->gap, from->gap, sizeof to->gap);
@@ -356,7 +356,7 @@ void arm_descend(const arm *a, const double *target, configuration *p) {
         gain = 1.0 - next.cost / p->cost;
         damping *= gain > 0.5 ? 0.2 : gain > 0.1 ? 0.5 : 2.0;
         stalls = gain < 5e-2 ? stalls + 1 : 0;
-        arm_copy(a, p, &next);
+        configuration_copy(a, p, &next);
     }
 }
 

@@ -36,7 +36,7 @@ static void curvature(const arm *a, const double *target, const configuration *p
     double ahead[ARM_JOINTS], behind[ARM_JOINTS];
     configuration near;
     int i, k;
-    arm_copy(a, &near, p);
+    configuration_copy(a, &near, p);
     for (k = 0; k < a->n; k++) {
         near.q[k] = p->q[k] + NUDGE * arm_unit(a, k);
         arm_examine(a, target, &near);
@@ -93,7 +93,7 @@ static void refine(const arm *a, const double *target, configuration *p) {
             arm_examine(a, target, &next);
             slope(a, &next, next_g);
             if (lower(next.cost, norm(next_g, a->n), p->cost, norm(g, a->n))) {
-                arm_copy(a, p, &next);
+                configuration_copy(a, p, &next);
                 memcpy(g, next_g, (size_t)a->n * sizeof *g);
                 shift = fmax(0.1 * shift, 1e-12);
                 known = 0;
@@ -111,8 +111,8 @@ static int keep(const arm *a, const configuration *p, configuration *best, int c
     if (rank > 0 && p->cost - best[rank - 1].cost < EQUAL * p->cost) return count;
     if (rank == KEPT) return count;
     if (count < KEPT) count++;
-    for (i = count - 1; i > rank; i--) arm_copy(a, &best[i], &best[i - 1]);
-    arm_copy(a, &best[rank], p);
+    for (i = count - 1; i > rank; i--) configuration_copy(a, &best[i], &best[i - 1]);
+    configuration_copy(a, &best[rank], p);
     return count;
 }
 

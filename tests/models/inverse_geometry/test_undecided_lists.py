@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from support.near_singular import KINDS, ROBOTS, at_distance, plain, robot, units_away
 
-import mbs.closed_forms.arm_core as core
 from mbs.models.inverse_geometry import function, many, solve, solve_many, solver
 from mbs.native import compiled
 
@@ -61,7 +60,8 @@ def test_without_a_compiler_and_by_machine_code_the_marks_are_the_same(name, mon
     one = solve_many(robot(name), T)
     monkeypatch.setattr(many, "MANY", 1)
     machine = solve_many(robot(name), T)
-    monkeypatch.setattr(core, "compiler_found", lambda: False)
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("CC", raising=False)
     interpreted = solve_many(robot(name), T)
     for other in (machine, interpreted):
         both = ~(one.undecided & other.undecided)

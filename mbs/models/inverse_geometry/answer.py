@@ -372,9 +372,9 @@ def _representative(question: Question, family: Family) -> Array:
     A seed that is one of its configurations stands for it.
     """
     indices, near = list(question.chain.indices), question.wishes.near
-    if question.wishes.seeded and _is_of(question, family, near[indices]):
-        if not set(question.wishes.bounds.outside(near)) & set(question.chain.names):
-            return np.asarray(near[indices])
+    outside = set(question.wishes.bounds.outside(near)) & set(question.chain.names)
+    if question.wishes.seeded and not outside and _is_of(question, family, near[indices]):
+        return np.asarray(near[indices])
     value = float(near[indices[question.chain.names.index(family.free)]])
     first = family.nearest(value)
     for q in (first, *family.configurations_from(value)):

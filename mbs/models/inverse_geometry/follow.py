@@ -1052,7 +1052,7 @@ class Walk:
         """Walk to the end of the path, or to where it cannot be followed; the reason of that."""
         while self.number < self.poses.count:
             at_pose = self.u == self.number - 1 and self.number > 0
-            if self._stays() or at_pose and (self._run() or self._smooth_step()):
+            if self._stays() or (at_pose and (self._run() or self._smooth_step())):
                 continue
             reason = self._on()
             if reason:

@@ -31,8 +31,7 @@ from timing import Array, InLibrary, Peer, harness
 import mbs
 import mbs.models
 from mbs.assembly import System
-from mbs.native import cached_library
-from mbs.native.compiled import c_source
+from mbs.native import c_source, cached_library
 from mbs.native.kernel import kernel_library
 
 BLOCK, MANY = 32768, 1_000_000

@@ -23,8 +23,8 @@ import casadi
 from casadi import Function
 
 import mbs
+from mbs import MbsError
 from mbs.assembly import System
-from mbs.errors import MbsError
 from mbs.identification import base_parameters, regressor
 from mbs.loops import modes
 from mbs.loops.plan import plan

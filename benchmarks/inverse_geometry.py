@@ -30,8 +30,7 @@ from inverse_geometry_speed import build_table, built, markdown, speed_table
 from support.arm_search import PlainArm, distance, merged, plain_arm, searched
 
 from mbs.assembly import System
-from mbs.models.inverse_geometry import solve
-from mbs.models.inverse_geometry.many import solve_many
+from mbs.models.inverse_geometry import solve, solve_many
 
 Array = np.ndarray[Any, Any]
 CLOSE, WRONG, SAME = 1e-9, 1e-6, 1e-5

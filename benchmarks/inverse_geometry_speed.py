@@ -20,8 +20,7 @@ from support.arm_search import plain_arm
 import mbs
 from mbs.assembly import System
 from mbs.closed_forms.arm_core import core
-from mbs.models.inverse_geometry import solve, solver
-from mbs.models.inverse_geometry.many import solve_many
+from mbs.models.inverse_geometry import solve, solve_many, solver
 
 _SHARE = 0.03
 """Seconds that a contender takes in a round."""

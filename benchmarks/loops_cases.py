@@ -19,7 +19,7 @@ from mbs.loops.configuration import start
 from mbs.models import transform
 from mbs.models.state.signals import effort_function
 from mbs.models.state.tree import FullState, full_state
-from mbs.native.compiler import compiler_found
+from mbs.native import compiler_found
 from mbs.robots import andrews_squeezer, bricard, flyball_governor, n_four_bar, simple_pendulum
 from mbs.simulate.run import integrate_legs
 from mbs.simulate.tolerances import step_tolerances

@@ -27,11 +27,12 @@ import numpy as np
 from files_of_others import SAME, Outcome, compare_folders, folder_parser, relative_gap
 
 import mbs
+from mbs import MbsError
 from mbs.components import Coupling, FixedTendon
 from mbs.components.joints import Motion
-from mbs.errors import MbsError
 from mbs.expressions import to_float
-from mbs.formats.mjcf import MjcfModel, read_mjcf
+from mbs.formats import read_mjcf
+from mbs.formats.mjcf import MjcfModel
 from mbs.formats.notes import Notes
 from mbs.recursions.route import relative_pose
 

@@ -24,10 +24,9 @@ from pathlib import Path
 import numpy as np
 
 import mbs
-from mbs import System
+from mbs import MbsError, System
 from mbs.components import Body, Prismatic, Revolute
-from mbs.errors import MbsError
-from mbs.simulate.fmu import fmu
+from mbs.simulate import fmu
 
 WRONG = 300.0
 KINDS = {"cs": "CoSimulation", "me": "ModelExchange"}

@@ -26,7 +26,8 @@ from robots import LINKS, frictionless
 
 import mbs
 from mbs.assembly import System
-from mbs.native.compiler import find_compiler, flags_for
+from mbs.native import find_compiler
+from mbs.native.compiler import flags_for
 from mbs.native.plain_source import plain_source
 from mbs.native.repeats import LEAST
 from mbs.robots import n_four_bar

@@ -23,10 +23,11 @@ import pinocchio
 from files_of_others import SAME, Outcome, compare_folders, folder_parser, relative_gap
 
 import mbs
+from mbs import MbsError
 from mbs.components import Coupling
-from mbs.errors import MbsError
+from mbs.formats import read_urdf
 from mbs.formats.notes import Notes
-from mbs.formats.urdf import FREE_JOINT, element_names, read_tree, read_urdf
+from mbs.formats.urdf import FREE_JOINT, element_names, read_tree
 from mbs.formats.xml import parse_xml
 from mbs.recursions.route import relative_pose
 

@@ -29,8 +29,8 @@ from fingerprint import c_text, digest
 from support.builders import ALONE, BUILDERS, CLOSED_ALONE, OPEN_ALONE, SYSTEMS, numbers, point
 
 import mbs
+from mbs import MbsError
 from mbs.assembly import System
-from mbs.errors import MbsError
 from mbs.loops import modes
 from mbs.loops.plan import plan
 from mbs.models import inverse_geometry

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import mbs
+from mbs import MbsError
 from mbs.components import PointMass, Revolute
-from mbs.errors import MbsError
 from mbs.numbers import has_boolean, numbers_given
 
 FORMS = [

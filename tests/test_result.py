@@ -6,8 +6,8 @@ import sys
 import numpy as np
 import pytest
 
+from mbs import Result
 from mbs.errors import ExportError, ModelError
-from mbs.result import Result
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ import pytest
 from support.bare_library import called, loaded
 
 import mbs
+from mbs import MbsError
 from mbs.app.tasks.simulation import SimulationSettings, simulate
 from mbs.components import Box, Custom, Revolute, custom
-from mbs.errors import MbsError
 
 PAGE = Path(__file__).parents[1] / "docs" / "validity.md"
 DURATION = 0.2

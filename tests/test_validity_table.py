@@ -14,9 +14,9 @@ import pytest
 from support.bare_library import called, loaded
 
 import mbs
+from mbs import MbsError
 from mbs.bridges import step
 from mbs.components import Body, Box, Cylinder, Fixed, Revolute, Spherical, Spring
-from mbs.errors import MbsError
 
 PAGE = Path(__file__).parents[1] / "docs" / "validity.md"
 STATUSES = (

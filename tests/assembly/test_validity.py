@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import mbs
+from mbs import MbsError
 from mbs.components import Body, Box, Revolute, Spherical
-from mbs.errors import MbsError, ModelError, Unclosable
+from mbs.errors import ModelError, Unclosable
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from support.change_points import linkage, slider_crank
 import mbs
 from mbs.errors import SolverError
 from mbs.export.fmu import pack
-from mbs.simulate.fmu import fmu
+from mbs.simulate import fmu
 
 SYSTEMS = {
     "parallelogram": lambda: mbs.robots.n_four_bar().assemble(active=["a0"]),

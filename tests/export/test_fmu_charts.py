@@ -11,7 +11,7 @@ from fmpy.fmi3 import FMU3Model
 from fmu_instances import Fmu, Fmu3
 
 import mbs
-from mbs.simulate.fmu import fmu
+from mbs.simulate import fmu
 
 MECHANISMS = {
     "n_four_bar": (

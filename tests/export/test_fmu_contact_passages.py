@@ -11,7 +11,7 @@ from fmu_instances import Fmu, Fmu3
 
 import mbs
 from mbs.components import CoulombFriction, RigidStop
-from mbs.simulate.fmu import fmu
+from mbs.simulate import fmu
 
 START = {"a0": -3.0}
 """The parallelogram lies flat after about 0.3 s."""

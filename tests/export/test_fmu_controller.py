@@ -11,7 +11,7 @@ from mbs.components import Body, DCMotor, Revolute
 from mbs.errors import CompilerError, ExportError, ModelError
 from mbs.export import CController
 from mbs.export.fmu.system_fmu import Contents, fmu_model
-from mbs.solvers.integrate import integrate
+from mbs.solvers import integrate
 
 TENSOR = ((0.02, 0, 0), (0, 0.03, 0), (0, 0, 0.04))
 LAW = """

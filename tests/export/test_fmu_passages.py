@@ -8,7 +8,7 @@ from support.change_points import linkage
 
 import mbs
 from mbs.errors import SolverError
-from mbs.simulate.fmu import fmu
+from mbs.simulate import fmu
 
 MECHANISMS = {
     "n_four_bar": (lambda: mbs.robots.n_four_bar().assemble(active=["a0"]), {"a0.v": -1.0}),

@@ -10,7 +10,7 @@ from support.change_points import linkage, slider_crank
 import mbs
 from mbs.components import RigidStop
 from mbs.errors import SolverError
-from mbs.simulate.fmu import fmu
+from mbs.simulate import fmu
 
 KINDS = pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
 MECHANISMS = {

@@ -10,8 +10,7 @@ from fmu_instances import Fmu
 
 import mbs
 from mbs.components import Body, JointFriction, JointStop, Mechanism, Prismatic
-from mbs.identification import regressor
-from mbs.identification.regressors import known_efforts, values_of
+from mbs.identification import known_efforts, regressor, values_of
 from mbs.models import ContactPoint, contact_phases, dae
 from mbs.models.state.tree import full_state
 

@@ -11,8 +11,7 @@ import mbs.models
 from mbs.app.tasks.exporting import toml
 from mbs.components import Body, Free, Mechanism, Revolute, Rotor, Spherical
 from mbs.errors import DescriptionError, ExportError, ModelError
-from mbs.formats import RobotTable, read_par, write_par
-from mbs.formats.table import FrameRow, InertiaRow
+from mbs.formats import FrameRow, InertiaRow, RobotTable, read_par, write_par
 
 
 def efforts(system, q, v, a, names):

@@ -8,8 +8,7 @@ import pytest
 import mbs
 from mbs.components import Prismatic, Revolute
 from mbs.errors import DescriptionError
-from mbs.formats import from_dict, read_toml, write_toml
-from mbs.formats.toml import to_dict
+from mbs.formats import from_dict, read_toml, to_dict, write_toml
 from mbs.models import limits
 
 TABLE = {

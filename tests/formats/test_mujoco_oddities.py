@@ -8,8 +8,9 @@ from formats.test_mujoco_spec import LOOP, TREE, Twin, assert_equal_motion
 from support.xml_mutants import mutated
 
 import mbs
+from mbs import MbsError
 from mbs.components import FixedTendon, Force, Free, Rod, Spherical, Spring
-from mbs.errors import DescriptionError, MbsError
+from mbs.errors import DescriptionError
 from mbs.expressions import to_float
 from mbs.formats import read_mjcf
 

@@ -5,7 +5,7 @@ import pytest
 from formats.test_urdf import ARM, INERTIAL
 
 import mbs.models
-from mbs.assembly.tree import Tree
+from mbs.assembly import Tree
 from mbs.components import Coupling, Fixed, Free, Prismatic, Revolute, Spherical
 from mbs.components.joints import Motion
 from mbs.errors import DescriptionError

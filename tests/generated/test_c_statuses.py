@@ -7,8 +7,9 @@ from support.bare_library import called, loaded
 from support.catalogue_systems import catalogue_system
 
 import mbs
+from mbs import MbsError
 from mbs.components import Body, Spherical
-from mbs.errors import MbsError, SingularPosture, Unclosable
+from mbs.errors import SingularPosture, Unclosable
 
 OK, NOT_FINITE, QUATERNION, PARAMETER, OPEN, UNDETERMINED, NO_RESULT = range(7)
 TARGETS = pytest.mark.parametrize("target", ["hosted", "bare"])

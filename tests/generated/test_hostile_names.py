@@ -17,9 +17,8 @@ import mbs.models
 from mbs.components import Body, Mechanism, Revolute
 from mbs.errors import ModelError
 from mbs.export.languages import LANGUAGES
-from mbs.formats import RobotTable, read_par, write_par, write_toml
+from mbs.formats import FrameRow, InertiaRow, RobotTable, read_par, write_par, write_toml
 from mbs.formats.files import component_name
-from mbs.formats.table import FrameRow, InertiaRow
 
 EVIL = "EVIL_CODE"
 """A word that stands in every text, and nowhere outside of comments and strings."""

@@ -6,15 +6,21 @@ from support.measured_arm import arm, motion, noisy_record, true_efforts
 import mbs
 import mbs.identification.bodies as physical_set
 from mbs.errors import ModelError, SolverError
-from mbs.identification.base_parameters import base_parameters
-from mbs.identification.exciting import Series, excitation
-from mbs.identification.identify import identify
+from mbs.identification import (
+    Record,
+    Samples,
+    Series,
+    base_parameters,
+    excitation,
+    identify,
+    least_squares,
+    numbers_of,
+    observe,
+    regressor,
+    values_of,
+)
 from mbs.identification.leading import active_indices
-from mbs.identification.least_squares import least_squares
 from mbs.identification.methods import METHODS
-from mbs.identification.observations import observe
-from mbs.identification.record import Record, Samples
-from mbs.identification.regressors import numbers_of, regressor, values_of
 
 
 def test_an_arm_identified_from_a_noisy_record_predicts_another_motion():

@@ -8,8 +8,7 @@ from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import ModelError
-from mbs.identification.exciting import Series, excitation
-from mbs.identification.identify import identify
+from mbs.identification import Record, Series, excitation, identify
 from mbs.identification.leading import (
     REGULAR,
     active_indices,
@@ -18,7 +17,6 @@ from mbs.identification.leading import (
     regular,
     signed_leads,
 )
-from mbs.identification.record import Record
 
 
 @cache

@@ -4,15 +4,25 @@ import numpy as np
 import pytest
 from support.real_records import panda_record, tx40_record
 
-from mbs.identification.base_parameters import base_parameters
-from mbs.identification.bodies import Prior, consistent, consistent_links
-from mbs.identification.estimate import held_out
-from mbs.identification.identify import identify
-from mbs.identification.least_squares import least_squares, robust, weighted
-from mbs.identification.methods import essential
-from mbs.identification.observations import EQUATIONS, excitation_quality, observe, observe_filtered
-from mbs.identification.record import smoothed, smoothed_with_velocity
-from mbs.identification.regressors import regressor
+from mbs.identification import (
+    Prior,
+    base_parameters,
+    consistent,
+    consistent_links,
+    essential,
+    excitation_quality,
+    held_out,
+    identify,
+    least_squares,
+    observe,
+    observe_filtered,
+    regressor,
+    robust,
+    smoothed,
+    smoothed_with_velocity,
+    weighted,
+)
+from mbs.identification.observations import EQUATIONS
 
 
 @pytest.fixture(scope="module")

@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 from support.measured_arm import equations, noisy_samples
 
-from mbs.identification.bodies import consistent
-from mbs.identification.estimate import held_out, plot_residuals
-from mbs.identification.identify import report
-from mbs.identification.least_squares import weighted
-from mbs.identification.observations import observe
+from mbs.identification import consistent, held_out, observe, plot_residuals, report, weighted
 
 
 def full():

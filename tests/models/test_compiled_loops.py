@@ -18,8 +18,7 @@ from mbs import models
 from mbs.components import Body, Mechanism, Revolute, Spring
 from mbs.errors import ModelError
 from mbs.models import tree_table
-from mbs.native import compiled
-from mbs.native.compiler import compiler_found
+from mbs.native import compiled, compiler_found
 
 pytestmark = pytest.mark.skipif(not compiler_found(), reason="there is no compiler")
 

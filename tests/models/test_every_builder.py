@@ -25,9 +25,8 @@ from support.random_trees import ALL_KINDS, random_tree
 
 import mbs
 import mbs.models
-from mbs.native import compiled
+from mbs.native import compile_library, compiled, compiler_found
 from mbs.native.compiled import generated, unwritten
-from mbs.native.compiler import compile_library, compiler_found
 
 COMPILER = pytest.mark.skipif(not compiler_found(), reason="there is no compiler")
 

@@ -16,12 +16,7 @@ import mbs.loops
 import mbs.models
 from mbs.components import Free, Prismatic, Revolute, Spherical
 from mbs.errors import ModelError
-from mbs.models.kinematics import (
-    jacobian,
-    jacobian_dot_velocity,
-    link_accelerations,
-    link_velocities,
-)
+from mbs.models import jacobian, jacobian_dot_velocity, link_accelerations, link_velocities
 from mbs.recursions.poses import base_poses, link_poses
 
 COMMON = dict(deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))

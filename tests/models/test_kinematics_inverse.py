@@ -15,13 +15,13 @@ from symbolic_robots import symbolic_robot
 import mbs
 import mbs.loops
 from mbs.errors import ModelError
-from mbs.models.jacobian_inverse import (
+from mbs.models import (
     inverse_differential_kinematics,
     inverse_jacobian,
+    jacobian,
     jacobian_determinant,
+    singularities,
 )
-from mbs.models.kinematics import jacobian
-from mbs.models.singularities import singularities
 from mbs.operations import count
 from mbs.recursions.jacobian import VelocityTarget
 from mbs.recursions.square_jacobian import square_jacobian

@@ -6,7 +6,8 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from mbs.errors import CompilerError
-from mbs.native.compiler import cache_dir, cached_library
+from mbs.native import cached_library
+from mbs.native.compiler import cache_dir
 
 SOURCE = {"f.c": '#include "f.h"\nint f(void) { return ANSWER; }', "f.h": "#define ANSWER 42"}
 

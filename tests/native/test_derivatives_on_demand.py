@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.native import compiled
-from mbs.native.compiler import compiler_found
+from mbs.native import compiled, compiler_found
 
 pytestmark = pytest.mark.skipif(not compiler_found(), reason="there is no compiler")
 

@@ -11,8 +11,7 @@ import pytest
 
 import mbs
 from mbs.errors import ModelError
-from mbs.native import compiled, link_flags
-from mbs.native.compiler import compiler_found
+from mbs.native import compiled, compiler_found, link_flags
 
 pytestmark = pytest.mark.skipif(not compiler_found(), reason="needs a compiler")
 

@@ -9,9 +9,8 @@ from support.random_trees import random_state, random_tree
 
 import mbs
 import mbs.models
-from mbs.native import compiled, find_compiler
+from mbs.native import compile_library, compiled, find_compiler
 from mbs.native.c_code import LANES, SinCosGroup, blocks, gives, needs, schedule, slots
-from mbs.native.compiler import compile_library
 from mbs.native.kernel import FAST_FLAGS, kernel_library, kernel_source, processor
 from mbs.operations.graph import graph_of
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from casadi import SX, Function
 
-from mbs.native import compiled, kernel
-from mbs.native.compiler import LIBRARY_SUFFIX, cached_library, compiler_found, is_whole
+from mbs.native import cached_library, compiled, compiler_found, kernel
+from mbs.native.compiler import LIBRARY_SUFFIX, is_whole
 
 pytestmark = pytest.mark.skipif(not compiler_found(), reason="there is no compiler")
 

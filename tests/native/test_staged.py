@@ -5,9 +5,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from mbs.native import compiled
+from mbs.native import compile_library, compiled, find_compiler
 from mbs.native.c_code import LANES
-from mbs.native.compiler import compile_library, find_compiler
 from mbs.native.kernel import FAST_FLAGS, kernel_library, kernel_source
 from mbs.native.staged import staged
 from mbs.operations.graph import graph_of

@@ -10,7 +10,8 @@ import time
 import pytest
 
 from mbs.errors import CompilerError
-from mbs.native.compiler import cache_dir, cached_library
+from mbs.native import cached_library
+from mbs.native.compiler import cache_dir
 
 compiler = sys.modules["mbs.native.compiler"]
 SOURCE = {"f.c": "int f(void) { return 42; }"}

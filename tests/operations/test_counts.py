@@ -3,8 +3,7 @@
 import casadi
 from casadi import SX, Function
 
-from mbs.operations import count
-from mbs.operations.counts import Count
+from mbs.operations import Count, count
 from mbs.recursions.route import cost
 
 

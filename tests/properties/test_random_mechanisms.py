@@ -12,7 +12,7 @@ from support.sweeps import examples
 
 import mbs.models
 import mbs.simulate
-from mbs.errors import MbsError
+from mbs import MbsError
 from mbs.loops import closure
 
 COMMON = dict(deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))

@@ -7,7 +7,7 @@ from casadi import SX
 from symbolic_robots import symbolic_robot
 
 import mbs.models
-from mbs.models.kinematics import jacobian
+from mbs.models import jacobian
 from mbs.operations import count
 from mbs.recursions.jacobian import VelocityTarget, cheapest_jacobian, outlook
 from mbs.recursions.jacobian import jacobian as frame_jacobian

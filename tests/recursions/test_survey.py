@@ -6,7 +6,7 @@ from casadi import SX
 
 import mbs
 import mbs.models
-from mbs.models.singularities import singularities
+from mbs.models import singularities
 from mbs.recursions.jacobian import VelocityTarget, nonzero, survey, varying
 
 

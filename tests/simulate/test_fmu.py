@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import mbs
+from mbs import Result
 from mbs.errors import ModelError, SolverError
 from mbs.export.fmu.description import FmuModel, FmuState, FmuVariable, Jumps
 from mbs.export.fmu.pack import write_fmu
-from mbs.result import Result
-from mbs.simulate.fmu import fmu
+from mbs.simulate import fmu
 
 KINDS = pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
 

@@ -7,7 +7,7 @@ import pytest
 
 import mbs
 from mbs.models.state.tree import full_state
-from mbs.native.compiler import compiler_found
+from mbs.native import compiler_found
 from mbs.robots import n_four_bar
 
 INTEGRATE = sys.modules["mbs.solvers.integrate"]

@@ -17,7 +17,7 @@ from mbs.components import (
 )
 from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.models.state.laws import conditions_of, time_laws
-from mbs.native.compiler import compiler_found
+from mbs.native import compiler_found
 from mbs.solvers import integrate, integrate_events
 
 PULSES = [(round(begin, 3), 0.5) for begin in np.linspace(0.503, 19.103, 20)]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import mbs
+from mbs import MbsError
 from mbs.components import Box, Revolute
-from mbs.errors import MbsError
 
 
 @pytest.fixture(scope="module")

@@ -13,9 +13,9 @@ import pytest
 from support.bennett import bennett
 
 import mbs
+from mbs import Result
 from mbs.components import CoulombFriction, PointMass, Prismatic, RigidStop
 from mbs.errors import Interrupted, ModelError, SolverError
-from mbs.result import Result
 from mbs.solvers import integrate_events
 from mbs.solvers.control_c import control_c
 

@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 import mbs
+from mbs import Result
 from mbs.components import Custom, PointMass, Prismatic, custom
 from mbs.errors import ExportError, ModelError, SolverError
-from mbs.result import Result
 
 
 def pendulum(m=2.0, gravity=9.81):

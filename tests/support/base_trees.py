@@ -9,7 +9,7 @@ from support.base_robots import random_table
 from support.plain_newton_euler import plain_efforts
 
 import mbs
-from mbs.identification.base_parameters import base_parameters
+from mbs.identification import base_parameters
 from mbs.spatial.inertia import TEN_PARAMETERS
 
 KINDS = (*TEN_PARAMETERS, "Ia")

@@ -7,9 +7,7 @@ from functools import cache
 import numpy as np
 
 import mbs
-from mbs.identification.base_parameters import base_parameters
-from mbs.identification.record import Record, Samples
-from mbs.identification.regressors import regressor, values_of
+from mbs.identification import Record, Samples, base_parameters, regressor, values_of
 from mbs.robots.rows import cuboid, frame, robot
 
 RATE = 400.0

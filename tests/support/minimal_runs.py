@@ -9,7 +9,7 @@ import casadi
 import numpy as np
 from casadi import SX, Function
 
-from mbs.loops.configuration import solve
+from mbs.loops import solve
 from mbs.models.state.independent import consistent_start
 from mbs.solvers import Events, integrate, integrate_events
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from support.catalogue_systems import catalogue_system
 
-from mbs.identification.record import Record, joint_side
+from mbs.identification import Record, joint_side
 from mbs.robots.rows import frame, robot
 
 _ROOT = Path(__file__).parents[2]

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import mbs
-from mbs.errors import MbsError
+from mbs import MbsError
 
 _ODD = (
     *("", "0", "-1", "1e308", "-1e-308", "nan", "inf", "-inf", "1 2", "0 0 0", "1 0 0 0", "x"),

@@ -12,8 +12,7 @@ from support.catalogue_systems import catalogue_system
 import mbs
 from mbs.app.tasks.base import base
 from mbs.errors import ModelError
-from mbs.identification import base_parameters
-from mbs.identification.regressors import values_of
+from mbs.identification import base_parameters, values_of
 
 
 def test_the_table_of_the_rx90_is_that_of_the_model():

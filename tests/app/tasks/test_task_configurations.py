@@ -8,6 +8,7 @@ import pytest
 from support.catalogue_systems import catalogue_system
 
 import mbs
+from mbs import MbsError
 from mbs.app.tasks.configurations import (
     configurations,
     locked_by_default,
@@ -16,7 +17,7 @@ from mbs.app.tasks.configurations import (
     pose_of,
     rpy_of,
 )
-from mbs.errors import MbsError, ModelError, NoClosedForm
+from mbs.errors import ModelError, NoClosedForm
 
 START = (0.3, -0.5, 0.7, 0.4, -0.9, 0.2)
 

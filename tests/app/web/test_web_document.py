@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import mbs
+from mbs import MbsError
 from mbs.app.web.document.document import Document
 from mbs.app.web.document.tables import COLUMNS, Cell, scalar, written
 from mbs.app.web.server import robot_document
-from mbs.errors import DescriptionError, MbsError
+from mbs.errors import DescriptionError
 from mbs.formats import from_dict
 from mbs.robots import catalogue
 

@@ -10,8 +10,8 @@ from urllib.error import HTTPError
 
 import pytest
 
+from mbs import MbsError
 from mbs.app.web.server import HOST, Guard, free_port, is_local, require_nicegui, robot_document
-from mbs.errors import MbsError
 
 
 @pytest.mark.parametrize(

@@ -3,11 +3,12 @@ import math
 import numpy as np
 import pytest
 
+from mbs import MbsError
 from mbs.app.web.document.document import Document
 from mbs.app.web.document.tables import Cell
 from mbs.app.web.session import Session, assembly_modes, carried, handles, mode_of, moved
 from mbs.components import Free, Mechanism, PointMass
-from mbs.errors import MbsError, Unclosable
+from mbs.errors import Unclosable
 from mbs.loops import examine
 from mbs.loops.configuration import require_closed
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from mbs import MbsError
 from mbs.app.web.document.document import Document
-from mbs.errors import MbsError
 
 URDF = b"""<?xml version="1.0"?><robot name="arm"><link name="base"/><link name="a"><inertial>
 <origin xyz="0 0 0.1" rpy="0 0 0"/><mass value="1.5"/><inertia ixx="0.1" iyy="0.1" izz="0.05"

@@ -10,8 +10,7 @@ from support.base_robots import row
 import mbs
 from mbs.components import Body, Prismatic, Revolute, Rod, Spring
 from mbs.errors import ModelError
-from mbs.identification import regressor
-from mbs.identification.base_parameters import base_parameters
+from mbs.identification import base_parameters, regressor
 
 INERTIA = (0.02, 0, 0, 0.03, 0, 0.04)
 

@@ -7,8 +7,7 @@ from support.base_robots import system
 from support.catalogue_systems import catalogue_system
 
 import mbs
-from mbs.identification.base_parameters import base_parameters
-from mbs.identification.regressors import columns_of
+from mbs.identification import base_parameters, columns_of
 
 CHOICES = ({"rotors": False, "friction": False}, {"friction": False}, {})
 

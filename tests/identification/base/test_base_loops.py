@@ -8,10 +8,9 @@ from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.components import Body, Prismatic, Revolute
-from mbs.identification.base_parameters import base_parameters
+from mbs.identification import base_parameters, columns_of
 from mbs.identification.grouping.grouping import default_parameters
 from mbs.identification.grouping.numeric import closed_positions, random_states, sampled_regressor
-from mbs.identification.regressors import columns_of
 
 CHOICES = ({"rotors": False, "friction": False}, {"friction": False}, {})
 COUNTS = {

@@ -10,9 +10,8 @@ from support.base_robots import table
 import mbs
 from mbs.errors import ModelError
 from mbs.formats import read_par, write_toml
-from mbs.identification.base_parameters import base_parameters
+from mbs.identification import base_parameters, columns_of, numbers_of
 from mbs.identification.grouping.grouping import Grouping
-from mbs.identification.regressors import columns_of, numbers_of
 from mbs.operations import count
 from mbs.spatial.inertia import TEN_PARAMETERS
 

@@ -11,7 +11,7 @@ from support.base_trees import KINDS, grouped_tree
 from support.plain_newton_euler import plain_efforts
 
 import mbs
-from mbs.identification.base_parameters import base_parameters
+from mbs.identification import base_parameters
 from mbs.identification.grouping.rules import lambda_transform
 from mbs.spatial import Khalil
 

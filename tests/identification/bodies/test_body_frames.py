@@ -4,9 +4,8 @@ from support.measured_arm import arm, noisy_record
 
 import mbs
 from mbs.components import Body, Revolute
+from mbs.identification import columns_of, identify, numbers_of
 from mbs.identification.bodies import bodies_table, body_values
-from mbs.identification.identify import identify
-from mbs.identification.regressors import columns_of, numbers_of
 
 CENTRE = (0.1, -0.2, 0.3)
 INERTIA = (0.3, 0.4, 0.5)

@@ -12,19 +12,20 @@ from support.measured_arm import (
 )
 
 from mbs.errors import ModelError
-from mbs.identification.bodies import (
+from mbs.identification import (
     Prior,
+    Record,
     consistent,
     consistent_links,
     consistent_weighted,
-    pseudo_inertias,
+    least_squares,
+    observe,
+    observe_filtered,
     recovered,
-    unconstrained_error,
+    regressor,
+    smoothed,
 )
-from mbs.identification.least_squares import least_squares
-from mbs.identification.observations import observe, observe_filtered
-from mbs.identification.record import Record, smoothed
-from mbs.identification.regressors import regressor
+from mbs.identification.bodies import pseudo_inertias, unconstrained_error
 
 DEVIATIONS = np.array([0.3, 0.1, 0.02])
 

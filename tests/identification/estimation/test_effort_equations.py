@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from support.measured_arm import equations, noisy_samples
 
+from mbs.identification import observe
 from mbs.identification.least_squares import EffortEquations
-from mbs.identification.observations import observe
 
 WEIGHTS = np.array([1.0, 2.0, 5.0])
 

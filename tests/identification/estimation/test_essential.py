@@ -6,9 +6,7 @@ from scipy.stats import f
 from support.measured_arm import equations, noisy_samples
 
 from mbs.errors import ModelError
-from mbs.identification.least_squares import least_squares, robust, weighted
-from mbs.identification.methods import essential
-from mbs.identification.observations import observe
+from mbs.identification import essential, least_squares, observe, robust, weighted
 
 
 def observations(deviation):

@@ -6,12 +6,17 @@ from support.catalogue_systems import catalogue_system
 from support.measured_arm import equations, mbs_values, motion, noisy_samples
 
 from mbs.errors import ModelError
-from mbs.identification.bodies import consistent
+from mbs.identification import (
+    Samples,
+    consistent,
+    instrumental,
+    least_squares,
+    numbers_of,
+    observe,
+    regressor,
+    simulated_motion,
+)
 from mbs.identification.leading import active_indices, positions
-from mbs.identification.least_squares import instrumental, least_squares, simulated_motion
-from mbs.identification.observations import observe
-from mbs.identification.record import Samples
-from mbs.identification.regressors import numbers_of, regressor
 
 _ACCELERATION = 3.0
 

@@ -6,16 +6,20 @@ import pytest
 from support.measured_arm import equations, noisy_record, noisy_samples
 
 from mbs.errors import ModelError, SolverError
-from mbs.identification.estimate import cross_validated, held_out, repetition
-from mbs.identification.least_squares import (
+from mbs.identification import (
+    cross_validated,
+    held_out,
     instrumental,
     least_squares,
+    observe,
+    observe_filtered,
     reweighted,
     robust,
+    smoothed,
     weighted,
 )
-from mbs.identification.observations import observe, observe_filtered
-from mbs.identification.record import smoothed, zero_phase
+from mbs.identification.estimate import repetition
+from mbs.identification.record import zero_phase
 
 DEVIATIONS = np.array([0.3, 0.1, 0.02])
 

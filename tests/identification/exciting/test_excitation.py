@@ -11,9 +11,7 @@ import mbs
 from mbs.assembly import System
 from mbs.components import Body, Revolute
 from mbs.errors import ModelError, NoClosedForm, SolverError
-from mbs.identification import regressor
-from mbs.identification.base_parameters import base_parameters
-from mbs.identification.exciting import Plane, Series, Trajectory, excitation
+from mbs.identification import Plane, Series, Trajectory, base_parameters, excitation, regressor
 from mbs.identification.leading import active_indices
 from mbs.identification.trajectory import Margin, MotionLimit, limits_of
 from mbs.loops.closing import Closing

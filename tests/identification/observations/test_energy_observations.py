@@ -2,9 +2,7 @@ import pytest
 from support.measured_arm import arm, equations, noisy_samples
 
 from mbs.errors import ModelError
-from mbs.identification.least_squares import least_squares
-from mbs.identification.observations import observe_energy
-from mbs.identification.regressors import energy_regressor, power_regressor
+from mbs.identification import energy_regressor, least_squares, observe_energy, power_regressor
 
 
 def test_work_of_the_efforts_is_that_of_the_parameters():

@@ -5,9 +5,7 @@ import pytest
 from support.measured_arm import arm, equations, noisy_samples
 
 from mbs.errors import ModelError
-from mbs.identification.least_squares import least_squares
-from mbs.identification.observations import observe_momentum
-from mbs.identification.regressors import filtered_regressor
+from mbs.identification import filtered_regressor, least_squares, observe_momentum
 
 
 def test_filtered_equations_hold_without_accelerations():

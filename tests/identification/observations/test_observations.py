@@ -7,15 +7,16 @@ from support.measured_arm import arm, equations, mbs_values, noisy_record, noisy
 import mbs
 from mbs.components import Body, Prismatic
 from mbs.errors import ModelError
-from mbs.identification.least_squares import least_squares
-from mbs.identification.observations import (
+from mbs.identification import (
+    Samples,
     excitation_quality,
+    least_squares,
     observe,
     observe_filtered,
-    require_visible,
+    regressor,
+    smoothed,
 )
-from mbs.identification.record import Samples, smoothed
-from mbs.identification.regressors import regressor
+from mbs.identification.observations import require_visible
 
 
 def full():

@@ -2,14 +2,8 @@ import numpy as np
 import pytest
 
 from mbs.errors import ModelError
-from mbs.identification.record import (
-    Record,
-    central_difference,
-    resampled,
-    smoothed,
-    smoothed_with_velocity,
-    zero_phase,
-)
+from mbs.identification import Record, resampled, smoothed, smoothed_with_velocity
+from mbs.identification.record import central_difference, zero_phase
 
 RATE = 500.0
 TIME = np.arange(5000) / RATE

@@ -4,9 +4,9 @@ from support.catalogue_systems import catalogue_system
 from support.measured_arm import arm, motion, noisy_record, true_efforts
 
 import mbs
+from mbs import Result
 from mbs.errors import ModelError
-from mbs.identification.record import Record, joint_side, smoothed
-from mbs.result import Result
+from mbs.identification import Record, joint_side, smoothed
 
 TIME, Q, V, A = motion()
 TAU = true_efforts(Q, V, A)

@@ -9,8 +9,8 @@ from support.catalogue_systems import catalogue_system
 import mbs
 from mbs.closed_forms.arm_search import search
 from mbs.errors import ModelError
+from mbs.models.inverse_geometry import follow
 from mbs.models.inverse_geometry.chain import frame_chain
-from mbs.models.inverse_geometry.follow import follow
 
 ELBOW_UP = np.array([0.3, -0.8, 0.4, 0.2, 0.6, 0.1])
 

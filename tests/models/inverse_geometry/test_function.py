@@ -13,7 +13,7 @@ from support.catalogue_systems import catalogue_system
 import mbs
 from mbs.errors import ModelError, NoClosedForm
 from mbs.export.languages import LANGUAGES
-from mbs.models.inverse_geometry.closed_form import InverseGeometry, function
+from mbs.models.inverse_geometry import InverseGeometry, function
 from mbs.native import c_source, compile_library, compiled
 from mbs.robots.rows import frame, robot
 

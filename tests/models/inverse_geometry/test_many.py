@@ -9,8 +9,7 @@ from support.catalogue_systems import catalogue_system
 import mbs
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.geometry import terminal_frame
-from mbs.models.inverse_geometry.many import ManySolutions, solve_many
-from mbs.models.inverse_geometry.solve import solve
+from mbs.models.inverse_geometry import ManySolutions, solve, solve_many
 
 LOCKED = {"panda": {"q3": 0.4}}
 
@@ -63,7 +62,7 @@ def test_rows_are_branches():
     system = assembled("puma560")
     _, _, T = poses(system, 3, 2)
     many = solve_many(system, T, method="pieper")
-    from mbs.models.inverse_geometry.closed_form import function
+    from mbs.models.inverse_geometry import function
 
     igm = function(system, "pieper")
     assert many.labels == igm.labels

@@ -7,7 +7,7 @@ from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import ModelError
-from mbs.models.inverse_geometry.solve import solve
+from mbs.models.inverse_geometry import solve
 
 solve_many = mbs.models.inverse_geometry.solve_many
 

@@ -11,8 +11,8 @@ from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import ModelError
-from mbs.models.inverse_geometry.closed_form import function
-from mbs.models.inverse_geometry.sheet import expression_lines, text
+from mbs.models.inverse_geometry import function, text
+from mbs.models.inverse_geometry.sheet import expression_lines
 from mbs.operations.graph import graph_of
 
 

@@ -1,1 +1,1 @@
-"""Textbook algorithms over the tree: CasADi SX in, SX out; no names, no files."""
+"""Recursive algorithms of multibody dynamics on a tree of links, as CasADi SX expressions."""

@@ -1,7 +1,7 @@
-"""Accelerations of a tree in a number of operations linear in its links: articulated bodies.
+"""Joint accelerations of a tree by the articulated-body algorithm, with O(n) operations.
 
-An articulated body is a link with everything behind it, its joints free to move. Taken together
-from the leaves to the base, their inertias solve A x = tau without the inertia matrix A.
+An articulated body is a link with its descendants, whose joints are free to move. The recursion
+from the leaves to the base solves A x = tau without forming the inertia matrix A.
 
 Source: Featherstone 1983; Brandl, Johanni & Otter 1988; Khalil & Creusot 1997, section 5.4.
 """
@@ -35,22 +35,22 @@ from mbs.spatial import (
     zeros,
 )
 
-# The inertia of an articulated body, and the joints taken out of it.
+# Inertia of an articulated body, and elimination of joints from it.
 #
-# Three blocks of scalars are moved through elementary screws. The row and the column of a joint
-# that was taken out are zero, and cost nothing from there on.
+# The three 3 x 3 blocks are transformed by elementary screws. The row and the column of an
+# eliminated joint are zero if the joint has no drive, and then cost no operations.
 #
 # Source: Featherstone 1983; Brandl, Johanni & Otter 1988; Khalil & Creusot 1997, section 5.4.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArticulatedInertia:
-    """What wrench a link needs for an acceleration: f = M vd + H wd, m = H' vd + J wd.
+    """Articulated inertia, which maps acceleration to wrench: f = M vd + H wd, m = H' vd + J wd.
 
     Attributes:
-        M: (3, 3) symmetric, translational [kg].
-        H: (3, 3) coupling [kg m].
-        J: (3, 3) symmetric, rotational [kg m^2].
+        M: (3, 3) symmetric translational block [kg].
+        H: (3, 3) coupling block [kg m].
+        J: (3, 3) symmetric rotational block [kg m^2].
     """
 
     M: SX
@@ -59,35 +59,35 @@ class ArticulatedInertia:
 
     @staticmethod
     def of(body: Inertia) -> ArticulatedInertia:
-        """Of a rigid body."""
+        """Return the articulated inertia of a single rigid body."""
         return ArticulatedInertia(
             casadi.densify(body.m * SX.eye(3)), casadi.densify(-skew(body.ms)), body.J
         )
 
     def __add__(self, other: ArticulatedInertia) -> ArticulatedInertia:
-        """Of two bodies that move together, in one frame."""
+        """Add the inertia of a body that moves with this one, in the same frame."""
         return ArticulatedInertia(self.M + other.M, self.H + other.H, self.J + other.J)
 
     def rotate(self, R: Rotation) -> ArticulatedInertia:
-        """The same body about the same point in the axes of frame i."""
+        """Express the inertia in the axes of frame i, about the same point."""
         return ArticulatedInertia(
             R.apply_to_tensor(self.M), R.apply_to_square(self.H), R.apply_to_tensor(self.J)
         )
 
     def shift(self, axis: int, t: SX) -> ArticulatedInertia:
-        """The body displaced by t [m] along a coordinate axis; ten products."""
+        """Displace the body by t [m] along a coordinate axis, with ten products."""
         if t.is_zero():
             return self
         return ArticulatedInertia(self.M, *_slid(self.M, self.H, self.J, t, axis))
 
     def column(self, direction: int) -> SX:
-        """(6, 1) wrench for a unit acceleration along one direction of a twist."""
+        """(6, 1) wrench of a unit acceleration along one component (0 to 5) of a twist."""
         if direction < 3:
             return casadi.vertcat(self.M[:, direction], self.H[direction, :].T)
         return casadi.vertcat(self.H[:, direction - 3], self.J[:, direction - 3])
 
     def without(self, pivot: Pivot) -> ArticulatedInertia:
-        """What is felt of the body when it may move freely along the direction of the pivot."""
+        """Return the inertia of the body if it is free to move along the direction of the pivot."""
         felt = _without(
             self.M, self.H, self.J, pivot.column, pivot.gain, pivot.rest, pivot.direction
         )
@@ -96,7 +96,7 @@ class ArticulatedInertia:
 
 @formula((3, 3), (3, 3), (3, 3), (1, 1))
 def _slid(M: SX, old: SX, tensor: SX, t: SX, axis: int) -> tuple[SX, SX]:
-    """H and J of an articulated body displaced along an axis."""
+    """Return H and J of an articulated body displaced by t [m] along a coordinate axis."""
     k, h = (axis + 1) % 3, (axis + 2) % 3
     H, J = SX(old), SX(tensor)
     H[:, k] -= t * M[:, h]
@@ -112,7 +112,7 @@ def _slid(M: SX, old: SX, tensor: SX, t: SX, axis: int) -> tuple[SX, SX]:
 
 @formula((3, 3), (3, 3), (3, 3), (6, 1), (6, 1), (6, 1))
 def _without(M: SX, H: SX, J: SX, column: SX, g: SX, own: SX, direction: int) -> tuple[SX, SX, SX]:
-    """M, H and J of an articulated body when the joint of a pivot may move freely."""
+    """Return M, H and J of an articulated body after elimination of the velocity of a pivot."""
     k, u = direction % 3, SX(column)
     u[direction] = 0
     M, H, J = (
@@ -129,11 +129,12 @@ def _without(M: SX, H: SX, J: SX, column: SX, g: SX, own: SX, direction: int) ->
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RotorDrive:
-    """What turns with a joint without being a part of its link.
+    """Inertia of the drive of a joint: Ia and the rotor that rotates with the joint.
 
     Attributes:
-        inertia: that the joint alone feels, beyond what moves with the column of its pivot.
-        momentum: (3, 1) of rotors for its unit velocity, in the frame of the pivot; links feel it.
+        inertia: part of the inertia D of the joint that the column of its pivot does not contain.
+        momentum: (3, 1) angular momentum of the rotor for a unit joint velocity, in the frame of
+            the pivot. It also acts on the links.
     """
 
     inertia: SX
@@ -142,16 +143,17 @@ class RotorDrive:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pivot:
-    """One velocity, taken out of the equations.
+    """Elimination of one joint velocity from the equations of motion.
 
     Attributes:
-        direction: where it stands in a twist.
-        column: (6, 1) wrench for its unit acceleration, that of the drive left out.
-        rest: (6, 1) what remains of its own column in the body; zero without a drive.
-        size: inertia that it moves, D.
-        inverse: -1 / D; its sign keeps a product by it from being turned into a division.
-        gain: (6, 1) -column / D, zero at the direction itself.
-        ratio: part of the drive in D.
+        direction: index (0 to 5) of the velocity in a twist [linear; angular].
+        column: (6, 1) wrench of a unit acceleration, with the momentum of the rotor but without
+            the inertia of the drive.
+        rest: (6, 1) column of the body after the elimination. Zero without a drive.
+        size: inertia D that the velocity moves.
+        inverse: -1 / D. The minus sign prevents CasADi from rewriting products as divisions.
+        gain: (6, 1) -column / D, with a zero at `direction`.
+        ratio: fraction of D due to the inertia of the drive.
     """
 
     direction: int
@@ -164,22 +166,22 @@ class Pivot:
 
     @staticmethod
     def of(body: ArticulatedInertia, direction: int, drive: RotorDrive) -> Pivot:
-        """Along a direction of a body, with what drives the joint."""
+        """Return the pivot of one direction of a body, with the drive of the joint."""
         column = body.column(direction)
         return Pivot(direction, *_pivot(column, drive.inertia, drive.momentum, direction))
 
     def transmit(self, wrench: SX, effort: SX) -> tuple[SX, SX]:
-        """The wrench (6, 1) that passes on to the antecedent, and the effort that accelerates."""
+        """Return the wrench (6, 1) on the antecedent and the effort that accelerates the joint."""
         return _transmitted(wrench, effort, self.gain, self.ratio, self.direction)
 
     def accelerate(self, twist: SX, left: SX) -> tuple[SX, SX]:
-        """The acceleration (6, 1) behind the joint, and its part that the joint adds."""
+        """Return the acceleration (6, 1) after the joint, and the joint acceleration."""
         return _accelerated(twist, left, self.gain, self.inverse, self.ratio, self.direction)
 
 
 @formula((6, 1), (1, 1), (3, 1))
 def _pivot(column: SX, inertia: SX, momentum: SX, direction: int) -> tuple[SX, SX, SX, SX, SX, SX]:
-    """Column, rest, size, inverse, gain and ratio of a pivot."""
+    """Compute column, rest, size, inverse, gain and ratio of a pivot."""
     column = SX(column)
     column[3:] += momentum
     D = column[direction] + inertia
@@ -211,7 +213,7 @@ def _accelerated(
 
 
 def _symmetric_product(a: SX, b: SX) -> SX:
-    """The product a b' where it is known to be symmetric: six multiplications."""
+    """Return the product a b', which must be symmetric, with six multiplications."""
     product = zeros(3, 3)
     for row in range(3):
         for column in range(row, 3):
@@ -225,19 +227,19 @@ _DIRECTIONS = {
     Motion.SPHERICAL: (3, 4, 5),
     Motion.FREE: (0, 1, 2, 3, 4, 5),
 }
-"""Where each velocity of a motion stands in a twist [linear; angular] where its directions are
-constant."""
+"""Index of each joint velocity in a twist [linear; angular], in the frame in which the directions
+of the joint are constant."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointElimination:
-    """A joint taken out of the equations, in the frame where this is cheapest.
+    """Elimination of all velocities of a joint, in the frame with the fewest operations.
 
     Attributes:
         inner: displacements from that frame to the frame of the link.
-        outer: displacements from the antecedent to it.
-        pivots: in the order in which they were taken.
-        sign: -1 where positive velocities move the link against the directions of the pivots.
+        outer: displacements from the frame of the antecedent to that frame.
+        pivots: eliminated velocities, in the order of elimination.
+        sign: -1 if positive velocities move the link against the directions of the pivots.
     """
 
     inner: tuple[Displacement, ...]
@@ -247,12 +249,12 @@ class JointElimination:
 
 
 def solve_inertia(tree: Tree, poses: list[LinkPose], right: SX) -> SX:
-    """(nv, m) solution of A x = right, without the inertia matrix A.
+    """Solve A x = right for x (nv, m), without forming the inertia matrix A.
 
     Args:
-        tree: the links, rotors included.
-        poses: each with respect to its antecedent.
-        right: (nv, m) efforts.
+        tree: links, rotors included.
+        poses: pose of each link relative to its antecedent.
+        right: (nv, m) right-hand sides, such as joint efforts.
     """
     poses, bodies = shift_frames(tree, poses, [link.inertia for link in tree.links])
     eliminations = _eliminations(tree, poses, bodies)
@@ -269,18 +271,19 @@ def articulated_accelerations(
     base: Acceleration,
     external: Mapping[int, Wrench],
 ) -> SX:
-    """(nv, 1) joint accelerations that efforts produce, friction and springs left out.
+    """Return the joint accelerations (nv, 1) due to joint efforts: forward dynamics of the tree.
 
-    The links move with zero joint accelerations first; what the wrenches of this motion leave of
-    the efforts accelerates the articulated bodies.
+    The wrenches of the motion with zero joint accelerations are computed first. The efforts that
+    do not balance them accelerate the articulated bodies. Joint friction and springs of the tree
+    are not included.
 
     Args:
-        tree: the links, rotors included.
-        poses: each with respect to its antecedent.
+        tree: links, rotors included.
+        poses: pose of each link relative to its antecedent.
         v: (nv, 1) joint velocities.
-        efforts: (nv, 1) without those of friction and springs.
-        base: motion of the base; see `resting_base`.
-        external: for some links the wrench that they exert on their environment.
+        efforts: (nv, 1) joint efforts, without friction and spring efforts.
+        base: motion of the base, see `resting_base`.
+        external: wrench that a link exerts on its environment, by link index.
     """
     inertias = [link.inertia for link in tree.links]
     if not external:
@@ -301,9 +304,9 @@ def articulated_accelerations(
 
 
 def inertia_pivots(tree: Tree, poses: list[LinkPose]) -> tuple[SX, SX]:
-    """(nv, 1) inertia that each velocity moves: with those behind it free, and locked.
+    """Return the inertia (nv, 1) of each velocity, with free and with locked descendant joints.
 
-    Where the first is a vanishing part of the second, the inertia matrix is singular.
+    If the first is negligible relative to the second, the inertia matrix is singular.
     """
     poses, bodies = shift_frames(tree, poses, [link.inertia for link in tree.links])
     rigid = regroup(tree, poses, bodies)
@@ -321,14 +324,14 @@ def inertia_pivots(tree: Tree, poses: list[LinkPose]) -> tuple[SX, SX]:
 
 
 def _numbers(link: Link) -> range:
-    """Where the velocities of a link stand in v."""
+    """Indices in v of the velocities of a link."""
     return range(link.v.start, link.v.stop)
 
 
 def _eliminations(
     tree: Tree, poses: list[LinkPose], bodies: Sequence[Inertia]
 ) -> list[JointElimination]:
-    """Every joint taken out, from the leaves to the base."""
+    """Eliminate every joint, from the leaves to the base; the result is ordered by link."""
     rigid = regroup(tree, poses, list(bodies))
     articulated = [ArticulatedInertia.of(body) for body in rigid]
     leaves = set(range(len(tree.links))) - {link.antecedent for link in tree.links}
@@ -356,7 +359,7 @@ def _eliminations(
 
 
 def _drive(tree: Tree, poses: list[LinkPose], j: int) -> RotorDrive:
-    """What drives joint j, in the frame of its link."""
+    """Return the drive inertia of joint j, in the frame of its link."""
     link = tree.links[j]
     if link.rotor is None:
         return RotorDrive(link.Ia, zeros())
@@ -370,7 +373,7 @@ def _drive(tree: Tree, poses: list[LinkPose], j: int) -> RotorDrive:
 def _solution(
     tree: Tree, joints: list[JointElimination], wrenches: Sequence[SX], efforts: SX
 ) -> SX:
-    """(nv, 1) accelerations; `wrenches` are those that the links need already."""
+    """Joint accelerations (nv, 1); `wrenches` (6, 1) are needed at zero joint accelerations."""
     needed, left = list(wrenches), zeros(tree.nv)
     for j in reversed(range(len(tree.links))):
         link, joint = tree.links[j], joints[j]
@@ -394,7 +397,7 @@ def _moved_wrench(steps: Sequence[Displacement], wrench: SX) -> SX:
 
 
 def _moved_twist(steps: Sequence[Displacement], twist: SX) -> SX:
-    """A twist about the origin of the frame before the steps, about the origin behind them."""
+    """Transform a twist from the frame before the steps to the frame after them."""
     v, w = twist[:3], twist[3:]
     for step in steps:
         p = step.point(zeros())

@@ -1,11 +1,12 @@
-"""A chain: joints one after the other and what is known between them, from a frame to another.
+"""Serial chain of unknown joints and known transforms between two frames.
 
-The last frame seen from the first is G_0 J_1(q_1) G_1 J_2(q_2) .. J_n(q_n) G_n: each J_k moves
-along its own z axis, each G_k is made of links, and of joints whose positions are known by then.
-In a ring the ends coincide, G_n is a part of G_0, and the product is 1.
+The pose of the last frame in the first frame is G_0 J_1(q_1) G_1 J_2(q_2) .. J_n(q_n) G_n. Each
+J_k is the displacement of an unknown joint along or about its z axis. Each G_k is the transform of
+links and of joints with known positions. In a closed loop (`Ring`) the two end frames coincide:
+G_n is merged into G_0, and the product is the identity.
 
-Everything that solves for joints works on it: rings of loops, arms that reach a pose, in symbols
-and in numbers. `transforms` alone says where its frames are.
+The solvers of closed loops and of inverse kinematics use this class, symbolically and numerically.
+`transforms` computes the poses of the frames.
 
 Source: Khalil & Kleinfinger 1986; Khalil & Creusot 1997, eq. 2.
 """
@@ -30,15 +31,15 @@ from mbs.spatial import Pose, axis_rotation, quaternion_rotation, vector
 
 Array = NDArray[np.float64]
 
-# One joint, and how it moves.
+# Joint of a chain and its displacement.
 
 
 @dataclass(frozen=True, slots=True)
 class Spin:
-    """The known turn of a rod about its own line, where a spherical joint of the tree carries it.
+    """Known rotation of a rod about its own line, if a spherical joint of the tree supports it.
 
     Attributes:
-        index: number of the angle among the positions.
+        index: index of the angle among the positions.
         rest: quaternion of the spherical joint in the assembled configuration.
     """
 
@@ -48,17 +49,18 @@ class Spin:
 
 @dataclass(frozen=True, slots=True)
 class ChainJoint:
-    """A joint whose position is looked for.
+    """Joint of a chain, whose position is usually unknown.
 
     Attributes:
-        name: of the coordinate.
-        motion: revolute or prismatic along its z axis; spherical turns in any way.
-        index: index of its position; of a ring in q, beyond the end of it for a cut joint; None
-            for a spherical joint whose position nothing asks for. Four numbers follow from there
-            for a quaternion.
-        sign: -1 where the chain runs through the joint from its frame_b to its frame_a.
-        cut: whether it belongs to the joint that closes a loop.
-        spin: of a spherical joint between a rod that may spin and its antecedent.
+        name: name of the coordinate.
+        motion: type of motion: revolute about z, prismatic along z, spherical or free.
+        index: index of the first position. In a loop chain it is an index in q; the positions of
+            the cut joint follow after the end of q. None for a spherical joint whose position is
+            not required. A quaternion occupies four positions.
+        sign: -1 if the chain passes through the joint from its frame_b to its frame_a, else 1.
+        cut: Whether the joint belongs to the joint that closes the loop.
+        spin: known rotation of a rod about its line, for a spherical joint between such a rod and
+            its antecedent.
     """
 
     name: str
@@ -70,11 +72,15 @@ class ChainJoint:
 
     @property
     def is_rotational(self) -> bool:
-        """Whether the joint rotates."""
+        """Whether the motion is not prismatic."""
         return self.motion is not Motion.PRISMATIC
 
     def displacement(self, q: SX) -> Pose:
-        """The pose behind the joint seen from before it, at its position [rad, m, quaternion]."""
+        """Return the pose of the frame after the joint in the frame before it, at position q.
+
+        A position is an angle [rad], a distance [m], a quaternion, or (free) three translations
+        [m] and a quaternion.
+        """
         match self.motion:
             case Motion.FREE:
                 return free_pose(q, self.sign)
@@ -86,7 +92,7 @@ class ChainJoint:
 
 
 def free_pose(values: SX, sign: int = 1) -> Pose:
-    """The pose that three translations and a quaternion tell, or its inverse."""
+    """Return the pose of three translations [m] and a quaternion; its inverse if sign is -1."""
     pose = Pose.translation(values[0:3]) @ _spherical_pose(values[3:7], 1)
     return pose if sign > 0 else pose.inverse()
 
@@ -96,18 +102,18 @@ def _spherical_pose(quaternion: SX, sign: int) -> Pose:
     return pose if sign > 0 else pose.inverse()
 
 
-# What stands between two joints.
+# Transform between two joints.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gap:
-    """The known transform from one joint to the next.
+    """Known transform from one joint of a chain to the next.
 
     Attributes:
-        pose: of the next joint's frame, seen from the frame after the joint before.
-        pivots: frames of the known revolute joints between them, seen likewise.
-        back: the inverse of the pose where it is known in a shorter form; nothing tells that the
-            elements of a symbolic rotation are orthonormal.
+        pose: pose of the frame before the next joint in the frame after the previous joint.
+        pivots: poses of the known revolute joints between the two, in the same frame as `pose`.
+        back: inverse of `pose`, if known in a shorter form. CasADi does not simplify symbolic
+            rotations by their orthonormality. None if not known.
     """
 
     pose: Pose = field(default_factory=Pose.identity)
@@ -115,33 +121,33 @@ class Gap:
     back: Pose | None = None
 
     def then(self, pose: Pose) -> Gap:
-        """With one more pose at its end."""
+        """Append a pose at the end."""
         back = None if self.back is None else pose.inverse() @ self.back
         return Gap(self.pose @ pose, self.pivots, back)
 
     def after(self, gap: Gap) -> Gap:
-        """With another gap before it."""
+        """Prepend another transform."""
         seen = (gap.pose @ pivot for pivot in self.pivots)
         known = self.back is not None or gap.back is not None
         back = self.inverse().pose @ gap.inverse().pose if known else None
         return Gap(gap.pose @ self.pose, (*gap.pivots, *seen), back)
 
     def inverse(self) -> Gap:
-        """From its end to its beginning."""
+        """Return the transform from the end to the beginning."""
         back = self.back or self.pose.inverse()
         return Gap(back, tuple(back @ pivot for pivot in self.pivots), self.pose)
 
 
-# The chain, and where its frames are.
+# The chain and the poses of its frames.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chain:
-    """Joints, and the gaps before, between and after them.
+    """Joints and the known transforms before, between and after them.
 
     Attributes:
-        joints: n of them, in their order.
-        gaps: n + 1; in a ring n, the one before each joint.
+        joints: n joints, in the order of the chain.
+        gaps: n + 1 transforms. A `Ring` has n: gaps[k] comes before joints[k].
     """
 
     joints: tuple[ChainJoint, ...]
@@ -149,15 +155,18 @@ class Chain:
 
     @property
     def between(self) -> Sequence[Pose]:
-        """The poses of the gaps."""
+        """Poses of the transforms `gaps`."""
         return [gap.pose for gap in self.gaps]
 
     def displacements(self, q: SX) -> Sequence[Pose]:
-        """Of the joints, all of one position each, at positions q, (n, 1) [rad or m]."""
+        """Return the displacements of the joints at positions q (n, 1) [rad or m].
+
+        All joints must be revolute or prismatic.
+        """
         return [joint.displacement(SX(q[k])) for k, joint in enumerate(self.joints)]
 
     def ring(self) -> Ring:
-        """The ring that it is where its ends coincide: its last gap becomes part of the first."""
+        """Return the closed chain if both ends coincide; the last gap is merged into the first."""
         if not self.joints:
             return Ring((), ())
         return Ring(self.joints, (self.gaps[0].after(self.gaps[-1]), *self.gaps[1:-1]))
@@ -165,22 +174,22 @@ class Chain:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ring(Chain):
-    """A chain whose ends coincide: gap k comes before joint k, and there is none after the last."""
+    """Closed chain, whose two end frames coincide; gaps[k] comes before joints[k]."""
 
     def rotated(self, first: int) -> Ring:
-        """The same loop begun at another joint."""
+        """Return the same loop, which starts with the joint of index `first`."""
         return Ring(
             self.joints[first:] + self.joints[:first], self.gaps[first:] + self.gaps[:first]
         )
 
     def reversed(self) -> Ring:
-        """The same loop in the other direction."""
+        """Return the same loop in the opposite direction."""
         joints = tuple(replace(joint, sign=-joint.sign) for joint in self.joints[::-1])
         gaps = tuple(gap.inverse() for gap in (self.gaps[0], *self.gaps[:0:-1]))
         return Ring(joints, gaps)
 
     def without(self, k: int) -> Ring:
-        """The loop with joint k locked at zero."""
+        """Return the loop with joint k locked at position zero."""
         n = len(self.joints)
         merged = self.gaps[(k + 1) % n].after(self.gaps[k])
         gaps = [merged if m == (k + 1) % n else gap for m, gap in enumerate(self.gaps) if m != k]
@@ -194,26 +203,26 @@ Q_contra = TypeVar("Q_contra", SX, Array, contravariant=True)
 
 
 class Transformable(Protocol[T_co, Q_contra]):
-    """A chain in symbols (`Chain`), or in numbers (`mbs.closed_forms.arm.Arm`)."""
+    """Protocol of a symbolic chain (`Chain`) or a numeric chain (`mbs.closed_forms.arm.Arm`)."""
 
     @property
     def between(self) -> Sequence[T_co]:
-        """The transforms before, between and, but in a ring, after the joints."""
+        """Known transforms before, between and (except in a ring) after the joints."""
 
     def displacements(self, q: Q_contra) -> Sequence[T_co]:
-        """The transforms of the joints at their positions."""
+        """Transforms of the joints at positions q."""
 
 
 def transforms(chain: Transformable[T, Q], q: Q) -> list[T]:
-    """Where the frames of a chain are: before every joint and, last, at its end.
+    """Compute the poses of the frames before every joint and at the end of a chain.
 
     Args:
-        chain: of n joints.
-        q: positions, (n, 1) symbols, or (..., n) numbers [rad or m].
+        chain: chain of n joints.
+        q: positions [rad or m]: symbolic (n, 1), or numeric (..., n).
 
     Returns:
-        n + 1 transforms, each seen from the beginning of the chain; of many configurations the
-        first one, which no joint moves, is a single (4, 4).
+        n + 1 transforms relative to the beginning of the chain. The first transform does not
+        depend on q, so that it is a single (4, 4) matrix even for many configurations.
     """
     between = chain.between
     here = between[0]
@@ -227,11 +236,11 @@ def transforms(chain: Transformable[T, Q], q: Q) -> list[T]:
 
 
 def frames_at_zero(gaps: Sequence[Gap], start: Pose | None = None) -> list[Pose]:
-    """The end of every gap where the joints between them are at zero, seen from one frame.
+    """Compute the poses of the ends of all gaps, with the joints between them at zero.
 
     Args:
-        gaps: one after the other.
-        start: where the first one begins, the identity when left out.
+        gaps: transforms, in the order of the chain.
+        start: pose of the beginning of the first gap. Default is the identity.
     """
     begin = Pose.identity() if start is None else start
     return list(accumulate((gap.pose for gap in gaps), matmul, initial=begin))[1:]
@@ -242,11 +251,14 @@ def frames_at_zero(gaps: Sequence[Gap], start: Pose | None = None) -> list[Pose]
 
 @dataclass(slots=True)
 class ChainBuilder:
-    """The chain so far: what was passed, and the gap since the last unknown joint.
+    """Builder of a chain, step by step along links and joints.
 
     Attributes:
-        known: indices in q of the positions that are known.
-        q: positions, of which the known ones are used.
+        known: indices in q of the known positions.
+        q: positions (nq, 1). Only the known positions are used.
+        joints: unknown joints so far.
+        gaps: transforms before these joints.
+        gap: transform since the last unknown joint.
     """
 
     known: Container[int]
@@ -256,17 +268,17 @@ class ChainBuilder:
     gap: Gap = field(default_factory=Gap)
 
     def over(self, pose: Pose) -> None:
-        """Over what does not move."""
+        """Append a known transform."""
         self.gap = self.gap.then(pose)
 
     def through(self, joint: ChainJoint) -> None:
-        """Through a joint that is looked for."""
+        """Append an unknown joint."""
         self.joints.append(joint)
         self.gaps.append(self.gap)
         self.gap = Gap()
 
     def past(self, joint: ChainJoint) -> None:
-        """Through a joint; over it, where its position is known."""
+        """Append a joint as unknown, or as a known transform if its position is known."""
         index = joint.index
         if index is None or index not in self.known:
             self.through(joint)
@@ -276,14 +288,14 @@ class ChainBuilder:
         self.over(joint.displacement(self.q[index : index + joint.motion.nq]))
 
     def along_tree(self, tree: Tree, a: Frame, b: Frame, spins: Mapping[int, Spin]) -> None:
-        """From frame a, back to the common link, and out to frame b.
+        """Append the path from frame a to the common link and from there to frame b.
 
         Args:
             tree: the links.
-            a: where the chain stands.
-            b: where it goes.
-            spins: of the spherical joints of rods, by the index in q at which their quaternions
-                begin.
+            a: frame at the current end of the chain.
+            b: frame at the new end of the chain.
+            spins: rotations of rods with spherical joints, by the first index in q of their
+                quaternions.
         """
         back, out = links_between(tree, a[0], b[0])
         self.over(a[1].inverse())
@@ -296,7 +308,7 @@ class ChainBuilder:
         self.over(b[1])
 
     def chain(self) -> Chain:
-        """What was passed."""
+        """Return the chain built so far."""
         return Chain(tuple(self.joints), (*self.gaps, self.gap))
 
 
@@ -307,21 +319,21 @@ def _joint(tree: Tree, k: int, sign: int, spins: Mapping[int, Spin]) -> ChainJoi
 
 
 def links_between(tree: Tree, a: int, b: int) -> tuple[list[int], list[int]]:
-    """The links from link a back to the common link, and from there out to link b."""
+    """Return the links from link a to the common link, and from there to link b."""
     fork = common_link(tree, a, b)
     back, out = ([k for k in tree.path(link) if k not in tree.path(fork)] for link in (a, b))
     return back[::-1], out
 
 
 def tree_chain(tree: Tree, a: Frame, b: Frame, known: Container[int], q: SX) -> Chain:
-    """The chain from one frame of a tree to another.
+    """Return the chain from frame a to frame b of a tree.
 
     Args:
         tree: the links.
-        a: where it begins.
-        b: where it ends.
-        known: indices in q of the positions that are known.
-        q: (nq, 1) positions, of which the known ones are used.
+        a: first frame of the chain.
+        b: last frame of the chain.
+        known: indices in q of the known positions.
+        q: (nq, 1) positions. Only the known positions are used.
     """
     builder = ChainBuilder(known, q)
     builder.along_tree(tree, a, b, {})

@@ -1,4 +1,4 @@
-"""Inertia matrix of a tree from the inertias of its composite bodies.
+"""Inertia matrix (mass matrix) of a tree by the composite-rigid-body algorithm.
 
 Source: Walker & Orin 1982; Khalil, Bennis & Gautier 1990; Khalil & Creusot 1997, eq. 27-38.
 """
@@ -20,10 +20,10 @@ from mbs.spatial import Wrench, body_through, wrench_through, zeros
 
 
 def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
-    """(nv, nv) symmetric inertia matrix A(q), rotors included [kg m^2, kg m, kg].
+    """Return the symmetric inertia matrix A(q) (nv, nv), rotors included [kg m^2, kg m, kg].
 
-    The composite body of link j is seen from the seat of its joint, where its momentum for a unit
-    velocity can be read off, and from there as a part of link i.
+    For a joint j with one velocity, the composite body of link j is expressed in the joint frame
+    on the antecedent i, in which the momentum for a unit velocity needs no products.
     """
     poses, bodies = shift_frames(tree, poses, [link.inertia for link in tree.links])
     composite = regroup(tree, poses, bodies)
@@ -53,14 +53,14 @@ def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
 
 
 def _at_seat(pose: LinkPose, motion: Motion, vector: SX) -> SX:
-    """A vector of the link in the frame in which the momentum of its joint is written."""
+    """Express a vector of the link in the frame in which its joint momentum is computed."""
     return pose.motion[0].rotation.apply(vector) if motion.nv == 1 else vector
 
 
 def _fill_ancestors(
     A: SX, tree: Tree, poses: list[LinkPose], j: int, column: int, wrench: Wrench
 ) -> None:
-    """The efforts at the ancestors of link j of a wrench on its antecedent, in column and row."""
+    """Write the efforts of a wrench on the antecedent of link j into its column and row of A."""
     k = tree.links[j].v.start + column
     i = tree.links[j].antecedent
     while i >= 0:
@@ -72,16 +72,16 @@ def _fill_ancestors(
         i = link.antecedent
 
 
-# A = L' D L of a tree's inertia matrix, without filling in its zeros.
+# Factors A = L' D L of the inertia matrix of a tree, without fill-in.
 #
-# The factor L has a non-zero only where a velocity is an ancestor of another one, so that
-# branches cost nothing to each other.
+# L[k, i] is zero unless velocity i is an ancestor of velocity k, so that velocities of different
+# branches cause no operations.
 #
 # Source: Featherstone 2008, section 6.5 (LTDL).
 
 
 def velocity_antecedents(tree: Tree) -> list[int]:
-    """For each velocity the one before it on the path to the base, or -1."""
+    """Return for each velocity the index of the previous velocity towards the base, or -1."""
     before = []
     for link in tree.links:
         i = link.antecedent
@@ -91,12 +91,12 @@ def velocity_antecedents(tree: Tree) -> list[int]:
 
 
 class TreeFactor(NamedTuple):
-    """A = L' D L of a tree's inertia matrix.
+    """Factors of the inertia matrix A = L' D L of a tree.
 
     Attributes:
-        ratios: for each velocity, the last first, and each of its ancestors, the nearest first,
-            minus the element of L.
-        inverse: 1 / D.
+        ratios: elements -L[k, i], from the last velocity k to the first, and for each k from its
+            nearest ancestor i to the farthest.
+        inverse: (n, 1) elements of 1 / D.
     """
 
     ratios: SX
@@ -104,22 +104,22 @@ class TreeFactor(NamedTuple):
 
 
 def factor_symbols(before: list[int]) -> TreeFactor:
-    """Symbols in the place of the factors of a matrix."""
+    """Return factors made of symbols, for the ancestors `before` of `factorize`."""
     size = sum(len(_path(before, k)) for k in range(len(before)))
     return TreeFactor(SX.sym("ratios", size), SX.sym("inverse", len(before)))
 
 
 def factorize(A: SX, before: list[int]) -> TreeFactor:
-    """The factors of A.
+    """Factorize A = L' D L.
 
     Args:
-        A: (n, n) symmetric, with A[i, j] zero unless one of i, j is an ancestor of the other.
-        before: for each row its ancestor, or -1; ancestors have smaller numbers.
+        A: (n, n) symmetric matrix; A[i, j] is zero unless i = j, i is an ancestor of j, or j of i.
+        before: index of the nearest ancestor of each row, or -1. Ancestors have smaller indices.
     """
     H, n = SX(A), A.shape[0]
     ratios, inverse = list[SX](), [SX(0)] * n
     for k in reversed(range(n)):
-        minus = -1 / H[k, k]  # its sign keeps products by it from being made divisions
+        minus = -1 / H[k, k]  # the sign prevents CasADi from rewriting products as divisions
         inverse[k] = -minus
         path = _path(before, k)
         for place, i in enumerate(path):
@@ -131,12 +131,12 @@ def factorize(A: SX, before: list[int]) -> TreeFactor:
 
 
 def substitute(factor: TreeFactor, right: SX, before: list[int]) -> SX:
-    """The solution x of A x = right, one or several columns.
+    """Solve A x = right for x (n, m) by substitution.
 
     Args:
-        factor: of A.
-        right: (n, m).
-        before: as of `factorized`.
+        factor: factors of A.
+        right: (n, m) right-hand sides.
+        before: index of the nearest ancestor of each row, as in `factorize`.
     """
     paths = [_path(before, k) for k in range(len(before))]
     x, place, ratio = SX(right), 0, dict[tuple[int, int], SX]()
@@ -153,12 +153,12 @@ def substitute(factor: TreeFactor, right: SX, before: list[int]) -> SX:
 
 
 def solve_tree(A: SX, right: SX, before: list[int]) -> SX:
-    """The solution x of A x = right; arguments as of `factorized` and `substituted`."""
+    """Solve A x = right for x; see `factorize` and `substitute` for the arguments."""
     return substitute(factorize(A, before), right, before)
 
 
 def _path(before: list[int], k: int) -> list[int]:
-    """The ancestors of a velocity, the nearest first."""
+    """Return the ancestors of a velocity, the nearest first."""
     path = []
     while before[k] >= 0:
         k = before[k]

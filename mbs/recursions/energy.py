@@ -14,7 +14,7 @@ from mbs.spatial import cross
 
 
 def kinetic_energy(tree: Tree, poses: list[LinkPose], v: SX) -> SX:
-    """Kinetic energy of links and rotors [J]."""
+    """Return the kinetic energy [J] of links and rotors."""
     motions = link_velocities(tree, poses, v)
     total = rotor_energy(tree, v, [motion.w for motion in motions])
     for link, motion in zip(tree.links, motions, strict=True):
@@ -29,7 +29,7 @@ def kinetic_energy(tree: Tree, poses: list[LinkPose], v: SX) -> SX:
 
 
 def potential_energy(tree: Tree, poses: list[LinkPose]) -> SX:
-    """Potential energy of gravity, zero with everything at the origin of the base [J]."""
+    """Return the potential energy [J] of gravity, relative to all mass at the base origin."""
     total = SX(0)
     for link, pose in zip(tree.links, base_poses(tree, poses), strict=True):
         moment = link.inertia.m * pose.p + casadi.mtimes(pose.R, link.inertia.ms)

@@ -1,6 +1,6 @@
-"""Force elements in the equations of a tree: wrenches on links, efforts on joints, energy.
+"""Wrenches and joint efforts of force elements, and wrenches that the joints transmit.
 
-Source: Khalil & Creusot 1997, eq. 15-20, for how wrenches on links become joint efforts.
+Source: Khalil & Creusot 1997, eq. 15-20, for the joint efforts of wrenches on links.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from mbs.recursions.velocities import (
 )
 from mbs.spatial import PseudoInertia, Wrench, add_wrenches, transform_wrench, zeros
 
-# Wrenches that the joints of a tree transmit, link by link as the description has them.
+# Wrenches that the joints of a tree transmit between the links of the description.
 #
-# The inverse dynamic model moves frames and inertial parameters to where they save operations;
-# its efforts stay the same, but not the wrenches between links. Here nothing is moved.
+# The inverse dynamic model shifts frames and regroups inertial parameters to save operations. This
+# keeps the joint efforts, but changes the wrenches between links. Here nothing is shifted.
 #
 # Source: Khalil & Creusot 1997, eq. 15-19.
 
@@ -32,14 +32,16 @@ from mbs.spatial import PseudoInertia, Wrench, add_wrenches, transform_wrench, z
 def inertial_loads(
     tree: Tree, poses: list[LinkPose], v: SX, a: SX, base: Acceleration
 ) -> dict[int, Wrench]:
-    """For every link the wrench that moves its bodies and turns its rotors, about and in its frame.
+    """Return the inertial wrench of each link and of its rotors, by link index.
+
+    Each wrench (force [N], moment [N m]) acts at the origin of the link frame, in its axes.
 
     Args:
         tree: the links.
-        poses: each with respect to its antecedent.
+        poses: pose of each link relative to its antecedent.
         v: (nv, 1) joint velocities.
         a: (nv, 1) joint accelerations.
-        base: motion of the base, gravity included.
+        base: motion of the base; its acceleration includes minus gravity.
     """
     motions = link_accelerations(tree, poses, v, a, base)
     spins = rotor_moments(tree, v, a, motions)
@@ -53,12 +55,13 @@ def inertial_loads(
 def transmitted_wrenches(
     tree: Tree, poses: list[LinkPose], loads: Mapping[int, Wrench]
 ) -> list[Wrench]:
-    """The wrench that each link takes from its antecedent, about and in its frame.
+    """Return the wrench that each link receives from its antecedent, in the frame of the link.
 
     Args:
         tree: the links.
-        poses: each with respect to its antecedent.
-        loads: for some links the wrench that they need themselves, about and in their frames.
+        poses: pose of each link relative to its antecedent.
+        loads: wrench that a link requires for itself, by link index, in the frame of the link.
+            Links without an entry require none.
     """
     carried = [loads.get(j, (zeros(), zeros())) for j in range(len(tree.links))]
     for j in reversed(range(len(tree.links))):
@@ -69,7 +72,7 @@ def transmitted_wrenches(
 
 
 def sum_wrenches(*parts: Mapping[int, Wrench]) -> dict[int, Wrench]:
-    """Wrenches on links added link by link."""
+    """Add wrenches on links, link by link."""
     total: dict[int, Wrench] = {}
     for part in parts:
         for link, wrench in part.items():
@@ -80,12 +83,12 @@ def sum_wrenches(*parts: Mapping[int, Wrench]) -> dict[int, Wrench]:
 def element_wrenches(
     acting: PartsAt, held: Container[tuple[str, str]] | None = None
 ) -> dict[int, Wrench]:
-    """For some links, the wrench that they exert on components, about and in their frames.
+    """Return the wrench that a link exerts on components, by link index, in the link frame.
 
     Args:
-        acting: the components at positions and velocities.
-        held: points, by component and port, whose wrenches alone count, those on the base (-1)
-            too; without it all on moving links.
+        acting: components at given positions and velocities.
+        held: points (component name, port) whose wrenches are summed, including points on the
+            base (link -1). By default all points on moving links.
     """
     exerted: list[dict[int, Wrench]] = []
     for part in acting.parts:
@@ -99,16 +102,16 @@ def element_wrenches(
 
 
 def element_efforts(acting: PartsAt, poses: list[LinkPose]) -> SX:
-    """(nv, 1) joint efforts that hold all components, the links at rest or not [N m or N].
+    """Return the joint efforts (nv, 1) that balance all components [N m or N].
 
-    It is the part that they have in the efforts of the inverse dynamic model.
+    It is the contribution of the components to the efforts of the inverse dynamic model.
     """
     wrenches = element_wrenches(acting)
     return wrench_efforts(acting.tree, poses, wrenches) + acting.efforts()
 
 
 def wrench_efforts(tree: Tree, poses: list[LinkPose], wrenches: Mapping[int, Wrench]) -> SX:
-    """(nv, 1) efforts along the motions that transmit wrenches of links to the base."""
+    """Return the joint efforts (nv, 1) that transmit wrenches of links to the base."""
     carried = transmitted_wrenches(tree, poses, wrenches)
     at = zip(tree.links, poses, carried, strict=True)
     return casadi.vertcat(*(effort(link, pose, *wrench) for link, pose, wrench in at))

@@ -1,8 +1,8 @@
-"""Jacobian of a frame, where its entries are zero or constant, and Renaud's factors of it.
+"""Jacobian of a frame, positions of its zero and constant entries, and its factors after Renaud.
 
-Every joint gives the velocity z x L along its own axis, L being the vector from the joint to the
-point whose velocity is asked for; the axes in which the result is asked for may be those of any
-frame, and the nearer they are to the middle of the chain, the fewer rotations are needed.
+A unit velocity of a revolute joint with axis z contributes the linear velocity z x L, where L is
+the vector from the joint to the reference point. The result may be expressed in the axes of any
+frame. Axes near the middle of the chain need the fewest rotations.
 
 Source: Renaud 1980; Khalil & Creusot 1997, eq. 3 and 5.
 """
@@ -44,14 +44,14 @@ from mbs.spatial import Pose, Rotation, cross, is_zero, skew, zeros
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VelocityTarget:
-    """A frame whose velocity is asked for.
+    """Frame whose velocity is required, and the axes of this velocity.
 
     Attributes:
         tree: the links.
         q: (nq, 1) symbols of positions.
-        p: (np, 1) symbols of parameters, whose operations are not counted.
-        frame: that moves.
-        axes: in which its velocity is.
+        p: (np, 1) symbols of parameters. Operations on parameters alone are not counted.
+        frame: moving frame whose velocity is required.
+        axes: frame in whose axes the velocity is expressed.
     """
 
     tree: Tree
@@ -61,18 +61,19 @@ class VelocityTarget:
     axes: Frame
 
     def along(self, axes: Frame) -> VelocityTarget:
-        """The same in other axes."""
+        """Return the same target with the velocity expressed in other axes."""
         return replace(self, axes=axes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlook:
-    """The tree seen from the frame in whose axes a Jacobian is asked for.
+    """Paths through a tree from the frame in whose axes a Jacobian is expressed.
 
     Attributes:
         tree: the links.
-        branches: two paths outwards from that frame: to the frame that moves, with the joints
-            that come after their common link, and to the base with the others.
+        branches: two paths that start at that frame. The first ends at the moving frame and
+            contains the joints after the common link of both frames. The second ends at the base
+            and contains the joints from the base up to the common link.
     """
 
     tree: Tree
@@ -80,12 +81,12 @@ class Outlook:
 
     @property
     def rotations(self) -> int:
-        """Number of rotations on the longer branch."""
+        """Number of rotations on the branch with more rotations."""
         return max(sum(isinstance(s, OtherRotation) for s in branch) for branch in self.branches)
 
 
 def outlook(target: VelocityTarget) -> Outlook:
-    """What the Jacobian of a frame in certain axes is made of."""
+    """Return the two paths from which the Jacobian of a target is computed."""
     tree, q, frame, axes = target.tree, target.q, target.frame, target.axes
     back, out = path_between(tree, q, axes, frame)
     aside = [step for step in back if not isinstance(step, (JointAt, OriginOf))]
@@ -96,14 +97,16 @@ def outlook(target: VelocityTarget) -> Outlook:
 
 
 def jacobian(seen: Outlook, reference: int | None = None, matrices: int = 0) -> SX:
-    """(6, nv) with [V; w] = J v, in the axes of the outlook.
+    """Return the Jacobian J (6, nv) of a moving frame, with [V; w] = J v, in the axes of `seen`.
 
     Args:
-        seen: the frame that moves and the axes.
-        reference: V is that of the point that is fixed on the frame and now at the origin of
-            this link's frame, -1 for the base's; None for the frame's own origin.
-        matrices: for so many rotations, counted from the axes, orientations are formed and applied;
-            beyond, each vector is rotated by itself. It changes the operations, not the result.
+        seen: paths from the axes to the moving frame and to the base.
+        reference: link (-1 for the base) whose frame origin is the reference point: V is the
+            velocity of the point of the moving frame that coincides with it. None for the origin
+            of the moving frame.
+        matrices: number of rotations, counted from the axes, that are multiplied to orientation
+            matrices. Beyond them each vector is rotated step by step. The result is the same; only
+            the number of operations changes.
     """
     J = zeros(6, seen.tree.nv)
     for branch, arms in zip(seen.branches, _arms(seen.branches, reference), strict=True):
@@ -114,11 +117,11 @@ def jacobian(seen: Outlook, reference: int | None = None, matrices: int = 0) -> 
 
 
 Column = tuple[int, SX, SX]
-"""Index in v, and what a unit of it gives: linear and angular velocity."""
+"""Index in v, and the linear and angular velocity (3, 1) of a unit velocity."""
 
 
 def _arms(branches: Sequence[list[PathStep]], reference: int | None) -> list[list[SX]]:
-    """After each step of each branch, the vector from there to the reference, in the axes there."""
+    """Vectors from the end of each step of each branch to the reference, in the local axes."""
     place = [_place(branch, reference) for branch in branches]
     here = 0 if reference is None or place[0] is not None else 1
     number = place[here]
@@ -131,7 +134,10 @@ def _arms(branches: Sequence[list[PathStep]], reference: int | None) -> list[lis
 
 
 def _place(branch: list[PathStep], reference: int | None) -> int | None:
-    """The step after which the reference is; -1 is the beginning, None elsewhere."""
+    """Index of the step that ends at the reference; None if it is not on the branch.
+
+    The index is -1 if an empty branch ends at the moving frame.
+    """
     if reference is None:
         return len(branch) - 1
     mark = OriginOf(reference)
@@ -139,7 +145,7 @@ def _place(branch: list[PathStep], reference: int | None) -> int | None:
 
 
 def _inward(branch: list[PathStep]) -> tuple[list[SX], SX]:
-    """Vectors to the end of the branch, after each step and before the first."""
+    """Vectors to the end of the branch: a list, from after each step, and from the start."""
     arm, arms = zeros(), []
     for step in reversed(branch):
         arms.append(arm)
@@ -152,7 +158,7 @@ def _inward(branch: list[PathStep]) -> tuple[list[SX], SX]:
 
 
 def _outward(branch: list[PathStep], arm: SX) -> list[SX]:
-    """Vectors to a reference that lies `arm` from the beginning of the branch."""
+    """Vectors to the reference from after each step; `arm` is the vector from the start."""
     arms = []
     for step in branch:
         match step:
@@ -165,7 +171,7 @@ def _outward(branch: list[PathStep], arm: SX) -> list[SX]:
 
 
 def _local_columns(tree: Tree, branch: list[PathStep], arms: list[SX]) -> list[tuple[int, Column]]:
-    """For each joint on the branch, the step where it is and its columns in the axes there."""
+    """Pairs of step index and Jacobian column, in the local axes, of the joints on a branch."""
     result = []
     for number, step in enumerate(branch):
         if isinstance(step, JointAt):
@@ -179,7 +185,7 @@ def _local_columns(tree: Tree, branch: list[PathStep], arms: list[SX]) -> list[t
 def _columns_at_start(
     branch: list[PathStep], columns: list[tuple[int, Column]], matrices: int
 ) -> list[Column]:
-    """The columns in the axes at the beginning of the branch."""
+    """Rotate the columns to the axes at the beginning of the branch."""
     turns = [number for number, step in enumerate(branch) if isinstance(step, OtherRotation)]
     split = turns[matrices] if matrices < len(turns) else len(branch)
     R, near = Pose.identity().R, []
@@ -207,34 +213,34 @@ def _rotate_by(rotation: Rotation, column: Column) -> Column:
     return k, V, w
 
 
-# Where the entries of a Jacobian are zero or constant, frame by frame, found on random
-# configurations.
+# Positions of the zero and constant entries of a Jacobian in each frame, found numerically.
 #
-# An entry that is zero at several random configurations with random lengths is zero always; so the
-# structure is known before a symbol is touched.
+# An entry that is zero at several random configurations with random lengths is assumed to be zero
+# everywhere. The structure is thus known without symbolic computation.
 
 
 Array = NDArray[np.float64]
 
 _SAMPLES = 3
 _ZERO = 1e-10
-"""Of lengths in units of the survey, and of components of unit vectors."""
+"""Zero threshold of scaled lengths and of components of unit vectors; far above rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Survey:
-    """A frame's Jacobian and the frames on the path to it, at random configurations.
+    """Jacobian of a moving frame, and the frames on the path to it, at random configurations.
 
-    Lengths are parts of the largest one, so that a small mechanism has no more zeros than a large
-    one.
+    Lengths are divided by the largest length, so that the zero threshold does not depend on the
+    size of the mechanism.
 
     Attributes:
-        frames: the base, the links on the path, and at last the axes that were asked for.
-        R: (frames, samples, 3, 3) their orientations in the base.
-        p: (frames, samples, 3) their origins in the base.
-        target_p: (samples, 3) origin of the frame that moves, in the base.
-        J: (samples, 6, nv) Jacobian in the base, for velocities in units of their own.
-        units: (nv,) these: of a tree's joints the length where they slide, 1 where they turn.
+        frames: base, links on the path, and the required axes last.
+        R: (frames, samples, 3, 3) orientations of these frames in the base.
+        p: (frames, samples, 3) scaled origins of these frames in the base.
+        target_p: (samples, 3) scaled origin of the moving frame in the base.
+        J: (samples, 6, nv) scaled Jacobian in the base, for velocities divided by `units`.
+        units: (nv,) units of the velocities. For joints of a tree: the largest length [m] if the
+            velocity only translates, else 1.
     """
 
     frames: tuple[Frame, ...]
@@ -245,7 +251,7 @@ class Survey:
     units: Array
 
     def combine(self, G: Array) -> Survey:
-        """The same of other velocities, of which G (samples, nv, m) makes these."""
+        """Return the survey for m other velocities u with v = G u, where G is (samples, nv, m)."""
         parts = G / self.units[:, None]
         sizes = np.abs(parts).max(axis=(0, 1))
         units = 1 / np.where(sizes > 0, sizes, 1.0)
@@ -253,25 +259,31 @@ class Survey:
 
     @property
     def on_path(self) -> range:
-        """Indices of the base and of the links."""
+        """Indices in `frames` of the base and of the links."""
         return range(len(self.frames) - 1)
 
     def linear(self, axes: int, reference: int | None) -> Array:
-        """(samples, 3, nv) velocity of a reference in the axes of a frame, both as positions."""
+        """(samples, 3, nv) velocity of frames[reference] in the axes of frames[axes].
+
+        None as reference is the origin of the moving frame.
+        """
         place = self.target_p if reference is None else self.p[reference]
         V = self.J[:, :3] + np.cross(self.J[:, 3:], (place - self.target_p)[..., None], axis=1)
         return np.asarray(np.swapaxes(self.R[axes], 1, 2) @ V)
 
     def angular(self, axes: int) -> Array:
-        """(samples, 3, nv) angular velocity in the axes of a frame."""
+        """(samples, 3, nv) angular velocity in the axes of frames[axes]."""
         return np.asarray(np.swapaxes(self.R[axes], 1, 2) @ self.J[:, 3:])
 
     def orientation(self, axes: int) -> Array:
-        """(samples, 3, 3) orientation of a frame in the axes that were asked for."""
+        """(samples, 3, 3) orientation of frames[axes] in the required axes."""
         return np.asarray(np.swapaxes(self.R[-1], 1, 2) @ self.R[axes])
 
     def separate_origins(self) -> list[int]:
-        """Indices of links whose origins are not always where a later one's or the frame's is."""
+        """Indices of frames on the path with distinct origins; of equal origins, the last frame.
+
+        Frames with the origin of the moving frame are left out.
+        """
         seen, kept = [self.target_p], []
         for number in reversed(self.on_path):
             if all(np.abs(self.p[number] - other).max() > _ZERO for other in seen):
@@ -280,7 +292,7 @@ class Survey:
         return kept[::-1]
 
     def arm(self, reference: int | None) -> Array:
-        """(samples, 3) from a reference to the frame's origin, in the axes asked for."""
+        """(samples, 3) scaled vector from a reference to the moving frame, in the required axes."""
         if reference is None:
             return np.zeros_like(self.target_p)
         arm = self.target_p - self.p[reference]
@@ -288,7 +300,7 @@ class Survey:
 
 
 def survey(target: VelocityTarget) -> Survey:
-    """The Jacobian of a frame at random configurations and parameters."""
+    """Evaluate the Jacobian of a target at random configurations and parameters."""
     tree, q, frame, axes = target.tree, target.q, target.frame, target.axes
     path = tree.path(frame[0])
     poses = base_poses(tree, link_poses(tree, q))
@@ -312,15 +324,15 @@ def survey(target: VelocityTarget) -> Survey:
 
 
 def random_samples(tree: Tree, parameters: int) -> list[tuple[Array, Array]]:
-    """Positions at random, and the same random parameters with each of them."""
+    """Return random positions, each with the same random parameters."""
     rng = np.random.default_rng(4)
-    # positive and of about one, as lengths and masses are, and not near zero
+    # positive values near 1 (SI units), as lengths and masses; values near zero are not generic
     p = rng.uniform(0.3, 1.7, parameters)
     return [(_random_position(tree, rng), p) for _ in range(_SAMPLES)]
 
 
 def _random_position(tree: Tree, rng: np.random.Generator) -> Array:
-    # [rad or m], between zero and a half turn, of which neither is generic
+    # [rad or m], between zero and pi, because angles of zero and pi are not generic
     q = rng.uniform(0.3, 2.8, tree.nq)
     for link in tree.links:
         if link.motion in (Motion.SPHERICAL, Motion.FREE):
@@ -330,32 +342,33 @@ def _random_position(tree: Tree, rng: np.random.Generator) -> Array:
 
 
 def nonzero(values: Array) -> NDArray[np.bool_]:
-    """Where a matrix, (samples, ...), is not zero in every sample."""
+    """Mask (...) of the entries of values (samples, ...) that are non-zero in some sample."""
     return np.asarray(
         (np.abs(values) > _ZERO * max(1.0, float(np.abs(values).max(initial=0)))).any(0)
     )
 
 
 def varying(values: Array) -> NDArray[np.bool_]:
-    """Where a matrix, (samples, ...), changes from configuration to configuration."""
+    """Mask (...) of the entries of values (samples, ...) that vary with the configuration."""
     return nonzero(values - values[0])
 
 
-# Renaud's factors of a Jacobian, and the frame in the middle that makes the last one simple.
+# Renaud's factors of a Jacobian, with an intermediate frame that makes the last factor simple.
 #
-# J = [R 0; 0 R] [I -L^; 0 I] J_i: the velocity of a reference point in the axes of an
-# intermediate frame i, moved to the origin of the frame, turned into the target axes.
+# J = [R 0; 0 R] [I -L^; 0 I] J_i. J_i gives the velocity of a reference point in the axes of an
+# intermediate frame i. The second factor shifts this velocity to the origin of the moving frame,
+# the first factor rotates the result to the target axes.
 #
 # Source: Renaud 1980; Khalil & Creusot 1997, eq. 4.
 
 
 _HOME = Pose.identity()
 _COUNTED = 6
-"""How many candidates are built and counted; the survey has ranked them. One in a long chain."""
+"""Number of best-ranked candidates whose operations are counted. In a long chain it is 1."""
 _MOST_TURNS = 24
-"""Branches with more turns than this take orientations for all of them."""
+"""Rotations per branch above which orientation matrices are formed for all rotations."""
 _MOST_PLACES = 16
-"""A longer chain is looked at from so many of its frames only."""
+"""Maximum number of frames of a chain that are tried as axes or reference."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -363,11 +376,12 @@ class Renaud:
     """The three factors of a Jacobian.
 
     Attributes:
-        intermediate: link in whose axes J is, -1 for the base.
-        reference: link whose origin V belongs to, None for the frame's own origin.
+        intermediate: link in whose axes J is expressed, -1 for the base.
+        reference: link whose origin is the reference point of J; None for the origin of the
+            moving frame.
         R: (3, 3) orientation of the intermediate frame in the target axes.
-        L: (3, 1) from the reference to the frame's origin, in the intermediate axes [m].
-        J: (6, nv) in the intermediate axes.
+        L: (3, 1) vector from the reference to the moving frame, in the intermediate axes [m].
+        J: (6, nv) Jacobian of the reference point in the intermediate axes.
     """
 
     intermediate: int
@@ -378,13 +392,13 @@ class Renaud:
 
     @property
     def rotation(self) -> SX:
-        """(6, 6) the first factor."""
+        """First factor (6, 6): rotation to the target axes."""
         Z = SX.zeros(3, 3)
         return casadi.vertcat(casadi.horzcat(self.R, Z), casadi.horzcat(Z, self.R))
 
     @property
     def displacement(self) -> SX:
-        """(6, 6) the second factor."""
+        """Second factor (6, 6): shift from the reference to the moving frame."""
         eye = casadi.densify(SX(DM.eye(3)))
         return casadi.vertcat(
             casadi.horzcat(eye, -skew(self.L)), casadi.horzcat(SX.zeros(3, 3), eye)
@@ -392,11 +406,12 @@ class Renaud:
 
 
 def cheapest_jacobian(target: VelocityTarget, reference: int | None = None) -> SX:
-    """(6, nv) Jacobian, of the ways to form it the one with the fewest operations.
+    """Return the Jacobian (6, nv) in the form with the fewest operations of several candidates.
 
     Args:
-        target: the frame that moves, and the axes.
-        reference: link whose origin V belongs to, None for the frame's own origin.
+        target: moving frame, and the axes of the Jacobian.
+        reference: link whose origin is the reference point of the linear velocity; None for the
+            origin of the moving frame.
     """
     seen = outlook(target)
     most = seen.rotations
@@ -408,12 +423,13 @@ def cheapest_jacobian(target: VelocityTarget, reference: int | None = None) -> S
 def renaud(
     target: VelocityTarget, intermediate: int | None = None, reference: int | None = None
 ) -> Renaud:
-    """The three factors; what is not asked for is chosen for the fewest operations of J.
+    """Return Renaud's three factors of a Jacobian; None selects the fewest operations of J.
 
     Args:
-        target: the frame that moves, and the target axes.
-        intermediate: link on the path to the frame, -1 for the base, or None for the best.
-        reference: link on the path whose origin the velocity J v belongs to, or None for the best.
+        target: moving frame, and the target axes.
+        intermediate: link on the path to the frame, -1 for the base, or None to select a link.
+        reference: link on the path whose origin is the reference point of J, or None to select
+            a link.
     """
     found = survey(target)
     ranked = _rank(found, intermediate, reference)
@@ -427,7 +443,10 @@ def renaud(
 
 
 def arm_from(target: VelocityTarget, reference: int | None) -> SX:
-    """(3, 1) from the origin of a link's frame to that of the frame that moves [m]."""
+    """Return the vector (3, 1) [m] from the origin of link `reference` to the moving frame.
+
+    It is expressed in the axes of the target. None as reference returns zeros.
+    """
     if reference is None:
         return zeros()
     place = reference, _HOME
@@ -438,7 +457,7 @@ def arm_from(target: VelocityTarget, reference: int | None) -> SX:
 def _rank(
     found: Survey, intermediate: int | None, reference: int | None
 ) -> list[tuple[int, int | None]]:
-    """Pairs of axes and reference, those with the fewest entries that vary first."""
+    """Sort pairs of axes and reference by the number of varying, then non-zero entries of J."""
     links = [found.frames[k][0] for k in found.on_path]
     places = spread(found.on_path)
     axes = places if intermediate is None else [links.index(intermediate)]
@@ -454,6 +473,6 @@ def _rank(
 
 
 def spread(places: Sequence[int]) -> list[int]:
-    """Some of many places, evenly."""
+    """Select at most `_MOST_PLACES` evenly spaced elements."""
     picks = np.linspace(0, len(places) - 1, min(len(places), _MOST_PLACES)).round().astype(int)
     return [places[k] for k in picks]

@@ -1,8 +1,8 @@
-"""Axes in which a joint is simple: its unit motions and their rates there.
+"""Unit motions of joints and their rates, in joint axes that need few operations.
 
-They stand at the origin of link j and do not turn with joint j: what is computed there for the
-joint needs no rotation about its own axis. Joints with parallel axes, one after the other, have the
-same axes, so that what is between them is a translation.
+The joint axes have their origin at the origin of link j but do not rotate with joint j, so that
+quantities of the joint need no rotation about its own axis. Successive joints with parallel axes
+have parallel joint axes. The transform between them is a translation.
 """
 
 from __future__ import annotations
@@ -18,53 +18,53 @@ from mbs.recursions.poses import LinkPose
 from mbs.recursions.velocities import Acceleration, motion_behind, unit_motions
 from mbs.spatial import Displacement, Rotation, ScrewDisplacement, cross, is_zero, vector, zeros
 
-# The unit motions of a joint and their rates, as seen by an observer at the joint.
+# Unit motions of a joint and their rates, relative to an observer at the joint.
 #
-# The unit motions of a joint are fixed in one of its two links, the carrier: in the link behind
-# the joint, or, of a backward joint, in the link before it. A small displacement along a unit
-# motion adds to the velocities and accelerations of everything behind the joint, as these see it,
-# the first and second rate of the unit motion where it is fixed in the other link.
+# The unit motions of a joint are constant in the axes of its carrier: the link after the joint or,
+# for a backward joint, the link before it. A small displacement along a unit motion changes the
+# velocities and accelerations of all descendants, expressed in their own frames, by the first and
+# second rate of the unit motion that is fixed in the link that is not the carrier.
 #
 # Source: Singh, Russell & Wensing 2022 (the vectors written there as Psi with one and two dots).
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Twist:
-    """A motion about a point: linear and angular part, (3, 1) each."""
+    """Motion vector about a point: linear and angular part, (3, 1) each."""
 
     linear: SX
     angular: SX
 
     def __add__(self, other: Twist) -> Twist:
-        """The sum of two motions about the same point."""
+        """Add a motion about the same point."""
         return Twist(self.linear + other.linear, self.angular + other.angular)
 
     def displaced(self, R: SX, p: SX) -> Twist:
-        """About the origin of a frame in which the present axes stand at p, turned by R."""
+        """Transform to a frame in which the current axes have origin p and orientation R."""
         angular = casadi.mtimes(R, self.angular)
         return Twist(casadi.mtimes(R, self.linear) + cross(p, angular), angular)
 
     def rate_on(self, carrier: Twist) -> Twist:
-        """Its rate where it is fixed on what moves with the velocity of the carrier."""
+        """Return the rate of the motion if it is fixed on a body with the velocity `carrier`."""
         turning = cross(carrier.angular, self.linear) + cross(carrier.linear, self.angular)
         return Twist(turning, cross(carrier.angular, self.angular))
 
     def power(self, f: SX, m: SX) -> SX:
-        """What a force f and a moment m about the same point do along the motion."""
+        """Return the power of a force f and a moment m about the same point along the motion."""
         return casadi.dot(self.linear, f) + casadi.dot(self.angular, m)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
-    """One motion that a joint allows, about the origin of its axes.
+    """Unit motion of a joint velocity and its rates, about the origin of the joint axes.
 
     Attributes:
-        unit: the motion for a unit velocity.
-        spin: (3, 1) rate of its angular part, when it is fixed in the link that is not its
+        unit: motion for a unit velocity.
+        spin: (3, 1) rate of the angular part of `unit`, if fixed in the link that is not the
             carrier.
-        second: its second rate, fixed in the same link.
-        faster: its rate fixed in the link before the joint, and fixed in the link behind it,
-            added: what a unit of velocity adds to the accelerations.
+        second: second rate of `unit`, if fixed in the link that is not the carrier.
+        faster: derivative of the acceleration with respect to the joint velocity: sum of the rates
+            of `unit` if fixed in the link before the joint and if fixed in the link after it.
     """
 
     unit: Twist
@@ -73,13 +73,13 @@ class Line:
     faster: Twist
 
     def drifting(self, twice: SX) -> Line:
-        """For an observer to whom everything has half of `twice` added to its velocity."""
+        """Change to an observer that measures all velocities larger by half of `twice`."""
         second = Twist(self.second.linear + cross(twice, self.spin), self.second.angular)
         linear = self.faster.linear + cross(twice, self.unit.angular)
         return Line(self.unit, self.spin, second, Twist(linear, self.faster.angular))
 
     def displaced(self, R: SX, p: SX) -> Line:
-        """About the origin of a frame in which the present axes stand at p, turned by R."""
+        """Transform to a frame in which the current axes have origin p and orientation R."""
         twists = (twist.displaced(R, p) for twist in (self.unit, self.second, self.faster))
         unit, second, faster = twists
         return Line(unit, casadi.mtimes(R, self.spin), second, faster)
@@ -87,15 +87,15 @@ class Line:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineObserver:
-    """Motion of the links of a joint, for an observer who moves with the origin of frame j.
+    """Motion of the two links of a joint, for an observer that moves with the origin of frame j.
 
     Attributes:
         v: (3, 1) velocity of the link that is not the carrier [m/s].
-        w: (3, 1) its angular velocity [rad/s].
-        vd: (3, 1) its acceleration, minus gravity [m/s^2].
-        wd: (3, 1) its angular acceleration [rad/s^2].
+        w: (3, 1) angular velocity of this link [rad/s].
+        vd: (3, 1) acceleration of this link, minus gravity [m/s^2].
+        wd: (3, 1) angular acceleration of this link [rad/s^2].
         v_carrier: (3, 1) velocity of the carrier [m/s].
-        w_carrier: (3, 1) its angular velocity [rad/s].
+        w_carrier: (3, 1) angular velocity of the carrier [rad/s].
     """
 
     v: SX
@@ -107,11 +107,11 @@ class LineObserver:
 
 
 def revolute_line(dot: SX, ddot: SX, vd: SX) -> Line:
-    """Of a revolute joint, about z.
+    """Return the unit motion and rates of a revolute joint about z.
 
     Args:
         dot: (3, 1) rate of the direction of the axis [rad/s].
-        ddot: (3, 1) its second rate [rad/s^2].
+        ddot: (3, 1) second rate of the direction of the axis [rad/s^2].
         vd: (3, 1) acceleration of the origin, which is on the axis [m/s^2].
     """
     return Line(
@@ -123,7 +123,7 @@ def revolute_line(dot: SX, ddot: SX, vd: SX) -> Line:
 
 
 def prismatic_line(dot: SX, ddot: SX) -> Line:
-    """Of a prismatic joint along z, for the rates of its direction."""
+    """Return the unit motion and rates of a prismatic joint along z; see `revolute_line`."""
     return Line(
         unit=Twist(vector([0, 0, 1]), zeros()),
         spin=zeros(),
@@ -133,7 +133,7 @@ def prismatic_line(dot: SX, ddot: SX) -> Line:
 
 
 def free_lines(link: Link, pose: LinkPose, seen: LineObserver) -> tuple[Line, ...]:
-    """The unit motions of a joint with several velocities."""
+    """Return the unit motions and rates of a joint with several velocities."""
     return tuple(_free_line(Twist(*unit), seen) for unit in unit_motions(link, pose))
 
 
@@ -151,29 +151,30 @@ def _free_line(unit: Twist, seen: LineObserver) -> Line:
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """A change of observer, who moves with the velocity of a point of the links.
+    """Change of observer between two points of the links; an observer moves with its point.
 
     Attributes:
-        twice: (3, 1) twice the velocity of the point left relative to the point reached [m/s].
+        twice: (3, 1) twice the velocity of the old point relative to the new point [m/s].
     """
 
     twice: SX
 
 
 AxesStep = Displacement | Drift
-"""An element of the path from the axes of one joint to those of the joint before."""
+"""Element of the path from the axes of a joint to the axes or frame of its antecedent."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointAxes:
-    """The axes of joint j at the origin of link j.
+    """Axes of joint j at the origin of link j.
 
     Attributes:
-        rotation: from the frame of link j to the axes; None when they are the same.
-        path: from the axes to those of the antecedent, when `parallel`, else to its frame.
-        parallel: whether the axes of the antecedent are parallel to these.
-        lines: the motions that the joint allows, in these axes.
-        w: (3, 1) angular velocity of link j, in these axes.
+        rotation: rotation from the frame of link j to the joint axes. None if both are the same.
+        path: displacements and changes of observer from the joint axes to the joint axes of the
+            antecedent if `parallel`, else to the frame of the antecedent.
+        parallel: Whether the joint axes of the antecedent are parallel to the axes of joint j.
+        lines: unit motions of the joint and their rates, in the joint axes.
+        w: (3, 1) angular velocity of link j, in the joint axes [rad/s].
     """
 
     rotation: Rotation | None
@@ -186,13 +187,13 @@ class JointAxes:
 def joint_axes(
     tree: Tree, poses: list[LinkPose], v: SX, motions: list[Acceleration], base: Acceleration
 ) -> list[JointAxes]:
-    """The axes of every joint.
+    """Return the axes, unit motions and rates of every joint.
 
     Args:
         tree: the links.
-        poses: each with respect to its antecedent.
+        poses: pose of each link relative to its antecedent.
         v: (nv, 1) joint velocities.
-        motions: of the links; see `link_accelerations`.
+        motions: velocities and accelerations of the links, see `link_accelerations`.
         base: motion of the base.
     """
     result: list[JointAxes] = []
@@ -212,7 +213,7 @@ def joint_axes(
 def _of_several(
     link: Link, pose: LinkPose, before: Acceleration, own: Acceleration, v: SX
 ) -> JointAxes:
-    """The frame of the link itself, for joints of several velocities."""
+    """Axes of a joint with several velocities: the frame of the link."""
     linear, angular = motion_behind(link, pose, v)
     path: tuple[AxesStep, ...] = (
         *_drift(linear),
@@ -231,7 +232,7 @@ def _of_several(
 def _of_one(
     link: Link, pose: LinkPose, before: Acceleration, own: Acceleration, v: SX
 ) -> JointAxes:
-    """The seat of the joint, moved along the axis."""
+    """Axes of a joint with one velocity: the joint frame on the antecedent, shifted along z."""
     w, wd = pose.at_seat(before.w), pose.at_seat(before.wd)
     dot = vector([w[1], -w[0], 0])
     ddot = vector([wd[1] + w[0] * w[2], w[1] * w[2] - wd[0], own.rate.U[2, 2]])
@@ -254,7 +255,7 @@ def _of_one(
 
 
 def _continue(pose: LinkPose, rotation: Rotation, axes: JointAxes, own: Acceleration) -> JointAxes:
-    """The axes of the joint before, at another point; `rotation` leads to them from its frame."""
+    """Axes parallel to the axes of the antecedent, to which `rotation` rotates from its frame."""
     p = rotation.apply(pose.p)
     shift = tuple(ScrewDisplacement.about(axis, SX(0), p[k]) for k, axis in enumerate("xyz"))
     path: tuple[AxesStep, ...] = (*shift, *_drift(cross(axes.w, p)))

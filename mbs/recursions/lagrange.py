@@ -1,10 +1,11 @@
-"""Lagrange's form: A, B and Q without differentiation, from augmented bodies.
+"""Matrices A, B and Q of Lagrange's form, from augmented bodies without differentiation.
 
-Every particle of the system moves at r_dot = J v, so that A is the integral of J' J over the mass
-and B that of J' dJ/dt: dA/dt = B + B', and B v are the Coriolis and centrifugal efforts. For
-revolute and prismatic joints B is made of the Christoffel symbols; for quaternion joints, whose
-velocities are no rates of positions, it is their extension. Column j of B needs the moments of the
-mass behind joint j and how they change: the augmented body of link j.
+Every particle of the system has the velocity r_dot = J v. Thus A is the integral of J' J over the
+mass, and B is the integral of J' dJ/dt, so that dA/dt = B + B'. B v are the Coriolis and
+centrifugal efforts. For revolute and prismatic joints, B consists of the Christoffel symbols. For
+quaternion joints, whose velocities are not rates of positions, B extends the Christoffel symbols.
+Column j of B depends on the moments of the mass of link j and its descendants and on their rates:
+the augmented body of link j.
 
 Source: Renaud 1986; Khalil & Creusot 1997, section 5.5; Echeandia & Wensing 2021.
 """
@@ -41,21 +42,22 @@ from mbs.spatial import (
 )
 from mbs.spatial.rotation import AxisRotation
 
-# The augmented body of a link: everything behind its joint, and how it changes.
+# Augmented body of a link: moments of the mass of the link and its descendants, and their rates.
 #
 # Source: Renaud 1986 (augmented bodies); Echeandia & Wensing 2021.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VelocityField:
-    """What the velocity field u of a unit joint velocity does, about an origin and in its axes.
+    """Integrals over the mass of the velocity field u of a unit joint velocity, in a frame.
 
-    With r a particle seen from the origin and u its velocity:
+    The vector r points from the origin of the frame to a particle, and u is the velocity of this
+    particle for a unit joint velocity.
 
     Attributes:
-        f, m: (3, 1) integrals of u and r x u over the mass, the momenta.
-        f_rate, m_rate: (3, 1) of du/dt and r x du/dt.
-        drag: (3, 1) of dr/dt x u.
+        f, m: (3, 1) integrals of u and of r x u: linear and angular momentum.
+        f_rate, m_rate: (3, 1) integrals of du/dt and of r x du/dt.
+        drag: (3, 1) integral of dr/dt x u.
     """
 
     f: SX
@@ -66,11 +68,11 @@ class VelocityField:
 
     @staticmethod
     def nothing() -> VelocityField:
-        """The column of no mass."""
+        """Return the integrals of a body without mass."""
         return VelocityField(zeros(), zeros(), zeros(), zeros(), zeros())
 
     def __add__(self, other: VelocityField) -> VelocityField:
-        """The column of two masses that move with the same velocity."""
+        """Add the integrals of a second mass with the same velocity field, in the same frame."""
         return VelocityField(
             self.f + other.f,
             self.m + other.m,
@@ -80,25 +82,28 @@ class VelocityField:
         )
 
     def through(self, step: Displacement, velocity: SX) -> VelocityField:
-        """The column in the frame before a displacement whose translation has this velocity."""
+        """Transform to the frame before a displacement, whose translation changes at `velocity`."""
         f, m = step.wrench(self.f, self.m)
         f_rate, m_rate = step.wrench(self.f_rate, self.m_rate)
         drag = step.rotation.apply(self.drag) + cross(velocity, f)
         return VelocityField(f, m, f_rate, m_rate, drag)
 
     def row(self, link: Link, w: SX) -> SX:
-        """Entries of B in the row of u for the velocities of a link; its directions turn at w."""
+        """Return the entries of B in the row of u and the columns of a link.
+
+        The directions of the joint of the link rotate at w (3, 1).
+        """
         return effort_at_joint(link, cross(self.f, w), cross(self.m, w) + self.drag)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Augmented:
-    """The mass behind a joint, about the origin of a frame and in its axes.
+    """Moments of the mass on the distal side of a joint, about the origin and axes of a frame.
 
     Attributes:
-        mass: its moments.
-        rate: half the rate of these moments, seen from the frame.
-        spin: (3, 1) half the angular momentum about the origin, seen from the frame.
+        mass: moments of order 0, 1 and 2.
+        rate: half the rate of the moments, relative to the frame.
+        spin: (3, 1) half the angular momentum about the origin, relative to the frame.
     """
 
     mass: PseudoInertia
@@ -107,25 +112,31 @@ class Augmented:
 
     @staticmethod
     def of(body: PseudoInertia, spin: SX) -> Augmented:
-        """A body at rest in the frame, with half the angular momentum of rotors in it."""
+        """Return the moments of a body at rest in the frame.
+
+        The argument `spin` is half the angular momentum (3, 1) of the rotors on the body.
+        """
         return Augmented(body, PseudoInertia(zeros(3, 3), zeros(), SX(0)), spin)
 
     @staticmethod
     def nothing() -> Augmented:
-        """No mass at all."""
+        """Return the moments of a body without mass."""
         return Augmented.of(PseudoInertia(zeros(3, 3), zeros(), SX(0)), zeros())
 
     def __add__(self, other: Augmented) -> Augmented:
-        """Two bodies in one frame."""
+        """Add the moments of a second body, in the same frame."""
         return Augmented(self.mass + other.mass, self.rate + other.rate, self.spin + other.spin)
 
     def through(self, step: Displacement) -> Augmented:
-        """The same mass about and in the frame before a displacement, which stands still."""
+        """Transform to the frame before a constant displacement."""
         _, spin = step.wrench(self.rate.ms, self.spin)
         return Augmented(step.body(self.mass), step.body(self.rate), spin)
 
     def moved(self, linear: SX, angular: SX) -> Augmented:
-        """Seen from a frame in which this one moves, at twice these velocities (3, 1)."""
+        """Change to a reference frame in which the current frame moves.
+
+        The arguments are half the linear and half the angular velocity (3, 1) of this motion.
+        """
         S, ms, m = self.mass.S, self.mass.ms, self.mass.m
         flow = casadi.mtimes(linear, ms.T) + casadi.mtimes(skew(angular), S)
         rate = PseudoInertia(
@@ -137,12 +148,12 @@ class Augmented:
         return Augmented(self.mass, rate, spin)
 
     def column(self, w: SX, linear: SX, angular: SX) -> VelocityField:
-        """The column of the velocity field linear + angular x r.
+        """Return the integrals of the velocity field u = linear + angular x r.
 
         Args:
             w: (3, 1) angular velocity of the frame.
-            linear: (3, 1) velocity at the origin, fixed in the frame.
-            angular: (3, 1) likewise.
+            linear: (3, 1) velocity at the origin, constant in the frame.
+            angular: (3, 1) angular velocity of the field, constant in the frame.
         """
         S, ms = self.mass.S, self.mass.ms
         f = self.mass.m * linear + cross(angular, ms)
@@ -161,12 +172,12 @@ class Augmented:
 
 
 def rotor_column(link: Link, carrier: int, w: SX) -> VelocityField:
-    """The column of the joint's velocity in the rotor that it spins on a carrier.
+    """Return the integrals of a unit joint velocity over the rotor that the joint drives.
 
     Args:
-        link: of the joint.
-        carrier: number of the link; the column is zero where the rotor is on another one.
-        w: (3, 1) angular velocity of the carrier.
+        link: link whose joint drives the rotor.
+        carrier: index of a link. The result is zero if the rotor is not mounted on this link.
+        w: (3, 1) angular velocity of the carrier, in its frame.
     """
     momentum = momentum_on(link, carrier)
     half_turn = 0.5 * cross(w, momentum)
@@ -174,7 +185,7 @@ def rotor_column(link: Link, carrier: int, w: SX) -> VelocityField:
 
 
 def _inertia_times(S: SX, a: SX) -> SX:
-    """J a of the inertia tensor J = tr(S) - S, without the squares that cancel."""
+    """Return J a with the inertia tensor J = tr(S) - S, without forming terms that cancel."""
     rows = []
     for k in range(3):
         m, n = (k + 1) % 3, (k + 2) % 3
@@ -183,12 +194,12 @@ def _inertia_times(S: SX, a: SX) -> SX:
 
 
 Step = tuple[Displacement, SX]
-"""A displacement, and the velocity (3, 1) of its translation, both in the axes before it."""
+"""Displacement and the rate (3, 1) of its translation, both in the axes before it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LagrangeForm:
-    """tau = A a + B v + Q.
+    """Matrices of the dynamic model tau = A a + B v + Q.
 
     Attributes:
         A: (nv, nv) symmetric inertia matrix [kg m^2, kg m, kg].
@@ -203,19 +214,19 @@ class LagrangeForm:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _FormPlace:
-    """Where the columns of a joint are written: its seat, or the frame of its link.
+    """Frame in which the columns of joint j are computed: joint frame on link i, or link frame j.
 
-    The directions of the joint are constant there.
-
-    Joints with parallel axes, one after the other, may have parallel places: what comes from
-    behind them is then turned once, by the sum of their angles.
+    The directions of the joint are constant in this column frame. Link i is the antecedent.
+    Successive joints with parallel axes may have parallel column frames. Vectors of their
+    descendants are then rotated once, by the sum of the joint angles.
 
     Attributes:
-        w: (3, 1) angular velocity of link j; of link i where the joint is backward.
+        w: (3, 1) angular velocity of link j, or of link i if the joint is backward.
         g: (3, 1) gravity acceleration.
-        inner: from the place to frame j; empty when it is frame j.
-        outer: to the place from frame i, or from the place of joint i when that is parallel.
-        parallel: whether it is.
+        inner: displacements from the column frame to frame j. Empty if both are the same.
+        outer: displacements to the column frame from the column frame of joint i if `parallel`,
+            else from frame i.
+        parallel: Whether the column frames of joints i and j are parallel.
     """
 
     w: SX
@@ -227,13 +238,13 @@ class _FormPlace:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _FormWork:
-    """The form being filled, and what its entries are read with.
+    """Matrices that are being filled, and the data of the tree required for their entries.
 
     Attributes:
-        form: so far.
+        form: matrices A, B and Q, filled in place.
         tree: the links.
-        places: of the joints.
-        w: (3, 1) angular velocities of the links, each in its frame.
+        places: column frames of the joints.
+        w: (3, 1) angular velocity of each link, in the link frame.
     """
 
     form: LagrangeForm
@@ -243,11 +254,11 @@ class _FormWork:
 
 
 def lagrange_form(tree: Tree, poses: list[LinkPose], v: SX) -> LagrangeForm:
-    """The three matrices of the dynamic model.
+    """Return the matrices A, B and Q of the dynamic model tau = A a + B v + Q.
 
     Args:
         tree: the links.
-        poses: each with respect to its antecedent.
+        poses: pose of each link relative to its antecedent.
         v: (nv, 1) joint velocities.
     """
     bodies = [PseudoInertia.of(link.inertia) for link in tree.links]
@@ -279,9 +290,9 @@ def lagrange_form(tree: Tree, poses: list[LinkPose], v: SX) -> LagrangeForm:
 
 
 def _places(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_FormPlace]:
-    """Where the columns of every joint are written.
+    """Choose the frame in which the columns of every joint are computed.
 
-    Nothing is read before a joint on the base, so that it needs no seat.
+    A joint on the base (not backward) uses its link frame, because it has no ancestors.
     """
     result: list[_FormPlace] = []
     gravity: list[SX] = []
@@ -307,9 +318,10 @@ def _places(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_Form
 
 
 def _follows(tree: Tree, poses: list[LinkPose], j: int, w: list[SX]) -> bool:
-    """Whether the axis is parallel to that of the joint before, and turns across itself.
+    """Whether joint j is parallel to the previous joint, and the direction of the axis varies.
 
-    Where it does not, links move in a plane, and turning them one by one leaves more zeros.
+    If the direction is constant, the links move in a plane, and one rotation per joint keeps more
+    zeros.
     """
     run = poses[j].run
     root = tree.links[run[0]].antecedent
@@ -320,7 +332,7 @@ def _follows(tree: Tree, poses: list[LinkPose], j: int, w: list[SX]) -> bool:
 
 
 def _parallel(pose: LinkPose, before: _FormPlace, angular: SX) -> _FormPlace:
-    """The place of a joint that is parallel to that of the joint before it."""
+    """Return the column frame of a joint, parallel to the column frame of the previous joint."""
     inner, _ = before.inner[0]
     p = inner.point(pose.foot)
     outer = FreeDisplacement(MatrixRotation(SX(DM.eye(3))), p)
@@ -339,7 +351,10 @@ def _parallel(pose: LinkPose, before: _FormPlace, angular: SX) -> _FormPlace:
 
 
 def _moving_steps(pose: LinkPose, w: SX, linear: SX) -> list[Step]:
-    """The displacements from frame i, which turns at w, to frame j; the last slides at `linear`."""
+    """Displacements with velocities from frame i, which rotates at w, to frame j.
+
+    The last displacement translates at `linear`, in the axes of frame j.
+    """
     steps: list[Step] = []
     for number, step in enumerate(pose.steps, 1):
         velocity = cross(w, step.point(zeros()))
@@ -351,7 +366,7 @@ def _moving_steps(pose: LinkPose, w: SX, linear: SX) -> list[Step]:
 
 
 def _fill_columns(work: _FormWork, j: int, body: Augmented) -> None:
-    """Columns and rows of the velocities of joint j, its own block and those of its ancestors."""
+    """Fill the rows and columns of joint j: its diagonal block and the blocks of its ancestors."""
     form, link, place = work.form, work.tree.links[j], work.places[j]
     spin = _at(place.inner, rotor_column(link, j, work.w[j]))
     for number, (linear, angular) in enumerate(unit_motions_at_joint(link)):
@@ -368,7 +383,10 @@ def _fill_columns(work: _FormWork, j: int, body: Augmented) -> None:
 
 
 def _add_drives(form: LagrangeForm, tree: Tree, v: SX) -> None:
-    """What Ia adds; on a Free joint it is a mass too, whose velocity turns with the link."""
+    """Add the drive inertia Ia to A. On a Free joint, it also adds Coriolis terms to B.
+
+    There Ia is also a mass, whose velocity is expressed in the rotating link frame.
+    """
     for link in tree.links:
         for k in range(link.v.start, link.v.stop):
             form.A[k, k] += link.Ia
@@ -378,7 +396,10 @@ def _add_drives(form: LagrangeForm, tree: Tree, v: SX) -> None:
 
 
 def _fill_ancestors(work: _FormWork, j: int, k: int, column: VelocityField) -> None:
-    """Entries of velocity k of joint j, at whose place the column is, with its ancestors."""
+    """Fill the entries of velocity k of joint j with the ancestors of j.
+
+    The column is expressed in the column frame of joint j.
+    """
     form, tree, places, w = work.form, work.tree, work.places, work.w
     driven = tree.links[j]
     while (i := tree.links[j].antecedent) >= 0:
@@ -398,13 +419,13 @@ def _fill_ancestors(work: _FormWork, j: int, k: int, column: VelocityField) -> N
 
 
 def _at(steps: list[Step], column: VelocityField) -> VelocityField:
-    """A column in the frame before these displacements."""
+    """Transform a column to the frame before the displacements."""
     for step, velocity in reversed(steps):
         column = column.through(step, velocity)
     return column
 
 
-# B of Lagrange's form by differentiating the inertia matrix: Christoffel's symbols.
+# Coriolis matrix B by differentiation of the inertia matrix (Christoffel symbols).
 #
 # For quaternion joints, whose velocities are not rates of positions, Hamel's terms are added as a
 # skew-symmetric block.
@@ -413,12 +434,15 @@ def _at(steps: list[Step], column: VelocityField) -> VelocityField:
 
 
 def christoffel(tree: Tree, q: SX, v: SX, A: SX) -> SX:
-    """B (nv, nv) = (dA/dt + D - D') / 2 with D = d(A v)/dq N(q), plus Hamel's block.
+    """Return the Coriolis matrix B (nv, nv) from derivatives of the inertia matrix.
+
+    B = (dA/dt + D - D') / 2 with D = d(A v)/dq N(q) and dq/dt = N(q) v, plus Hamel's blocks of
+    quaternion joints.
 
     Args:
         tree: the links.
-        q: (nq, 1) symbols.
-        v: (nv, 1) symbols.
+        q: (nq, 1) symbols of positions.
+        v: (nv, 1) symbols of velocities.
         A: (nv, nv) inertia matrix at q.
     """
     momentum = casadi.mtimes(A, v)
@@ -434,7 +458,10 @@ def christoffel(tree: Tree, q: SX, v: SX, A: SX) -> SX:
 
 
 def _hamel(motion: Motion, momentum: SX) -> SX:
-    """The matrix that times the joint's own velocity is w x p (and V x p) of its momentum p."""
+    """Return the matrix whose product with the joint velocity is w x p (and V x p).
+
+    The vector p is the momentum of the joint.
+    """
     if motion is Motion.SPHERICAL:
         return -skew(momentum)
     linear, angular = skew(momentum[0:3]), skew(momentum[3:6])

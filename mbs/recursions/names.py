@@ -1,7 +1,7 @@
-"""Names of what the recursions compute, as SYMORO writes them.
+"""SYMORO names of the quantities that the recursions compute.
 
-An element comes before its link: W32 is the third element of the angular velocity of link 2. From
-the tenth link on an underscore stands between them: W3_12.
+The index of the element precedes the link number: W32 is the third element of the angular velocity
+of link 2. From link 10 on, an underscore separates the two numbers: W3_12.
 
 Source: Khalil & Creusot 1997, section 5.1; docs/notation.md lists them.
 """
@@ -14,7 +14,7 @@ from mbs.recursions.newton_euler import Dynamics
 
 
 def newton_euler_names(dynamics: Dynamics) -> list[tuple[str, SX]]:
-    """Names and scalars of the recursions of Newton and Euler."""
+    """Return the names and scalars of the Newton-Euler recursions."""
     named: list[tuple[str, SX]] = []
     for j, motion in enumerate(dynamics.motions, 1):
         own, joint = dynamics.own[j - 1], dynamics.wrenches[j - 1]
@@ -33,7 +33,7 @@ def newton_euler_names(dynamics: Dynamics) -> list[tuple[str, SX]]:
 
 
 def _elements(name: str, matrix: SX, link: int) -> list[tuple[str, SX]]:
-    """The elements of a vector or matrix that are neither constant nor a lone symbol."""
+    """Return the elements of a matrix that are neither constant nor a single symbol."""
     rows, columns = matrix.shape
     named = []
     for column in range(columns):

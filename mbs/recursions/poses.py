@@ -30,15 +30,15 @@ from mbs.spatial import (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkPose:
-    """Frame j seen from its antecedent i, as displacements that are cheap to apply.
+    """Pose of frame j relative to its antecedent i, as displacements that are cheap to apply.
 
     Attributes:
-        seat: from frame i to the seat of joint j, a frame fixed on link i whose z axis is the
-            axis of the joint.
-        motion: from the seat to frame j: the rotation and translation of the joint.
-        run: numbers of the revolute joints with parallel axes, one after the other, that end
-            with this joint; the joint alone when its antecedent's axis is another.
-        spin: the turn by the sum of the angles of the run.
+        seat: displacements from frame i to the joint frame on link i (the seat), whose z axis is
+            the axis of joint j.
+        motion: displacements from the seat to frame j: rotation and translation of the joint.
+        run: indices of the consecutive revolute joints with parallel axes that end with this
+            joint. It holds j alone if the axis of the antecedent is not parallel.
+        spin: rotation by the summed angles of the run.
     """
 
     seat: tuple[Displacement, ...]
@@ -48,7 +48,7 @@ class LinkPose:
 
     @property
     def steps(self) -> tuple[Displacement, ...]:
-        """From frame i to frame j."""
+        """Displacements from frame i to frame j."""
         return self.seat + self.motion
 
     @property
@@ -75,29 +75,29 @@ class LinkPose:
         return R
 
     def at_seat(self, vector: SX) -> SX:
-        """A vector of frame i in the seat of the joint."""
+        """Express a vector of frame i in the axes of the seat."""
         for step in self.seat:
             vector = step.rotation.apply_inverse(vector)
         return vector
 
     def apply(self, vector: SX) -> SX:
-        """A vector of frame j in frame i."""
+        """Express a vector of frame j in frame i."""
         for step in reversed(self.steps):
             vector = step.rotation.apply(vector)
         return vector
 
     def apply_inverse(self, vector: SX) -> SX:
-        """A vector of frame i in frame j."""
+        """Express a vector of frame i in frame j."""
         for step in self.steps:
             vector = step.rotation.apply_inverse(vector)
         return vector
 
     def wrench(self, f: SX, m: SX) -> Wrench:
-        """Force and moment about the origin of j, in j, about the origin of i and in its axes."""
+        """Transform a wrench about the origin of j, in frame j, to the origin and axes of i."""
         return wrench_through(self.steps, f, m)
 
     def after(self, pose: Pose) -> Pose:
-        """Frame j seen from the frame in which frame i has this pose."""
+        """Return the pose of frame j in the frame in which frame i has the pose `pose`."""
         rows = pose.R.T
         for step in self.steps:
             rows = casadi.horzcat(*(step.rotation.apply_inverse(rows[:, k]) for k in range(3)))
@@ -105,7 +105,7 @@ class LinkPose:
 
 
 def link_poses(tree: Tree, q: SX) -> list[LinkPose]:
-    """Every link frame seen from its antecedent at the positions q, (nq, 1)."""
+    """Return the pose of each link relative to its antecedent at the positions q, (nq, 1)."""
     poses: list[LinkPose] = []
     angles: list[SX] = []
     for j, link in enumerate(tree.links):
@@ -123,12 +123,12 @@ def link_poses(tree: Tree, q: SX) -> list[LinkPose]:
 
 
 def _continues(before: Link, seat: tuple[ScrewDisplacement, ...]) -> bool:
-    """Whether a revolute joint on this seat has the axis direction of the one before."""
+    """Whether joint `before` is revolute and parallel to a revolute joint on this seat."""
     return before.motion is Motion.REVOLUTE and not any(_turns(step) for step in seat)
 
 
 def base_poses(tree: Tree, poses: list[LinkPose]) -> list[Pose]:
-    """Every link frame seen from the base."""
+    """Return the pose of each link frame in the base frame."""
     result: list[Pose] = []
     for link, pose in zip(tree.links, poses, strict=True):
         i = link.antecedent
@@ -139,7 +139,7 @@ def base_poses(tree: Tree, poses: list[LinkPose]) -> list[Pose]:
 def _joint(
     link: Link, seat: tuple[ScrewDisplacement, ...], q: SX
 ) -> tuple[tuple[ScrewDisplacement, ...], tuple[Displacement, ...]]:
-    """The seat of a joint and the displacement from it to the frame of the link."""
+    """Return the seat of a joint and the displacements from the seat to the link frame."""
     at = link.placement
     match link.motion:
         case Motion.REVOLUTE:
@@ -150,7 +150,7 @@ def _joint(
 
 
 def _free(link: Link, q: SX) -> FreeDisplacement:
-    """The displacement of a spherical or free motion; its inverse where it is passed backward."""
+    """Return the displacement of a spherical or free joint, inverted for a backward joint."""
     R = quaternion_rotation(q[link.motion.nq - 4 :])
     R = R.T if link.backward else R
     if link.motion is not Motion.FREE:
@@ -161,10 +161,10 @@ def _free(link: Link, q: SX) -> FreeDisplacement:
 
 
 def _moving(*steps: ScrewDisplacement) -> tuple[ScrewDisplacement, ...]:
-    """The steps that move anything."""
+    """Return the steps that are not the identity."""
     return tuple(step for step in steps if _turns(step) or not step.t.is_zero())
 
 
 def _turns(step: ScrewDisplacement) -> bool:
-    """Whether it turns; the cosine of a small angle is one, its sine is not zero."""
+    """Whether a step rotates. A tiny angle has a cosine of one and a nonzero sine."""
     return not (step.rotation.s.is_zero() and step.rotation.c.is_one())

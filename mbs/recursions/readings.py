@@ -1,4 +1,4 @@
-"""What sensors read of positions, velocities and accelerations, in models and along wires."""
+"""Sensor readings of positions, velocities and accelerations, for models and signal wires."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mbs.recursions.route import BASE, relative_acceleration, relative_motion, r
 from mbs.recursions.velocities import Acceleration, Velocity
 
 Readings = dict[str, SX]
-"""What a sensor reads, by the names of its quantities."""
+"""Readings of a sensor by the name of the quantity."""
 
 
 def frame_readings(
@@ -24,14 +24,15 @@ def frame_readings(
     velocities: list[Velocity] | None,
     accelerations: list[Acceleration] | None = None,
 ) -> Readings:
-    """What a sensor on points reads.
+    """Return the readings of a sensor on frames of links.
 
     Args:
         tree: the links.
-        attached: the sensor; it reads "absolute", "relative" or "distance".
+        attached: sensor of the kind "absolute", "relative" or "distance".
         q: (nq, 1) positions.
-        velocities: of the links, each in its frame; at rest when None.
-        accelerations: likewise, gravity left out; not read when left out.
+        velocities: velocities of the links, each in its frame. None means at rest.
+        accelerations: accelerations of the links without gravity, each in its frame. If None, no
+            acceleration is returned.
     """
     frames = attached.frames
     a, b = frames if len(frames) == 2 else (BASE, *frames)
@@ -47,14 +48,14 @@ def frame_readings(
 
 
 def axes_of(attached: AttachedSensor) -> Frame:
-    """The frame in whose axes a sensor reads its vectors."""
+    """Return the frame in whose axes a sensor expresses its vectors."""
     frames = attached.frames
     a, b = frames if len(frames) == 2 else (BASE, *frames)
     return {"world": BASE, "body": b, "a": a, "b": b}[getattr(attached.sensor, "axes", "b")]
 
 
 def in_axes(tree: Tree, q: SX, vectors: Readings, axes: Frame, home: Frame) -> Readings:
-    """Vectors given in the axes of the frame `home` in those of another one."""
+    """Express vectors of the frame `home` in the frame `axes`."""
     if axes is home:
         return vectors
     R = relative_pose(tree, q, axes, home).R
@@ -68,14 +69,14 @@ def coordinate_readings(
     v: SX | None,
     a: SX | None = None,
 ) -> Readings:
-    """Position, velocity and acceleration of a coordinate of the tree, as far as it has them.
+    """Return the position, velocity and acceleration of a coordinate, as far as they exist.
 
     Args:
-        name: of the coordinate.
+        name: name of the coordinate.
         tables: the coordinates of q and of v.
         q: (nq, 1) positions.
-        v: (nv, 1) velocities; not read when None.
-        a: (nv, 1) accelerations, likewise.
+        v: (nv, 1) velocities. If None, no velocity is returned.
+        a: (nv, 1) accelerations. If None, no acceleration is returned.
     """
     read: Readings = {}
     positions, speeds = tables

@@ -1,4 +1,4 @@
-"""Simulation: of a system by compiled code, of an FMU through an importer; of many cases."""
+"""Simulation of a system by compiled code, of an FMU through FMPy, and of parameter sweeps."""
 
 from mbs.simulate.fmu import fmu
 from mbs.simulate.run import Simulator, run

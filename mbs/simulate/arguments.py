@@ -1,4 +1,4 @@
-"""Checks of the numbers that simulations are asked with."""
+"""Checks of durations, steps and tolerances of simulations."""
 
 import numbers
 
@@ -8,19 +8,19 @@ from mbs.errors import ModelError
 from mbs.text import quoted
 
 LONGEST = 10_000_000
-"""Rows of the longest result."""
+"""Maximum number of rows of a result."""
 
 
 def positive(value: object, what: str, where: str) -> float:
-    """A finite positive number.
+    """Return a value as a finite positive float.
 
     Args:
-        value: what was given.
-        what: its name and unit, for the message.
-        where: of what it is, for the message.
+        value: value to check.
+        what: name and unit of the value, for the error message.
+        where: name of the model, for the error message.
 
     Raises:
-        ModelError: it is anything else.
+        ModelError: the value is not a finite positive number.
     """
     if isinstance(value, numbers.Real) and not isinstance(value, bool):
         number = float(value)
@@ -30,15 +30,15 @@ def positive(value: object, what: str, where: str) -> float:
 
 
 def count_steps(duration: float, step: float, where: str) -> int:
-    """How many steps make a duration, one at least.
+    """Return the number of steps of a duration, at least 1.
 
     Args:
-        duration: s, positive.
-        step: s, positive.
-        where: of what it is, for the message.
+        duration: positive duration [s].
+        step: positive time step [s].
+        where: name of the model, for the error message.
 
     Raises:
-        ModelError: the result would be too long.
+        ModelError: the result would have more than `LONGEST` rows.
     """
     if not duration / LONGEST <= step:
         raise ModelError(

@@ -1,4 +1,4 @@
-"""Simulation of an FMU, ours or anyone's, through the libraries of fmpy."""
+"""Simulation of an FMU of any tool through the library FMPy."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ from mbs.simulate.fmu_plan import (
 from mbs.simulate.fmu_variables import NUMBERS
 from mbs.text import quoted
 
-# Co-simulation of one FMU: it makes the steps.
+# Co-simulation of an FMU, which integrates by itself.
 #
 # An input that the FMU cannot follow during a step is held at its value in the middle of the
-# step, which is right to second order, and has its own value again where a row is kept.
+# step, which is accurate to second order. It is set to its current value before a row is recorded.
 
 
 _DISCARD = 2
@@ -56,12 +56,12 @@ _MOST_ITERATIONS = 1000
 
 @dataclass(frozen=True, slots=True)
 class Reached:
-    """How a step ended.
+    """End of a step.
 
     Attributes:
-        time: where [s].
-        event: something happened there.
-        terminated: the FMU asks for the end.
+        time: time at the end of the step [s].
+        event: Whether an event occurred at this time.
+        terminated: Whether the FMU requests the end of the simulation.
     """
 
     time: float
@@ -71,12 +71,13 @@ class Reached:
 
 @dataclass(slots=True)
 class Intermediate:
-    """What an FMU of FMI 3.0 is told between communication points.
+    """Callback of an FMU of FMI 3.0 between communication points (intermediate update).
 
     Attributes:
-        apply: sets the continuous inputs at (time, after).
-        look: called at the end of each step of the solver inside.
-        lost: errors, which C cannot pass on.
+        apply: callable (time, after) that sets the continuous inputs; `after` selects the value
+            after a jump.
+        look: callable (time) at the end of each internal solver step.
+        lost: errors raised in the callback, which C code cannot propagate.
     """
 
     apply: Callable[[float, bool], None] | None = None
@@ -86,7 +87,7 @@ class Intermediate:
     def __call__(
         self, _: Any, time: float, settable: bool, gettable: bool, finished: bool, *rest: Any
     ) -> None:
-        """As the standard calls it."""
+        """Call with the arguments of fmi3IntermediateUpdateCallback."""
         try:
             if settable and self.apply is not None:
                 self.apply(time, False)
@@ -100,13 +101,13 @@ def co_simulate(instance: Any, plan: Plan, recording: Recording, watch: Intermed
     """Run an instance from begin to end; rows and events go to the recording.
 
     Args:
-        instance: of the FMU, an object of fmpy, instantiated.
-        plan: the run.
-        recording: that is filled.
-        watch: what the instance calls between communication points.
+        instance: instantiated FMPy object of the FMU.
+        plan: settings of the simulation.
+        recording: recording to which rows and events are added.
+        watch: intermediate update callback of the instance.
 
     Raises:
-        ModelError: the steps do not divide the duration, which the FMU needs.
+        ModelError: the FMU requires a fixed step size, and it does not divide the duration.
         SolverError: a value is not finite, or an event does not end.
     """
     offered = plan.description.coSimulation
@@ -124,7 +125,7 @@ def co_simulate(instance: Any, plan: Plan, recording: Recording, watch: Intermed
 
 
 def _older(instance: Any, plan: Plan, points: dict[float, bool], recording: Recording) -> None:
-    """FMI 2.0: inputs with their slopes where the FMU interpolates, then the step."""
+    """Run FMI 2.0: set inputs, with slopes if the FMU interpolates, then step."""
     apply = plan.tracks.setter(instance)
     held = not plan.description.coSimulation.canInterpolateInputs
     recording.begin(plan.begin)
@@ -160,7 +161,7 @@ def _step_older(instance: Any, begin: float, end: float) -> Reached:
 def _newer(
     instance: Any, plan: Plan, points: dict[float, bool], kept: tuple[Recording, Intermediate]
 ) -> None:
-    """FMI 3.0: steps up to a point or an event, where the FMU is in event mode."""
+    """Run FMI 3.0: step to the next point or event, and process events in event mode."""
     offered, (recording, watch) = plan.description.coSimulation, kept
     continuous = plan.tracks.continuous() if offered.hasEventMode else plan.tracks
     run = _Newer(instance, plan, recording, watch, continuous.setter(instance))
@@ -197,7 +198,7 @@ def _newer(
 
 @dataclass(frozen=True, slots=True)
 class _Newer:
-    """Calls of FMI 3.0."""
+    """Calls of FMI 3.0 for co-simulation."""
 
     instance: Any
     plan: Plan
@@ -206,7 +207,7 @@ class _Newer:
     apply: Callable[[float, bool], None]
 
     def step(self, begin: float, end: float) -> Reached:
-        """One step, and how it ended."""
+        """Make a step, and return its end."""
         event, terminated, early, last = self.instance.doStep(
             currentCommunicationPoint=begin, communicationStepSize=end - begin
         )
@@ -216,7 +217,7 @@ class _Newer:
         return Reached(time, bool(event), bool(terminated))
 
     def event(self, time: float, *, jumped: bool, otherwise: list[str]) -> float:
-        """Event mode, and the time of the next event that is known [s]."""
+        """Process an event, and return the time of the next time event [s], or inf."""
         self.instance.enterEventMode()
         if jumped:
             self.plan.tracks.setter(self.instance)(time, True)
@@ -226,7 +227,7 @@ class _Newer:
         return following
 
     def update(self) -> float:
-        """Iterate an event to its end, then back to steps."""
+        """Iterate an event to convergence, and return to step mode."""
         for _ in range(_MOST_ITERATIONS):
             again, terminated, _, _, known, next_time = self.instance.updateDiscreteStates()
             if terminated:
@@ -237,19 +238,19 @@ class _Newer:
         raise SolverError(f"FMU {self.recording.name}: an event does not come to an end")
 
 
-# Model exchange of one FMU: an integrator here makes the steps and finds the events.
+# Model exchange of an FMU: an integrator of FMPy makes the steps and locates the events.
 
 
-_MOST_STEPS = 100_000  # of the integrator between two points
+_MOST_STEPS = 100_000  # maximum number of integrator steps per output interval
 
 
 def exchange(instance: Any, plan: Plan, recording: Recording) -> None:
     """Run an instance from begin to end; rows and events go to the recording.
 
     Args:
-        instance: of the FMU, an object of fmpy, instantiated.
-        plan: the run.
-        recording: that is filled.
+        instance: instantiated FMPy object of the FMU.
+        plan: settings of the simulation.
+        recording: recording to which rows and events are added.
 
     Raises:
         SolverError: the integration fails, a value is not finite, or an event does not end.
@@ -264,7 +265,7 @@ def exchange(instance: Any, plan: Plan, recording: Recording) -> None:
 
 
 def _steps(run: _Exchange, following: float) -> None:
-    """From event to event, and from row to row."""
+    """Integrate to the end, and stop at rows, events and jumps of inputs."""
     plan, recording = run.plan, run.recording
     jumps = plan.tracks.jumps
     integrator = _integrator(run)
@@ -287,7 +288,7 @@ def _steps(run: _Exchange, following: float) -> None:
 
 
 class _Clock:
-    """Sets the time of an instance, and its inputs as they are then."""
+    """Setter of the time of an instance and of its inputs at this time."""
 
     def __init__(self, instance: Any, plan: Plan) -> None:
         self._instance = instance
@@ -295,12 +296,12 @@ class _Clock:
         self._after = plan.begin
 
     def move(self, time: float) -> None:
-        """To a time, before what jumps there, unless the jump is done."""
+        """Set the time and continuous inputs, before a jump at this time unless it was made."""
         self._instance.setTime(time)
         self._smooth(time, time <= self._after)
 
     def jump(self, time: float) -> None:
-        """Every input jumps that does at this time."""
+        """Set all inputs to their values after the jumps at this time."""
         self._after = time
         self._all(time, True)
 
@@ -311,7 +312,7 @@ def _setter(tracks: Tracks, instance: Any) -> Callable[[float, bool], None]:
 
 @dataclass(frozen=True, slots=True)
 class _Exchange:
-    """Calls of FMI 2.0 and 3.0."""
+    """Calls of FMI 2.0 and 3.0 for model exchange."""
 
     instance: Any
     plan: Plan
@@ -319,14 +320,14 @@ class _Exchange:
     clock: _Clock
 
     def completed(self) -> tuple[bool, bool]:
-        """After a step: whether the FMU wants an event, and whether it asks for the end."""
+        """Complete a step; return whether the FMU requests an event, and the end."""
         if not self.plan.description.modelExchange.needsCompletedIntegratorStep:
             return False, False
         wanted, ended = self.instance.completedIntegratorStep()
         return bool(wanted), bool(ended)
 
     def event(self, time: float, fired: list[int]) -> tuple[float, bool]:
-        """Event mode: the time of the next event that is known [s], and whether the run ends."""
+        """Process an event; return the time of the next time event [s], and whether to end."""
         self.instance.enterEventMode()
         self.clock.jump(time)
         following, ended = self.update()
@@ -335,7 +336,7 @@ class _Exchange:
         return following, ended
 
     def update(self) -> tuple[float, bool]:
-        """Iterate an event to its end, then back to continuous time."""
+        """Iterate an event to convergence, and return to continuous-time mode."""
         newer = self.plan.newer
         update = self.instance.updateDiscreteStates if newer else self.instance.newDiscreteStates
         for _ in range(_MOST_ITERATIONS):
@@ -348,7 +349,7 @@ class _Exchange:
         raise SolverError(f"FMU {self.recording.name}: an event does not come to an end")
 
     def _told(self, time: float, fired: list[int]) -> Iterator[tuple[str, str]]:
-        """What happened where no discrete variable changes."""
+        """Yield name and text of an event for the case that no discrete variable changes."""
         names = [unknown.variable.name for unknown in self.plan.description.eventIndicators]
         for k in fired:
             name = names[k] if k < len(names) else self.recording.name
@@ -359,12 +360,12 @@ class _Exchange:
 
 @dataclass(slots=True)
 class _Steps:
-    """An integrator of fmpy.
+    """Integrator of FMPy.
 
     Attributes:
-        solver: that makes the steps.
-        bounded: tells it a time that it must not pass.
-        lost: errors of the FMU inside it.
+        solver: FMPy solver object.
+        bounded: callable that sets the stop time of the solver [s].
+        lost: errors of the FMU in callbacks of the solver.
     """
 
     solver: Any
@@ -372,15 +373,15 @@ class _Steps:
     lost: list[Exception]
 
     def step(self, time: float, until: float) -> tuple[list[int], float]:
-        """One step: numbers of the indicators that changed sign, and the time reached [s]."""
+        """Make a step; return the indices of indicators that changed sign, and the time [s]."""
         try:
             self.bounded(until)
             _, roots, reached = self.solver.step(time, until)
         except Exception as error:
             raise (self.lost[0] if self.lost else error) from error
-        self.lost.clear()  # what was discarded was tried again
+        self.lost.clear()  # the solver has repeated discarded evaluations
         reached = float(reached)
-        # some roundings of the time that the solver was given
+        # relative tolerance 1e-14: some rounding errors of the time `until`
         near = abs(reached - until) <= 1e-14 * max(1.0, abs(until))
         return np.flatnonzero(roots).tolist(), until if near else reached
 
@@ -409,7 +410,7 @@ def _cvode(run: _Exchange, common: dict[str, Any], lost: list[Exception]) -> _St
     from fmpy.sundials import CVodeSolver
 
     class Solver(CVodeSolver):  # type: ignore[misc]
-        """Keeps errors of the FMU, which would be lost in C; what it discards is tried again."""
+        """CVODE that stores errors of the FMU and repeats steps that the FMU discards."""
 
         def f(self, *arguments: Any) -> int:
             return _keep(super().f, arguments, lost)
@@ -432,7 +433,7 @@ def _cvode(run: _Exchange, common: dict[str, Any], lost: list[Exception]) -> _St
 
 
 def _keep(call: Callable[..., int], arguments: tuple[Any, ...], lost: list[Exception]) -> int:
-    """What CVODE is answered: 1 asks for a shorter step, -1 for the end."""
+    """Return the status for CVODE: 0 success, 1 shorter step, -1 unrecoverable error."""
     try:
         return call(*arguments)
     except Exception as error:
@@ -441,7 +442,7 @@ def _keep(call: Callable[..., int], arguments: tuple[Any, ...], lost: list[Excep
 
 
 def _quiet(solver: Any) -> None:
-    """What CVODE complains of goes to the solver alone, not to the terminal."""
+    """Send error messages of CVODE to the solver object only, not to the terminal."""
     from ctypes import c_void_p
 
     from fmpy.sundials.libraries import sundials_core
@@ -463,22 +464,22 @@ def _stop_at(solver: Any, until: float) -> None:
     stop(solver.cvode_mem, until)
 
 
-# Messages of FMUs, each brought to the simulation of the thread that it comes from.
+# Messages of FMUs, each passed to the simulation that runs in the same thread.
 #
-# fmpy keeps one logger for the whole process in a C library and never asks whether the Python
-# function behind it still lives. So there is one function here that lives as long as the process.
+# FMPy stores a single logger per process in a C library and holds no reference to its Python
+# function. The logger here is therefore a function that is never freed.
 
 
 Listener = Callable[[int, str], None]
-"""Called with the status and the text of a message."""
+"""Callable with the status and the text of a message."""
 
-_LISTENERS: dict[int, Listener] = {}  # by thread
+_LISTENERS: dict[int, Listener] = {}  # listeners by thread identifier
 _LOCK, _LOADING = threading.Lock(), threading.Lock()
 
 
 @contextmanager
 def listening(listener: Listener) -> Iterator[None]:
-    """While it lasts, messages of FMUs that this thread runs go to `listener`."""
+    """Pass messages of FMUs in this thread to `listener` within the context."""
     thread = threading.get_ident()
     with _LOCK:
         before = _LISTENERS.get(thread)
@@ -495,13 +496,13 @@ def listening(listener: Listener) -> Iterator[None]:
 
 @contextmanager
 def instance(description: Any, folder: str, kind: str, watch: Callable[..., None]) -> Iterator[Any]:
-    """An instance of an FMU of FMI 2.0 or 3.0 whose messages are heard; it is freed at the end.
+    """Instantiate an FMU of FMI 2.0 or 3.0, and free the instance at the end of the context.
 
     Args:
-        description: its model description.
-        folder: where it was unpacked.
+        description: model description.
+        folder: folder of the extracted FMU.
         kind: "CoSimulation" or "ModelExchange".
-        watch: called between communication points, in FMI 3.0 where the FMU offers it.
+        watch: intermediate update callback, used if the FMU supports it (FMI 3.0).
     """
     from fmpy import fmi2, fmi3
 
@@ -520,9 +521,8 @@ def instance(description: Any, folder: str, kind: str, watch: Callable[..., None
             unzipDirectory=folder,
             instanceName=description.modelName,
         )
-    says_why = str(description.generationTool).startswith(
-        "mbs"
-    )  # others, asked to log, say everything
+    # FMUs of other tools would log every call
+    says_why = str(description.generationTool).startswith("mbs")
     if newer:
         offers = _offer(interface, watch) if stepped else {}
         fmu.instantiate(loggingOn=says_why, logMessage=_log_newer, **offers)
@@ -536,7 +536,7 @@ def instance(description: Any, folder: str, kind: str, watch: Callable[..., None
 
 @contextmanager
 def _kept_directory() -> Iterator[None]:
-    """A library is loaded by fmpy from its folder: one thread at a time, and back again."""
+    """Restore the working directory, which FMPy changes on loading; one thread at a time."""
     with _LOADING:
         before = os.getcwd()
         try:
@@ -546,7 +546,7 @@ def _kept_directory() -> Iterator[None]:
 
 
 def _offer(interface: Any, watch: Callable[..., None]) -> dict[str, Any]:
-    """What an instance for co-simulation of FMI 3.0 is told that its host can do."""
+    """Return the host capabilities for the instantiation of an FMI 3.0 co-simulation."""
     events = bool(interface.hasEventMode)
     found: dict[str, Any] = {"eventModeUsed": events, "earlyReturnAllowed": events}
     if interface.providesIntermediateUpdate:
@@ -556,7 +556,7 @@ def _offer(interface: Any, watch: Callable[..., None]) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def _functions() -> tuple[Any, Any, Any]:
-    """What C calls for messages and memory; made once, never freed."""
+    """Return the C callbacks for messages and memory, made once and never freed."""
     from fmpy import fmi2
 
     return (
@@ -567,10 +567,10 @@ def _functions() -> tuple[Any, Any, Any]:
 
 
 def _callbacks() -> Any:
-    """The C functions of an instance.
+    """Return the C callbacks of an FMI 2.0 instance.
 
-    fmpy's proxy for messages knows one logger at a time, that of the last who asked, and other
-    users of fmpy may have freed theirs: so it is told ours for every instance.
+    The logger proxy of FMPy holds only the last logger, which other users of FMPy may have freed.
+    The logger is therefore set again for every instance.
     """
     from fmpy import fmi2
     from fmpy.logging import addLoggerProxy
@@ -593,7 +593,7 @@ def _log(environment: Any, name: bytes, status: int, category: bytes, message: b
 
 
 def _log_newer(environment: Any, status: int, category: bytes, message: bytes) -> None:
-    """The same in FMI 3.0, which needs no proxy."""
+    """Pass on a message of FMI 3.0, which needs no logger proxy."""
     from fmpy import fmi3
 
     listener = _LISTENERS.get(threading.get_ident())
@@ -608,7 +608,7 @@ _SOLVERS = ("CVode", "Euler")
 _ROWS = ("step", "solver")
 _STEPS = 500
 _UNUSED = ("sources/", "documentation/")
-_OK = 0  # status of messages that are no complaint, in every version of FMI
+_OK = 0  # status of messages without warning or error, in all FMI versions
 
 
 def fmu(
@@ -626,45 +626,48 @@ def fmu(
     rows: Literal["step", "solver"] = "step",
     quiet: bool = False,
 ) -> Result:
-    """Inputs, states and outputs of an FMU over time, and the events.
+    """Simulate an FMU, and return its inputs, states, outputs and events over time.
 
-    In model exchange inputs are given at the time at which they are needed. In co-simulation an FMU
-    2.0 that interpolates inputs follows their mean slope over each step, so that straight lines are
-    exact; another one holds their value in the middle of the step. Either is right to second order.
-    Steps end where a table bends or jumps, if the FMU takes steps of any length.
+    Model exchange evaluates inputs at the current time. In co-simulation, an FMU 2.0 that
+    interpolates inputs uses their mean slope over each step, which is exact for straight lines.
+    Other FMUs hold the value in the middle of the step. Both are accurate to second order. If the
+    FMU supports variable step sizes, steps end at the kinks and jumps of input tables.
 
-    Events are changes of discrete variables. In model exchange and in co-simulation of FMI 3.0 with
-    event mode they are at their time, with a row before and one after, and an event that changes
-    no discrete variable is told too; else they are at the end of the step.
+    Events are changes of discrete variables. Model exchange, and co-simulation of FMI 3.0 with
+    event mode, record an event at its time, with a row before and a row after it; events without
+    change of a discrete variable are recorded too. Otherwise an event is at the end of its step.
 
     Args:
-        path: the FMU, of FMI 2.0 or 3.0.
-        duration: s; by default until the stop time that the FMU proposes, else 1 s.
-        inputs: input to a number, to a function of time, or to (times, values) with straight
-            lines between them and a jump where a time is repeated; or a `Result`, whose columns
-            feed the inputs of the same names.
-        parameters: parameter to its value.
-        start: state, input or other variable with a start value, to its value at the start;
-            positions also under the names of `run`, such as "j1" for "j1.q". Or the `State` of the
-            mechanism that the FMU was made of.
-        kind: the interface that is used; the FMU brings the solver for co-simulation.
-        step: communication step and distance of the rows, s; by default the one that the FMU
-            proposes, else a 500th of the duration. The last one is shorter where steps do not
-            divide the duration.
+        path: path of an FMU of FMI 2.0 or 3.0.
+        duration: duration [s]. By default up to the stop time in the FMU, or 1 s if it has none.
+        inputs: dict from input to a number, a function of time, or (times, values) with linear
+            interpolation and a jump at a repeated time. Or a `Result`, whose columns are the
+            values of the inputs with the same names.
+        parameters: dict from parameter to value.
+        start: dict from state, input or other variable with a start value to its initial value;
+            positions also by their names in `run`, such as "j1" for "j1.q". Or a `State` of the
+            mechanism from which the FMU was exported.
+        kind: interface, "CoSimulation" (with the solver in the FMU) or "ModelExchange".
+        step: communication step and time between rows [s]. The default is the step size in the
+            FMU, or 1/500 of the duration. The last step is shorter if the steps do not divide the
+            duration.
         tolerance: relative tolerance.
-        solver: for model exchange: "CVode" or "Euler".
-        record: variables to keep, of any type of numbers; by default inputs, states and outputs.
-        rows: "solver" adds a row at every step of the solver inside, where an FMU 3.0 tells them.
-        quiet: show no progress bar.
+        solver: solver of model exchange, "CVode" or "Euler".
+        record: names of numeric variables to record; by default inputs, states and outputs.
+        rows: "step" for a row per step; "solver" adds a row at every internal solver step, if an
+            FMU 3.0 reports these steps.
+        quiet: Whether to hide the progress bar.
 
     Returns:
-        the variables, with the units that the FMU gives them; `events` with time, name of the
-        variable and words.
+        Result with the variables in the units of the FMU. Its `events` contain the time, the name
+        of the variable and a description.
 
     Raises:
-        ModelError: the FMU is invalid or lacks the interface, or a name or a value does not fit.
-        SolverError: the FMU refused a call; the message is its own, `result` has what was reached.
-        Interrupted: control-C was pressed; a KeyboardInterrupt whose `result` has what was reached.
+        ModelError: the FMU is invalid or lacks the interface, or a name or a value is invalid.
+        SolverError: a call of the FMU failed. The message is that of the FMU; `result` contains
+            the rows that were reached.
+        Interrupted: control-C was pressed. It is a KeyboardInterrupt; `result` contains the rows
+            that were reached.
     """
     file = _path(path)
     start = state_of(start)
@@ -748,7 +751,7 @@ def _check_kind(description: Any, kind: str) -> None:
 
 
 def _span(description: Any, duration: float | None, where: str) -> tuple[float, float]:
-    """Start and duration [s]."""
+    """Return start time and duration [s]."""
     experiment = description.defaultExperiment
     begin = float(getattr(experiment, "startTime", None) or 0.0)
     stop = getattr(experiment, "stopTime", None)
@@ -765,10 +768,10 @@ def _interval(description: Any, duration: float, step: float | None, where: str)
 
 
 def _between_steps(folder: str, plan: Plan) -> set[str]:
-    """Names of the variables that have a value between communication points.
+    """Return the names of the variables that can be read between communication points.
 
     Raises:
-        ModelError: the FMU does not tell the steps of its solver.
+        ModelError: the FMU does not report the steps of its solver.
     """
     root = ElementTree.parse(f"{folder}/modelDescription.xml").getroot()
     found = {str(v.get("name")) for v in root.iter() if v.get("intermediateUpdate") == "true"}
@@ -782,7 +785,7 @@ def _between_steps(folder: str, plan: Plan) -> set[str]:
 
 
 def _record(folder: str, plan: Plan, record: Sequence[str] | None) -> list[Any]:
-    """The variables to keep."""
+    """Return the variables to record."""
     described = plan.description
     known = {
         v.name: v

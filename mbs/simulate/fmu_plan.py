@@ -1,4 +1,4 @@
-"""What is asked of a run of an FMU, its inputs over time, and what is kept of it."""
+"""Settings of an FMU simulation, its inputs over time, and the recording of its results."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from mbs.simulate.fmu_variables import (
 )
 from mbs.text import did_you_mean, error_text, quoted
 
-# Values of the variables of an FMU that a user gives.
+# Values of FMU variables set by the user.
 
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ _FORMS = "a number, a function of time, or (times, values)"
 def start_values(
     description: Any, parameters: Mapping[str, float], start: Mapping[str, float] | State
 ) -> dict[str, float]:
-    """Values of parameters, states and inputs before the run, their names and numbers checked."""
+    """Return the checked initial values of parameters, states and inputs, by name."""
     known = numbers_of(description)
     if isinstance(start, State):
         start = _starts_of(start, {n for n, v in known.items() if _settable(v)})
@@ -53,10 +53,10 @@ def start_values(
 def _full_names(
     start: Mapping[str, float], allowed: set[str], every: Iterable[str]
 ) -> dict[str, float]:
-    """Starts with the names of coordinates, as `run` takes them, under the names of variables.
+    """Replace coordinate names of `run`, such as "j1", by variable names, such as "j1.q".
 
     Raises:
-        ModelError: a coordinate is there by both names.
+        ModelError: a coordinate is given by both names.
     """
     found, others = dict[str, float](), set(every)
     for name, value in start.items():
@@ -70,13 +70,13 @@ def _full_names(
 
 
 def _starts_of(state: State, settable: set[str]) -> dict[str, float]:
-    """The start values of an FMU of a mechanism in a state.
+    """Return the start values of an exported mechanism for a state.
 
-    Positions and velocities of independent joints and states of components are set. Positions that
-    loops determine choose the branch.
+    They are positions and velocities of independent joints and states of components. Positions of
+    dependent joints select the branch of the loops.
 
     Raises:
-        ModelError: the FMU has none of them.
+        ModelError: the FMU has no variable of the state.
     """
     positions = {f"{name}.{end}": x for name, x in state.q.items() for end in ("q", "solved")}
     velocities = {f"{name}.v": x for name, x in state.v.items()}
@@ -90,23 +90,23 @@ def _starts_of(state: State, settable: set[str]) -> dict[str, float]:
 
 
 def _settable(variable: Any) -> bool:
-    """Whether the standard allows to set it before the run."""
+    """Return whether FMI allows to set the variable before initialization."""
     if variable.variability == "constant" or variable.causality == "independent":
         return False
     return variable.causality == "input" or variable.initial in ("exact", "approx")
 
 
 def check_names(what: str, given: Iterable[str], allowed: set[str], known: Iterable[str]) -> None:
-    """Refuse names that are unknown or may not be given.
+    """Raise if a name is unknown or its variable cannot be set.
 
     Args:
-        what: the argument that names them.
-        given: names.
-        allowed: names that may be given.
-        known: all names.
+        what: name of the checked argument, for the error message.
+        given: names to check.
+        allowed: names that are valid here.
+        known: names of all variables.
 
     Raises:
-        ModelError: says which name, and the nearest one that may be given.
+        ModelError: a name is not allowed. The message contains the nearest allowed name.
     """
     everything = set(known)
     for name in given:
@@ -125,10 +125,10 @@ def check_names(what: str, given: Iterable[str], allowed: set[str], known: Itera
 
 
 def pair(name: str, signal: tuple[Any, ...]) -> tuple[Array, Array]:
-    """The times and values of a table.
+    """Return the times and values of a table as arrays.
 
     Raises:
-        ModelError: it is no pair of arrays of numbers.
+        ModelError: the signal is not a pair of numeric arrays.
     """
     try:
         times, values = (np.asarray(part, dtype=float) for part in signal)
@@ -138,10 +138,10 @@ def pair(name: str, signal: tuple[Any, ...]) -> tuple[Array, Array]:
 
 
 def finite_number(name: str, value: Any) -> float:
-    """A value as a finite number.
+    """Return a value as a finite float.
 
     Raises:
-        ModelError: it is none.
+        ModelError: the value is not a finite number.
     """
     try:
         number = float(value)
@@ -152,7 +152,7 @@ def finite_number(name: str, value: Any) -> float:
     return number
 
 
-# Inputs of an FMU over time, as they jump, bend and are held.
+# Inputs of an FMU over time, with jumps and kinks.
 
 
 Inputs = Mapping[str, Signal] | Result
@@ -160,12 +160,13 @@ Inputs = Mapping[str, Signal] | Result
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """One input over time.
+    """Input over time.
 
     Attributes:
-        value: of (time, True right after a jump or False right before it).
-        corners: times at which it bends or jumps [s].
-        jumps: times at which it jumps [s].
+        value: callable (time, after) that returns the value. `after` is True for the value right
+            after a jump, False for the value right before it.
+        corners: times of kinks and jumps [s].
+        jumps: times of jumps [s].
     """
 
     value: Callable[[float, bool], float]
@@ -175,12 +176,12 @@ class Track:
 
 @dataclass(frozen=True, slots=True)
 class Tracks:
-    """All inputs that are given.
+    """Inputs of an FMU over time.
 
     Attributes:
-        variables: of the model description.
-        tracks: one for each.
-        starts: values at the start, of elements of arrays that have no track.
+        variables: input variables of the model description.
+        tracks: Track of each variable.
+        starts: start values by name, used for array elements without track.
     """
 
     variables: tuple[Any, ...]
@@ -189,7 +190,7 @@ class Tracks:
 
     @property
     def corners(self) -> list[float]:
-        """Times at which an input bends or jumps [s]."""
+        """Sorted times at which an input has a kink or a jump [s]."""
         return sorted({t for track in self.tracks for t in track.corners})
 
     @property
@@ -198,17 +199,17 @@ class Tracks:
         return frozenset(t for track in self.tracks for t in track.jumps)
 
     def continuous(self) -> Tracks:
-        """Those that are continuous in time."""
+        """Return the inputs whose variables are continuous in time."""
         chosen = [k for k, variable in enumerate(self.variables) if _continuous(variable)]
         variables = tuple(self.variables[k] for k in chosen)
         return Tracks(variables, tuple(self.tracks[k] for k in chosen), self.starts)
 
     def at(self, time: float, after: bool) -> list[float]:
-        """The value of each input at a time, right after a jump or right before it."""
+        """Return the value of each input at a time, right after or right before a jump."""
         return [track.value(time, after) for track in self.tracks]
 
     def setter(self, instance: Any) -> Callable[[float, bool], None]:
-        """A function of (time, after) that sets the inputs of an instance."""
+        """Return a function (time, after) that sets the inputs of an instance."""
         write = writer(instance, self.variables, self.starts)
 
         def apply(time: float, after: bool) -> None:
@@ -218,7 +219,7 @@ class Tracks:
         return apply
 
     def slopes(self, begin: float, end: float) -> tuple[list[int], list[float]]:
-        """Value references of the continuous inputs, and their mean rates over a step [1/s]."""
+        """Return value references of continuous inputs, and their mean rates over a step [1/s]."""
         given = [
             (variable.valueReference, track)
             for variable, track in zip(self.variables, self.tracks, strict=True)
@@ -229,16 +230,16 @@ class Tracks:
 
 
 def tracks_of(description: Any, inputs: Inputs, starts: Mapping[str, float] = NOTHING) -> Tracks:
-    """Inputs as functions of time.
+    """Return the inputs as functions of time.
 
     Args:
-        description: of the FMU.
-        inputs: name of an input to a number, a function of time or (times, values); or a Result,
-            whose columns feed the inputs of the same name; of an array its elements, `tau[2]`.
-        starts: values at the start, by name.
+        description: model description of the FMU.
+        inputs: dict from input to a number, a function of time or (times, values); or a Result,
+            whose columns are the inputs of the same name. Array elements are named `tau[2]`.
+        starts: start values by name.
 
     Raises:
-        ModelError: a name is unknown or no input, or a value does not fit.
+        ModelError: a name is unknown or not an input, or a value is invalid.
     """
     numbers = numbers_of(description)
     known = {name: v for name, v in numbers.items() if v.causality == "input"}
@@ -319,22 +320,22 @@ def _of_table(name: str, signal: tuple[Any, ...], *, straight: bool) -> Track:
 
 Interface = Literal["CoSimulation", "ModelExchange"]
 
-_SAME = 1e-9  # of a step: times nearer than that are one
+_SAME = 1e-9  # fraction of a step: times closer than this are equal
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A run of an FMU.
+    """Settings of an FMU simulation.
 
     Attributes:
-        description: of the FMU, as fmpy reads it.
-        kind: the interface that is used.
-        times: of the rows [s].
-        tracks: the inputs.
-        starts: variable to its value before the run.
-        tolerance: relative.
-        solver: of model exchange.
-        rows: where else rows are kept.
+        description: model description of the FMU, read by FMPy.
+        kind: interface, "CoSimulation" or "ModelExchange".
+        times: times of the rows [s].
+        tracks: inputs over time.
+        starts: dict from variable to initial value.
+        tolerance: relative tolerance.
+        solver: solver of model exchange, "CVode" or "Euler".
+        rows: "solver" to record internal solver steps too, or "step".
     """
 
     description: Any
@@ -348,31 +349,31 @@ class Plan:
 
     @property
     def newer(self) -> bool:
-        """Whether the FMU is of FMI 3.0."""
+        """Whether the FMU has version 3.0 of FMI."""
         return bool(self.description.fmiVersion.startswith("3"))
 
     @property
     def begin(self) -> float:
-        """Start of the run [s]."""
+        """Start time [s]."""
         return self.times[0]
 
     @property
     def end(self) -> float:
-        """End of the run [s]."""
+        """End time [s]."""
         return self.times[-1]
 
 
 def row_times(begin: float, duration: float, step: float, where: str) -> tuple[float, ...]:
-    """Times of the rows: multiples of the step, and the end.
+    """Return the times of the rows: multiples of the step after the start, and the end.
 
     Args:
-        begin: [s].
-        duration: [s].
-        step: distance of the rows [s].
-        where: of what it is, for messages.
+        begin: start time [s].
+        duration: duration [s].
+        step: time between rows [s].
+        where: name of the model, for error messages.
 
     Raises:
-        ModelError: there are too many.
+        ModelError: the number of rows exceeds the limit.
     """
     count_steps(duration, step, where)
     whole = int(duration / step * (1 + _SAME))
@@ -384,9 +385,9 @@ def row_times(begin: float, duration: float, step: float, where: str) -> tuple[f
 
 
 def with_points(times: tuple[float, ...], points: Iterable[float]) -> dict[float, bool]:
-    """Times of the rows and points between them, in order, and whether there is a row.
+    """Merge times of rows and points in order; the values are True for times with a row.
 
-    A row that is nearly at a point moves to it.
+    A row within `_SAME` of a step of a point is moved to the point.
     """
     inside = {t for t in points if times[0] < t < times[-1]}
     tight = _SAME * min(np.diff(times), default=1.0)
@@ -404,11 +405,11 @@ def with_points(times: tuple[float, ...], points: Iterable[float]) -> dict[float
 
 
 def set_up(instance: Any, plan: Plan) -> None:
-    """Initialization, up to its end.
+    """Initialize an instance: set start values and inputs, and leave initialization mode.
 
     Args:
-        instance: of the FMU, an object of fmpy.
-        plan: the run.
+        instance: FMPy object of the FMU.
+        plan: settings of the simulation.
     """
     if not plan.newer:
         instance.setupExperiment(tolerance=plan.tolerance, startTime=plan.begin, stopTime=plan.end)
@@ -424,13 +425,13 @@ def set_up(instance: Any, plan: Plan) -> None:
 
 
 def require_equal_steps(plan: Plan, where: str) -> None:
-    """Refuse a last step of another length where the FMU cannot make it.
+    """Raise if the last step has a different length than the others.
 
     Raises:
-        ModelError: says which step to give.
+        ModelError: the lengths differ. The message contains a step that divides the duration.
     """
     steps = np.diff(plan.times)
-    # in parts of a step: rounding of times is less, and a shorter last step is one by intent
+    # tolerance 1e-6 of a step: above rounding errors of times, below any intended difference
     if len(steps) > 1 and abs(steps[-1] - steps[0]) > 1e-6 * steps[0]:
         count = len(steps)
         span = plan.end - plan.begin
@@ -440,7 +441,7 @@ def require_equal_steps(plan: Plan, where: str) -> None:
         )
 
 
-# What is kept of the run of an FMU: rows of variables, and events.
+# Recording of an FMU simulation: rows of variables, and events.
 
 
 Event = tuple[float, str, str]
@@ -448,18 +449,19 @@ Event = tuple[float, str, str]
 
 @dataclass(slots=True)
 class Recording:
-    """Rows and events of a run, while it lasts.
+    """Rows and events recorded during a simulation.
 
     Attributes:
-        name: of the model.
-        columns: name of a column to its unit.
-        read: the values of a row now.
-        watched: names of the discrete variables.
-        modes: their values now.
-        reached: told the time of every row.
-        times: of the rows [s].
-        rows: values.
-        events: time, name and words.
+        name: name of the model.
+        columns: dict from column name to unit.
+        read: function that reads the current values of a row.
+        watched: names of the discrete variables whose changes are events.
+        modes: function that reads the current values of the watched variables.
+        reached: progress callback, called with the time of every row.
+        times: times of the rows [s].
+        rows: values of the rows.
+        events: events, each with time [s], name and description.
+        last: values of the watched variables at the last event.
     """
 
     name: str
@@ -474,15 +476,15 @@ class Recording:
     last: list[float] = field(default_factory=list)
 
     def begin(self, time: float) -> None:
-        """The first row."""
+        """Record the first row and the initial discrete values."""
         self.last = self.modes() if self.watched else []
         self.row(time)
 
     def row(self, time: float) -> None:
-        """Keep the values of now, once where nothing has changed at that time.
+        """Record the current values, unless the last row has the same time and values.
 
         Raises:
-            SolverError: one of them is not finite.
+            SolverError: a value is not finite.
         """
         values = self.read()
         for column, value in zip(self.columns, values, strict=True):
@@ -494,11 +496,11 @@ class Recording:
         self.reached(time)
 
     def record_event(self, time: float, otherwise: Iterable[tuple[str, str]] = ()) -> None:
-        """Keep every discrete variable that has changed, or where none has, these names and words.
+        """Record the changes of discrete variables as events.
 
         Args:
-            time: [s].
-            otherwise: what is said where no discrete variable changed.
+            time: time [s].
+            otherwise: name and description of events to record if no discrete variable changed.
         """
         now = self.modes() if self.watched else []
         changed = [
@@ -510,14 +512,14 @@ class Recording:
         self.events.extend(changed or [(time, name, words) for name, words in otherwise])
 
     def ended(self, time: float) -> None:
-        """The FMU asks for the end."""
+        """Record the event that the FMU ends the simulation."""
         self.events.append((time, self.name, "ends the simulation"))
 
     def result(self, stopped: tuple[float, str] | None = None) -> Result:
-        """All of it.
+        """Return the recorded rows and events as a Result.
 
         Args:
-            stopped: time, s, and sentence of what stopped the run early; None where it is complete.
+            stopped: time [s] and error message of an early stop; None if the run is complete.
         """
         values = np.array(self.rows, dtype=float).reshape(len(self.times), len(self.columns))
         return Result(
@@ -533,13 +535,13 @@ class Recording:
 def recording_of(
     instance: Any, description: Any, variables: list[Any], reached: Callable[[float], None]
 ) -> Recording:
-    """A recording of an instance, still empty.
+    """Return an empty recording of an instance.
 
     Args:
-        instance: of an FMU, an object of fmpy.
-        description: its model description.
-        variables: to keep.
-        reached: told the time of every row.
+        instance: FMPy object of an FMU.
+        description: model description of the FMU.
+        variables: variables to record.
+        reached: progress callback, called with the time of every row.
     """
     watched = [
         v

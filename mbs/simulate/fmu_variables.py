@@ -1,4 +1,4 @@
-"""Reading and writing variables of an instance of an FMU, of any type, as numbers."""
+"""Read and write FMU variables of any numeric type as Python numbers."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ NOTHING: Mapping[str, float] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """One number of an array, which has what fmpy tells of a variable.
+    """Element of an array variable, with the attributes of the FMPy variable.
 
     Attributes:
-        array: the variable.
-        place: in the array, row by row from 0.
-        name: such as `q[2]` or `R[1,3]`.
+        array: FMPy variable of the array.
+        place: index in the array in row-major order, from 0.
+        name: name with indices from 1, such as `q[2]` or `R[1,3]`.
     """
 
     array: Any
@@ -36,19 +36,19 @@ class Element:
 
     @property
     def start(self) -> float:
-        """The start value in the description, 0 where there is none."""
+        """Start value in the model description; 0 if there is none."""
         values = str(self.array.start or "0").split()
         return _number(values[self.place if len(values) > 1 else 0])
 
 
 def elements_of(variable: Any) -> list[Element]:
-    """The elements of an array; none of a scalar."""
+    """Return the elements of an array variable, or an empty list for a scalar."""
     names = columns_of([variable]) if variable.shape else ()
     return [Element(variable, place, name) for place, name in enumerate(names)]
 
 
 def numbers_of(description: Any) -> dict[str, Any]:
-    """Every scalar variable that is a number, and every element of an array of them, by name."""
+    """Return all numeric scalar variables and elements of numeric arrays, by name."""
     return {
         v.name: v
         for variable in description.modelVariables
@@ -58,12 +58,12 @@ def numbers_of(description: Any) -> dict[str, Any]:
 
 
 def size_of(variable: Any) -> int:
-    """How many numbers a variable has."""
+    """Return the number of elements of a variable; 1 for a scalar."""
     return math.prod(variable.shape) if variable.shape else 1
 
 
 def columns_of(variables: Iterable[Any]) -> dict[str, str]:
-    """Name and unit of each number of the variables: elements of arrays as `name[1,2]`."""
+    """Return units of scalars and array elements by name; elements are named `name[1,2]`."""
     columns: dict[str, str] = {}
     for variable in variables:
         declared = variable.declaredType
@@ -76,11 +76,11 @@ def columns_of(variables: Iterable[Any]) -> dict[str, str]:
 
 
 def reader(instance: Any, variables: Sequence[Any]) -> Callable[[], list[float]]:
-    """A function that reads variables, in their order.
+    """Return a function that reads the values of variables, in their order.
 
     Args:
-        instance: of an FMU, an object of fmpy.
-        variables: of its model description.
+        instance: FMPy object of an FMU.
+        variables: variables of the model description.
     """
     groups = [
         (getattr(instance, f"get{kind}"), [v.valueReference for v in members], sizes, places)
@@ -102,14 +102,14 @@ def reader(instance: Any, variables: Sequence[Any]) -> Callable[[], list[float]]
 def writer(
     instance: Any, variables: Sequence[Any], starts: Mapping[str, float] = NOTHING
 ) -> Callable[[Sequence[float]], None]:
-    """A function that sets scalar variables and elements of arrays, in their order.
+    """Return a function that sets scalar variables and elements of arrays, in their order.
 
-    An array is set as a whole: elements that are not named keep their start value.
+    An array is set as a whole. Its elements that are not in `variables` get their start value.
 
     Args:
-        instance: of an FMU, an object of fmpy.
-        variables: of its model description, or `Element`.
-        starts: start values other than those of the description, by name.
+        instance: FMPy object of an FMU.
+        variables: variables of the model description, or `Element`.
+        starts: start values by name that replace values of the model description.
     """
     newer = hasattr(instance, "getFloat64")
     found: dict[str, _Target] = {}
@@ -130,14 +130,14 @@ def writer(
 
 @dataclass(slots=True)
 class _Target:
-    """What one call sets.
+    """Variables of the same type, which are set by a single FMI call.
 
     Attributes:
-        put: the call.
-        cast: makes a number one of its type.
-        first: place of the first value of each variable, by its value reference.
-        values: of all variables.
-        places: number of each given value, and its place.
+        put: FMI setter (value references, values).
+        cast: conversion of a float to the type.
+        first: dict from value reference to the index of the first element in `values`.
+        values: values of all variables, in the order of `first`.
+        places: pairs of the index of an argument of `write` and its index in `values`.
     """
 
     put: Callable[[list[int], list[Any]], None]
@@ -147,7 +147,7 @@ class _Target:
     places: list[tuple[int, int]] = field(default_factory=list)
 
     def add(self, number: int, variable: Any, starts: Mapping[str, float]) -> None:
-        """Another given value."""
+        """Append a variable or element that is argument `number` of `write`."""
         whole, offset = variable, 0
         if isinstance(variable, Element):
             whole, offset = variable.array, variable.place
@@ -159,7 +159,7 @@ class _Target:
 
 
 def set_values(instance: Any, values: Mapping[str, float], description: Any) -> None:
-    """Give the variables and elements of arrays that are named their values."""
+    """Set variables and elements of arrays by name."""
     named = [v for name, v in numbers_of(description).items() if name in values]
     writer(instance, named, values)([values[v.name] for v in named])
 
@@ -169,7 +169,7 @@ def _number(text: str) -> float:
 
 
 def _call(kind: str, newer: bool) -> str:
-    """The type of the call that reads or sets variables of a type."""
+    """Return the type in the name of the FMI getter and setter of a type."""
     if kind != "Enumeration":
         return kind
     return "Int64" if newer else "Integer"
@@ -184,7 +184,7 @@ def _cast(kind: str) -> Callable[[float], float | int | bool]:
 def _by_type(
     instance: Any, variables: Sequence[Any]
 ) -> list[tuple[str, list[Any], int | None, list[int]]]:
-    """Type, variables of it, how many values where the call asks for it, and their places."""
+    """Return by type: FMI type, variables, number of values (FMI 3.0 only), row indices."""
     newer = hasattr(instance, "getFloat64")
     found: dict[str, tuple[list[Any], list[int]]] = {}
     first = 0

@@ -1,4 +1,4 @@
-"""Simulation of a system, compiled where there is a compiler, loops kept closed."""
+"""Simulate a system with closed loops, by compiled code if a C compiler is available."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ from mbs.solvers import EventMotion, Events, integrate_events
 from mbs.solvers.problem import METHODS, IntegrationEvent, Passage, failed
 from mbs.text import did_you_mean, quoted
 
-# Rigid stops and Coulomb friction in a simulation: how they start, and what a result says of them.
+# Rigid stops and Coulomb friction in a simulation: initial modes, events, columns of results.
 
 
 Array = NDArray[np.float64]
@@ -90,12 +90,12 @@ _LIMITS = {-1: "lower", 1: "upper"}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactMotion:
-    """What k coordinates with contacts do in a simulation.
+    """Contact modes and events of k coordinates with stops or friction in a simulation.
 
     Attributes:
-        first: (2 k,) modes at the start.
-        modes: (m, 2 k) at the times of the motion.
-        events: in the order of time.
+        first: modes at the start, (2 k,): k of the stops, then k of friction.
+        modes: modes at the times of the motion, (m, 2 k).
+        events: contact events in order of time.
     """
 
     first: Array
@@ -104,11 +104,12 @@ class ContactMotion:
 
 
 def require_contacts_possible(system: System, motions: Sequence[Prescribed]) -> None:
-    """Refuse what rigid stops and Coulomb friction cannot be simulated with.
+    """Raise if rigid stops or Coulomb friction cannot be simulated in this system.
 
     Raises:
-        ModelError: a motion is prescribed where one acts, two of one kind act on one coordinate,
-            or the loops are over-constrained in a way that changes with the configuration.
+        ModelError: prescribed motions move a coordinate with a stop or friction, two contacts
+            of the same kind act on one coordinate, or the loops are over-constrained and their
+            independent rows change with the configuration.
     """
     contacts = contacts_of(system)
     require_undriven(system, contacts, [motion.velocity for motion in motions])
@@ -116,10 +117,12 @@ def require_contacts_possible(system: System, motions: Sequence[Prescribed]) -> 
 
 
 def first_modes(system: System, x0: Array, p: Array) -> Array:
-    """(2 k,) modes at the start: what rests at a limit touches it, what moves slides.
+    """Return the contact modes at the start, (2 k,).
+
+    A coordinate that rests at a limit is in contact; a coordinate that moves slides.
 
     Args:
-        system: with k coordinates on which contacts act.
+        system: system with k coordinates on which contacts act.
         x0: state at the start.
         p: (np,) parameters.
 
@@ -151,10 +154,10 @@ def first_modes(system: System, x0: Array, p: Array) -> Array:
 
 
 def contact_columns(system: System) -> Iterator[tuple[int, str, str]]:
-    """Index, name and unit of the columns of contacts: modes side by side, then efforts.
+    """Yield index, name and unit of the columns of contacts: 2 k modes, then 2 k efforts.
 
     Args:
-        system: with k coordinates on which contacts act, (2 k,) modes and (2 k,) efforts.
+        system: system with k coordinates on which contacts act.
     """
     contacts = contacts_of(system)
     for column, element in enumerate((*contacts.stops, *contacts.frictions)):
@@ -164,14 +167,14 @@ def contact_columns(system: System) -> Iterator[tuple[int, str, str]]:
 
 
 def every_effort(system: System, q: Array, p: Array, tau: Array, efforts: Array) -> Array:
-    """(m, nv) joint efforts, those of contacts included.
+    """Return the joint efforts (m, nv), including the efforts of contacts.
 
     Args:
-        system: with k rows on which contacts act, or none.
-        q: (m, nq) positions.
-        p: (np,) parameters.
-        tau: (m, nv) joint efforts without them.
-        efforts: (m, 2 k) of the stops, then of friction.
+        system: system with k >= 0 coordinates on which contacts act.
+        q: positions (m, nq).
+        p: parameters (np,).
+        tau: joint efforts (m, nv) without contacts.
+        efforts: contact efforts (m, 2 k): k of the stops, then k of friction.
     """
     contacts, k = contacts_of(system), len(contacts_of(system))
     if not k:
@@ -185,12 +188,13 @@ def every_effort(system: System, q: Array, p: Array, tau: Array, efforts: Array)
 def list_events(
     system: System, contact: ContactMotion | None, others: Sequence[IntegrationEvent] = ()
 ) -> tuple[tuple[float, str, str], ...]:
-    """Time, name of the element or component and what it does, of every event.
+    """Return time, name of the element or component, and description of every event.
 
     Args:
-        system: in motion.
-        contact: what contacts do, their events and those of components behind them.
-        others: events of components alone, where there are no contacts.
+        system: simulated system.
+        contact: contact modes and events. The indices of component events follow the indices of
+            contact events. None if the system has no contacts.
+        others: component events of a system without contacts.
     """
     own = part_event_names(system)
     happened = [(event.time, *own[k]) for event in others for k in event.fired]
@@ -228,23 +232,23 @@ def _changes(
 
 
 def _said(element: ContactElement, what: str) -> tuple[str, str]:
-    """The component, and what its friction or stop does."""
+    """Return the name of the component and the event text with the label of its contact."""
     return element.part.name, f"{element.label} {what}" if element.label else what
 
 
-# Inputs of the devices of drive lines, in whatever form the user gives them.
+# Inputs and initial states of the devices of drive lines, from all accepted forms.
 
 
 def input_function(system: System, u: Effort) -> Function | None:
-    """`u(t, q, v, p) -> u`, (nu, 1), one input for each device.
+    """Return the Function `u(t, q, v, p) -> u` of the device inputs, (nu, 1).
 
     Args:
-        system: open or closed.
-        u: constants by the name of the device, or all of them, or a function of (t, q, v), or
-            None for zeros.
+        system: open or closed system.
+        u: dict of constants by device name, sequence of all nu inputs, function of (t, q, v), or
+            None for the defaults `system.u_default`.
 
     Returns:
-        the Function; None where nothing is given.
+        Function of the inputs. None if `u` is None or empty.
 
     Raises:
         ModelError: a name is unknown, or the inputs are not (nu, 1) numbers.
@@ -266,14 +270,15 @@ def input_function(system: System, u: Effort) -> Function | None:
 
 
 def device_states(system: System, z0: Mapping[str, float] | Sequence[float] | None) -> list[float]:
-    """The states of the devices at the start, zero where none is given.
+    """Return the states of the devices at the start.
 
     Args:
-        system: open or closed.
-        z0: by name, such as `motor.i`, or all of them.
+        system: open or closed system.
+        z0: dict of states by name, such as `motor.i`, or sequence of all states. A state without
+            value starts at its default `system.z_start`.
 
     Raises:
-        ModelError: a name is unknown, or a value is no number.
+        ModelError: a name is unknown, the number of values is wrong, or a value is not finite.
     """
     if z0 is None or isinstance(z0, Mapping):
         return list(by_name(system, "z0", z0, system.states, system.z_start))
@@ -294,47 +299,47 @@ def _numbers(system: System, what: str, values: Any) -> list[float]:
     return [float(value) for value in array.ravel()]
 
 
-# Integration in one leg, or in several: over-constrained loops whose independent rows change.
+# Integration in one segment (Leg), or in several if the independent closure rows change.
 #
-# In a loop such as Bennett's, which rows of the closing joint are independent changes with the
-# configuration: no choice holds over a whole revolution. Steps in local tangent coordinates use all
-# rows, and need no choice. Where there are none, as for laws that CasADi cannot write as C, a leg
-# ends where its rows have lost most of their independence, and the next one begins there with
-# rows that are chosen for that configuration.
+# In an over-constrained loop such as Bennett's, the set of independent closure rows changes with
+# the configuration: no set is valid over a whole revolution. Steps in local tangent coordinates
+# use all rows. If these steps are not available, as for laws that CasADi cannot write as C, a
+# segment ends when its rows have lost most of their independence. The next segment starts there
+# with rows that are chosen for that configuration.
 
 
 _LOST = 0.05
-"""Part of its independence at the start of a leg at which a leg ends."""
+"""Fraction of the row independence at the start of a segment at which the segment ends."""
 _SINGULAR = 1e-6
-"""Independence below which a configuration is singular for all rows: a thousandth, as a sine."""
+"""Row independence below which a configuration is singular; it corresponds to a sine of 1e-3."""
 _FLAT = 1e-3
-"""Sine of the angle between a rolling disc and its plane at which it counts as flat."""
+"""Sine of the angle between a rolling disc and its plane below which the disc lies flat."""
 
 _INTERPRETED = 2e6
-"""Instructions that CasADi interprets in some 10 ms; what is asked for beyond them is compiled,
+"""Number of instructions that CasADi interprets in about 10 ms. Beyond it, `observe` is compiled,
 which takes some tenths of a second for a mechanism of ten links."""
 
 _FIRST_STEP = 1e-9
-"""Step behind a crossing [s], from which steps grow tenfold where nothing errs: what two bodies do
-to each other is met at any speed before they are through each other."""
+"""First step after a crossing [s]; steps grow up to tenfold each if their error is small. A contact
+of two fast bodies is then resolved before the bodies pass through each other."""
 
 Stop = SolverError | Interrupted | None
-"""Why a motion ends early; None where it does not."""
+"""Error that ends a motion early; None if the motion reaches its end."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leg:
-    """A part of a motion with one state equation.
+    """Segment of a motion with one state equation.
 
     Attributes:
-        state: its equations.
-        times: (m,) s, that were reached.
-        x: (m, nx) states at these times.
-        contact: what rigid stops and Coulomb friction do meanwhile, None where there are none.
-        first_slope: as `EventMotion` has it.
-        driven: numbers of the velocities whose motion is prescribed.
-        happened: events of components, where there are no contacts.
-        first_bias: (nv,) efforts of gravity and velocities at the first time; None as before.
+        state: state equation.
+        times: times that were reached [s], (m,).
+        x: states at these times, (m, nx).
+        contact: modes and events of rigid stops and Coulomb friction; None without contacts.
+        first_slope: slope at a singular start, `EventMotion.first_slope`; None at a regular start.
+        driven: indices of the velocities whose motion is prescribed.
+        happened: events of components in a system without contacts.
+        first_bias: efforts of gravity and velocities at the first time, (nv,), or None.
     """
 
     state: FullState
@@ -348,25 +353,25 @@ class Leg:
 
     @property
     def without_start(self) -> Leg:
-        """The same without its first row, which belongs to the leg before."""
+        """Copy without the first row, which is the last row of the previous segment."""
         return replace(self, times=self.times[1:], x=self.x[1:])
 
     def observed(self, p: Array) -> list[Array]:
-        """What the state equation observes, (m, ..) each."""
+        """Return the outputs of `state.observe` at the m times, each (m, ..)."""
         observe, count = self.state.observe, len(self.times)
         if not count:
             return [np.empty((0, observe.numel_out(k))) for k in range(observe.n_out())]
         every = np.repeat(p[None, :], count, axis=0)
         if self.contact is not None:
             every = np.hstack([every, self.contact.modes])
-        # rows follow each other in memory as CasADi has the columns of a map
+        # rows are contiguous in memory, as the columns of a CasADi map
         values = [found.T for found in self._map(count)(self.times, self.x, every)]
-        if self.first_slope is not None:  # the rows alone would allow other accelerations there
+        if self.first_slope is not None:  # the closure rows do not determine them
             self._correct_first(values[0][0], values[1][0], every[0])
         return values
 
     def _map(self, count: int) -> OnArrays:
-        """`observe` for as many states; in machine code once it has been asked for often."""
+        """Return `observe` mapped over `count` states; compiled beyond `_INTERPRETED` in total."""
         prepared, observe = self.state.prepared, self.state.observe
         asked = prepared.get("asked", 0) + count * observe.n_instructions()
         if asked > _INTERPRETED and "machine code" not in prepared:
@@ -380,10 +385,10 @@ class Leg:
         return known[1]
 
     def _correct_first(self, a: Array, tau: Array, p: Array) -> None:
-        """Accelerations of the branch at a singular start, and what they ask of drives.
+        """Set accelerations and drive efforts of the branch at a singular start, in place.
 
-        One drive gives the power that inertia and forces take; shares of several are not
-        determined.
+        The effort of one drive follows from the power of inertia and forces. The efforts of
+        several drives are not determined (nan).
         """
         assert self.state.passage is not None
         assert self.first_slope is not None
@@ -405,22 +410,23 @@ def integrate_legs(
     modes: Array | None = None,
     **options: Any,
 ) -> tuple[list[Leg], Stop]:
-    """The motion at given times, in one leg for most systems, and why it ends before the last.
+    """Integrate a motion over given times, in one segment for most systems.
 
     Args:
-        system: open or closed.
-        equations: the state equation of a system that differs in its independent rows alone.
-        x0: (nx,) state at the first time.
-        times: (m,) s, increasing.
-        p: (np,) parameters, then the inputs that are given for this motion.
-        modes: (k,) modes of rigid stops and Coulomb friction at the start; found by the positions
-            and velocities if left out.
-        options: of `integrate`.
+        system: open or closed system.
+        equations: callable that returns the state equation of `system` or of a copy with other
+            independent rows.
+        x0: state at the first time, (nx,).
+        times: increasing times [s], (m,).
+        p: parameters (np,), followed by the inputs of this motion.
+        modes: modes of rigid stops and Coulomb friction at the start, (2 k,). By default they
+            follow from the positions and velocities.
+        options: options of `integrate_events`.
 
     Returns:
-        the legs that were reached, one at least; None where they reach the last time, or else why
-        they do not: the message says when and in which configuration, and at a singular one the
-        joint that the loops do not hold.
+        The segments that were reached, at least one, and None or the error that ends the motion
+        early. The error message contains the time and the configuration, and at a singular
+        configuration the joint that the loops do not constrain.
     """
     legs, stop = _integrate(system, equations, x0, times, p, modes, **options)
     if isinstance(stop, SolverError) and stop.state:
@@ -443,12 +449,12 @@ def integrate_legs(
 
 
 def _own(system: System, p: Array) -> Array:
-    """The parameters of the system, without the inputs that are given for a motion."""
+    """Return the parameters of the system, without the inputs of the motion."""
     return p[: len(system.parameters)]
 
 
 def _without_inertia(system: System) -> str:
-    """Which velocity moves no inertia, as the end of a sentence; empty if each moves some."""
+    """Return the end of an error message that names a velocity without inertia, or empty text."""
     try:
         require_inertia(system)
     except ModelError as error:
@@ -457,11 +463,11 @@ def _without_inertia(system: System) -> str:
 
 
 _TOUCHED = 1e-6
-"""Distance from a limit [rad or m] at which a rigid stop is closed; impacts are found to 1e-9."""
+"""Distance from a limit [rad or m] below which a stop is closed; impacts are located to 1e-9."""
 
 
 def _at_stops(system: System, x: Array, p: Array) -> str:
-    """The rigid stops that are closed at a singular state, and the remedy; empty if none is."""
+    """Return text with the rigid stops closed at a singular state and the remedy, or empty text."""
     contacts = contacts_of(system)
     if not len(contacts):
         return ""
@@ -480,7 +486,7 @@ def _at_stops(system: System, x: Array, p: Array) -> str:
 
 
 def _with_names(system: System, stop: SolverError) -> str:
-    """The message, with the events that are to blame by component and label."""
+    """Return the error message with names of components in place of indices of indicators."""
     message, _, numbers = str(stop).partition("; indicators ")
     contacts = [name for _ in KINDS for name in contacts_of(system).names]
     names = [*contacts, *map(", ".join, part_event_names(system))]
@@ -489,7 +495,7 @@ def _with_names(system: System, stop: SolverError) -> str:
 
 
 def _lost(system: System, q: Array, p: Array) -> str:
-    """The joint that moves most in what the rows hold least at a configuration, in words."""
+    """Return text with the joint that moves most in the least constrained directions at q."""
     found = scales(system)
     J = np.array(constraint_jacobian(system)(q, _own(system, p)))
     J = J * found.rows.reshape(-1, 1) * found.columns([speed.unit for speed in system.speeds])
@@ -497,8 +503,8 @@ def _lost(system: System, q: Array, p: Array) -> str:
     rank = system.nv - system.closure.mobility
     if not rank or not np.isfinite(J).all():
         return ""
-    free = np.linalg.svd(J)[2][rank - 1 :]  # as many directions as are free there, at the least
-    moves = np.round(np.sum(free**2, axis=0), 6)  # the first of joints that move alike
+    free = np.linalg.svd(J)[2][rank - 1 :]  # at least the free directions at q
+    moves = np.round(np.sum(free**2, axis=0), 6)  # rounded: the first of equal joints is chosen
     name = system.speeds[int(np.argmax(moves))].name
     return f", and the loops hardly hold {name} there"
 
@@ -518,7 +524,7 @@ def _integrate(
             return _with_other_rows(system, equations, x0, times, p, options)
         q, parameters = x0[: system.nq], _own(system, p)
         if float(row_independence(system)(q, parameters)) < _SINGULAR:
-            state = equations(rows_at(system, q, parameters))  # the start may be regular for others
+            state = equations(rows_at(system, q, parameters))  # other rows may be regular
     if len(contacts_of(system)):
         return _with_contacts(system, state, x0, times, p, modes, options)
     discs = [disc.name for _, disc in rolling_discs(system)]
@@ -548,7 +554,7 @@ def _motion(
     p: Array,
     options: dict[str, Any],
 ) -> EventMotion:
-    """The motion as far as it comes; its steps end where laws of components have bends."""
+    """Integrate as far as possible. Steps end at discontinuities of the laws of components."""
     rhs, project, passage = state.rhs, state.project, state.passage
     own, count, prepared = events, 0, state.prepared
     if state.crossings is not None:
@@ -576,7 +582,7 @@ def _motion(
 def _stops(
     state: FullState, begin: float, end: float, p: Array
 ) -> tuple[Array, NDArray[np.bool_]] | None:
-    """Times at which laws of time jump, bend or are short; the last ones found are kept."""
+    """Return times of jumps, kinks and short pulses of the laws of time; the last are cached."""
     if state.timing is None:
         return None
     own = p[: state.timing.p]
@@ -591,18 +597,18 @@ def _stops(
 def with_crossings(
     state: FullState, x0: Array, span: tuple[float, float], events: Events | None, p: Array
 ) -> tuple[Events, tuple[Function, Function | None, Passage | None]]:
-    """Events with the crossings behind them, and the functions of the state with their modes.
+    """Append the crossings to the events, and their modes to the functions of the state.
 
-    On which side of a crossing the motion is, 1 or -1, is its mode; nothing jumps there, so that
-    it does not matter whether a step stops a little before or behind it. The modes of sides and
-    counts are as `guard` has them; the last mode is the duration.
+    The mode of a crossing is its side, 1 or -1. The state is continuous at a crossing, so a step
+    may end slightly before or after it. `guard` defines the modes of sides and counts; the last
+    mode is the duration.
 
     Args:
-        state: with crossings.
-        x0: (nx,) at the start.
+        state: state equation with crossings.
+        x0: state at the start, (nx,).
         span: times of the start and the end [s].
-        events: others; None where there are none.
-        p: (np,) parameters, without modes.
+        events: other events, or None.
+        p: parameters (np,), without modes.
     """
     assert state.crossings is not None
     modes = () if events is None else tuple(np.ravel(np.asarray(events.modes, dtype=float)))
@@ -610,12 +616,12 @@ def with_crossings(
         state.prepared["crossings"] = _watch_crossings(state, events, len(x0), len(p), len(modes))
     (indicators, jump, approaches), functions = state.prepared["crossings"]
     t0, end = span
-    duration = end - t0 or 1.0  # a motion of one time has no events
+    duration = end - t0 or 1.0  # 1 s if only one time is requested: no events
     start = np.array(state.crossings(t0, x0, [*p, *modes]))[:, 0]
     few = state.sides + state.counts
     plain, sides, counts = np.split(start, [len(start) - few, len(start) - state.counts])
     places = [*np.where(plain > 0, 1.0, -1.0), *np.sign(sides), *np.floor(counts)]
-    if few:  # awake, not in a row, since the start
+    if few:  # initial modes of `guard`: awake, no repeated events, since the start
         begin = float(math.floor(ticks_of(t0, duration)))
         places += [*np.zeros(2 * few), *np.full(few, begin), duration]
     first_step = _FIRST_STEP if state.short else 0.0
@@ -627,14 +633,14 @@ def _watch_crossings(
 ) -> tuple[
     tuple[Function, Function, Function | None], tuple[Function, Function | None, Passage | None]
 ]:
-    """Indicators and jump with the crossings behind those of others, and the functions.
+    """Return indicators and jump with the crossings last, and the functions with their modes.
 
     Args:
-        state: with crossings.
-        events: others; None where there are none.
+        state: state equation with crossings.
+        events: other events, or None.
         n: number of states.
         own: number of parameters.
-        modes: number of the modes of the others.
+        modes: number of modes of the other events.
     """
     assert state.crossings is not None
     count, n_p, few = state.crossings.numel_out(0), own + modes, state.sides + state.counts
@@ -662,7 +668,7 @@ def _watch_crossings(
     if events is not None:
         indicators.insert(0, events.indicators.call(at)[0])
         jumps = casadi.mmax(fired_first)
-        there, *changed = events.jump.call([*at, fired_first])  # modes where there are some
+        there, *changed = events.jump.call([*at, fired_first])  # modes, if any
         state_after = casadi.if_else(jumps, there, x)
         after = [casadi.if_else(jumps, now, pm[own:n_p]) for now in changed]
     after += [casadi.if_else(fired_plain > 0, -sides, sides), then, duration]
@@ -695,12 +701,12 @@ def _watch_crossings(
 
 
 def _without_crossings(motion: EventMotion, events: Events | None, modes: int) -> EventMotion:
-    """The motion with the modes and events of others alone.
+    """Remove the modes and events of crossings from a motion.
 
     Args:
-        motion: with crossings.
-        events: others; None where there are none.
-        modes: number of the modes of crossings.
+        motion: motion with crossings.
+        events: other events, or None.
+        modes: number of modes of crossings.
     """
     first = 0 if events is None else events.indicators.numel_out(0)
     kept = motion.modes.shape[1] - modes
@@ -714,11 +720,11 @@ def _without_crossings(motion: EventMotion, events: Events | None, modes: int) -
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Limit:
-    """Where a leg ends: a measure of the configuration falls below a level.
+    """End of a segment: a measure of the configuration falls below a level.
 
     Attributes:
-        measure: `measure(q, p)`.
-        level: of the measure.
+        measure: Function `measure(q, p)`.
+        level: value of the measure at which the segment ends.
     """
 
     measure: Function
@@ -733,7 +739,7 @@ def _with_other_rows(
     p: Array,
     options: dict[str, Any],
 ) -> tuple[list[Leg], Stop]:
-    """Legs of an over-constrained system, each with rows that suit its first configuration."""
+    """Integrate in segments, each with closure rows chosen at its first configuration."""
     legs: list[Leg] = []
     start = Leg(equations(system), times[:1], x0.reshape(1, -1))
     system, limit = _next(system, x0[: system.nq], _own(system, p))
@@ -789,21 +795,21 @@ def _leg(
     limit: Limit,
     options: dict[str, Any],
 ) -> tuple[Leg, EventMotion, float | None]:
-    """One leg, the motion, and when it ended early, below the limit; it rests from then on."""
+    """Integrate one segment up to the limit; after it the state is held constant until the end."""
     n, n_p = len(x0), len(p)
     count = state.events[0].numel_out(0) if state.events else 0
     t, x, pm, fired = (
         SX.sym(k, m) for k, m in (("t", 1), ("x", n), ("p", n_p + 1), ("f", count + 1))
     )
     parameters, ended = pm[:n_p], pm[n_p]
-    # a rate that has no value at the end is left out
+    # after the limit the rate is zero, even if `rhs` is not finite
     rate = casadi.if_else(ended, 0, state.rhs(t, x, parameters))
     rhs = Function("rhs", [t, x, pm], [rate])
     assert state.project is not None
     corrected, residual = state.project(t, x, parameters)
     kept = [casadi.if_else(ended, x, corrected), casadi.if_else(ended, 0, residual)]
     project = Function("project", [t, x, pm], kept)
-    # events of components, then the end
+    # indicators of components, then of the limit
     left = limit.measure(x[: system.nq], parameters[: len(system.parameters)]) - limit.level
     watched, after = left, x
     if state.events:
@@ -836,9 +842,9 @@ def _leg(
 
 
 def _next(system: System, q: Array, p: Array) -> tuple[System, Limit | None]:
-    """The system with rows that suit a configuration better, and where its leg ends.
+    """Choose the closure rows at a configuration and the limit at which their segment ends.
 
-    No leg begins where all rows are dependent.
+    The limit is None if the configuration is singular. No segment can start there.
     """
     better = rows_at(system, q, p)
     old, new = (float(row_independence(one)(q, p)) for one in (system, better))
@@ -847,7 +853,7 @@ def _next(system: System, q: Array, p: Array) -> tuple[System, Limit | None]:
     return chosen, limit
 
 
-# Prescribed motions of a simulation: laws of time, or signals, by the names of positions and rates.
+# Prescribed motions: laws of time or signals, by the names of positions and their rates.
 
 
 Motion = Mapping[str, float | str | Signal | Function | Callable[[Any], Any]] | None
@@ -855,16 +861,16 @@ _KINDS = ("q", "v", "a")
 
 
 def prescribed_motions(system: System, motion: Motion) -> list[Prescribed]:
-    """What a user prescribes, by names such as "j1.q", "j1.v" and "j1.a".
+    """Return the prescribed motions of a dict with names such as "j1.q", "j1.v" and "j1.a".
 
     Args:
-        system: open or closed.
-        motion: for each name a number, a function of the time made of CasADi operations, or a
-            signal of a component, itself or by its name.
+        system: open or closed system.
+        motion: law of each name: a number, a function of time made of CasADi operations, or a
+            signal of a component (the Signal or its name).
 
     Raises:
-        ModelError: a name is unknown, a law is no function of time, a signal follows from the
-            motion, or the loops tie what is prescribed.
+        ModelError: a name is unknown, a law is not a function of time, a signal depends on the
+            motion, or the loops make the prescribed velocities dependent.
     """
     if not isinstance(motion, Mapping | None):
         raise ModelError(
@@ -880,7 +886,7 @@ def prescribed_motions(system: System, motion: Motion) -> list[Prescribed]:
                 " velocity or its acceleration"
             )
     if found:
-        hybrid_dynamics(system, names)  # refuses what the loops tie
+        hybrid_dynamics(system, names)  # raises if the loops make them dependent
     return found
 
 
@@ -893,19 +899,19 @@ def start_positions(
     p: Sequence[float],
     begin: float,
 ) -> tuple[Start, Values]:
-    """The start of a motion, with what is prescribed of it at its first time.
+    """Return the initial positions and velocities, including the prescribed values.
 
     Args:
-        system: open or closed.
-        motions: what is prescribed.
+        system: open or closed system.
+        motions: prescribed motions.
         q0: positions by name.
         v0: velocities by name.
-        z0: (nz,) states of components at the start.
-        p: (np,) parameters.
-        begin: the first time [s].
+        z0: states of components at the start, (nz,).
+        p: parameters (np,).
+        begin: first time [s].
 
     Raises:
-        ModelError: a start is given for what is prescribed, or not by name.
+        ModelError: `q0` or `v0` contradicts a prescribed value, or is not given by name.
     """
     if not motions:
         return q0, v0
@@ -932,7 +938,7 @@ def _by_name(system: System, what: str, given: Values, kinds: Collection[str]) -
 
 
 def _put(system: System, values: dict[str, float], name: str, value: float, what: str) -> None:
-    # both are given with the digits that people and files write, not computed
+    # relative tolerance 1e-9: both values are typed or read from files, not computed
     if name in values and abs(values[name] - value) > 1e-9 * max(1.0, abs(value)):
         raise ModelError(
             f"{system.name}: {what} gives {name} = {values[name]:g}, but its motion starts at"
@@ -980,7 +986,7 @@ def _prescribe(system: System, name: str, law: Any) -> Prescribed:
 
 
 def _signal(system: System, name: str, given: str) -> tuple[SX, SX]:
-    """A signal of a component, and the rates of all states that it follows from."""
+    """Return a signal of a component and the rates (nz, 1) of all states of components."""
     q, v = (
         casadi.vertcat(SX(0, 1), *(SX.sym(f"{row.name}.{letter}") for row in rows))
         for letter, rows in (("q", system.coordinates), ("v", system.speeds))
@@ -1001,7 +1007,7 @@ def _signal(system: System, name: str, given: str) -> tuple[SX, SX]:
 
 
 def _value(system: System, name: str, law: Any, t: SX) -> SX:
-    """The law as one scalar expression of the time."""
+    """Return the law as a scalar expression of the time t."""
     given = law
     if callable(law):
         try:
@@ -1028,16 +1034,16 @@ def _value(system: System, name: str, law: Any, t: SX) -> SX:
     return value
 
 
-# What sensors read in the course of a simulation.
+# Sensor readings in a simulation.
 
 
 def sensor_values(system: System, motion: Mapping[str, Array]) -> Array:
-    """(n, k) values of every element that the sensors read, in their order.
+    """Return the readings of all sensors at n instants, (n, k), in the order of the sensors.
 
     Args:
-        system: with sensors.
-        motion: a column for each instant of q (nq, n), v, a and tau (nv, n) of the whole tree, of
-            states z and inputs u of components, and of the parameters p (np, n).
+        system: system with sensors.
+        motion: arrays with one column per instant: q (nq, n), v, a and tau (nv, n) of the whole
+            tree, states z and inputs u of components, parameters p (np, n).
     """
     model = measurements(system, "tree")
     count = motion["q"].shape[1]
@@ -1046,26 +1052,26 @@ def sensor_values(system: System, motion: Mapping[str, Array]) -> Array:
     return np.hstack([np.array(one).T.reshape(count, -1) for one in values])
 
 
-# What a result shows: a column for each quantity, and where its values come from.
+# Columns of a result: name, unit and source of the values of each quantity.
 
 
 _SCALARS = (("kinetic_energy", "J"), ("potential_energy", "J"), ("closure_residual", "1"))
 _BLOCKS = ("x", "a", "tau", "u", "y", "scalars", "sensors", "contacts")
-"""Where values come from, side by side: the state, what the state equation observes, the rest."""
+"""Blocks of values in order: state, outputs of `observe` (a, tau, u, y, scalars), the others."""
 
 
 _Column = tuple[str, str, str, int]
-"""Name and unit of a column, the block where its values are, and the index in it."""
+"""Name and unit of a column, name of the block of its values, index in the block."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Columns:
-    """The columns of a result.
+    """Columns of a result.
 
     Attributes:
-        units: by name, in order.
-        places: for each, its index in the blocks side by side.
-        blocks: which of them the columns are of.
+        units: unit of each column by name, in order.
+        places: index of each column in the concatenated blocks.
+        blocks: names of the blocks that the columns use.
     """
 
     units: Mapping[str, str]
@@ -1074,10 +1080,10 @@ class _Columns:
 
 
 def _columns_of(system: System, outputs: tuple[str, ...] | None) -> _Columns:
-    """All columns of a result, or those that are asked for.
+    """Return all columns of a result, or the columns named in `outputs`.
 
     Raises:
-        ModelError: a name is unknown, or there twice.
+        ModelError: a name is unknown, or occurs twice.
     """
     nq, nv, nu = system.nq, system.nv, len(system.inputs)
     contacts = contacts_of(system)
@@ -1131,7 +1137,7 @@ def _chosen(system: System, every: Sequence[_Column], outputs: Sequence[str]) ->
 
 
 def _state_names(system: System) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
-    """Names of positions, velocities and states of components."""
+    """Return the names of positions, velocities and states of components."""
     return (
         tuple(row.name for row in system.coordinates),
         tuple(row.name for row in system.speeds),
@@ -1140,16 +1146,16 @@ def _state_names(system: System) -> tuple[tuple[str, ...], tuple[str, ...], tupl
 
 
 def modes_of(legs: Sequence[Leg]) -> Array:
-    """(n, k) modes of rigid stops and Coulomb friction at the rows of a motion."""
-    contact = legs[0].contact  # a motion with contacts has one leg
+    """Return the modes of rigid stops and Coulomb friction at n rows, (n, 2 k) or (n, 0)."""
+    contact = legs[0].contact  # a motion with contacts has one segment
     return np.empty((sum(len(leg.times) for leg in legs), 0)) if contact is None else contact.modes
 
 
 def require_state_of(system: System, state: State) -> None:
-    """Refuse a state of another mechanism.
+    """Raise if a state belongs to another mechanism.
 
     Raises:
-        ModelError: its names are not those of the system; the message says which.
+        ModelError: the names of the state differ from the names of the system.
     """
     wanted, given = _state_names(system), (tuple(state.q), tuple(state.v), tuple(state.z))
     for what, own, other in zip(("positions", "velocities", "states"), wanted, given, strict=True):
@@ -1209,21 +1215,21 @@ def _result(
     )
 
 
-# A system under some laws, prepared once for many motions.
+# Simulator: a system with laws of efforts and motions, prepared once for many simulations.
 
 
 _KEPT = 8
-"""State equations that a system keeps between runs: a few laws that a script takes in turn. As many
-starts, and sets of columns."""
+"""Maximum number of cached state equations per system, enough for a script with a few laws; also
+the maximum number of cached simulators, starts and sets of columns."""
 
 
 _LOOKS = 1000
-"""Steps of a motion under laws in which no pulse can be found beforehand, at least: pulses of one
-thousandth of the duration are met."""
+"""Minimum number of steps of a motion under laws whose pulses cannot be located beforehand: a pulse
+of one thousandth of the duration is not missed."""
 
 
 def _is_opaque(law: Function | None) -> bool:
-    """Whether a law calls code that is no expression: a Callback or a function of a library."""
+    """Return whether a law calls a Callback or an external function, whose code is opaque."""
     if law is None:
         return False
     names = [one.class_name() for one in (law, *law.find_functions())]
@@ -1231,13 +1237,13 @@ def _is_opaque(law: Function | None) -> bool:
 
 
 class Simulator(MadeOnce):
-    """Motions of one system under the same laws: prepared once, called many times.
+    """Simulator of one system under fixed laws, prepared once and called many times.
 
-    Its state equation and its machine code are made at the first call, kept with the system, and on
-    disk by their content, so that another process only reads them. It may be pickled and called
-    from several threads at once.
+    The first call derives the state equation and compiles it. Both are cached with the system and
+    on disk, so that another process reads them. A simulator can be pickled, and can be called from
+    several threads at once.
 
-    `simulator(duration, q0=..., inputs={"j1.tau": 2.0})` is a motion as that of `run`.
+    `simulator(duration, q0=..., inputs={"j1.tau": 2.0})` simulates one motion, as `run` does.
     """
 
     settings = ("system",)
@@ -1253,21 +1259,21 @@ class Simulator(MadeOnce):
         u: Effort = None,
         method: str = "dopri5",
     ) -> None:
-        """Check what is given for all motions.
+        """Check and store the arguments that are common to all motions.
 
         Args:
-            system: open or closed.
-            inputs: efforts and inputs of components that are numbers of each motion, such as
-                "j1.tau" and "motor.voltage"; they take the place of what `tau` and `u` say.
-            outputs: the columns of results, such as "j1.q"; all when left out. Accelerations,
-                efforts, energies and sensors cost nothing where no column is of them.
-            tau: as of `run`, likewise the others.
-            motion: likewise.
-            u: likewise.
-            method: likewise.
+            system: open or closed system.
+            inputs: names of efforts and component inputs whose constant value is set in each call,
+                such as "j1.tau" and "motor.voltage". The values replace those of `tau` and `u`.
+            outputs: names of the columns of results, such as "j1.q"; all columns by default.
+                Accelerations, efforts, energies and sensors without column are not computed.
+            tau: joint efforts, as in `run`.
+            motion: prescribed motions, as in `run`.
+            u: inputs of devices, as in `run`.
+            method: integration method, as in `run`.
 
         Raises:
-            ModelError: `system` is no System, a name is unknown, or a law has the wrong form.
+            ModelError: `system` is not a System, a name is unknown, or a law has the wrong form.
         """
         require_system(system)
         self.system = system
@@ -1288,19 +1294,19 @@ class Simulator(MadeOnce):
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """The full names of the inputs that a call may give."""
+        """Full names of the inputs whose values can be set in a call."""
         return tuple(one.name for one in self._given)
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """The columns of results."""
+        """Names of the columns of results."""
         return tuple(self._columns.units)
 
     def __repr__(self) -> str:
         return f"<Simulator {self.system.name}: {len(self.outputs)} signals>"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds the system and the laws; what was made of them is found on disk."""
+        """Pickle the system and the laws. The derived equations are cached on disk."""
         laws = self._effort, self._inputs, tuple(self._motions)
         plain = self._given, self._outputs, self._method
         return _simulator_of, packed((self.system, laws, plain))
@@ -1320,23 +1326,23 @@ class Simulator(MadeOnce):
         max_step: float | None = None,
         quiet: bool = True,
     ) -> Result:
-        """One motion.
+        """Simulate one motion.
 
         Args:
-            duration: [s].
-            q0: as of `run`, likewise the others.
-            v0: likewise.
-            z0: likewise.
-            guess: likewise.
-            inputs: values of those that the simulator has, the others zero or as described.
-            parameters: as of `run`, likewise the others.
-            step: likewise.
-            tolerance: likewise.
-            max_step: likewise.
-            quiet: likewise.
+            duration: duration [s].
+            q0: initial positions, as in `run`.
+            v0: initial velocities, as in `run`.
+            z0: initial states of devices, as in `run`.
+            guess: approximate positions that select the branch of the loops, as in `run`.
+            inputs: values of `Simulator.inputs` by name. An input without value has its default.
+            parameters: values of parameters by name, as in `run`.
+            step: time between the rows of the result [s].
+            tolerance: expected error of the motion, as in `run`.
+            max_step: longest integration step [s], as in `run`.
+            quiet: Whether to hide the progress bar.
 
         Raises:
-            what `run` raises.
+            ModelError, CompilerError, Unclosable, SolverError, Interrupted: as in `run`.
         """
         system, motions = self.system, self._motions
         duration = positive(duration, "duration [s]", system.name)
@@ -1380,7 +1386,7 @@ class Simulator(MadeOnce):
         if motions and legs[0].first_slope is not None:
             H = _first_bias(system, x0, self._inputs, _own(system, p))
             legs[0] = replace(legs[0], driven=tuple(m.velocity for m in motions), first_bias=H)
-        if isinstance(stop, Interrupted):  # rows may take long where laws do
+        if isinstance(stop, Interrupted):  # deferred: slow laws make the rows slow
             stop.compute = partial(_result, system, legs, p, stop, self._columns, allowed, note)
             raise stop
         result = _result(system, legs, p, stop, self._columns, allowed, note)
@@ -1390,7 +1396,7 @@ class Simulator(MadeOnce):
         return result
 
     def _values(self, inputs: Mapping[str, float] | None) -> list[float]:
-        """Numbers of the inputs that the simulator has."""
+        """Return the values of `self.inputs`, in order; defaults if no value is given."""
         inputs = values_given(f"{self.system.name}: inputs", inputs, '"j1.tau": 2.0')
         if not inputs:
             return [one.default for one in self._given]
@@ -1405,13 +1411,13 @@ class Simulator(MadeOnce):
 
     @functools.cached_property
     def _key(self) -> Packed | None:
-        """What laws say; None where they hold machine code, which has no text."""
+        """Cache key of the laws; None if they contain machine code, which has no text form."""
         return content_of((self._effort, self._inputs, tuple(self._motions), self._given))
 
     def content(self) -> bytes:
-        """What its motions follow from, as text that is the same in another process.
+        """Return a cache key of system and laws that is the same in every process.
 
-        Code of a user is known by the equations that it makes.
+        If the laws or components contain user-defined Python code, it is the pickled equation.
         """
         known = self.system.content(), self._key
         if None not in known:
@@ -1419,7 +1425,7 @@ class Simulator(MadeOnce):
         return pickle.dumps(replace(self._equations(self.system), prepared={}))
 
     def _equations(self, system: System) -> FullState:
-        """The state equation of the system, or of one that differs in its independent rows."""
+        """Return the state equation of the system, or of a copy with other independent rows."""
         laws = self._effort, self._inputs, self._motions, self._given
         if self._key is None:
             return full_state(system, *laws)
@@ -1431,19 +1437,19 @@ class Simulator(MadeOnce):
         return found
 
 
-# State equations on disk, by all that made them: another process reads what this one derived.
+# Cache of state equations on disk, shared between processes.
 
 
 def _on_disk(system: System, laws: Any, derive: Callable[[], FullState]) -> FullState:
-    """The state equation that was derived from the same content, in whatever process.
+    """Return a state equation from the cache on disk, or derive and store it.
 
-    What cannot be read is derived anew, and so is what code of a user takes part in, which no
-    text knows; MBS_KEEP_EQUATIONS=0 keeps nothing on disk.
+    An unreadable entry is derived again. Systems with user-defined Python code have no cache key
+    and are not cached. MBS_KEEP_EQUATIONS=0 disables the cache.
 
     Args:
-        system: open or closed.
-        laws: what else it was derived from, as text.
-        derive: makes it where it is not at hand.
+        system: open or closed system.
+        laws: cache key of the laws.
+        derive: callable that derives the state equation.
     """
     own = system.content()
     if own is None or os.environ.get("MBS_KEEP_EQUATIONS", "1") == "0":
@@ -1451,18 +1457,18 @@ def _on_disk(system: System, laws: Any, derive: Callable[[], FullState]) -> Full
     content = repr((own, laws, casadi.CasadiMeta.version(), _sources()))
     name = hashlib.sha256(content.encode()).hexdigest()
     file = cache_dir() / f"equations-{name}.pickle"
-    with suppress(Exception):  # it is not there, or damaged
+    with suppress(Exception):  # the file is missing or damaged
         found: FullState = pickle.loads(read_sealed(file))
         return found
     made = derive()
-    with suppress(Exception):  # a full disk, or a Function without text: the next one derives too
+    with suppress(Exception):  # a full disk, or a Function that cannot be pickled
         write_sealed(pickle.dumps(replace(made, prepared={})), file)
     return made
 
 
 @functools.cache
 def _sources() -> str:
-    """A hash of this package's Python, which derives the equations."""
+    """Return a hash of the Python files of this package, which derive the equations."""
     total = hashlib.sha256()
     for file in sorted(Path(__file__).parents[1].rglob("*.py")):
         total.update(file.read_bytes())
@@ -1470,7 +1476,7 @@ def _sources() -> str:
 
 
 def _simulator_of(*state: Any) -> Simulator:
-    """The simulator that was pickled."""
+    """Restore a pickled simulator."""
     system, (effort, inputs, motions), (given, outputs, method) = unpacked(*state)
     made = Simulator(system, [one.name for one in given], outputs, method=method)
     made._effort, made._inputs, made._motions = effort, inputs, list(motions)
@@ -1478,7 +1484,7 @@ def _simulator_of(*state: Any) -> Simulator:
 
 
 def _degrees_given(system: System, q0: Start, guess: Guess) -> str:
-    """Return a note on starts and guesses that look like degrees; those of a state do not."""
+    """Return a note on starts and guesses that look like degrees; empty text if q0 is a state."""
     if isinstance(q0, State | Result):
         return ""
     given: dict[str, float] = {}
@@ -1499,9 +1505,9 @@ def _started(
     p: Array,
     guess: Guess,
 ) -> tuple[Array, Array]:
-    """The start of a motion; the last few are kept, for the next motion from the same one.
+    """Return the initial positions and velocities; the last few results are cached.
 
-    So are positions alone: motions that differ in their velocities close the loops once.
+    Positions are also cached alone: starts that differ in velocities close the loops once.
     """
     own = _own(system, p)
     named = dict(zip((one.name for one in system.parameters), own, strict=True))
@@ -1513,7 +1519,7 @@ def _started(
             for given in (q0, v0)
         )
         hash((positions, velocities))
-    except (TypeError, NotImplementedError):  # lists, arrays, DM, and values without meaning
+    except (TypeError, NotImplementedError):  # lists, arrays, DM and invalid values
         return start(system, q0, v0, named)
 
     def position() -> Array:
@@ -1546,71 +1552,72 @@ def run(
     method: str = "dopri5",
     quiet: bool = False,
 ) -> Result:
-    """The motion of a system from given positions and velocities under given joint efforts.
+    """Simulate a system from initial positions and velocities under joint efforts and motions.
 
-    A one-step method with error control. After every step positions and velocities are
-    projected onto the independent closure rows, so that loops do not drift; the step is accepted
-    when all closure rows hold.
+    The forward dynamics are integrated by a one-step method with error control. After every step,
+    positions and velocities are projected onto the independent closure rows, so that the loops do
+    not drift. A step is accepted if all closure rows are satisfied.
 
-    What stops a motion, an error or control-C, is raised with what was reached as its `result`: a
-    `Result` of the rows before the stop, whose `stopped` has the time and the sentence.
+    An error or control-C during the integration raises an exception with the attribute `result`:
+    a `Result` of the rows before the stop. Its `stopped` contains the time and the error message.
 
     Args:
-        system: open or closed.
-        duration: [s].
-        q0: positions at the start by coordinate name [rad or m], the others as in the assembled
-            configuration; in a closed system the loops are closed with the independent ones as
-            given, and a complete configuration is taken as it is. Or a `State`, as
-            `Result.state` gives it: the motion goes on from there, at its time, with its
-            velocities, its states of components and its modes. A `Result` is its last state.
-        v0: velocities at the start by name [rad/s or m/s], the others zero; in a closed system
-            they may be of any joints, and the others follow. Or those of a `State` or `Result`.
-        tau: joint efforts [N m or N]: constants of motors by name, or a function of (t, q, v) made
-            of CasADi operations, or a casadi.Function, that returns (nv, 1) efforts, zero where
-            there is no motor; or a dict that names joints, also such as have no motor.
-        motion: laws for coordinates that drives move: by name such as "j1.q" a position, "j1.v" a
-            velocity, "j1.a" an acceleration. Each law is a number, a smooth function of t made of
-            CasADi operations, or a signal of a component, itself or by its name, such as
-            "filter.q". A signal follows from states of components and parameters alone. The column
-            `j1.tau` is the whole effort, with the drive's.
-        u: inputs of the devices of drive lines, such as voltages: constants by the name of the
-            device, or a function of (t, q, v) as for tau; zero when left out. What the devices
-            deliver is added to tau.
-        z0: states of devices at the start by name, such as `motor.i`, the others zero. Or those of
-            a `State` or `Result`.
-        guess: approximate positions of other joints at the start, which choose the branch on which
-            the loops are closed.
-        parameters: values of symbols, the others at their defaults.
+        system: open or closed system.
+        duration: duration [s].
+        q0: initial positions by coordinate name [rad or m]; the other coordinates are as in the
+            assembled configuration. In a closed system the independent positions are kept and the
+            loops are closed; a complete configuration is used unchanged. A `State` of
+            `Result.state` continues that motion with its time, velocities, component states and
+            modes. A `Result` is replaced by its last state.
+        v0: initial velocities by name [rad/s or m/s]; the others are zero. In a closed system they
+            may be of any joints, and the others follow. A `State` or `Result` is also accepted.
+        tau: joint efforts [N m or N]: dict of constants by motor name, or a function of (t, q, v)
+            made of CasADi operations, or a casadi.Function. A function returns efforts (nv, 1),
+            zero for joints without motor, or a dict by joint name, also of joints without motor.
+        motion: prescribed motions by name: "j1.q" for a position, "j1.v" for a velocity, "j1.a"
+            for an acceleration. Each law is a number, a smooth function of t made of CasADi
+            operations, or a signal of a component (the Signal or its name, such as "filter.q")
+            that depends on component states and parameters only. The column `j1.tau` is the total
+            effort, including the effort of the drive.
+        u: inputs of the devices of drive lines, such as voltages: dict of constants by device name,
+            or a function of (t, q, v) as for tau. The default is `system.u_default`. The efforts of
+            the devices are added to tau.
+        z0: initial states of devices by name, such as `motor.i`; the others have their default.
+            A `State` or `Result` is also accepted.
+        guess: approximate initial positions of other joints, which select the branch on which the
+            loops are closed.
+        parameters: values of parameters by name; the others have their defaults.
         step: time between the rows of the result [s]; it does not change the accuracy.
-        tolerance: error of the motion to be expected [rad, m, rad/s or m/s]. A step may err by a
-            twenty-fifth of it, and by a thousandth relative to large coordinates. Or a dict of
+        tolerance: expected error of the motion [rad, m, rad/s or m/s]. The error of one step is
+            limited to 1/25 of this value, and to 1/1000 relative to large coordinates. A dict sets
             tolerances by unit, such as "rad" and "m/s", and by name, such as "j1.q"; "others" is
-            for the other states. A pair has an absolute and a relative tolerance.
+            for the other states. A pair is an absolute and a relative tolerance.
             `result.info["note"]` names positions that move by less than 100 tolerances, and starts
             that look like degrees.
-        max_step: the longest step of the integration [s]. Error control, the times at which laws
-            jump, and short laws limit the steps by default. If a law calls a Callback or an
-            external function, whose jumps cannot be found, the default is duration / 1000.
-            It is needed where a law is short in space and smooth, such as a narrow potential well.
-        method: "dopri5", Dormand and Prince's explicit pair, or "rodas", the linearly implicit
+        max_step: longest integration step [s]. By default error control, the times at which laws
+            jump, and short laws limit the steps. If a law calls a Callback or an external function,
+            whose jumps cannot be located, the default is duration / 1000. Set it if a law is
+            smooth and short in space, such as a narrow potential well.
+        method: "dopri5", the explicit pair of Dormand and Prince, or "rodas", the linearly implicit
             RODAS5P for stiff systems.
-        quiet: no progress bar.
+        quiet: Whether to hide the progress bar.
 
     Returns:
-        A `Result` with, for every coordinate, `name.q`, `name.v`, `name.a`, `name.tau`, and
-        `kinetic_energy`, `potential_energy`, `closure_residual`; for every device its input, its
-        states and its outputs, such as `motor.voltage`, `motor.i`, `motor.tau`, `motor.w`; and
-        what every sensor reads, such as `tip.p.x`. A rigid stop or Coulomb friction has `name.mode`
-        and `name.effort`, and `events` says when they change.
+        Result with `name.q`, `name.v`, `name.a` and `name.tau` of every coordinate, and
+        `kinetic_energy`, `potential_energy`, `closure_residual`. Every device has its input, states
+        and outputs, such as `motor.voltage`, `motor.i`, `motor.tau`, `motor.w`; every sensor has
+        its readings, such as `tip.p.x`. A rigid stop or Coulomb friction has `name.mode` and
+        `name.effort`, and `events` lists the times of its changes.
 
     Raises:
-        ModelError: `system` is no System, a name is unknown or has no motor, or an argument has the
-            wrong type or size.
-        CompilerError: the compiler that CC names does not start.
+        ModelError: `system` is not a System, a name is unknown or has no motor, or an argument has
+            the wrong type or size.
+        CompilerError: the compiler named by the environment variable CC does not start.
         Unclosable: the loops cannot be closed at these positions.
-        SolverError: the integration cannot go on; the message says when and why, `result` has
-            what was reached.
-        Interrupted: control-C was pressed; a KeyboardInterrupt whose `result` has what was reached.
+        SolverError: the integration cannot continue. The message contains the time and the reason,
+            `result` the rows that were reached.
+        Interrupted: control-C was pressed. It is a KeyboardInterrupt; `result` contains the rows
+            that were reached.
     """
     simulator = simulator_of(system, tau=tau, motion=motion, u=u, method=method)
     return simulator(
@@ -1628,12 +1635,12 @@ def run(
 
 
 def simulator_of(system: System, inputs: Sequence[str] = (), **laws: Any) -> Simulator:
-    """What runs a motion under these laws; where they are numbers, the one of the last such run.
+    """Return a simulator for these laws; simulators of constant laws are cached.
 
     Args:
-        system: open or closed.
-        inputs: as of `Simulator`.
-        laws: likewise, and the method.
+        system: open or closed system.
+        inputs: names of inputs, as in `Simulator`.
+        laws: keyword arguments tau, motion, u and method of `Simulator`.
     """
 
     def build() -> Simulator:
@@ -1645,16 +1652,16 @@ def simulator_of(system: System, inputs: Sequence[str] = (), **laws: Any) -> Sim
         if law is None or type(law) is str:
             key.append(f"{name} {law}")
             continue
-        # a function may say something else in the next call
+        # a function may return another value in the next call
         if type(law) is not dict or any(type(value) not in (int, float) for value in law.values()):
             return build()
-        key.append(f"{name} {law}")  # every digit of the numbers, and the signs of zeros
+        key.append(f"{name} {law}")  # with all digits, and the signs of zeros
     found: Simulator = system.recent("simulators", tuple(key), build, _KEPT)
     return found
 
 
 def _first_bias(system: System, x0: Array, inputs: Function | None, p: Array) -> Array:
-    """(nv,) efforts of gravity and velocities at the start."""
+    """Return the efforts of gravity and velocities (bias) at the start, (nv,)."""
     n = system.nq + system.nv
     q, v = x0[: system.nq], x0[system.nq : n]
     u = system.u_default if inputs is None else np.array(inputs(0, q, v, p)).ravel()

@@ -1,4 +1,4 @@
-"""Parameter studies: one simulation for each case, over any executor."""
+"""Parameter sweeps: simulation of many cases, by any executor of `concurrent.futures`."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from mbs.simulate.fmu_variables import numbers_of
 from mbs.simulate.run import run, simulator_of
 from mbs.text import did_you_mean, error_text, quoted
 
-# The cases of a parameter study, and the folder that keeps their results.
+# Cases of a parameter sweep, and the folder of their results.
 
 
 _INDEX = "study.json"
@@ -45,13 +45,14 @@ Grid = Mapping[str, Iterable[float]] | Sequence[Mapping[str, float]]
 
 
 def cases_of(grid: Grid) -> tuple[Case, ...]:
-    """Every combination of the values of a grid, the last name fastest; or the cases as listed.
+    """Return the cases of a grid.
 
     Args:
-        grid: name to its values, or one dict of names to values for each case.
+        grid: dict from name to values, for all combinations (the last name varies fastest), or
+            sequence of cases, each a dict from name to value.
 
     Raises:
-        ModelError: there is no case, or a value is no number.
+        ModelError: the grid has no case, or a value is not a number.
     """
     if isinstance(grid, Mapping):
         listed = list(_combinations(grid))
@@ -86,25 +87,25 @@ def _number(name: str, value: object) -> float:
 
 @dataclass(frozen=True, slots=True, weakref_slot=True)
 class Folder:
-    """Where the results of a study are kept, a file for each case.
+    """Folder of the results of a sweep, with one file per case.
 
     Attributes:
-        path: the folder, absolute: threads that load FMUs change the working directory meanwhile.
+        path: absolute path, because threads that load FMUs change the working directory.
     """
 
     path: Path
 
     @staticmethod
     def opened(path: object, study: Mapping[str, object]) -> Folder:
-        """The folder of a study: made, or found with the same study in it.
+        """Make the folder of a sweep, or open it if it contains the same sweep.
 
         Args:
-            path: where.
-            study: what is studied, as JSON knows it.
+            path: path of the folder.
+            study: JSON description of the sweep, as returned by `study_of`.
 
         Raises:
-            ModelError: it holds another study, or results of an unknown one.
-            ExportError: it cannot be written.
+            ModelError: the folder contains another sweep, or results without description.
+            ExportError: the folder cannot be written.
         """
         folder = Folder(_make(path_of(path).absolute()))
         index = folder.path / _INDEX
@@ -121,20 +122,20 @@ class Folder:
         return folder
 
     def file(self, number: int) -> Path:
-        """The file of a case."""
+        """Return the path of the result of a case."""
         return self.path / f"case_{number:06d}.npz"
 
     def part(self, number: int) -> Path:
-        """The file of what a case that failed had reached."""
+        """Return the path of the partial result of a case that failed."""
         return self.path / f"part_{number:06d}.npz"
 
     def keep(self, number: int, result: Result | None, complaint: str = "") -> None:
-        """Write the result of a case; or why it failed, with what it had reached.
+        """Write the result of a case, or its error message and partial result.
 
         Args:
-            number: of the case.
-            result: whole, or up to where it stopped; None where nothing was reached.
-            complaint: why it failed; empty where it did not.
+            number: index of the case.
+            result: complete result, or the rows before the stop; None if there are no rows.
+            complaint: error message; empty if the case succeeded.
 
         Raises:
             ExportError: the folder cannot be written.
@@ -149,15 +150,15 @@ class Folder:
             result.save(part if complaint else self.file(number))
 
     def complained(self, number: int) -> str:
-        """Why a case has no result."""
+        """Return the error message of a case without complete result."""
         said = self._complaint(number)
         return said.read_text(encoding="utf-8") if said.is_file() else "not simulated yet"
 
     def known(self) -> tuple[str, tuple[Case, ...]]:
-        """The name of the model that is studied here, and the cases.
+        """Return the name of the model and the cases of the sweep in this folder.
 
         Raises:
-            ModelError: there is no study.
+            ModelError: the folder contains no sweep.
         """
         try:
             study = json.loads((self.path / _INDEX).read_text(encoding="utf-8"))
@@ -171,7 +172,7 @@ class Folder:
         return self.path / f"case_{number:06d}.txt"
 
     def missing(self, count: int) -> list[int]:
-        """The numbers of the cases, of so many, that have no whole result yet."""
+        """Return the indices, below `count`, of the cases without complete result."""
         return [number for number in range(count) if not zipfile.is_zipfile(self.file(number))]
 
 
@@ -185,24 +186,24 @@ def _make(folder: Path) -> Path:
     return folder
 
 
-# What makes a parameter study the same as an earlier one.
+# Identity of a parameter sweep: model content, cases and options.
 
 
-_ADDRESS = re.compile(r" at 0x[0-9A-Fa-f]+")  # of objects in memory, another one every time
+_ADDRESS = re.compile(r" at 0x[0-9A-Fa-f]+")  # address of an object in the memory of one process
 
 
 def study_of(
     model: System | str | os.PathLike[str], cases: Sequence[Case], options: Mapping[str, Any]
 ) -> dict[str, object]:
-    """A study as JSON knows it.
+    """Return the JSON description of a sweep, which identifies it.
 
     Args:
-        model: a system, or the path of an FMU.
-        cases: name to value, of each simulation.
-        options: further arguments of every simulation.
+        model: system, or path of an FMU.
+        cases: dict from name to value of each simulation.
+        options: further arguments of all simulations.
 
     Raises:
-        ModelError: there is no such FMU.
+        ModelError: the FMU cannot be read, or `model` is neither a System nor a path.
     """
     name, content = _system(model, options) if isinstance(model, System) else _fmu(model)
     described = {option: _describe(value) for option, value in sorted(options.items())}
@@ -211,12 +212,12 @@ def study_of(
 
 
 _LAWS = ("tau", "motion", "u", "method")
-"""Options that are the same in all cases; what a case says of efforts and inputs is in their place,
-as numbers, so that no case has equations of its own."""
+"""Options common to all cases. Efforts and inputs of a case are numeric inputs of the simulator, so
+that all cases have the same equations."""
 
 
 def _system(system: System, options: Mapping[str, Any]) -> tuple[str, bytes]:
-    """Its name, and what its motions under these laws follow from, to the last digit."""
+    """Return the name of the system, and the cache key of system and laws."""
     laws = {name: options[name] for name in _LAWS if name in options}
     return system.name, simulator_of(system, **laws).content()
 
@@ -234,7 +235,7 @@ def _fmu(path: object) -> tuple[str, bytes]:
 
 
 def _describe(value: object) -> str:
-    """A text that is the same the next time."""
+    """Return a text of an option that is the same in every process."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key!r}: {_describe(value[key])}" for key in value) + "}"
     if isinstance(value, (list, tuple)):
@@ -244,29 +245,29 @@ def _describe(value: object) -> str:
     return getattr(value, "__qualname__", None) or _ADDRESS.sub("", repr(value))
 
 
-# The results of a parameter study, read from disk one by one.
+# Results of a parameter sweep, read from disk on access.
 
 
 Array = NDArray[np.float64]
 Measures = Mapping[str, Callable[[Result], float]]
-"""Name of a column to a function that makes one number of a result."""
+"""Dict from column name to a function that returns a number for a Result."""
 
 _SHOWN = 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sweep:
-    """The results of a parameter study; each is read from disk when it is asked for.
+    """Results of a parameter sweep. Each result is read from disk on access.
 
-    `sweep[k]` is the result of case k, `sweep[-1]` that of the last one, `sweep[2:5]` a study of
-    some of the cases.
+    `sweep[k]` is the result of case k, `sweep[-1]` the result of the last case, and `sweep[2:5]` a
+    Sweep of cases 2 to 4. Iteration yields the pairs (case, result) of the successful cases.
 
     Attributes:
-        name: of the model.
-        cases: name to value, of each simulation.
-        folder: where the results are.
-        failures: number of a case that failed, and what it said.
-        numbers: of the file of each case.
+        name: name of the model.
+        cases: dict from name to value of each simulation.
+        folder: folder of the results.
+        failures: dict from the index of a failed case (from 0) to its error message.
+        numbers: index of the file of each case.
     """
 
     name: str
@@ -277,23 +278,23 @@ class Sweep:
 
     @classmethod
     def open(cls, folder: str | os.PathLike[str]) -> Sweep:
-        """The study in a folder, whole or not, without simulating anything.
+        """Open the complete or partial results in a folder, without simulation.
 
         Args:
-            folder: that `sweep` was given.
+            folder: folder that was passed to `sweep`.
 
         Returns:
-            the study; cases without a result are among the failures.
+            Sweep of all cases. Cases without result are in `failures`.
 
         Raises:
-            ModelError: there is no study.
+            ModelError: the folder contains no sweep.
         """
         place = Folder(path_of(folder).absolute())
         name, cases = place.known()
         return cls(name, cases, place, {}, tuple(range(len(cases)))).as_found()
 
     def as_found(self) -> Sweep:
-        """The same study, with the failures that its folder records now."""
+        """Return a copy with the failures that are now recorded in the folder."""
         missing = self.folder.missing(len(self.cases))
         return replace(self, failures={k: self.folder.complained(k) for k in missing})
 
@@ -304,7 +305,7 @@ class Sweep:
         )
 
     def __str__(self) -> str:
-        """A table of the cases, the first twenty of them."""
+        """Return a table of the first twenty cases and their error messages."""
         names = list(dict.fromkeys(name for case in self.cases for name in case))
         rows = [["case", *names, ""]]
         for k, case in enumerate(self.cases[:_SHOWN]):
@@ -323,7 +324,7 @@ class Sweep:
         return len(self.cases)
 
     def __iter__(self) -> Iterator[tuple[Case, Result]]:
-        """Each case that succeeded, with its result."""
+        """Iterate over the pairs (case, result) of the cases that succeeded."""
         return ((case, self[k]) for k, case in enumerate(self.cases) if k not in self.failures)
 
     @overload
@@ -331,10 +332,10 @@ class Sweep:
     @overload
     def __getitem__(self, number: slice) -> Sweep: ...
     def __getitem__(self, number: int | slice) -> Result | Sweep:
-        """The result of a case, counted from the end where negative; or a study of some cases.
+        """Return the result of a case (negative: from the end), or a Sweep of a slice.
 
         Raises:
-            ModelError: it failed, or there is no such case.
+            ModelError: the case failed, or the index is out of range.
         """
         if isinstance(number, slice):
             return self._part(range(len(self.cases))[number])
@@ -344,13 +345,15 @@ class Sweep:
         return Result.load(self.folder.file(self.numbers[place]))
 
     def reached(self, number: int) -> Result:
-        """What a case came to, up to where it stopped if it failed; its `stopped` says so.
+        """Return the result of a case, or its rows before the stop if it failed.
+
+        The `stopped` of a partial result contains the time and the error message.
 
         Args:
-            number: of the case, counted from the end where negative.
+            number: index of the case; negative indices count from the end.
 
         Raises:
-            ModelError: it failed before it had a row, or there is no such case.
+            ModelError: the case failed without a row, or the index is out of range.
         """
         place = _index(number, len(self.cases))
         if place not in self.failures:
@@ -367,17 +370,18 @@ class Sweep:
         return Sweep(self.name, cases, self.folder, failures, numbers)
 
     def summary(self, measures: Measures | None = None) -> dict[str, Array]:
-        """One number of each case, for each measure.
+        """Evaluate measures, each a scalar function of a Result, for all cases.
 
         Args:
-            measures: name to a function of a `Result`; when left out, the last value of every
-                signal, as `j1.q.end` and so on.
+            measures: dict from name to function of a `Result`. The default is the last value of
+                every signal, named `j1.q.end` for the signal `j1.q`.
 
         Returns:
-            name to (number of cases,) values, in the unit of the measure; NaN where a case failed.
+            Dict from name to values (number of cases,) in the unit of the measure. The value of a
+            failed case is NaN.
 
         Raises:
-            ModelError: a measure gives no number, or has the name of what varies.
+            ModelError: a measure does not return a number, or has the name of a varied quantity.
         """
         varied = {name for case in self.cases for name in case}
         for name in measures or ():
@@ -393,13 +397,13 @@ class Sweep:
         return columns
 
     def to_pandas(self, measures: Measures | None = None) -> Any:
-        """A pandas DataFrame: a row for each case with its values, then the measures.
+        """Return a pandas DataFrame with one row per case: varied values, then measures.
 
         Args:
-            measures: as for `summary`.
+            measures: measures, as in `summary`.
 
         Returns:
-            the table; `.attrs["failures"]` has what failed cases said.
+            DataFrame. Its `.attrs["failures"]` contains the error messages of failed cases.
         """
         pandas = optional_module("pandas", "tables")
         names = list(dict.fromkeys(name for case in self.cases for name in case))
@@ -410,14 +414,14 @@ class Sweep:
         return frame
 
     def to_xarray(self, measures: Measures | None = None) -> Any:
-        """An xarray Dataset of the measures.
+        """Return an xarray Dataset of the measures.
 
         Args:
-            measures: as for `summary`.
+            measures: measures, as in `summary`.
 
         Returns:
-            over the names that were varied where the cases are every combination of their values;
-            else over the number of the case.
+            Dataset. Its dimensions are the varied names if the cases are all combinations of their
+            values in order, and otherwise the index of the case.
         """
         xarray = optional_module("xarray", "tables")
         columns, axes = self.summary(measures), _axes(self.cases)
@@ -455,7 +459,7 @@ def _measure(result: Result, measures: Measures | None, case: int) -> Iterator[t
 
 
 def _axes(cases: tuple[Case, ...]) -> dict[str, tuple[float, ...]] | None:
-    """The values of each name, where the cases are all their combinations in order."""
+    """Return the values of each name, or None if the cases are not a full grid in order."""
     names = list(cases[0]) if cases else []
     values = {name: tuple(dict.fromkeys(c.get(name, np.nan) for c in cases)) for name in names}
     every = [dict(zip(names, x, strict=True)) for x in itertools.product(*values.values())]
@@ -471,11 +475,11 @@ _OPTIONS = {
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What a case comes to; it can be sent between processes.
+    """Result of a case, which can be pickled.
 
     Attributes:
-        result: of the simulation, up to where it stopped; None where nothing was reached.
-        complaint: what went wrong; empty where nothing did.
+        result: result of the simulation, or its rows before the stop; None if there are no rows.
+        complaint: error message; empty if the case succeeded.
     """
 
     result: Result | None
@@ -494,39 +498,39 @@ def sweep(
 ) -> Sweep:
     """Simulate a mechanism or an FMU for every case of a grid.
 
-    Each result is written as soon as it is there. A study that was interrupted goes on where it
-    stopped when it is started again with the same folder; cases that failed are tried again. It is
-    the same study when the cases, the options and the content of the model are the same; functions
-    among the options are distinguished by their names alone.
+    Each result is written when its simulation ends. An interrupted sweep resumes if it is started
+    again with the same folder; failed cases are simulated again. A sweep is the same if its cases,
+    options and model content are equal. Functions in the options are compared by name only.
 
     Args:
-        model: a system, simulated by `run`; or the path of an FMU, simulated by `fmu`.
-        grid: name to its values, for every combination, the last name fastest; or a sequence with
-            one dict of names to values for each case. Names of a system are parameters, positions
-            and velocities at the start such as `j1.q` and `j1.v`, constant efforts such as
-            `j1.tau`, and of components states at the start such as `motor.i` and constant inputs
-            such as `motor.voltage`; those of an FMU are parameters, inputs and start values.
-        duration: [s]; needed for a system.
-        folder: where results are kept; one that lasts as long as the answer when left out.
-        executor: any executor of `concurrent.futures`, also that of a cluster; this process when
-            left out. Executors of processes take a system, which is prepared once in each, or the
-            path of an FMU that all of them can read; options are sent as pickles. Results are sent
-            back and written here.
-        quiet: no progress bar.
+        model: system, simulated by `run`, or path of an FMU, simulated by `fmu`.
+        grid: dict from name to values, for all combinations (the last name varies fastest), or
+            sequence of cases, each a dict from name to value. Names of a system: parameters,
+            initial positions and velocities such as `j1.q` and `j1.v`, constant efforts such as
+            `j1.tau`, initial states of components such as `motor.i`, and constant inputs such as
+            `motor.voltage`. Names of an FMU: parameters, inputs and start values.
+        duration: duration of each simulation [s]; required for a system.
+        folder: folder of the results. The default is a temporary folder, which is deleted with the
+            returned Sweep.
+        executor: executor of `concurrent.futures` or of a cluster. By default the cases run one
+            after another in this process. A process of an executor prepares a system once, and
+            must be able to read the path of an FMU. Options are pickled. Results are sent back and
+            written by this process.
+        quiet: Whether to hide the progress bar.
         **options: further arguments of `run` or `fmu`, the same for all cases.
 
     Returns:
-        the cases and their results. A case that fails, for whatever reason, does not end the study;
-        what it had reached is kept too, as `Sweep.reached` gives it.
+        Sweep with the cases and their results. A case that fails does not end the sweep;
+        `Sweep.reached` returns its partial result.
 
     Raises:
-        ModelError: the grid is empty, a name in it is unknown to the model, there is no such
-            option, the folder holds another study, there is no such FMU, a system has no duration,
-            or the model or an option cannot be sent to other processes.
+        ModelError: the grid is empty, a name of the grid or an option is unknown, the folder
+            contains another sweep, the FMU cannot be read, a system has no duration, or the model
+            or an option cannot be sent to other processes.
         ExportError: the folder cannot be written.
-        SolverError: a process of the executor ended; `result` is the `Sweep` of what was done.
-        Interrupted: control-C was pressed; a KeyboardInterrupt whose `result` is the `Sweep` of
-            what was done, the case under way as far as it had come.
+        SolverError: a process of the executor ended. `result` is the Sweep of the finished cases.
+        Interrupted: control-C was pressed. It is a KeyboardInterrupt; `result` is the Sweep of the
+            finished cases, with the partial result of the interrupted case.
     """
     cases = cases_of(grid)
     if duration is not None:
@@ -535,7 +539,7 @@ def sweep(
     simulate = _simulation(model, cases)
     if executor is not None:
         _check_executor(model, executor, options)
-    # a law that is called may change the working directory
+    # absolute, because a law may change the working directory
     kept = tempfile.mkdtemp(prefix="mbs-sweep-") if folder is None else path_of(folder).absolute()
     study = study_of(model, cases, options)
     place = Folder.opened(kept, study)
@@ -562,14 +566,14 @@ def sweep(
 
 @dataclass(frozen=True, slots=True)
 class _Task:
-    """One simulation."""
+    """Simulation of one case."""
 
     simulate: Callable[[Case, Mapping[str, Any]], Result]
     case: Case
     options: Mapping[str, Any]
 
     def __call__(self) -> Answer:
-        """Simulate; what went wrong is an answer too, so that the other cases go on."""
+        """Simulate the case. An error is returned as an Answer, so that other cases continue."""
         try:
             return Answer(self.simulate(self.case, self.options))
         except SolverError as error:
@@ -587,7 +591,7 @@ class _Run:
     system: System
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A process that has simulated a case has what the next one needs."""
+        """Pickle by content, so that a process prepares the system for its first case only."""
         return _run_of, self.system.cached("packed", lambda: packed(self.system))
 
     def __call__(self, case: Case, options: Mapping[str, Any]) -> Result:
@@ -600,9 +604,9 @@ class _Run:
         return simulator(quiet=True, inputs=inputs, **merged)
 
 
-@functools.lru_cache(maxsize=4)  # the studies that a cluster works on in turn
+@functools.lru_cache(maxsize=4)  # simulations of up to 4 sweeps that share a cluster
 def _run_of(data: bytes, names: tuple[str, ...], graphs: str) -> _Run:
-    """What was sent to this process, with what earlier cases prepared."""
+    """Unpickle a simulation, or return it from the cache of this process."""
     return _Run(unpacked(data, names, graphs))
 
 
@@ -622,10 +626,10 @@ class _Fmu:
 
 
 def _simulation(model: object, cases: Sequence[Case]) -> _Run | _Fmu:
-    """What simulates a case.
+    """Return the callable that simulates a case of the model.
 
     Raises:
-        ModelError: there is no such model, or it does not have a name of the grid.
+        ModelError: the model cannot be read, or a name of the grid is unknown.
     """
     if isinstance(model, System):
         _require_names(model.name, cases, _system_names(model))
@@ -655,7 +659,7 @@ def _system_names(system: System) -> set[str]:
 
 
 def _require_names(model: str, cases: Sequence[Case], known: set[str]) -> None:
-    """Refuse a name that the model does not have, before anything is simulated."""
+    """Raise if a name of a case is unknown to the model."""
     for name in dict.fromkeys(name for case in cases for name in case):
         if name not in known:
             raise ModelError(
@@ -664,7 +668,7 @@ def _require_names(model: str, cases: Sequence[Case], known: set[str]) -> None:
 
 
 def _check_options(model: object, options: Mapping[str, Any]) -> None:
-    """Refuse options that the simulation does not have."""
+    """Raise if an option is not an argument of `run` or `fmu`, or the duration is missing."""
     if isinstance(model, System) and "duration" not in options:
         raise ModelError(
             f"sweep: {model.name} is a system and has no duration; give one in seconds"
@@ -679,8 +683,8 @@ def _check_options(model: object, options: Mapping[str, Any]) -> None:
 
 
 def _check_executor(model: object, executor: object, options: Mapping[str, Any]) -> None:
-    """Refuse what is no executor, and what it cannot send to other processes."""
-    from concurrent.futures import ProcessPoolExecutor  # which loads multiprocessing
+    """Raise if it is not an Executor, or the model or options cannot be pickled for it."""
+    from concurrent.futures import ProcessPoolExecutor  # loads multiprocessing
 
     if not isinstance(executor, Executor):
         raise ModelError(
@@ -707,7 +711,7 @@ def _check_executor(model: object, executor: object, options: Mapping[str, Any])
 
 
 def _arguments(system: System, case: Case) -> dict[str, dict[str, float]]:
-    """The arguments of `run` that the names of a case belong to."""
+    """Return the values of a case, grouped by argument of `run`."""
     given: dict[str, dict[str, float]] = {}
     signals = _signals(system)
     for name, value in case.items():
@@ -720,7 +724,7 @@ def _arguments(system: System, case: Case) -> dict[str, dict[str, float]]:
 
 
 def _signals(system: System) -> dict[str, list[str]]:
-    """States and inputs of components, by the argument of `run` that takes them."""
+    """Return names of states and inputs of components, grouped by argument of `run`."""
     return {
         "z0": [name for name, _ in system.states],
         "u": [name for name, _ in system.inputs],
@@ -728,7 +732,7 @@ def _signals(system: System) -> dict[str, list[str]]:
 
 
 def _merge(options: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Options of all cases, with the values of one."""
+    """Return the options of all cases, updated with the values of one case."""
     merged = dict(options)
     state = state_of(merged.get("q0"))
     if isinstance(state, State) and "q0" in given:
@@ -736,7 +740,7 @@ def _merge(options: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, An
             f"sweep: q0 is a state and the grid has {', '.join(given['q0'])}; give q0 as a dict of"
             " independent joints"
         )
-    if isinstance(state, State):  # else values of the grid would be the only ones
+    if isinstance(state, State):  # add the remaining values of the state
         merged["v0"] = dict(state.v) if merged.get("v0") is None else merged["v0"]
         merged["z0"] = dict(state.z) if merged.get("z0") is None else merged["z0"]
     for argument, values in given.items():
@@ -772,7 +776,7 @@ def _spread(tasks: Mapping[int, _Task], executor: Executor) -> Iterator[tuple[in
             f"sweep: a process of the executor ended ({error}); start the study again with the same"
             " folder, and what was written is kept"
         ) from error
-    finally:  # those that have not begun when one breaks the study off
+    finally:  # cancel pending cases if an exception ends the sweep
         for future in futures:
             future.cancel()
 
@@ -782,5 +786,5 @@ def _answer(future: Future[Answer]) -> Answer:
         return future.result()
     except BrokenExecutor:
         raise
-    except Exception as error:  # lost in transit, such as a worker of a cluster
+    except Exception as error:  # the task was lost, such as with a worker of a cluster
         return Answer(None, error_text(error))

@@ -1,4 +1,4 @@
-"""Tolerances of a motion: one number, or numbers for units and single states."""
+"""Tolerances of a motion, common to all states or by unit and name of states."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from mbs.text import did_you_mean, quoted
 
 Array = NDArray[np.float64]
 Tolerance = float | Mapping[str, float | tuple[float, float]]
-"""A number for all states; or numbers by the unit or the name of states. Instead of a number, a
-pair: an absolute and a relative tolerance."""
+"""Tolerance of all states, or dict of tolerances by unit or name of states. In a dict, a pair is an
+absolute and a relative tolerance."""
 
 OTHERS = "others"
-"""Key of the tolerance of the states that are not named."""
+"""Key of the tolerance of the states without entry in the dict."""
 DEFAULT = 1e-8
-"""Tolerance of a motion [rad, m, rad/s or m/s]."""
+"""Default absolute tolerance of a motion [rad, m, rad/s or m/s]."""
 _SHARE = 0.04
-"""Part of the tolerance of a motion that a step may err by."""
+"""Error tolerance of a step as a fraction of the tolerance of the motion."""
 _RELATIVE = 0.025
-"""Relative tolerance of a motion for an absolute one of 1. It is small, since angles that count
-revolutions make no room for larger errors."""
+"""Ratio of the relative to the absolute tolerance of a motion. It is small because an angle that
+counts revolutions is large, but must not have a larger error."""
 _LEAST_ABSOLUTE, _LEAST_RELATIVE = 1e-13, 1e-14
-"""Smallest tolerances of a step: some ten roundings of numbers of size one."""
+"""Smallest tolerances of a step, of the order of rounding errors of numbers of size one."""
 _SMALL = 100.0
-"""Tolerances below which a motion is small: its relative error is more than a percent."""
+"""Number of tolerances below which a motion is small: its relative error exceeds one percent."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +40,7 @@ class Tolerances:
     Attributes:
         common: absolute tolerance of the states that are not named.
         absolute, relative: (nx,) tolerances of all states.
-        named: whether states have tolerances of their own.
+        named: Whether single states or units have different tolerances.
     """
 
     common: float
@@ -49,10 +49,11 @@ class Tolerances:
     named: bool
 
     def of_step(self) -> tuple[float, float, Array | None]:
-        """Relative and absolute tolerance of a step, and the (2, nx) factors of each state.
+        """Return relative and absolute tolerance of a step, and factors of the states or None.
 
-        A step may err by a twenty-fifth of the tolerance of the motion, since errors of steps add
-        up. Tolerances stay above ten roundings, below which steps would only become shorter.
+        The tolerance of a step is 1/25 of the tolerance of the motion, because the errors of steps
+        accumulate. Smaller tolerances than rounding errors would only shorten the steps. The
+        factors (2, nx) multiply the absolute and relative tolerance of each state.
         """
         rtol, atol = step_tolerances(self.common)
         if not self.named:
@@ -63,7 +64,7 @@ class Tolerances:
 
 
 def step_tolerances(tolerance: float) -> tuple[float, float]:
-    """Relative and absolute tolerance of a step for one tolerance of a motion."""
+    """Return relative and absolute tolerance of a step for a common tolerance of the motion."""
     relative = max(_SHARE * _RELATIVE * tolerance, _LEAST_RELATIVE)
     return relative, max(_SHARE * tolerance, _LEAST_ABSOLUTE)
 
@@ -72,14 +73,15 @@ def tolerances_of(system: System, given: Tolerance) -> Tolerances:
     """Return the tolerances of the states q, v and z of a system.
 
     Args:
-        system: open or closed.
-        given: a number; or a dict from units, such as "rad" and "m/s", and names, such as "j1.q",
-            to numbers. A name counts before a unit. "others" is for the other states, 1e-8 if left
-            out. A number is the absolute tolerance; the relative one is a fortieth of it. A pair
-            has both.
+        system: open or closed system.
+        given: absolute tolerance of all states, or dict of tolerances by unit, such as "rad" and
+            "m/s", and by name, such as "j1.q". A name has priority over a unit. "others" is for
+            the other states, 1e-8 by default. A number is an absolute tolerance, and the relative
+            tolerance is 1/40 of it. In a dict, a pair is an absolute and a relative tolerance.
 
     Raises:
-        ModelError: a key is no unit and no state of the system, or a number is not positive.
+        ModelError: a key is neither a unit nor a state of the system, or a tolerance is not a
+            finite positive number.
     """
     if isinstance(given, tuple | list):
         raise ModelError(
@@ -116,7 +118,7 @@ def tolerances_of(system: System, given: Tolerance) -> Tolerances:
 
 
 def _pair(value: object, what: str, where: str) -> tuple[float, float]:
-    """The absolute and the relative tolerance that a number or a pair gives."""
+    """Return the absolute and the relative tolerance of a number or a pair."""
     if isinstance(value, tuple | list):
         if len(value) != 2:
             raise ModelError(
@@ -133,9 +135,9 @@ def small_motions(system: System, q: Array, tolerances: Tolerances) -> tuple[str
     """Return the names of positions that move, but by less than 100 tolerances.
 
     Args:
-        system: open or closed.
-        q: (n, nq) positions of a motion.
-        tolerances: of the motion.
+        system: open or closed system.
+        q: positions of a motion, (n, nq).
+        tolerances: tolerances of the motion.
     """
     moved = np.ptp(q, axis=0) if len(q) else np.zeros(q.shape[1])
     found = (moved > 0) & (moved < _SMALL * tolerances.absolute[: q.shape[1]])

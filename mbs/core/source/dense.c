@@ -41,7 +41,7 @@ void dense_reflect(const double *tail, double weight, int count, double *column)
     int i;
     for (i = 1; i < count; i++) sum += tail[i] * column[i];
     sum *= weight;
-    if (sum == 0.0) return; /* columns of loops that share no joint */
+    if (sum == 0.0) return; /* columns of loops without common joint */
     column[0] -= sum;
     for (i = 1; i < count; i++) column[i] -= sum * tail[i];
 }

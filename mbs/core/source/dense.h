@@ -1,6 +1,6 @@
 /* Linear algebra of small real matrices.
  *
- * Code of its own, because where only a C compiler is there is no LAPACK to link with.
+ * Implemented without LAPACK, so that a C compiler is the only requirement.
  * Re-entrant: no globals and no allocation. Matrices are stored column by column.
  */
 #ifndef MBS_DENSE_H
@@ -8,36 +8,37 @@
 
 #define DENSE_MOST 32 /* rows or columns */
 
-/* A P = Q R by reflections, the longest remaining column first.
+/* Factors A P = Q R by Householder reflections, with the longest remaining column as pivot.
  * Source: Businger and Golub 1965; Golub and Van Loan 2013, algorithm 5.4.1. */
 typedef struct {
     int rows, columns, steps;  /* steps: reflections; fewer than columns where the rank is known */
     double *A;                 /* (rows, columns), replaced by R and, below it, the reflections */
-    double weight[DENSE_MOST]; /* of the reflections */
+    double weight[DENSE_MOST]; /* weights of the reflections */
     int order[DENSE_MOST];     /* column k of R belongs to column order[k] */
 } dense_qr;
 
+/* Factorize A in place; sets A, weight and order. */
 void dense_factorize(dense_qr *f);
 
-/* A reflection that leaves only the first element of v (count,): v becomes that element and, below
- * it, the tail of the vector (1, tail) that it is made of. Returns its weight. */
+/* Make the Householder reflection that maps v (count,) to a multiple of the first unit vector. v[0]
+ * becomes the factor and v[1..] the tail of the reflection vector (1, tail). Returns its weight. */
 double dense_reflection(double *v, int count);
 
 /* column (count,) -= weight v (v' column), where v is (1, tail); tail[0] is not read. */
 void dense_reflect(const double *tail, double weight, int count, double *column);
 
-/* B (rows, count) = Q' B. */
+/* Compute B = Q' B (rows, count) in place. */
 void dense_turn(const dense_qr *f, double *B, int count);
 
-/* X (columns, count), in place of the first rows of B (rows, count), such that A X is as near
- * to B as it can be; pivots below `least` times the first one are taken to be of that size. */
+/* Write the least-squares solution X (columns, count) of A X = B to the first rows of each column
+ * of B (rows, count). Pivots below `least` times the first pivot are raised to that size. */
 void dense_solve(const dense_qr *f, double *B, int count, double least);
 
-/* |last pivot / first pivot|, an estimate of the reciprocal condition. */
+/* Return |last pivot / first pivot|, an estimate of the reciprocal condition number. */
 double dense_regularity(const dense_qr *f);
 
-/* The last `count` columns of Q, V (rows, count): an orthonormal basis of what is orthogonal to the
- * columns of A when their rank is rows - count. */
+/* Write the last `count` columns of Q to V (rows, count). They are an orthonormal basis of the
+ * orthogonal complement of the columns of A, if the rank of A is rows - count. */
 void dense_complement(const dense_qr *f, double *V, int count);
 
 #endif

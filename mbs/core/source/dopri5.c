@@ -16,7 +16,7 @@ const double DOPRI5_D[7] = {-12715105075.0 / 11282082432,  0.0,
                             701980252875.0 / 199316789632, -1453857185.0 / 822651844,
                             69997945.0 / 29380423};
 
-/* work after the first 2n: k2 .. k7 (6n), dense output (5n) */
+/* Layout of `work` after the first 2n elements: stages k2 .. k7 (6n), dense output (5n). */
 static double *stage(const stepper *s, int i) {
     return i == 0 ? stepper_slope(s) : s->work + (size_t)(1 + i) * s->n;
 }
@@ -29,7 +29,7 @@ static double combine(const stepper *s, const double *weight, int count, int row
     return sum;
 }
 
-/* The six new stages and the candidate state, which is where the last of them is taken. */
+/* Compute stages 2 to 7, the candidate state (the point of stage 7) and the error estimate. */
 static int attempt(stepper *s, const double *x, double h) {
     double t = stepper_time(s), *e = stepper_trial(s);
     int i, k, status;

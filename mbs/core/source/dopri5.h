@@ -9,14 +9,14 @@
 
 #define DOPRI5_WORK(n) (13 * (n))
 
-/* The tableau: nodes, stages, weights of the error, and of the last term of the dense output. */
+/* Butcher tableau: nodes, stage weights, error weights, weights of the last dense-output term. */
 extern const double DOPRI5_C[7], DOPRI5_A[7][6], DOPRI5_E[7], DOPRI5_D[7];
 
-/* The state at a part a of a step; dense (5, n), row by row. */
+/* Evaluate the dense output (5, n), stored by rows, at the fraction a of the step. */
 void dopri5_interpolate(const double *dense, int n, double a, double *row);
 
-/* Without a projection the last call of the right-hand side that stepper_step makes is at the new
- * state. */
+/* Initialise a stepper with this method. work has DOPRI5_WORK(n) elements. Without projection, the
+ * last evaluation of the right-hand side in stepper_step is at the new state. */
 void dopri5_init(stepper *s, int n, stepper_rhs rhs, void *user, double *memory, double *work);
 
 #endif

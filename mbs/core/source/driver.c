@@ -19,7 +19,7 @@ struct driver {
     passage *passage;
     driver_model model;
     double *p, *memory, *work, *projected, *modes, *event_memory, *event_work, *passage_memory;
-    int stopped; /* an evaluation answered MODEL_STOP: nothing is evaluated any more */
+    int stopped; /* whether an evaluation returned MODEL_STOP, which ends all evaluations */
 };
 
 static int evaluate(driver *d, const model_function *f, double t, const double *x,
@@ -211,7 +211,7 @@ void driver_replace(driver *d, const driver_model *model) { d->model = *model; }
 
 int driver_begin(driver *d, double *x) {
     int status = STEPPER_OK;
-    fenv_t environment; /* other libraries may have switched denormal numbers off */
+    fenv_t environment; /* other libraries may have disabled denormal numbers */
     fegetenv(&environment);
     fesetenv(FE_DFL_ENV);
     if (d->solver.project && project(d, stepper_time(&d->solver), x))

@@ -6,46 +6,47 @@
 #include "model.h"
 #include "passage.h"
 
-#define DRIVER_STOPPED 100 /* an evaluation answered MODEL_STOP; beyond the states of the stepper */
+#define DRIVER_STOPPED 100 /* status: an evaluation returned MODEL_STOP */
 
-/* The functions of an integration. Each takes t, x (n,) and p (n_p,). The last n_modes of p are
- * modes, which jumps change. */
+/* Functions of the integrated model. The inputs of each function are t, x (n,) and p (n_p,). The
+ * last n_modes elements of p are the modes, which jumps change. */
 typedef struct {
     int n, n_p, n_modes, n_indicators;
     model_function rhs;      /* -> x' (n,) */
-    model_function project;  /* -> x after one Newton step onto the constraints, its residual */
-    model_function jacobian; /* -> d rhs / d x (n, n), d rhs / d t; given: the method is RODAS5P */
+    model_function project;  /* -> x after a Newton step onto the constraints, its residual */
+    model_function jacobian; /* -> d rhs / d x (n, n), d rhs / d t; selects RODAS5P */
     model_function indicators, rates; /* -> (n_indicators,) values, and their rates of change */
     model_function approaches;        /* -> (n_indicators, 3), see events.h */
-    model_function jump;     /* takes the fired indicators too -> x, modes (n_modes,) */
+    model_function jump;     /* with the fired indicators as input 4 -> x, modes (n_modes,) */
     model_function rows, forces, regularity; /* see passage.h */
-    passage_size size;          /* of rows */
-    passage_patterns patterns;  /* of the matrices of rows and forces */
+    passage_size size;          /* dimensions of rows */
+    passage_patterns patterns;  /* sparsity patterns of the matrices of rows and forces */
     double typical;             /* regularity at a common configuration */
 } driver_model;
 
 typedef struct {
-    double rtol, atol, max_step, first_step; /* first_step: after an event [s]; 0: estimated */
+    double rtol, atol, max_step, first_step; /* first_step: after an event [s], 0 to estimate it */
     const double *absolute, *relative; /* (n,) factors of the tolerances of each state, or NULL */
-    const double *stops, *jumps; /* (n_stops,) times at which steps end; 1 if laws may jump there */
+    const double *stops, *jumps; /* (n_stops,) stop times; 1 if functions of time may jump there */
     long n_stops;
 } driver_control;
 
 typedef struct driver driver;
 
-/* Begin at time t. All arrays stay with the caller, but p is copied. NULL: no memory is left. */
+/* Create an integration that starts at time t. p is copied; the caller keeps all other arrays.
+ * Returns NULL if no memory is left. */
 driver *driver_new(const driver_model *model, const double *p, const driver_control *control,
                    double t);
 void driver_free(driver *d);
 
-/* Evaluate other functions from now on, which must give the same values. Sizes stay. */
+/* Replace the functions of the model by functions with the same values and sizes. */
 void driver_replace(driver *d, const driver_model *model);
 
 /* Project the first state x (n,) and evaluate the indicators there. Returns a status. */
 int driver_begin(driver *d, double *x);
 
-/* Fill rows *done .. count - 1 of table (count, n) with the states at times[]. Return after `budget`
- * steps (STEPPER_MORE), after an event (EVENTS_FIRED), or with another status. */
+/* Fill rows *done .. count - 1 of table (count, n) with the states at times[]. Return after
+ * `budget` steps (STEPPER_MORE), after an event (EVENTS_FIRED), or with another status. */
 int driver_table(driver *d, double *x, const double *times, long count, double *table, long *done,
                  long budget);
 
@@ -55,7 +56,7 @@ int driver_leaves(driver *d, const double *x, double *slope);
 
 double driver_time(const driver *d);
 double driver_step(const driver *d);        /* the next step that error control requires [s] */
-const double *driver_fired(const driver *d); /* (n_indicators,) 1 for those of the last event */
+const double *driver_fired(const driver *d); /* (n_indicators,) 1 if fired last */
 const double *driver_modes(const driver *d); /* (n_modes,) present modes */
 
 #endif

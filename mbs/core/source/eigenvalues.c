@@ -3,7 +3,7 @@
 #include <float.h>
 #include <math.h>
 
-enum { SWEEPS = 90, PATIENCE = 10 }; /* for one eigenvalue */
+enum { SWEEPS = 90, PATIENCE = 10 }; /* iterations: limit, interval of other shifts */
 
 static double off_diagonal_row(int n, const double *A, int i) {
     double sum = 0.0;
@@ -33,7 +33,7 @@ static int all_finite(int n, const double *A) {
     return 1;
 }
 
-/* Elements of about 1 or less, by a power of two; gives its exponent. */
+/* Scale A by a power of two to elements of at most 1. Returns the exponent. */
 static int scale_rows(int n, double *A) {
     double most = 0.0;
     int i, exponent = 0;
@@ -43,7 +43,7 @@ static int scale_rows(int n, double *A) {
     return exponent;
 }
 
-/* A = D^-1 A D such that rows and columns have about the same size. */
+/* Balance A = D^-1 A D so that rows and columns have about the same size. */
 static void balance(int n, double *A) {
     int i, j, changed = 1;
     while (changed) {
@@ -62,8 +62,8 @@ static void balance(int n, double *A) {
     }
 }
 
-/* Turns v (m,) into the vector and gives the weight of the reflection I - weight v v' that leaves
- * of the former v its first element alone, which is stored in *first. */
+/* Replace v (m,) by the vector of the reflection I - weight v v' that maps the old v to a multiple
+ * of the first unit vector, and return the weight. *first: the remaining first element. */
 static double reflector(int m, double *v, double *first) {
     double size = 0.0, most = 0.0, weight;
     int i;
@@ -106,8 +106,8 @@ static void reduce_to_hessenberg(int n, double *A) {
     }
 }
 
-/* Where the block that ends at row `last` begins: below an element as small as rounding of its
- * neighbours, or of `least`. */
+/* First row of the block that ends at row `last`: the subdiagonal element before it is below the
+ * rounding error of its diagonal neighbours, or of `least`. */
 static int block_start(int n, double *H, int last, double least) {
     int l;
     for (l = last; l > 0; l--) {
@@ -121,14 +121,14 @@ static int block_start(int n, double *H, int last, double least) {
     return 0;
 }
 
-/* Two shifts, the eigenvalues of a matrix with diagonal x, y whose other elements have the product
- * `cross`. */
+/* Two shifts: the eigenvalues of a matrix (2, 2) with diagonal x, y. `cross` is the product of its
+ * off-diagonal elements. */
 typedef struct {
     double x, y, cross;
 } shifts;
 
-/* The first column of (H - s1)(H - s2) from row m on, divided by one of its elements; differences
- * of the diagonal are taken first, which are small where eigenvalues are alike. */
+/* First column of (H - s1)(H - s2) from row m on, divided by the subdiagonal element. Diagonal
+ * differences are formed first, because they are small if eigenvalues are close. */
 static void first_column(int n, const double *H, int m, const shifts *s, double *v) {
     double a = H[m * n + m], below = H[(m + 1) * n + m], x = s->x - a, y = s->y - a;
     v[0] = (x * y - s->cross) / below + H[m * n + m + 1];
@@ -136,7 +136,7 @@ static void first_column(int n, const double *H, int m, const shifts *s, double 
     v[2] = H[(m + 2) * n + m + 1];
 }
 
-/* Where two elements below the diagonal are together so small that the step may begin; the block
+/* Row at which a step may start, because two successive subdiagonal elements are small. The block
  * has three rows or more. */
 static int step_start(int n, const double *H, int first, int last, const shifts *s) {
     double v[3];
@@ -152,7 +152,7 @@ static int step_start(int n, const double *H, int first, int last, const shifts 
     return m;
 }
 
-/* Rows k .. k + size - 1 of columns k .. last, then these columns of rows first .. end. */
+/* Reflect rows k .. k + size - 1 in columns k .. last, then these columns in rows first .. end. */
 static void reflect(int n, double *H, int k, int size, double weight, const double *v, int first,
                     int last) {
     double a = weight * v[0], b = weight * v[1], c = size == 3 ? weight * v[2] : 0.0;
@@ -210,7 +210,8 @@ static void pair_at(const double *row, const double *next, double *real, double 
     imaginary[0] = imaginary[1] = 0.0;
 }
 
-/* The lower right two rows of a block have them; now and then others, so that no cycle lasts. */
+/* Shifts from the last two rows of a block. Every PATIENCE iterations exceptional shifts are used,
+ * which end cycles. */
 static shifts shifts_of(int n, const double *row, int last, int sweeps) {
     shifts s;
     s.x = row[last];

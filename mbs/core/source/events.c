@@ -6,22 +6,23 @@
 
 enum { LOOKS = 2, TANGENTS = 30, SECANTS = 20, MAX_JUMPS = 20, MAX_IDLE = 100 };
 
-static const double DEPARTURE = 1e-8; /* part of a step in which what rises may become positive */
-/* Part of a step before which an event is where the dense output has hardly left the start: what the
- * step saw behind the event counts with its square there. */
+static const double DEPARTURE = 1e-8; /* fraction of a step for a rising indicator to leave zero */
+/* Fraction of a step up to which an event does not repeat it: the error of the dense output from
+ * stages after the event grows with the square of this fraction. */
 static const double AT_START = 1e-3;
 
-static const double NEAR = 0.5;    /* product of pace and time between two looks, at most: half an
-                                    * obstacle, or half a radian of a turn */
-static const double FASTER = 1.25; /* the speed between two looks, over that at the looks */
-static const double FALL = 0.85;   /* part of the time to zero until the next look: 2 / (1 + FASTER)
-                                    * would just be near enough */
-static const double FULL = 0.98;   /* part of the time of NEAR, likewise: the pace may grow a little */
-static const double OFF = 0.1;     /* part of an indicator by which it may leave the curve of the
-                                    * step, and multiple of the tolerance */
-static const double SHORTER = 0.75; /* part of a step that missed a law, at most, of the next try */
+static const double NEAR = 0.5;    /* maximum of pace times time between two samples: half an
+                                    * obstacle, or a rotation of half a radian */
+static const double FASTER = 1.25; /* assumed ratio of the speed between samples to that at them */
+static const double FALL = 0.85;   /* fraction of the time to zero until the next sample; the limit
+                                    * is 2 / (1 + FASTER) */
+static const double FULL = 0.98;   /* fraction of the time of NEAR: the pace may grow a little */
+static const double OFF = 0.1;     /* maximum deviation from the curve of the step, as a fraction of
+                                    * the indicator (at least 100 times the tolerance) */
+static const double SHORTER = 0.75; /* maximum fraction of a step that is repeated after a missed
+                                     * change of the equations */
 
-/* offsets in memory; then k values each of */
+/* Offsets in `memory`, followed by six arrays (count,). */
 enum { LAST, IDLE, PENDING, UNSEEN, ARRAYS };
 static double *kept(const events *e, int i) {
     return e->memory + ARRAYS + (size_t)i * (size_t)e->count;
@@ -33,7 +34,7 @@ static double *left(const events *e) { return kept(e, 3); }
 static double *overshot(const events *e) { return kept(e, 4); }
 static double *left_rate(const events *e) { return kept(e, 5); }
 
-/* work: a state, then k values each of */
+/* Layout of `work`: a state (n,), then 15 arrays (count,). */
 static double *part(const events *e, int i) {
     return e->work + e->solver->n + (size_t)i * (size_t)e->count;
 }
@@ -41,8 +42,8 @@ static double *right(const events *e) { return part(e, 0); }
 static double *middle(const events *e) { return part(e, 1); }
 static double *right_rate(const events *e) { return part(e, 2); }
 static double *middle_rate(const events *e) { return part(e, 3); }
-static double *at_start(const events *e) { return part(e, 4); } /* which could fire there */
-/* approaches, 3 columns each of */
+static double *at_start(const events *e) { return part(e, 4); } /* `armed` there */
+/* approaches at the left and right sample, 3 columns each */
 static double *left_near(const events *e) { return part(e, 5); }
 static double *right_near(const events *e) { return part(e, 8); }
 /* indicators and their rates at both ends of the step */
@@ -70,7 +71,7 @@ const double *events_due(const events *e) { return due(e); }
 const double *events_armed(const events *e) { return armed(e); }
 const double *events_seen(const events *e) { return left(e); }
 
-/* rates: NULL, or how fast the indicators rise there. */
+/* Evaluate the indicators at time t of the last step, and their rates unless rates is NULL. */
 static int look(const events *e, const double *x, double t, double *values, double *rates) {
     void *user = e->solver->user;
     int status = stepper_state(e->solver, x, t, e->work);
@@ -80,7 +81,7 @@ static int look(const events *e, const double *x, double t, double *values, doub
     return stepper_all_finite(values, e->count) ? STEPPER_OK : EVENTS_INDICATORS_FAILED;
 }
 
-/* The least of the indicators that can fire. */
+/* Smallest value of the indicators that can fire. */
 static double least(const events *e, const double *values) {
     double value = HUGE_VAL;
     int k;
@@ -89,27 +90,28 @@ static double least(const events *e, const double *values) {
     return value;
 }
 
+/* Let positive indicators fire at their next zero. */
 static void arm(const events *e, const double *values) {
     int k;
     for (k = 0; k < e->count; k++)
         if (values[k] > 0.0) armed(e)[k] = 1.0;
 }
 
-/* The indicators at the present time, before it is known which of them are due. */
+/* Evaluate the indicators and rates at the present time and clear the pending jump. */
 static int look_here(events *e, const double *x) {
     e->near_at = NAN;
     e->memory[PENDING] = e->memory[UNSEEN] = 0.0;
     return look(e, x, stepper_time(e->solver), left(e), left_rate(e));
 }
 
-/* It is where an integrator outside had let it come, and a jump of velocities has not changed it. */
+/* Whether indicator k still has the negative value to which an external integrator overshot. */
 static int is_overshot(const events *e, int k) {
     double below = overshot(e)[k];
     return below > 0.0 && fabs(left(e)[k] + below) <= 1e-9 * below;
 }
 
-/* Which indicators ask for a jump at the present state. One that is zero to the tolerance and does
- * not clearly fall waits: the first look at the next step shows whether it leaves zero. */
+/* Set the indicators that trigger a jump at the present state. An indicator that is zero within the
+ * tolerance and does not clearly fall is decided by the first sample of the next step. */
 static int judge(events *e, const double *x) {
     double t = stepper_time(e->solver), step = stepper_last_step(e->solver);
     double slack = fmax(1e3 * DBL_EPSILON * fabs(t), DEPARTURE * step), zero = e->solver->atol;
@@ -154,6 +156,7 @@ void events_overshoot(events *e, const double *value) {
     for (k = 0; k < e->count; k++) overshot(e)[k] = fmax(0.0, -value[k]);
 }
 
+/* Whether an indicator that cannot fire yet is not positive at the right sample. */
 static int returned(const events *e) {
     int k;
     for (k = 0; k < e->count; k++)
@@ -161,7 +164,8 @@ static int returned(const events *e) {
     return 0;
 }
 
-/* What has just left zero may be back at the first look: look earlier, until it is above. */
+/* Move the first sample *end to an earlier time until indicators that started at zero are positive.
+ * If none is found down to the rounding of time, the indicators can fire from `start` on. */
 static int first_look(const events *e, const double *x, double start, double *end) {
     double step = stepper_last_step(e->solver);
     int k, status = look(e, x, *end, right(e), right_rate(e));
@@ -178,13 +182,14 @@ static int first_look(const events *e, const double *x, double start, double *en
     return status;
 }
 
+/* Next time in (a, b): secant through the values low and high, or bisection after SECANTS tries. */
 static double next_guess(double a, double b, double low, double high, double margin, int count) {
     if (count >= SECANTS || b - a <= 4 * margin) return a + 0.5 * (b - a);
     return fmin(fmax(a + (b - a) * low / (low - high), a + margin), b - margin);
 }
 
-/* The first time after a at which an indicator is not positive: secants with a safeguard, and
- * the half of each value that stays (the Illinois rule). */
+/* Locate in *b a zero crossing after a, by the Illinois method: secants with a safeguard, and half
+ * the value at an end that is kept twice. */
 static int locate(const events *e, const double *x, double a, double *b) {
     double low = least(e, left(e)), high = least(e, right(e)), value;
     double step = stepper_last_step(e->solver);
@@ -207,9 +212,9 @@ static int locate(const events *e, const double *x, double a, double *b) {
     }
 }
 
-/* An indicator that falls at a and rises at *b: if it is not positive in between, *b becomes a time
- * when it is not. Tangents at the ends bound what is convex from below; they are drawn again from
- * where they meet, until they stay positive. */
+/* Search indicator k, which falls at a and rises at *b, for a value that is not positive, and set
+ * *b to its time. Tangents bound a convex function from below. They are refined at their
+ * intersection until the bound is positive. */
 static int find_dip(const events *e, const double *x, int k, double a, double *b) {
     double low = left(e)[k], fall = left_rate(e)[k];
     double end = *b, high = right(e)[k], rise = right_rate(e)[k];
@@ -235,6 +240,7 @@ static int find_dip(const events *e, const double *x, int k, double a, double *b
     return STEPPER_OK;
 }
 
+/* Apply find_dip to all indicators that can fire and are positive at both samples. */
 static int find_dips(const events *e, const double *x, double a, double *b) {
     int k, status = STEPPER_OK;
     for (k = 0; k < e->count && !status; k++)
@@ -243,31 +249,33 @@ static int find_dips(const events *e, const double *x, double a, double *b) {
     return status;
 }
 
-/* Whether error control may make another step from start to an event. Steps in coordinates of a chart
- * stay. */
+/* Whether a step that contains an event is repeated up to the event. Steps of fixed size and steps
+ * in local coordinates (kept_closed) are not repeated. */
 static int may_repeat(const stepper *s, double start, double event) {
     double end = stepper_time(s);
     return event < end && event - start > AT_START * (end - start) && s->fixed == 0.0 &&
            !s->kept_closed;
 }
 
-/* Approaches at the place of the last look. */
+/* Evaluate the approaches at the state of the last sample. */
 static int look_near(const events *e, double t, double *near) {
     if (e->model->approaches(e->solver->user, t, e->work, near)) return EVENTS_INDICATORS_FAILED;
     return stepper_all_finite(near, 3 * e->count) ? STEPPER_OK : EVENTS_INDICATORS_FAILED;
 }
 
+/* Reciprocal time scale of indicator k, the larger value of both samples. */
 static double pace(const events *e, int k) {
     return fmax(left_near(e)[e->count + k], right_near(e)[e->count + k]);
 }
 
+/* Copy the approaches of the right sample to the left sample, at time t. */
 static void move_near(events *e, double t) {
     memcpy(left_near(e), right_near(e), 3 * sizeof(double) * (size_t)e->count);
     e->near_at = t;
 }
 
-/* Approaches at both ends of the step from start; *fast: whether they change within it, with the
- * indicators at both ends. */
+/* Evaluate the approaches at both ends of the step from start. *fast: whether an indicator is fast
+ * enough to need more samples. If so, evaluate the indicators and rates at both ends, too. */
 static int look_at_ends(events *e, const double *x, double start, int *fast) {
     double end = stepper_time(e->solver);
     int k, status = STEPPER_OK;
@@ -283,7 +291,7 @@ static int look_at_ends(events *e, const double *x, double start, int *fast) {
     return status ? status : look(e, x, end, last_value(e), last_rate(e));
 }
 
-/* Whether no indicator can have fallen to zero and risen in a time between the looks. */
+/* Whether no indicator can have fallen to zero and risen again between samples at a and b. */
 static int are_near(const events *e, double a, double b) {
     double width = b - a, least_width = 1e-3 * stepper_last_step(e->solver);
     int k;
@@ -298,7 +306,7 @@ static int are_near(const events *e, double a, double b) {
     return 1;
 }
 
-/* Time to the next look that is likely to be near enough, from the left one. */
+/* Time from the left sample to the next that probably satisfies are_near. */
 static double time_to_next(const events *e) {
     double least_time = HUGE_VAL;
     int k;
@@ -311,7 +319,7 @@ static double time_to_next(const events *e) {
     return least_time;
 }
 
-/* Move the right look at *b towards a until both are near. */
+/* Move the right sample at *b towards a until are_near holds. */
 static int come_near(const events *e, const double *x, double a, double *b) {
     int status = look_near(e, *b, right_near(e));
     while (!status && !are_near(e, a, *b)) {
@@ -322,8 +330,8 @@ static int come_near(const events *e, const double *x, double a, double *b) {
     return status;
 }
 
-/* Whether the indicators on which the equations depend are at t where the cubic through the ends of
- * the step has them. */
+/* Whether the indicators on which the equations depend agree at t with the cubic Hermite curve
+ * through both ends of the step, within OFF. */
 static int follows(const events *e, double start, double t) {
     const stepper *s = e->solver;
     double h = stepper_time(s) - start, u = (t - start) / h, w = 1.0 - u;
@@ -340,8 +348,9 @@ static int follows(const events *e, double start, double t) {
     return 1;
 }
 
-/* The first event in the step from start, with the indicators there at the right; HUGE_VAL: none.
- * again: where a shorter step ends, if this one has missed a part of a law; HUGE_VAL: it has not. */
+/* Find the first event in the step from start; right() contains the indicators there.
+ * event: time of the event, HUGE_VAL if there is none. again: end time of a repeated step, if this
+ * step missed a change of the equations, else HUGE_VAL. */
 static int first_event(events *e, const double *x, double start, double *event, double *again) {
     double from = start, end = stepper_time(e->solver);
     int number = 1, near = 0, status = STEPPER_OK;
@@ -350,7 +359,7 @@ static int first_event(events *e, const double *x, double start, double *event, 
     while (!status && from < end) {
         double next = number < LOOKS ? start + number * (end - start) / LOOKS : end;
         double to = near ? fmin(next, from + time_to_next(e)) : next;
-        if (to <= from) to = next; /* a time below its rounding */
+        if (to <= from) to = next; /* the increment is below the rounding of time */
         status = from > start ? look(e, x, to, right(e), right_rate(e))
                               : first_look(e, x, start, &to);
         if (near && !status) {
@@ -377,6 +386,7 @@ static int first_event(events *e, const double *x, double start, double *event, 
     return status;
 }
 
+/* Return to the time of the event and make its jump pending. */
 static int stop_at_event(events *e, double *x, double event) {
     int k;
     for (k = 0; k < e->count; k++) due(e)[k] = armed(e)[k] > 0.0 && right(e)[k] <= 0.0;
@@ -397,7 +407,7 @@ int events_step(events *e, double *x, double limit) {
     while (!status) {
         double end = again;
         if (again == HUGE_VAL) {
-            /* its stages behind the event are of other laws: once more, as far as the event alone */
+            /* Stages after the event use other equations: repeat the step up to the event. */
             if (event == HUGE_VAL || repeats++ || !may_repeat(s, start, event)) break;
             end = event;
         }
@@ -410,7 +420,8 @@ int events_step(events *e, double *x, double limit) {
     return status || event == HUGE_VAL ? status : stop_at_event(e, x, event);
 }
 
-/* What the last modes constrain is projected; those in between may constrain what they cannot. */
+/* Project the state onto the constraints of the final modes. Modes between jumps are not projected,
+ * because their constraints may not be solvable. */
 static int projected(events *e, double *x) {
     stepper *s = e->solver;
     if (!s->project) return STEPPER_OK;

@@ -4,17 +4,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Part of the square of a column's length below which its remaining part is summed again: four of its
- * sixteen digits have cancelled. */
+/* Fraction of a squared column length below which the remaining square is summed again: four of its
+ * sixteen digits are then lost by cancellation. */
 #define CANCELLED 1e-4
-/* Relative difference of lengths that count as equal: the first of equal columns is the pivot, since
- * rounding decides which of them is the longest. */
+/* Relative difference of lengths that count as equal: the first of equal columns is the pivot,
+ * since rounding decides which of them is the longest. */
 #define EQUAL 1e-6
 #define STALLED 1e-14   /* length of a step [rad or m] that changes no digit that matters */
-#define LAST_DIGITS 1e-2 /* part of the tolerance above which one more step is made */
-#define SHORTEST 1e-6   /* part of a step below which it is not halved any more */
+#define LAST_DIGITS 1e-2 /* fraction of the tolerance above which another step is made */
+#define SHORTEST 1e-6   /* fraction of a step at which the halving ends */
 
-/* The sum of a (n,) in the order of NumPy: eight partial sums, of halves beyond 128 elements. */
+/* Sum a (n,) in the order of NumPy: eight partial sums, and by halves above 128 elements. */
 static double sum(const double *a, int n) {
     double part[8], total = 0.0;
     int i, j, half = n / 2;
@@ -35,7 +35,7 @@ static double sum(const double *a, int n) {
     return total;
 }
 
-/* The sums of the columns of a (m, n), row by row; a single column is summed as above. */
+/* Sum the columns of a (m, n), row by row. A single column is summed by `sum`. */
 static void column_sums(const double *a, int m, int n, double *sums) {
     int i, j;
     if (n == 1) {
@@ -53,8 +53,8 @@ static double norm(const double *a, int n, double *squares) {
     return sqrt(sum(squares, n));
 }
 
-/* Reflect the columns of W (m, n), rows `stride` apart, so that the first one has its first element
- * alone; others are left as they are below it. */
+/* Reflect the columns of W (m, n), with a row stride of `stride`, so that the first column becomes
+ * a multiple of the first unit vector. Its elements below the first are not overwritten. */
 static void reflect(double *W, int m, int n, int stride, double *v, int *rows, double *products,
                     double *sums) {
     int i, j, count = 0;
@@ -85,7 +85,7 @@ static int any(const double *a, int n) {
     return 0;
 }
 
-/* Space for a solution, one block. */
+/* Scratch arrays of a solution, in one block. */
 typedef struct {
     double *W, *products, *F; /* (m, n + 1), scratch, (n, n) */
     double *squares, *exact, *v, *sums, *y;
@@ -110,7 +110,7 @@ static void *opened(space *w, int m, int n) {
     return block;
 }
 
-/* The squares of what is left of columns from row k on, summed anew. */
+/* Recompute the squared lengths of the columns from row k on, if cancellation spoiled them. */
 static void sum_anew(space *w, int m, int n, int k) {
     int i, j;
     for (j = k; j < n; j++) {
@@ -134,7 +134,7 @@ static void exchange(space *w, int m, int n, int k, int other) {
     }
 }
 
-/* W = Q R with pivots, up to its rank, which is returned. */
+/* Factorize W = Q R with column pivoting. Returns the rank. */
 static int factorized(space *w, int m, int n, double gap) {
     int width = n + 1, steps = m < n ? m : n, i, j, k;
     double longest = 0.0;
@@ -170,7 +170,7 @@ static void solved(space *w, int m, int n, const double *A, const double *b, dou
     }
     rank = factorized(w, height, n, gap);
     loose = n - rank;
-    /* back substitution: the right side, and the columns that are free */
+    /* back substitution of the right side and of the dependent columns */
     for (k = rank - 1; k >= 0; k--) {
         double *row = w->W + k * width;
         for (j = rank; j < width; j++) row[j] /= row[k];
@@ -183,7 +183,7 @@ static void solved(space *w, int m, int n, const double *A, const double *b, dou
         for (j = 0; j < loose; j++)
             F[i * loose + j] = i < rank ? -w->W[i * width + rank + j] : (double)(i - rank == j);
     }
-    /* what they free is taken out */
+    /* remove the null space from the solution */
     for (k = 0; k < loose; k++) {
         int rest = loose - k - 1;
         double size;
@@ -218,7 +218,7 @@ static int all_finite(const double *a, int n) {
     return 1;
 }
 
-/* Whether every row is below a part of its tolerance. */
+/* Whether every residual is at most `part` times its tolerance. */
 static int below(const least_squares *s, double part) {
     int i;
     for (i = 0; i < s->rows; i++)
@@ -231,7 +231,7 @@ static void place(const least_squares *s, const double *x, double length, const 
     for (i = 0; i < s->unknowns; i++) s->q[s->free[i]] = x[i] + length * step[i];
 }
 
-/* The Jacobian by the unknowns, row by row. */
+/* Write the elements of the Jacobian by the unknowns to J (rows, unknowns), by rows. */
 static void spread(const least_squares *s, double *J) {
     int k, n = s->unknowns;
     memset(J, 0, sizeof(double) * (size_t)(s->rows * n));
@@ -290,7 +290,7 @@ static int make_step(const least_squares *s, iteration *t) {
     return 0;
 }
 
-/* Halve the step until the residual falls. Returns 0 if it did, 1 if no length is short enough, and
+/* Halve the step until the residual decreases. Returns 0 on success, 1 if no length suffices, and
  * -1 if a function failed. */
 static int line_search(least_squares *s, iteration *t, int reached, double *size, double *length) {
     int m = s->rows;
@@ -326,7 +326,7 @@ static int iterate(least_squares *s, iteration *t, double *residual) {
         if (make_step(s, t)) return LEAST_SQUARES_FAILED;
         searched = line_search(s, t, reached, &size, &length);
         if (searched < 0) return LEAST_SQUARES_FAILED;
-        if (searched > 0) { /* the last iterate */
+        if (searched > 0) { /* return to the last iterate */
             for (i = 0; i < n; i++) s->q[s->free[i]] = t->x[i];
             memcpy(s->r, t->kept, sizeof(double) * (size_t)m);
             break;

@@ -10,9 +10,9 @@
 
 #include "model.h"
 
-/* The shortest x (n,) of those that minimise |A x - b|, with A (m, n) row by row and b (m,). A column
- * counts as dependent if its part orthogonal to the columns before it is shorter than `gap` of the
- * longest column. Returns 1 if no memory is left. */
+/* Compute the shortest x (n,) that minimises |A x - b|, for A (m, n) by rows and b (m,). A column
+ * counts as dependent if its part orthogonal to the columns before it is shorter than `gap` times
+ * the longest column. Returns 1 if no memory is left. */
 int shortest_solution(int m, int n, const double *A, const double *b, double gap, double *x);
 
 /* Equations r(q, p) = 0 with some elements of q unknown. */
@@ -21,20 +21,20 @@ typedef struct {
     double *q, *r, *e;       /* (size,), (rows,), (elements,) */
     const double *p;
     const int *free;         /* (unknowns,) indices of the unknowns in q */
-    const int *row, *column; /* (elements,) of the Jacobian; the column among the unknowns, or -1 */
+    const int *row, *column; /* (elements,) of the Jacobian; column of an unknown, or -1 */
     const double *tolerance; /* (rows,) */
     double gap;              /* see shortest_solution */
     int iterations;
     model_function equations; /* (q, p) -> r, e */
-    model_function values;    /* (q, p) -> r; none: `equations` is used */
+    model_function values;    /* (q, p) -> r, optional; else `equations` */
     model_function step;      /* (e, b) -> the shortest x (unknowns,) for large sparse Jacobians */
 } least_squares;
 
-/* Failed: a function has no value, or no memory is left. */
+/* Result of gauss_newton. Failed: a function has no value, or no memory is left. */
 enum { LEAST_SQUARES_OPEN, LEAST_SQUARES_CONVERGED, LEAST_SQUARES_FAILED };
 
-/* Damped Gauss-Newton iteration from q, which becomes the last iterate; *residual: Euclidean norm
- * there. The step is halved until the residual falls. */
+/* Solve by a damped Gauss-Newton iteration from q, which becomes the last iterate. *residual:
+ * Euclidean norm of r there. Each step is halved until the residual decreases. */
 int gauss_newton(least_squares *s, double *residual);
 
 #endif

@@ -6,18 +6,19 @@
 #ifndef MBS_MODEL_H
 #define MBS_MODEL_H
 
-/* Answers of an evaluation. */
+/* Return values of an evaluation. */
 enum {
     MODEL_STOP = -1,    /* the integration must stop now, for example after control-C */
     MODEL_VALUES = 0,
     MODEL_NO_VALUE = 1  /* the function has no value here: a shorter step may succeed */
 };
 
-/* arg: one pointer for each input; res: one for each output, NULL if it is not needed. */
+/* Evaluate a function. arg: a pointer to each input. res: a pointer to each output, NULL for an
+ * output that is not required. */
 typedef int (*model_evaluate)(void *self, const double **arg, double **res);
 
 typedef struct {
-    model_evaluate evaluate; /* NULL: the model has no such function */
+    model_evaluate evaluate; /* NULL if the model has no such function */
     void *self;
 } model_function;
 
@@ -25,13 +26,13 @@ typedef struct {
 typedef struct {
     int (*code)(const double **arg, double **res, long long *iw, double *w, int mem);
     int inputs, outputs;
-    const double **arg; /* the convention wants more room than there are inputs */
+    const double **arg; /* CasADi may require more elements than inputs */
     double **res;
     long long *iw;
     double *w;
 } compiled_function;
 
-/* The model_evaluate of a compiled_function. */
+/* Evaluate a compiled_function (self), in the form of model_evaluate. */
 int compiled_evaluate(void *self, const double **arg, double **res);
 
 #endif

@@ -8,105 +8,108 @@
 #include "dense.h"
 #include "dopri5.h"
 
-/* The regularity is foreseen for this many steps, a little more than the next one. */
+/* Number of steps for which the regularity is extrapolated, a little more than the next step. */
 #define AHEAD 1.2
-/* Part of the largest sigma below which values are means: rounding reaches u' as its inverse square,
- * 3e-16 / (3e-5)^2 = 3e-7, and beyond it nothing is left; a larger part misses what a motion does
- * beside the singular configuration, as that of a delta robot, whose legs pass one after another. */
+/* Fraction of the largest sigma below which values are means of neighbours. The rounding error of
+ * u' grows with the inverse square of this fraction, 3e-16 / (3e-5)^2 = 3e-7; at smaller sigma no
+ * accuracy remains. A larger fraction smooths the motion near the singular configuration, such as
+ * that of a delta robot whose legs become singular one after another. */
 #define FLOOR 3e-5
-#define AWAY 2.0      /* floors from which on a state is regular */
-#define BESIDE 4.0    /* floors between neighbours in means: those next to the middle are regular */
-/* Weights of neighbours 1, 2 and 3 on either side: what they give is exact for degree five. */
+#define AWAY 2.0      /* multiple of FLOOR above which a state is regular */
+#define BESIDE 4.0    /* multiple of FLOOR between neighbours in means, so that they are regular */
+/* Weights of neighbours 1, 2 and 3 on either side: the mean is exact up to degree five. */
 static const double MEAN[3] = {0.75, -0.3, 0.05};
-/* sigma_min(C N T), part of its value at the origin, below which the chart has rotated too far from
- * the motion: its tangents are then 78 degrees away. */
+/* Alignment of the tangents with the chart (1 at its origin) below which the chart is left: the
+ * tangents are then rotated by 78 degrees. */
 #define TURNED 0.2
-#define NEWTON 10       /* Newton steps onto the rows; quadratic convergence takes three or four */
-#define DEGENERATE (10 * DBL_EPSILON) /* part of the longest row below which one is rounding */
-/* Rows beyond which the fill of pivots costs more than they tell: the last pivot is nearer to the
- * smallest singular value than the smallest of pivots in order, by a factor of two. */
+#define NEWTON 10       /* maximum Newton steps onto the rows; three or four are usual */
+#define DEGENERATE (10 * DBL_EPSILON) /* fraction of the largest pivot that counts as zero */
+/* Number of rows above which they are factorized without pivoting: the fill by pivoting costs more
+ * than its better estimate of the smallest singular value (by a factor of two) is worth. */
 #define MANY 32
-#define LAST_MOVE 1e-9  /* after a move this small the next one is rounding */
-/* Part of the velocities, or of what they make of a step, by which a state may differ from where the
- * velocities and accelerations of the stages lead. What error control lets pass is a hundredth of it;
- * on another branch velocities differ by about their own size. */
+#define LAST_MOVE 1e-9  /* size of a Newton step [rad or m] after which the next is rounding */
+/* Fraction of the velocities, or of the distance that they move in a step, by which a state may
+ * differ from the explicit result of the stages. The error control permits a hundredth of it. On
+ * another branch the velocities differ by about their own size. */
 #define BREAK 0.01
-/* Rounding of u' for accelerations of size one and sigma one: it is added to the tolerance. */
+/* Rounding error of u' for accelerations and sigma of size one. It is added to the tolerance. */
 #define NOISE 3e-16
-/* A step that begins further away is refused if a stage comes so near the singular configuration that its rounding exceeds
- * this multiple of atol, half a tolerance: the next length passes it between two stages. */
+/* Multiple of atol (half a tolerance) that limits the rounding error of a stage near a singular
+ * configuration. A larger error rejects a step that starts further away. The next shorter step has
+ * the singular configuration between two stages. */
 #define DODGED 15.0
-#define DODGES 8 /* refused steps in a row after which more rounding is accepted: 0.83^8 = 0.2 */
-#define MOST_NOISE 1000.0 /* the same after them: 40 tolerances */
-/* Where a guide chooses the branch: the largest move from it onto the rows [rad or m], part of its
- * velocities by which others may differ, and the least velocity of which that is a part. On another
- * branch velocities differ by about their own size. */
+#define DODGES 8 /* consecutive rejected steps before more rounding is accepted: 0.83^8 = 0.2 */
+#define MOST_NOISE 1000.0 /* multiple of atol that is accepted afterwards: 40 tolerances */
+/* Limits if a guide selects the branch: the largest move from the guide onto the rows [rad or m],
+ * the fraction of its velocities by which the velocities may differ, and the smallest speed for
+ * this fraction [rad/s or m/s]. On another branch the velocities differ by about their own size. */
 #define REACH 0.1
 #define ASTRAY 0.1
 #define IDLE 1e-3
-/* A start in a singular configuration is seen from this far back along its velocity [rad or m]. */
+/* Distance [rad or m], against the velocity, of the regular state for a start that is singular. */
 #define BACK 0.02
-#define HALVINGS 25 /* of a step, to where its rows become dependent: 3e-8 of it */
-/* Largest row there of branches that meet: what is more may be why a motion stops. Positions are on the
- * rows to 1e-13. */
+#define HALVINGS 25 /* bisections of a step to locate dependent rows, to 3e-8 of its length */
+/* Largest residual of the rows at a singular configuration at which branches meet. A larger
+ * residual may explain why a motion stops. Positions satisfy the rows to 1e-13. */
 #define APART 2e-13
-/* Part of its velocities by which such a start may miss those of the branch: what a mean of values
- * beside it errs by is 1e-9, and what misses by more carries energy that the branch does not. */
+/* Fraction of its velocities by which a singular start may differ from the branch. The mean of
+ * neighbouring values has an error of 1e-9; a larger difference has energy across the branch. */
 #define STRAY 1e-6
-/* Part of the longest row below which one is dependent where a start is closed: branches cross, and
- * Newton steps halve the distance from there, until a remainder of the rows by rounding, its square,
- * moves as much. */
+/* Fraction of the longest row below which a row is dependent when a start is projected. Where
+ * branches cross, each Newton step halves the distance, until its square reaches the rounding error
+ * of the rows. */
 #define SETTLED 1e-8
-#define PLACING 40     /* such Newton steps: 1e-12 of the first distance */
-#define CLOSED 1e-12   /* largest row of a start, for coordinates of size one */
-/* The same where its velocities are found: more than what a start that is closed so far leaves. */
+#define PLACING 40     /* maximum Newton steps of a start: to 1e-12 of the first distance */
+#define CLOSED 1e-12   /* largest residual of a start, for coordinates of size one */
+/* Fraction of the longest row below which a row is dependent when the velocities of a start are
+ * computed. It exceeds the distance from the crossing that a start projected to CLOSED has. */
 #define DEPENDENT 1e-6
-#define MASSLESS 1e-10 /* part of the largest pivot of the inertia matrix below which one is none */
+#define MASSLESS 1e-10 /* fraction of the largest inertia pivot below which a pivot is zero */
 
-/* offsets in memory */
+/* Offsets in `memory`. */
 enum { SIGMA, LARGEST, REGULARITY, RISE, SEEN, SEEN_TIME, BASED, BASE_TIME, BASE };
 
-/* Sets of rows, a bit for each. */
+/* Set of rows, with a bit for each row. */
 typedef unsigned long long mask;
 #define BITS 64
 #define WORDS(n) (((n) + BITS - 1) / BITS)
 
-/* Where a matrix has elements, by columns: those of column k from start[k] on, before start[k + 1],
- * are in the rows row[], in rising order. The same by rows: element from[] of the first order is in
- * column column[]. */
+/* Sparsity pattern of a matrix. Elements start[k] .. start[k + 1] - 1 belong to column k and have
+ * the row indices row[], in ascending order. By rows: entries begin[i] .. begin[i + 1] - 1 belong
+ * to row i, with the column index column[] and the index from[] in the order by columns. */
 typedef struct {
     int columns, rows, *start, *row;
     int *begin, *column, *from;
 } pattern;
 
-/* A (n, m) = Q R by reflections, each of the rows alone in which its column has elements: rows of
- * loops touch few joints. */
+/* Sparse factors A (n, m) = Q R by Householder reflections. Each reflection acts only on the rows
+ * in which its column has elements, because each row of a loop depends on few joints. */
 typedef struct {
-    double *A, *weight;  /* columns of R */
-    double *tails;       /* what reflection k is made of, from k n on, */
-    int *moved, *count;  /* the rows in which it is, row[k] first, from k n on; how many they are */
-    int *order;          /* column k of R stands in column order[k] of A, */
-    int *row;            /* and its row k in row[k]; the rows that no reflection has come last */
-    double *size;        /* squares of what is left of columns, in that order, */
-    mask *where;         /* and the rows in which they may have elements, WORDS(n) for each */
-    int *last;           /* the last column that may have an element in a row, in their order */
-    mask *touched;       /* by columns of A: the rows in which one may have had elements; */
-    int *upper, *uppers; /* the rows of R in which it has some but the last, and how many they are */
-    int height, columns; /* of A as it was filled last; elements outside touched are zero. height is 0
-                            where they need not be */
+    double *A, *weight;  /* A, replaced by R; weights of the reflections */
+    double *tails;       /* vector of reflection k, from index k n on */
+    int *moved, *count;  /* rows of reflection k, from index k n on, row[k] first; their number */
+    int *order;          /* column k of R is stored in column order[k] of A */
+    int *row;            /* row k of R is stored in row row[k] of A; rows without reflection last */
+    double *size;        /* squared lengths of the remaining columns, by position in order */
+    mask *where;         /* rows in which each remaining column may have elements, WORDS(n) words */
+    int *last;           /* last position in order at which a row may have an element */
+    mask *touched;       /* rows in which each column of A may have had elements, WORDS(n) words */
+    int *upper, *uppers; /* rows of the elements above the diagonal of R, by columns of A; number */
+    int height, columns; /* size of A when it was last filled. Elements outside touched are zero,
+                            unless height is 0 */
 } factors;
 
-/* Rows and forces at a point, and the tangents there. */
+/* Constraint rows, forces and tangents at a state. */
 typedef struct {
     passage_rows rows;
-    double *inertia;      /* elements of M */
+    double *inertia;      /* elements of M by its pattern */
     double *M, *f, *rate; /* M is replaced by its Cholesky factor L */
-    int *end;             /* of the columns of L, the row behind their last element */
-    factors qr;           /* of L^-1 J' */
+    int *end;             /* row after the last element of each column of L */
+    factors qr;           /* factors of L^-1 J' */
     double *T;            /* (nv, d) tangents, orthonormal in the metric of M */
     int rank;
-    double sigma; /* the smallest pivot of R: the distance from losing rank */
-    double more;  /* what is added to M as more J' J */
+    double sigma; /* smallest pivot of R: distance from the loss of rank */
+    double more;  /* factor of J' J that was added to M, usually 0 */
 } frame;
 
 struct passage {
@@ -117,42 +120,43 @@ struct passage {
     double *memory, *block;
     int *numbers;
     pattern slope, J, N, M;
-    int *J_from; /* where nq is nv: the elements of slope that are those of J */
-    frame base, here;
-    factors other; /* of matrices that last for one solution */
-    double *C;            /* (d, nq) coordinates of positions */
-    const double *guide;  /* a state near the one that is looked for, or NULL; */
-    double *guided, ahead; /* how fast its positions move, and for how long */
-    double *drift;        /* (nv,) velocity of the base where rows move and u is zero */
-    double *own, *trial;  /* 2 d + nz coordinates of the state and of a stage */
-    double *slopes[7];    /* of them */
+    int *J_from; /* indices in slope of the elements of J, if nq equals nv */
+    frame base, here; /* frames at the origin of the chart and at the present point */
+    factors other; /* factors of temporary matrices */
+    double *C;            /* (d, nq) matrix from positions to chart coordinates */
+    const double *guide;  /* state that selects the branch, or NULL */
+    double *guided, ahead; /* rates of its positions, and time by which they are extrapolated */
+    double *drift;        /* (nv,) velocity of the base at u = 0, if rows depend on time */
+    double *own, *trial;  /* (2 d + nz,) chart coordinates of the state and of a stage */
+    double *slopes[7];    /* slopes of the chart coordinates at the stages */
     double *full[7];      /* slopes of x at the stages */
-    double *dense;        /* (5, n) */
-    double *at, *side, *sum;       /* points (n,), a sum of them */
+    double *dense;        /* (5, n) dense output of the last step */
+    double *at, *side, *sum;       /* scratch: a state (n,), a direction (d,), neighbours */
     double *K, *r, *y, *w, *G;     /* scratch */
-    double *across;       /* (5, n) of a step that is tried */
+    double *across;       /* (5, n) dense output of the attempted step */
     double *ready_x;
     double ready_time, sigma;
-    double alignment; /* of the tangents with those of the chart: 1 at its origin, 0 across */
+    double alignment; /* alignment of the tangents with the chart: 1 at its origin, 0 orthogonal */
     int d, ready, charted, kept, singular, lasting;
-    int opened; /* the full step is, at the present state */
-    int dodges; /* steps refused since the last one, for the rounding of a stage */
-    int missed; /* branches that come near each other were met since the last full step */
+    int opened; /* whether `open` of the wrapped method was called at the present state */
+    int dodges; /* number of steps rejected in succession for the rounding of a stage */
+    int missed; /* whether branches that do not meet were found since the last full step */
 };
 
-/* Solve L y = b, or L' y = b, in place; L (n, n) by columns, column k with elements before end[k]. */
+/* Solve L y = b in place. L (n, n) is stored by columns; column k has elements before end[k]. */
 static void lower(const double *L, const int *end, int n, double *b) {
     int i, k;
     for (k = 0; k < n; k++) {
-        if (b[k] == 0.0) continue; /* rows of loops touch few joints */
+        if (b[k] == 0.0) continue; /* rows of loops depend on few joints */
         b[k] /= L[k * n + k];
         for (i = k + 1; i < end[k]; i++) b[i] -= L[k * n + i] * b[k];
     }
 }
 
+/* Bit of a row in its word. */
 static mask bit(int row) { return (mask)1 << row % BITS; }
 
-/* The lowest row of a word of a set. */
+/* Index of the lowest bit of a nonzero word. */
 static int lowest(mask bits) {
 #ifdef __GNUC__
     return __builtin_ctzll(bits);
@@ -163,7 +167,7 @@ static int lowest(mask bits) {
 #endif
 }
 
-/* The same as lower for b with elements in a set of rows, which grows. */
+/* Solve L y = b in place for a sparse b. set: rows of its elements; rows that fill in are added. */
 static void lower_among(const double *L, const int *end, int n, mask *set, double *b) {
     int word, i, k;
     for (word = 0; word < WORDS(n); word++) {
@@ -181,6 +185,7 @@ static void lower_among(const double *L, const int *end, int n, mask *set, doubl
     }
 }
 
+/* Solve L' y = b in place. */
 static void lower_transposed(const double *L, const int *end, int n, double *b) {
     int i, k;
     for (k = n - 1; k >= 0; k--) {
@@ -190,7 +195,8 @@ static void lower_transposed(const double *L, const int *end, int n, double *b) 
     }
 }
 
-/* M (n, n) = L L', and where its columns end; before, a bound of that. 1 where a pivot is too small. */
+/* Factorize M (n, n) = L L' in place. end: row after the last element of each column, on input of
+ * M, on return of L. Returns 1 if a pivot is below MASSLESS of the largest diagonal element. */
 static int cholesky(double *M, int *end, int n) {
     double largest = 0.0;
     int i, j, k;
@@ -210,6 +216,7 @@ static int cholesky(double *M, int *end, int n) {
     return 0;
 }
 
+/* Evaluate the rows at x. Returns 1 on failure. */
 static int rows_at(passage *g, double t, const double *x, const passage_rows *rows) {
     int j, nv = g->size.nv;
     if (g->model.rows(g->s->user, t, x, rows)) return 1;
@@ -219,6 +226,7 @@ static int rows_at(passage *g, double t, const double *x, const passage_rows *ro
     return 0;
 }
 
+/* Evaluate rows, inertia and forces at x. Returns 1 on failure. */
 static int evaluate(passage *g, frame *p, double t, const double *x) {
     void *user = g->s->user;
     if (rows_at(g, t, x, &p->rows) || g->model.forces(user, t, x, p->inertia, p->f, p->rate))
@@ -229,7 +237,7 @@ static int evaluate(passage *g, frame *p, double t, const double *x) {
            !stepper_all_finite(p->f, g->size.nv);
 }
 
-/* M in place of L, and bounds of where its columns end. */
+/* Write the elements of M over L, and the ends of its columns. */
 static void place_mass(const passage *g, frame *p) {
     int n = g->size.nv, i, k;
     for (k = 0; k < n; k++) {
@@ -245,7 +253,8 @@ static void place_mass(const passage *g, frame *p) {
     }
 }
 
-/* L of M; of M + more J' J where links without mass leave M singular: on the rows it moves alike. */
+/* Compute L from M. If links without mass make M singular, factorize M + more J' J, which gives the
+ * same motion on the rows. Returns 1 if this matrix is singular, too. */
 static int factor_mass(passage *g, frame *p) {
     int n = g->size.nv, m = g->size.speeds, i, j, k;
     double *square = g->G, mass = 0.0, length = 0.0;
@@ -269,7 +278,7 @@ static int factor_mass(passage *g, frame *p) {
     return cholesky(p->M, p->end, n);
 }
 
-/* b (n,) reflected by reflection k. */
+/* Apply reflection k to b (n,) in place. */
 static void reflect(const factors *f, int n, int k, double *b) {
     const double *tail = f->tails + k * n;
     const int *rows = f->moved + k * n;
@@ -282,7 +291,7 @@ static void reflect(const factors *f, int n, int k, double *b) {
     for (i = 1; i < count; i++) b[rows[i]] -= sum * tail[i];
 }
 
-/* A (n, m) becomes zero, and its columns are to be filled by put. */
+/* Set A (n, m) to zero, before it is filled by put. */
 static void begin_columns(factors *f, int n, int m) {
     int known = f->height == n && f->columns >= m ? m : 0, words = WORDS(n), j, word;
     for (j = 0; j < known; j++)
@@ -298,12 +307,13 @@ static void begin_columns(factors *f, int n, int m) {
     f->height = n;
 }
 
+/* Set element (i, j) of A (n, m). */
 static void put(factors *f, int n, int i, int j, double value) {
     f->A[j * n + i] = value;
     f->touched[j * WORDS(n) + i / BITS] |= bit(i);
 }
 
-/* A was filled in another way. */
+/* Find the nonzero elements of A (n, m) if it was not filled by put. */
 static void look_for_columns(factors *f, int n, int m) {
     int i, j;
     memset(f->touched, 0, sizeof *f->touched * (size_t)(m * WORDS(n)));
@@ -313,7 +323,7 @@ static void look_for_columns(factors *f, int n, int m) {
     f->height = 0;
 }
 
-/* Where the column at place k has elements, and its length. */
+/* Set the nonzero rows and the squared length of the column at position k. */
 static void look_at(factors *f, int n, int k) {
     const double *column = f->A + f->order[k] * n;
     const mask *touched = f->touched + f->order[k] * WORDS(n);
@@ -334,7 +344,7 @@ static void look_at(factors *f, int n, int k) {
     f->uppers[f->order[k]] = 0;
 }
 
-/* The columns at places k and j change them. */
+/* Exchange the columns at positions k and j. */
 static void exchange(factors *f, int n, int k, int j) {
     int i, words = WORDS(n), column = f->order[k];
     double kept = f->size[k];
@@ -347,8 +357,8 @@ static void exchange(factors *f, int n, int k, int j) {
     }
 }
 
-/* Column k of R becomes what its reflection leaves, an element in the next row; of many columns,
- * in the first row where it has one. */
+/* Make reflection k. Its column keeps one element: in the next row, or in the first row
+ * with an element if there are many columns. */
 static void make_reflection(factors *f, int n, int k, int many) {
     double *column = f->A + f->order[k] * n, *tail = f->tails + k * n;
     mask *where = f->where + k * WORDS(n);
@@ -369,8 +379,8 @@ static void make_reflection(factors *f, int n, int k, int many) {
     f->row[k] = rows[0];
 }
 
-/* The column at place j after reflection k: where they meet its rows may have elements now, but
- * row k is done. What is left of it is summed where somebody asks for it. */
+/* Apply reflection k to the column at position j, if they have common rows. Update its nonzero rows
+ * and, if sums is set, its remaining squared length. */
 static void reflect_column(factors *f, int n, int k, int j, int sums) {
     int i, words = WORDS(n), done = f->row[k], own = f->order[j];
     mask *touched = f->touched + own * words, *where = f->where + j * words;
@@ -387,7 +397,7 @@ static void reflect_column(factors *f, int n, int k, int j, int sums) {
         f->size[j] += column[f->row[i]] * column[f->row[i]];
 }
 
-/* Behind the last column that meets reflection k: it may have elements in all of its rows then. */
+/* Return the position after the last column that reflection k changes, and note its fill. */
 static int reach_of(factors *f, int n, int k) {
     const int *rows = f->moved + k * n;
     int end = k + 1, i;
@@ -397,9 +407,10 @@ static int reach_of(factors *f, int n, int k) {
     return end;
 }
 
-/* A (n, m) = Q R up to a rank, or until what remains is shorter than a part of the first column; the
- * rank. The longest remaining column is next. Of many that are all needed it is the first: in
- * their order those of a chain of loops have reflections of few rows. */
+/* Factorize A (n, m) = Q R up to `rank`, or until the remaining columns are shorter than `least`
+ * times the first pivot. Returns the rank. The pivot is the longest remaining column. More than
+ * MANY columns that are all required are factorized in order, because reflections of a chain of
+ * loops then have few rows. */
 static int factorize(factors *f, int n, int m, int rank, double least) {
     double first = 0.0;
     int i, j, k, end, in_order = m > MANY && rank == m && least == 0.0;
@@ -422,7 +433,7 @@ static int factorize(factors *f, int n, int m, int rank, double least) {
     return rank;
 }
 
-/* The elements y of Q' x, in the rows of the first ones, such that A' x = b there. */
+/* Solve R' y = b for y = Q' x, so that A' x = b for the first `rank` columns in order of pivots. */
 static void forward(const factors *f, int n, int rank, const double *b, double *y) {
     int i, k;
     for (k = 0; k < rank; k++) {
@@ -434,17 +445,18 @@ static void forward(const factors *f, int n, int rank, const double *b, double *
     }
 }
 
+/* Absolute value of pivot k. */
 static double pivot_of(const factors *f, int n, int k) {
     return fabs(f->A[f->order[k] * n + f->row[k]]);
 }
 
-/* Q y, in place. */
+/* Compute y = Q y in place. */
 static void reflect_back(const factors *f, int n, int rank, double *y) {
     int k;
     for (k = rank - 1; k >= 0; k--) reflect(f, n, k, y);
 }
 
-/* L^-1 J' = Q R, as many columns as the rank. */
+/* Factorize L^-1 J' = Q R up to the rank and set sigma. */
 static void factor_rows(passage *g, frame *p) {
     int n = g->size.nv, m = g->size.speeds, i, j;
     factors *f = &p->qr;
@@ -459,31 +471,33 @@ static void factor_rows(passage *g, frame *p) {
     for (j = 0; j < p->rank; j++) p->sigma = fmin(p->sigma, pivot_of(&p->qr, n, j));
 }
 
-/* The shortest y (n,) with A' y = b, A (n, m), on its rows that are not nearly dependent. */
+/* Compute the shortest y (n,) with A' y = b, where A (n, m) is in g->other. Rows of A' that are
+ * dependent within the fraction `least` are omitted. */
 static void shortest(passage *g, int n, int m, const double *b, double least, double *y) {
     factors *f = &g->other;
     int rank, k;
     look_for_columns(f, n, m);
     rank = factorize(f, n, m, n < m ? n : m, least);
     memset(y, 0, sizeof(double) * (size_t)n);
-    for (k = 0; k < rank; k++) /* what is empty determines nothing */
+    for (k = 0; k < rank; k++) /* empty rows determine nothing */
         if (pivot_of(f, n, k) == 0.0) rank = k;
     forward(f, n, rank, b, y);
     reflect_back(f, n, rank, y);
 }
 
-/* v = L^-T Q y, in place. */
+/* Compute v = L^-T Q y in place. */
 static void to_velocity(const passage *g, const frame *p, double *y) {
     int n = g->size.nv;
     reflect_back(&p->qr, n, p->rank, y);
     lower_transposed(p->M, p->end, n, y);
 }
 
-/* The elements of y such that J v = c for v = L^-T Q y. */
+/* Compute the first `rank` elements of y such that J v = c for v = L^-T Q y. */
 static void along_rows(const passage *g, const frame *p, const double *c, double *y) {
     forward(&p->qr, g->size.nv, p->rank, c, y);
 }
 
+/* Compute L, the factors of the rows, and the tangents T. Returns 1 on failure. */
 static int factor(passage *g, frame *p) {
     int n = g->size.nv, j;
     if (factor_mass(g, p)) return 1;
@@ -497,7 +511,7 @@ static int factor(passage *g, frame *p) {
     return !isfinite(p->sigma);
 }
 
-/* The shortest velocity v with J v = b. */
+/* Compute the velocity v with J v = b that is shortest in the metric of M. */
 static void particular(const passage *g, const frame *p, double *v) {
     memset(v, 0, sizeof(double) * (size_t)g->size.nv);
     along_rows(g, p, p->rows.b, v);
@@ -514,7 +528,7 @@ static double rate_of(const passage *g, const passage_rows *rows, int i, const d
     return rate;
 }
 
-/* y = C N v */
+/* Compute y = C N v, the rates of the chart coordinates. */
 static void coordinates(const passage *g, const frame *p, const double *v, double *y) {
     int i, k;
     for (k = 0; k < g->d; k++) y[k] = 0.0;
@@ -524,8 +538,8 @@ static void coordinates(const passage *g, const frame *p, const double *v, doubl
     }
 }
 
-/* A (n, n) = L U with row exchanges, in place, and b (n, count) as its rows are: the sign of the
- * determinant, 0 where A is singular. */
+/* Factorize A (n, n) = L U with row exchanges, in place, and apply the row operations to b
+ * (n, count). Returns the sign of the determinant, 0 if A is singular. */
 static int eliminate(double *A, int n, double *b, int count) {
     int sign = 1, i, j, k;
     for (k = 0; k < n; k++) {
@@ -549,7 +563,7 @@ static int eliminate(double *A, int n, double *b, int count) {
     return sign;
 }
 
-/* X = A^-1 b in place of b (n, count), A (n, n) replaced; 1 if singular. */
+/* Compute b = A^-1 b (n, count) in place. A (n, n) is overwritten. Returns 1 if it is singular. */
 static int solve(double *A, int n, double *b, int count) {
     int i, j, k;
     if (!eliminate(A, n, b, count)) return 1;
@@ -561,7 +575,7 @@ static int solve(double *A, int n, double *b, int count) {
     return 0;
 }
 
-/* C = T' M N^+ at the base. */
+/* Compute C = T' M N^+ at the base. Returns 1 on failure. */
 static int coordinates_of_base(passage *g) {
     frame *p = &g->base;
     int nq = g->size.nq, nv = g->size.nv, i, j, k, d = nv - p->rank;
@@ -598,8 +612,8 @@ static int coordinates_of_base(passage *g) {
     return 0;
 }
 
-/* The Newton step r, in place of the residuals of the rows and of xi, by reflections of the slopes
- * K (rows, nq); 1 where they are dependent. */
+/* Replace the residuals r of the rows and of xi by the Newton step, by a QR factorization of the
+ * slopes K (rows, nq). Returns 1 if they are dependent. */
 static int newton_step(passage *g, int rows, double *r) {
     double *K = g->K, least = HUGE_VAL, most = 0.0;
     int nq = g->size.nq, i, j, k;
@@ -619,8 +633,9 @@ static int newton_step(passage *g, int rows, double *r) {
     return 0;
 }
 
-/* The rows below the first ones of a square matrix whose transposed first rows are factorized: Z, the
- * directions along the first rows (d, n), and S (d, d) the last rows D (d, n) along them. */
+/* Complete a square matrix (n, n) whose first rows are factorized (transposed) and whose last rows
+ * are D (d, n). Computes Z (d, n), a basis of the null space of the first rows, and S = D Z'
+ * (d, d). */
 static void border(const factors *f, int n, int d, const double *D, double *Z, double *S) {
     int m = n - d, i, j, k;
     memset(Z, 0, sizeof(double) * (size_t)(n * d));
@@ -632,8 +647,8 @@ static void border(const factors *f, int n, int d, const double *D, double *Z, d
     }
 }
 
-/* The same where there are as many rows as positions: onto the rows of the loops, which touch few
- * joints each, then along them by the rows D (d, nq), those of xi, which touch all. */
+/* Newton step as in newton_step, for as many rows as positions: first onto the sparse rows of the
+ * loops, then in their null space by the dense rows D (d, nq) of xi. */
 static int sparse_newton_step(passage *g, const double *slopes, const double *D, double *r) {
     factors *f = &g->other;
     int n = g->size.nq, d = g->d, m = n - d, i, j, k;
@@ -662,7 +677,8 @@ static int sparse_newton_step(passage *g, const double *slopes, const double *D,
     return 0;
 }
 
-/* Newton steps from q in x onto all rows, xi as given; *distance: how far they went. */
+/* Project the positions in x onto all rows at fixed xi by Newton steps. *distance: sum of their
+ * largest elements. Returns 1 if they do not converge. */
 static int onto_rows(passage *g, double t, const double *xi, double *x, double *distance) {
     frame *p = &g->here;
     const double *q0 = g->memory + BASE;
@@ -707,7 +723,8 @@ static int onto_rows(passage *g, double t, const double *xi, double *x, double *
     return 1;
 }
 
-/* Positions by the guide, or by tangent and curvature from the base, which choose the branch. */
+/* Predict the positions from the guide, or by tangent and curvature from the base. The prediction
+ * selects the branch. Returns 1 on failure. */
 static int predict(passage *g, double t, const double *xi, double *x) {
     const double *x0 = g->memory + BASE;
     int nq = g->size.nq, nv = g->size.nv, n = g->s->n, i, j, k;
@@ -736,7 +753,7 @@ static int predict(passage *g, double t, const double *xi, double *x) {
     return 0;
 }
 
-/* 1 where velocities are other ones than those of the guide. */
+/* Whether the velocities v differ from the velocities of the guide by more than ASTRAY. */
 static int astray(const passage *g, const double *v) {
     const double *guide = g->guide + g->size.nq;
     double speed = IDLE, miss = 0.0;
@@ -748,7 +765,7 @@ static int astray(const passage *g, const double *v) {
     return !(miss < ASTRAY * speed);
 }
 
-/* The state x at the coordinates y = (xi, u, z), its slope, and that of y. */
+/* Compute the state x at the chart coordinates y = (xi, u, z), and the slopes of x and y. */
 static int lift(passage *g, double t, const double *y, double *x, double *xdot, double *ydot) {
     frame *p = &g->here;
     int nq = g->size.nq, nv = g->size.nv, nz = g->size.nz, d = g->d, i, j, k;
@@ -781,7 +798,7 @@ static int lift(passage *g, double t, const double *y, double *x, double *xdot, 
     for (k = 0; k < d; k++)
         for (i = 0; i < nv; i++) v[i] += p->T[k * nv + i] * g->K[d * d + k];
     if (g->guide && astray(g, v)) return STEPPER_SINGULAR;
-    /* accelerations: a = L^-T (f, what acts along the rows as they ask) */
+    /* accelerations: L^-1 f along the tangents, and the component that the rows require */
     if (rows_at(g, t, x, &p->rows) ||
         g->model.forces(g->s->user, t, x, g->G, p->f, p->rate))
         return STEPPER_SINGULAR;
@@ -805,7 +822,8 @@ static int lift(passage *g, double t, const double *y, double *x, double *xdot, 
     return stepper_all_finite(xdot, g->s->n) ? STEPPER_OK : STEPPER_SINGULAR;
 }
 
-/* Values beside y along the motion, three on either side; 1 where one of them is not regular. */
+/* Compute x and the slopes at y as weighted means of three neighbours on either side along the
+ * motion. Returns 1 if a neighbour is not regular. */
 static int mean_of(passage *g, double t, const double *y, double apart, const double *along,
                    double shift, double *x, double *xdot, double *ydot) {
     int n = g->s->n, d = g->d, ny = 2 * d + g->size.nz, i, j, side, status;
@@ -830,6 +848,7 @@ static int mean_of(passage *g, double t, const double *y, double apart, const do
     return 0;
 }
 
+/* Compute x and the slopes at the chart coordinates y, by means of neighbours if y is singular. */
 static int slope(passage *g, double t, const double *y, double *x, double *xdot, double *ydot) {
     int d = g->d, i, status = lift(g, t, y, x, xdot, ydot);
     double largest = g->memory[SIGMA], dt = t - g->memory[BASE_TIME], rho;
@@ -858,6 +877,7 @@ static int slope(passage *g, double t, const double *y, double *x, double *xdot,
     return STEPPER_OK;
 }
 
+/* Regularity at x, 0 on failure. Updates the largest value. */
 static double regularity_at(passage *g, double t, const double *x) {
     double value = 0.0;
     if (g->model.regularity(g->s->user, t, x, &value) || !isfinite(value)) value = 0.0;
@@ -865,7 +885,8 @@ static double regularity_at(passage *g, double t, const double *x) {
     return value;
 }
 
-/* A regular state behind a singular one, along its velocity; 1 where no branch has this velocity. */
+/* Make a regular base at the distance BACK before the singular state x, along its velocity.
+ * Returns 1 if no branch has this velocity. */
 static int base_behind(passage *g, double t, const double *x) {
     int nq = g->size.nq, nv = g->size.nv, n = g->s->n, i, pass;
     double *q = g->at, *v = g->w, *y = g->y, speed = 0.0, move = HUGE_VAL, behind, part;
@@ -895,7 +916,7 @@ static int base_behind(passage *g, double t, const double *x) {
     return 0;
 }
 
-/* y = (xi, u, z) of x */
+/* Compute the chart coordinates y = (xi, u, z) of x. */
 static int coordinates_of(passage *g, double t, const double *x, double *y) {
     int nq = g->size.nq, d = g->d, i, k;
     if (rows_at(g, t, x, &g->here.rows)) return 1;
@@ -908,7 +929,7 @@ static int coordinates_of(passage *g, double t, const double *x, double *y) {
     return 0;
 }
 
-/* 1 where velocities of a start are not those of the state on the branch. */
+/* Whether the velocities of a start x differ from the state `on` of the branch beyond STRAY. */
 static int strays(const passage *g, const double *x, const double *on) {
     int first = g->size.nq, i;
     double speed = 0.0, miss = 0.0;
@@ -919,7 +940,8 @@ static int strays(const passage *g, const double *x, const double *on) {
     return !(miss <= STRAY * speed);
 }
 
-/* The chart at a state where it is regular, else at the last one that was; and the state in it. */
+/* Make the chart at x, or at the last regular state if x is not regular, and compute the
+ * coordinates of x in it. Returns a status of the stepper. */
 static int prepare(passage *g, double t, const double *x) {
     double *m = g->memory, part;
     int n = g->s->n, first = !(m[BASED] > 0.0);
@@ -946,7 +968,7 @@ static int prepare(passage *g, double t, const double *x) {
     if (first) {
         g->sigma = HUGE_VAL;
         if (slope(g, t, g->own, g->at, g->full[0], g->slopes[0]) || strays(g, x, g->at)) {
-            m[BASED] = m[SIGMA] = 0.0; /* whoever asks again is refused again */
+            m[BASED] = m[SIGMA] = 0.0; /* a second call then fails in the same way */
             return STEPPER_UNDETERMINED;
         }
     }
@@ -956,8 +978,8 @@ static int prepare(passage *g, double t, const double *x) {
     return STEPPER_OK;
 }
 
-/* 1 where a state has left the branch of another one at the same time: by what its velocities are,
- * or a step of this length makes of them. */
+/* Whether the states x and `along` at the same time are on different branches, by their velocities
+ * or by their positions after a step h. a: largest acceleration in the step. */
 static int left_branch(const passage *g, const double *x, const double *along, double h, double a) {
     int nq = g->size.nq, nv = g->size.nv, i;
     double v = h * a, move = 0.0, change = 0.0, zero = g->s->atol; /* at rest */
@@ -969,7 +991,7 @@ static int left_branch(const passage *g, const double *x, const double *along, d
     return change > BREAK * v + zero || move > BREAK * h * v + zero;
 }
 
-/* The error of a step in the chart, in coordinates of the tree. */
+/* Compute the error estimate of a step in the chart, in the coordinates (n,) of the tree. */
 static void error_of(const passage *g, double h, double *error) {
     int nq = g->size.nq, nv = g->size.nv, nz = g->size.nz, d = g->d, i, j, k;
     const double *T = g->base.T, *N = g->base.rows.N;
@@ -994,7 +1016,7 @@ static void error_of(const passage *g, double h, double *error) {
     memcpy(error + nq + nv, e + 2 * d, sizeof(double) * (size_t)nz);
 }
 
-/* The dense output of a step from x to y, with the slopes at its ends: cubic, but for the stages. */
+/* Compute the dense output of a step from x to y as the cubic with the slopes at its ends. */
 static void cubic(const passage *g, const double *x, const double *y, double h, const double *first,
                   const double *last, double *dense) {
     int n = g->s->n, i;
@@ -1008,7 +1030,7 @@ static void cubic(const passage *g, const double *x, const double *y, double h, 
     }
 }
 
-/* The rows of the coordinates for velocities, C N (d, nv). */
+/* Compute D = C N (d, nv), the rates of the chart coordinates per velocity. */
 static void coordinate_rows(const passage *g, const passage_rows *rows, double *D) {
     int nq = g->size.nq, nv = g->size.nv, d = g->d, i, j, k;
     for (k = 0; k < d; k++)
@@ -1023,8 +1045,8 @@ static void coordinate_rows(const passage *g, const passage_rows *rows, double *
         }
 }
 
-/* The rows of velocities that the base chose, and those of the coordinates: square, singular where
- * the rows are dependent; transposed where asked for. */
+/* Fill K (nv, nv) with the velocity rows that the base selected and the rows C N of the
+ * coordinates, or with the transpose. K is singular if the rows are dependent. */
 static void square(const passage *g, const passage_rows *rows, int transposed, double *K) {
     int nv = g->size.nv, rank = g->base.rank, j, k;
     double *D = g->G;
@@ -1042,7 +1064,7 @@ static void square(const passage *g, const passage_rows *rows, int transposed, d
             K[transposed ? k * nv + j : j * nv + k] = D[(k - rank) * nv + j];
 }
 
-/* 1 or -1: whether an odd number of exchanges makes it. */
+/* Sign of the permutation order (n,), -1 if it is odd. seen (n,) is scratch. */
 static int parity(const int *order, int n, int *seen) {
     int sign = 1, i, j;
     for (i = 0; i < n; i++) seen[i] = 0;
@@ -1051,7 +1073,7 @@ static int parity(const int *order, int n, int *seen) {
     return sign;
 }
 
-/* The same matrix by factors of the many rows that touch few joints: g->other, Z and S of border. */
+/* Factorize the matrix K of square by its sparse rows: factors in g->other, Z and S of border. */
 static void factor_square(passage *g, const passage_rows *rows, double *Z, double *S) {
     factors *f = &g->other;
     int n = g->size.nv, rank = g->base.rank, i, k;
@@ -1067,7 +1089,8 @@ static void factor_square(passage *g, const passage_rows *rows, double *Z, doubl
     border(f, n, g->d, D, Z, S);
 }
 
-/* The sign of its determinant: each reflection changes it. */
+/* Sign of the determinant of the matrix of square, 0 if it is singular. Each reflection changes
+ * it. */
 static int sign_of_square(passage *g, const passage_rows *rows) {
     factors *f = &g->other;
     int n = g->size.nv, rank = g->base.rank, sign, k;
@@ -1082,7 +1105,8 @@ static int sign_of_square(passage *g, const passage_rows *rows) {
     return sign * eliminate(S, g->d, NULL, 0);
 }
 
-/* y = K^-1 y, or with K transposed, for that matrix K; 1 if it is singular. */
+/* Compute y = K^-1 y, or y = K^-T y if transposed, for the matrix K of square. Returns 1 if it is
+ * singular. */
 static int solve_square(passage *g, const passage_rows *rows, int transposed, double *y) {
     factors *f = &g->other;
     int n = g->size.nv, rank = g->base.rank, d = g->d, i, k;
@@ -1102,7 +1126,7 @@ static int solve_square(passage *g, const passage_rows *rows, int transposed, do
         memcpy(y, z, sizeof(double) * (size_t)n);
         return 0;
     }
-    for (k = 0; k < d; k++) { /* the last rows first, which alone move what is along the others */
+    for (k = 0; k < d; k++) { /* the last rows first: only they act in the null space Z */
         double sum = 0.0;
         for (i = 0; i < n; i++) sum += Z[k * n + i] * y[i];
         z[k] = sum;
@@ -1129,20 +1153,20 @@ static int solve_square(passage *g, const passage_rows *rows, int transposed, do
     return 0;
 }
 
-/* The side of the singular configuration on which a point is, by the sign of a determinant. */
+/* Side of the singular configuration on which a state is: the sign of the determinant of square. */
 static int side_of(passage *g, const passage_rows *rows) {
     if (g->base.rank > MANY) return sign_of_square(g, rows);
     square(g, rows, 0, g->K);
     return eliminate(g->K, g->size.nv, NULL, 0);
 }
 
-/* How far the rows are from holding where they are dependent: what of them no move of the positions
- * changes there, zero where branches of motion meet. */
+/* Residual of the rows that no change of positions removes at a singular configuration. It is zero
+ * if branches of motion meet there. */
 static double gap_of(passage *g, const passage_rows *rows) {
     int n = g->size.nv, first = g->size.speeds - g->size.anchors, i, pass, status;
     double *y = g->y, most = 0.0, sum = 0.0;
     for (i = 0; i < n; i++) y[i] = 1.0;
-    for (pass = 0; pass < 2; pass++) { /* towards the null vectors on the right and on the left */
+    for (pass = 0; pass < 2; pass++) { /* inverse iteration: right and left null vector */
         if (g->base.rank > MANY) {
             status = solve_square(g, rows, pass, y);
         } else {
@@ -1161,10 +1185,10 @@ static double gap_of(passage *g, const passage_rows *rows) {
     return most > 0.0 ? fabs(sum) / most : 0.0;
 }
 
-/* 1 where a step goes across a singular configuration, though the branches there only come near
- * each other and a motion that stays on its own reverses. With f = gap + k s w, s along the one and
- * w along the other, sigma is sqrt(2 k gap) where it reverses; what is below AWAY floors is passed
- * as if the branches met. */
+/* Whether a step crosses a singular configuration at which branches come near each other and do not
+ * meet, so that the true motion reverses. For rows f = gap + k s w, with s along one branch and w
+ * along the other, sigma is sqrt(2 k gap) at the reversal. If it is below AWAY times FLOOR, the
+ * step passes as if the branches met. */
 static int jumps(passage *g, double t, const double *x, double h, const double *y,
                  const double *first, const double *last) {
     double low = 0.0, high = 1.0, speed = 0.0, gap, *at = g->at, sigma = g->here.sigma;
@@ -1197,9 +1221,10 @@ static int jumps(passage *g, double t, const double *x, double h, const double *
     return sqrt(gap) > AWAY * FLOOR * g->memory[SIGMA];
 }
 
-/* Rounding of a change of velocities at a part of the largest sigma. */
+/* Rounding error of a velocity change. sigma: fraction of the largest sigma. */
 static double rounding(double change, double sigma) { return NOISE * change / (sigma * sigma); }
 
+/* Attempt one step of dopri5 in the chart. Returns a status of the stepper. */
 static int chart_attempt(passage *g, const double *x, double h) {
     stepper *s = g->s;
     double t = stepper_time(s), a = 0.0, *candidate = stepper_candidate(s);
@@ -1218,13 +1243,13 @@ static int chart_attempt(passage *g, const double *x, double h) {
         if (status) return status;
         for (i = 0; i < nv; i++) a = fmax(a, fabs(g->full[k][nq + i]));
     }
-    /* a step may end in the singular configuration at a limit, or where it began in one: a slow
-     * start leaves it in many steps */
+    /* A step may end in the singular configuration at a limit, or if it began there: a slow motion
+     * needs many steps to leave it. */
     begun = g->memory[BASE_TIME] != t || memcmp(g->memory + BASE, x, sizeof *x * (size_t)s->n);
     if (!s->cut && !begun && (g->singular || g->here.sigma < AWAY * FLOOR * g->memory[SIGMA]))
         return STEPPER_ENDS_SINGULAR;
     if (jumps(g, t, x, h, candidate, g->full[0], g->full[6])) return STEPPER_CHART_LEFT;
-    for (i = 0; i < s->n; i++) { /* where the stages lead, without the rows */
+    for (i = 0; i < s->n; i++) { /* explicit result of the stages, without the rows */
         double sum = 0.0;
         for (j = 0; j < 6; j++) sum += DOPRI5_A[6][j] * g->full[j][i];
         g->at[i] = x[i] + h * sum;
@@ -1241,7 +1266,7 @@ static int chart_attempt(passage *g, const double *x, double h) {
     return STEPPER_OK;
 }
 
-/* The least regularity that the next step of this length is thought to meet. */
+/* Smallest regularity expected in the next step h, by linear extrapolation. */
 static double foreseen(passage *g, double t, const double *x, double h) {
     double *m = g->memory;
     if (!(m[SEEN] > 0.0) || t != m[SEEN_TIME]) {
@@ -1252,6 +1277,7 @@ static double foreseen(passage *g, double t, const double *x, double h) {
     return fmin(m[REGULARITY], m[REGULARITY] + AHEAD * h * m[RISE]);
 }
 
+/* Attempt a step of the wrapped method, or a step in the chart if the regularity is too small. */
 static int attempt(stepper *s, const double *x, double h) {
     passage *g = s->passage;
     double t = stepper_time(s), ahead = foreseen(g, t, x, h), on = PASSAGE_ON * g->memory[LARGEST];
@@ -1313,8 +1339,8 @@ static void interpolate(const stepper *s, double a, double *row) {
         g->inner->interpolate(s, a, row);
 }
 
-/* What the full step opens with, such as a Jacobian, waits until one is made: near singular
- * configurations it may have no value. */
+/* Postpone `open` of the wrapped method, which may compute a Jacobian, until a full step is made:
+ * near singular configurations the Jacobian may have no value. */
 static int open(stepper *s, const double *x) {
     passage *g = s->passage;
     (void)x;
@@ -1322,7 +1348,7 @@ static int open(stepper *s, const double *x) {
     return STEPPER_OK;
 }
 
-/* The slope that opens a step: where the rows are nearly dependent, that of the chart. */
+/* Set the slope at the start of a step, from the chart if the rows are nearly dependent. */
 static int opening(stepper *s, const double *x) {
     return passage_slope(s->passage, stepper_time(s), x, stepper_slope(s), NULL);
 }
@@ -1345,7 +1371,7 @@ void passage_start(passage *g) {
 
 void passage_forget(passage *g) { g->ready = g->kept = g->charted = g->lasting = g->missed = g->opened = 0; }
 
-/* The chart as memory has it. */
+/* Recompute the chart from memory, unless it is valid. Returns 1 on failure. */
 static int restored(passage *g) {
     const double *m = g->memory;
     if (g->lasting) return 0;
@@ -1399,7 +1425,7 @@ int passage_place(passage *g, double t, double *x, const int *loose, int count) 
     for (pass = 0; pass <= PLACING; pass++) {
         if (rows_at(g, t, x, &g->here.rows)) return 1;
         for (worst = 0.0, j = 0; j < m; j++) {
-            int free = j >= first && j < g->size.speeds; /* what stops and friction lock is there */
+            int free = j >= first && j < g->size.speeds; /* locked by stops or friction */
             r[j] = free ? 0.0 : -g->here.rows.position[j];
             worst = fmax(worst, fabs(r[j]));
             memset(A + j * count, 0, sizeof(double) * (size_t)count);
@@ -1480,7 +1506,7 @@ int passage_loosest(passage *g, double t, const double *x, const double *unit) {
         for (i = 0; i < nv; i++) size += v[i] * v[i];
         for (i = 0; i < nv; i++) v[i] /= sqrt(size), moves[i] += v[i] * v[i];
     }
-    for (i = 0; i < nv; i++) /* the first of joints that move alike */
+    for (i = 0; i < nv; i++) /* the first of joints with equal moves */
         if (moves[i] > most + 1e-6) most = moves[i], found = i;
     return found;
 }
@@ -1509,8 +1535,8 @@ double passage_regularity(passage *g, double t, const double *x) {
     return regularity_at(g, t, x) / g->memory[LARGEST];
 }
 
-/* Room for the next count doubles of a block, or numbers that are no longer; without a block only
-   how much is taken so far. */
+/* Return memory for `count` doubles (or integers and masks, which are no longer) from a block. With
+ * block NULL only the size is counted. */
 static void *take(double *block, size_t *used, size_t count) {
     double *found = block ? block + *used : NULL;
     *used += count + 1;
@@ -1556,6 +1582,7 @@ static void lay_frame(frame *p, const passage_size *z, double *block, size_t *us
     p->T = take(block, used, nv * nv);
 }
 
+/* Assign all arrays in the block. Returns its size in doubles; block may be NULL for that. */
 static size_t lay(passage *g, double *block) {
     const passage_size *z = &g->size;
     size_t nq = (size_t)z->nq, nv = (size_t)z->nv, n = (size_t)g->s->n, ny = 2 * nv + (size_t)z->nz;
@@ -1587,8 +1614,8 @@ static size_t lay(passage *g, double *block) {
     return used;
 }
 
-/* The pattern of a matrix (rows, columns); given as start, then row, or NULL for all elements. 1: no
- * memory is left. */
+/* Make the pattern of a matrix (rows, columns). given: start, then row, or NULL for a dense matrix.
+ * Returns 1 if no memory is left. */
 static int make_pattern(pattern *p, int rows, int columns, const int *given) {
     int count = given ? given[columns] : rows * columns, j, k;
     size_t size = 2 * (size_t)count + (size_t)columns + (size_t)rows + 2;
@@ -1615,7 +1642,7 @@ static int make_pattern(pattern *p, int rows, int columns, const int *given) {
     return 0;
 }
 
-/* The first rows of slope are those of J. 1: no memory is left. */
+/* Make the pattern of J, whose rows are the first rows of slope. Returns 1 if no memory is left. */
 static int pattern_of_slopes(passage *g) {
     const pattern *all = &g->slope;
     int columns = all->columns, count = all->start[columns], status, j, k, n = 0;

@@ -1,131 +1,142 @@
-/* Through singular configurations of closed loops, by steps in local tangent coordinates.
+/* Steps through singular configurations of closed loops, in local tangent coordinates.
  *
- * Where the rows of the loops become dependent, branches of motion meet. With s the distance from
- * there along a branch, an error w across it obeys (s w)'' = 0: it grows as 1/s, whatever the step,
- * so a state of all coordinates does not come through, though the motion along the branch is as
- * smooth as anywhere. Near such a configuration a step is therefore made in coordinates xi along the
- * branch and their rates u, of which positions, velocities and accelerations of the tree follow by
- * Newton steps onto all rows; the error across is removed at every stage. At the singular
- * configuration itself, where they do not follow, they are means of values on both sides.
+ * "Rows" are the closure constraints of the loops. At a configuration where the rows become
+ * dependent, branches of motion meet. Let s be the distance from it along a branch. An error w
+ * across the branch obeys (s w)'' = 0 and grows as 1/s for any step size. An integration of all
+ * coordinates therefore fails there, although the motion along the branch is smooth. Near such a
+ * configuration the steps use coordinates xi along the branch and their rates u. Positions,
+ * velocities and accelerations of the tree follow from Newton steps onto all rows, which remove the
+ * error across the branch at every stage. At the singular configuration itself they are weighted
+ * means of values on both sides.
  *
- * The chart is orthogonal in the metric of the inertia matrix: the direction that the rows lose does
- * not reach u'. It is made anew at each step, where the step begins. Elsewhere the method of the
- * stepper runs unchanged.
+ * The chart (the local coordinates) is orthogonal in the metric of the inertia matrix, so that the
+ * direction in which the rows lose rank has no effect on u'. A new chart is made at the start of
+ * each step. Away from singular configurations the method of the stepper runs unchanged.
  *
  * Source: Hairer, Lubich and Wanner 2006, IV.5.3, for local tangent coordinates; Golub and Van Loan
- * 2013, algorithm 5.4.1, for the orthogonal factors of the rows, cut at the rank that assembling
- * found.
+ * 2013, algorithm 5.4.1, for the orthogonal factors of the rows, truncated at the rank that the
+ * assembly of the model found.
  */
 #ifndef MBS_PASSAGE_H
 #define MBS_PASSAGE_H
 
 #include "stepper.h"
 
-/* Part of the largest regularity below which steps are made in the chart. A full step magnifies its
- * errors by 1 / regularity and rounding by its square; at a fifth that is little, and a tenth of the
- * range of a crank lies below it. */
+/* Fraction of the largest regularity below which steps are made in the chart. A full step magnifies
+ * errors by 1 / regularity and rounding by its square. At a fifth the magnification is small; a
+ * tenth of the range of a crank lies below it. */
 #define PASSAGE_ON 0.2
 
+/* Dimensions of the state and of the constraint rows. */
 typedef struct {
-    int nq, nv, nz; /* positions, velocities and other states of x */
-    int positions;  /* rows of positions: the first ones belong to those of velocities, the last
-                       ones keep quaternions at unit length */
-    int anchors;    /* those of velocities that lock the coordinate which the last anchors rows of
-                       positions before the norms give, wherever it is */
-    int speeds;     /* rows of velocities */
-    int moving;     /* 1 where rows depend on time */
+    int nq, nv, nz; /* numbers of positions, velocities and other states in x */
+    int positions;  /* number of position rows: the rows that belong to the velocity rows, in
+                       the same order, then the unit norms of quaternions */
+    int anchors;    /* number of velocity rows that lock a coordinate. They are the last velocity
+                       rows. Their position rows keep the value at the origin of the chart. */
+    int speeds;     /* number of velocity rows */
+    int moving;     /* 1 if the rows depend on time, else 0 */
 } passage_size;
 
-/* position (positions,) and its slopes by q (positions, nq); J (speeds, nv), b and c with J v = b
- * and J a = c; N (nq, nv) and bend (nq,) with q' = N v and q'' = N a + bend; the rank of J. Where nq
- * is nv the model leaves out J, which are the slopes, N, the unit matrix, and bend, which is zero. */
-/* Where matrices have elements: for each column, and behind the last one, the place of its first element;
- * then the rows of all elements, column by column and rising. NULL: everywhere. The model writes the
- * elements alone, in this order. */
+/* Sparsity patterns in compressed columns: the index of the first element of each column, the
+ * number of elements, then the row indices of all elements by columns, in ascending order. NULL
+ * for a dense matrix. The model writes only these elements, in this order. */
 typedef struct {
     const int *slope, *J, *N, *M;
 } passage_patterns;
 
+/* Constraint rows at a state. position (positions,): residuals. slope (positions, nq): derivatives
+ * of position by q. J (speeds, nv), b and c: J v = b and J a = c. N (nq, nv) and bend (nq,):
+ * q' = N v and q'' = N a + bend. rank: rank of J. If nq equals nv, the model omits J (equal to the
+ * first rows of slope), N (unit matrix) and bend (zero). */
 typedef struct {
     double *position, *slope, *J, *b, *c, *N, *bend, *rank;
 } passage_rows;
 
+/* Functions of the model. They return 0, or nonzero on failure. */
 typedef struct {
     int (*rows)(void *user, double t, const double *x, const passage_rows *rows);
-    /* Inertia matrix M (nv, nv), forces f (nv,) so that M a = f + J' y, and rates of the other
-     * states. */
+    /* Inertia matrix M (nv, nv), forces f (nv,) with M a = f + J' y, where y are the constraint
+     * forces, and rates (nz,) of the other states. */
     int (*forces)(void *user, double t, const double *x, double *M, double *f, double *rate);
-    /* How independent the rows of the full step are: near zero, and linear in the distance, where
-     * they become dependent. */
+    /* Measure of the independence of the rows: near a singular configuration it is small and linear
+     * in the distance from it. */
     int (*regularity)(void *user, double t, const double *x, double *value);
     double typical; /* regularity at a common configuration */
 } passage_model;
 
-/* What one step hands to the next: scalars, then the last regular state. */
+/* Number of doubles that are kept between steps: scalars, then the last regular state (n,). */
 #define PASSAGE_MEMORY(n) (8 + (n))
 
 typedef struct passage passage;
 
-/* NULL: no memory is left. patterns may be NULL: all matrices are dense. After the init of the method, which it wraps. */
+/* Wrap the method of an initialised stepper. Returns NULL if no memory is left. patterns is NULL if
+ * all matrices are dense. memory has PASSAGE_MEMORY(n) elements. */
 passage *passage_new(stepper *s, const passage_size *size, const passage_patterns *patterns,
                      const passage_model *model, double *memory);
 void passage_free(passage *g);
 
-/* Before stepper_start. */
+/* Clear the memory before stepper_start. */
 void passage_start(passage *g);
 
-/* The memory was replaced: what stands beside it belongs to it no more. */
+/* Discard all data outside `memory` after its contents were replaced. */
 void passage_forget(passage *g);
 
-/* Positions and velocities projected onto the rows in the chart of the last step; 1 where there is
- * no such chart, and the projection of the full step is to be used. */
+/* Project positions and velocities in x onto the rows in the chart of the last step. Returns 1 if
+ * the last step had no chart; the projection of the full step is then required. */
 int passage_project(passage *g, double t, double *x);
 
-/* A start where rows may be dependent, before any step. */
+/* Functions for a first state at which the rows may be dependent. */
 
-/* 1 where they nearly are at a state. */
+/* Whether the rows are dependent, or nearly so, at x. */
 int passage_singular(passage *g, double t, const double *x);
 
-/* Positions projected onto all rows, those of x that are loose alone; 1: they do not come there. */
+/* Project the positions in x onto all rows by changes of the positions with indices loose (count,).
+ * Returns 1 if the Newton steps do not converge. */
 int passage_place(passage *g, double t, double *x, const int *loose, int count);
 
-/* The velocities in x become the smallest on all rows that keep the given ones of them; 1 where no
- * motion has these. */
+/* Replace the velocities in x by the shortest vector that satisfies all rows and keeps the
+ * velocities with indices kept (count,). Returns 1 if no motion has these velocities. */
 int passage_velocities(passage *g, double t, double *x, const int *kept, int count);
 
-/* The slope of a state, in a singular configuration that of the branch which has its velocities; on
- * (n,), where it is not NULL: the state on the branch, x where rows are independent. A status of the
- * stepper: undetermined where no branch has these velocities. */
+/* Compute the slope xdot (n,) at x. In a singular configuration it is the slope of the branch that
+ * has the velocities of x. on (n,) or NULL: the state on the branch; x if the rows are independent.
+ * Returns a status of the stepper, STEPPER_UNDETERMINED if no branch has these velocities. */
 int passage_slope(passage *g, double t, const double *x, double *xdot, double *on);
 
-/* The velocity that the rows constrain least at a state, each in its unit (nv,); -1: no answer. */
+/* Return the index of the velocity that the rows constrain least at x, or -1 on failure.
+ * unit (nv,): factor that scales each velocity. */
 int passage_loosest(passage *g, double t, const double *x, const double *unit);
 
-/* Where the steps are made by somebody else, a chart lasts from one call of passage_chart to the
- * next; all return a status of the stepper. */
+/* Functions for an external integrator. A chart is valid from one call of passage_chart to the
+ * next. All functions return a status of the stepper. */
 
-/* The chart begins here. */
+/* Make a chart at the state x. */
 int passage_chart(passage *g, double t, const double *x);
 
-/* y = (xi, u, z), the coordinates of x in the chart. */
+/* Compute the coordinates y = (xi, u, z) of x in the chart. */
 int passage_coordinates(passage *g, double t, const double *x, double *y);
 
-/* The state x on the rows at the coordinates y, on the branch of a state guide near it; the slopes of
- * x and y; *alignment: how far the tangents are from those at the origin, 1 there and 0 across. */
+/* Compute the state x on the rows at the coordinates y, and the slopes of x and y. guide (n,):
+ * state near x that selects the branch. *alignment: alignment of the tangents with the tangents at
+ * the origin of the chart, 1 if parallel and 0 if orthogonal. */
 int passage_state(passage *g, double t, const double *y, const double *guide, double *x,
                   double *slope_x, double *slope_y, double *alignment);
 
-/* Right after passage_state gave y and its slope at t + h: 1 where the path to it from a state x on
- * the motion at t, with its slope, goes across branches that only come near each other. */
+/* Whether a step from x at t, with slope first, to y at t + h, with slope last, jumps between
+ * branches that come near each other and do not meet. Call it right after passage_state computed
+ * y (n,) and last (n,). */
 int passage_jumps(passage *g, double t, const double *x, const double *first, double h,
                   const double *y, const double *last);
 
-/* The inverse of how fast velocities, in their units (nv,), are at most where the independent ones,
- * as many as the motion is free, have size one: zero where those determine nothing. 1: no answer. */
+/* Compute how well the independent velocities determine the motion. independent: indices of as many
+ * velocities as there are degrees of freedom. unit (nv,): factor that scales each velocity.
+ * *grip: 1 / largest element (at least 1) of the matrix from the independent velocities to all
+ * velocities; 0 if they do not determine the motion. Returns 1 on failure. */
 int passage_grip(passage *g, double t, const double *x, const int *independent, const double *unit,
                  double *grip);
 
-/* How independent the rows are, part of the largest value so far. */
+/* Return the regularity at x, as a fraction of the largest value so far. */
 double passage_regularity(passage *g, double t, const double *x);
 
 #endif

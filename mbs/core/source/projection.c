@@ -3,9 +3,9 @@
 #include <math.h>
 #include <string.h>
 
-#define TOLERANCE 1e-12 /* of the largest state or one: above rounding, and below the residual before
-                           the last step, 1e-8 */
-#define STEPS 10        /* each squares the error: more do not converge */
+#define TOLERANCE 1e-12 /* residual, relative to the largest state or 1: above rounding, and below
+                           the residual before the last step, 1e-8 */
+#define STEPS 10        /* maximum Newton steps: each squares the error, more do not help */
 
 static int all_finite(const double *v, int n) {
     int i;
@@ -23,7 +23,7 @@ int projection_converge(int n, projection_step step, void *user, double t, doubl
         for (i = 0; i < n; i++) scale = fmax(scale, fabs(x[i]));
         if (all_finite(after, n))
             memcpy(x, after, sizeof(double) * (size_t)n);
-        else if (!(residual < TOLERANCE * scale)) /* else x is on rows that are dependent there */
+        else if (!(residual < TOLERANCE * scale)) /* else x satisfies dependent rows */
             return 1;
         if (residual < TOLERANCE * scale) return 0;
     }

@@ -2,8 +2,8 @@
 #ifndef MBS_PROJECTION_H
 #define MBS_PROJECTION_H
 
-/* One Newton step from x (n,) at time t: the state after it, and the largest residual at x. Returns 0,
- * or another number if there is no value. */
+/* Make one Newton step from x (n,) at time t. after (n,): state after the step. *residual: largest
+ * residual at x. Returns 0, or nonzero on failure. */
 typedef int (*projection_step)(void *user, double t, const double *x, double *after,
                                double *residual);
 

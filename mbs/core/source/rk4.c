@@ -2,7 +2,8 @@
 
 #include <string.h>
 
-/* work after the first 2n: a slope, the state, the slope and the step for dense output, the point */
+/* Layout of `work` after the first 2n elements: a slope, states and scaled slopes at both ends of
+ * the step for dense output, and the point of a stage. */
 static double *part(const stepper *s, int i) { return s->work + i * s->n; }
 static double *slope(const stepper *s) { return part(s, 2); }
 static double *from(const stepper *s) { return part(s, 3); }
@@ -25,7 +26,7 @@ static int attempt(stepper *s, const double *x, double h) {
         }
         for (i = 0; i < n; i++) y[i] += h / 6.0 * WEIGHT[k] * slope(s)[i];
     }
-    memset(stepper_trial(s), 0, sizeof(double) * (size_t)n); /* no estimate of the error */
+    memset(stepper_trial(s), 0, sizeof(double) * (size_t)n); /* the method has no error estimate */
     return stepper_all_finite(y, n) ? STEPPER_OK : STEPPER_NOT_FINITE;
 }
 
@@ -45,7 +46,7 @@ static int close(stepper *s, double t) {
     return STEPPER_OK;
 }
 
-/* The cubic with the states and slopes of both ends. */
+/* Evaluate the cubic Hermite interpolant of the step at the fraction a. */
 static void interpolate(const stepper *s, double a, double *row) {
     double b = 1.0 - a;
     int i;

@@ -7,7 +7,7 @@ enum { STAGES = 8 };
 
 static const double GAMMA = 0.21193756319429014;
 
-/* Each further stage adds the last one to its state: A[6] = (A[5], 1), A[7] = (A[5], 1, 1). */
+/* Stages 6 and 7 add the previous stage to its state: A[6] = (A[5], 1), A[7] = (A[5], 1, 1). */
 static const double A[STAGES][STAGES - 1] = {
     {0},
     {3.0},
@@ -52,7 +52,8 @@ static const double DENSE[3][STAGES] = {
     {11.419903575922262, 2.8879645146136994, 72.92137995996029, 80.12511834622643,
      -52.072871366152654, -59.78993625266729, -0.15582684282751913, 4.883087185713722}};
 
-/* work after the first 2n: stages (8n), dense output (5n), d rhs / d t, a slope, pivots, J, LU */
+/* Layout of `work` after the first 2n elements: stages (8n), dense output (5n), d rhs / d t, a
+ * slope, pivots (n each), J and its LU factors (n n each). */
 static double *part(const stepper *s, int i) { return s->work + (size_t)i * s->n; }
 static double *stage(const stepper *s, int i) { return part(s, 2 + i); }
 static double *dense(const stepper *s, int i) { return part(s, 10 + i); }
@@ -87,7 +88,7 @@ static void swap_rows(double *a, int n, int i, int k) {
     }
 }
 
-/* LU with row exchanges of a (n, n), column by column. 1: singular. */
+/* Factorize a (n, n), stored by columns, in place: LU with row exchanges. Returns 1 if singular. */
 static int factorize(double *a, double *pivot, int n) {
     int i, j, k;
     for (k = 0; k < n; k++) {
@@ -124,7 +125,7 @@ static void solve(const double *a, const double *pivot, int n, double *b) {
     }
 }
 
-/* I / (h gamma) - J, factorized. */
+/* Factorize I / (h gamma) - J. Returns a status of the stepper. */
 static int shifted(stepper *s, double h) {
     size_t i, n = (size_t)s->n;
     double *a = factors(s);
@@ -173,7 +174,7 @@ static void interpolate(const stepper *s, double a, double *row) {
     int i;
     for (i = 0; i < s->n; i++) {
         double bend = dense(s, 2)[i] + a * (dense(s, 3)[i] + a * dense(s, 4)[i]);
-        /* a mode, which is constant, keeps its value bit for bit */
+        /* this form keeps constant states, such as modes, bit for bit */
         row[i] = dense(s, 0)[i] + a * ((dense(s, 1)[i] - dense(s, 0)[i]) + b * bend);
     }
 }

@@ -4,17 +4,17 @@
 #include <math.h>
 #include <string.h>
 
-/* offsets in memory */
+/* Offsets in `memory`. */
 enum { TIME, STEP, ERROR, SLOPE_VALID, LAST_STEP, LAST_END, SLOPE };
 
 static const double SAFETY = 0.9, SHRINK = 0.2, GROW = 10.0, BETA = 0.04;
-static const double NEAR_ZERO = 1e-10; /* part of the limit below which time counts as zero */
+static const double NEAR_ZERO = 1e-10; /* fraction of the limit below which time counts as zero */
 
-/* Part of the time that laws are asked beside a jump: a few roundings of arithmetic on times. */
+/* Relative distance to a jump at which functions of time are evaluated: a few roundings of time. */
 static const double ASIDE = 1e3 * DBL_EPSILON;
-static const double GAP = 0.25; /* part of the time between two jumps that this is at most */
+static const double GAP = 0.25; /* maximum of that distance, as a fraction of the time to a jump */
 
-static const double UNMOVED = 0.01; /* part of the tolerances that a move is not worth a slope */
+static const double UNMOVED = 0.01; /* projection, in tolerances, below which the slope is kept */
 
 void stepper_init(stepper *s, int n, const stepper_method *method, stepper_rhs rhs, void *user,
                   double *memory, double *work) {
@@ -50,7 +50,7 @@ void stepper_restart_afresh(stepper *s) {
     s->memory[STEP] = s->fixed > 0.0 ? s->fixed : s->afresh;
 }
 
-/* Between which times laws are asked until the next stop at which they may jump. */
+/* Set the interval [from, to] between the previous and the next jump of functions of time. */
 static void find_side(stepper *s) {
     long before = s->next - 1, after = s->next;
     double first, last, aside, end = s->n_stops ? fabs(s->stops[s->n_stops - 1]) : 0.0;
@@ -112,6 +112,7 @@ void stepper_close(stepper *s, const double *slope) {
     s->memory[SLOPE_VALID] = slope ? 1.0 : 0.0;
 }
 
+/* Weighted root mean square of v (n,): each element is divided by its error tolerance. */
 static double norm(const stepper *s, const double *v, const double *x, const double *y) {
     double sum = 0.0;
     int i;
@@ -124,12 +125,12 @@ static double norm(const stepper *s, const double *v, const double *x, const dou
     return s->n ? sqrt(sum / s->n) : 0.0;
 }
 
-/* A step that an explicit Euler step and its curvature suggest (Hairer et al. 1993, II.4). */
+/* First step size from an explicit Euler step and its curvature (Hairer et al. 1993, II.4). */
 static double first_step(stepper *s, const double *x, double span) {
     const double *k1 = stepper_slope(s);
     double *y = stepper_trial(s), *k2 = stepper_candidate(s), d0, d1, d2, h0, h1;
     int i;
-    s->noise = 0.0; /* no attempt was made here yet */
+    s->noise = 0.0; /* rounding is estimated by attempts only */
     d0 = norm(s, x, x, x);
     d1 = norm(s, k1, x, x);
     h0 = d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01 * d0 / d1;
@@ -142,6 +143,7 @@ static double first_step(stepper *s, const double *x, double span) {
     return fmin(fmin(100 * h0, h1), span);
 }
 
+/* Project the candidate onto the constraints and set `corrected`. */
 static int project_candidate(stepper *s, const double *x, double t_new) {
     double *y = stepper_candidate(s), *move = stepper_trial(s);
     int i;
@@ -153,7 +155,7 @@ static int project_candidate(stepper *s, const double *x, double t_new) {
     return STEPPER_OK;
 }
 
-/* Project the candidate and make it the state; the slope there opens the next step. */
+/* Project the candidate and copy it to x. `close` of the method stores the slope there. */
 static int accept(stepper *s, double *x, double t_new, double h) {
     double *y = stepper_candidate(s);
     int status = STEPPER_OK;
@@ -169,6 +171,7 @@ static int accept(stepper *s, double *x, double t_new, double h) {
     return STEPPER_OK;
 }
 
+/* Compute the slope at x and the first step size, unless they are available. */
 static int open_step(stepper *s, const double *x, double limit) {
     double *m = s->memory;
     if (m[SLOPE_VALID] == 0.0) {
@@ -183,14 +186,15 @@ static int open_step(stepper *s, const double *x, double limit) {
     return STEPPER_OK;
 }
 
-/* How a failed try is shortened: by what its reason asks for, which is known of singular
- * configurations; a quarter else. */
+/* Factor of the step size after a failed attempt: 0.83 at singular configurations, 0.5 outside the
+ * local coordinates, 0.25 for other failures. */
 static double shortened(int status) {
     if (status >= STEPPER_SINGULAR && status <= STEPPER_NEAR_MISS) return 0.83;
     return status == STEPPER_CHART_LEFT ? 0.5 : 0.25;
 }
 
-/* One try of one step towards limit. STEPPER_MORE: accepted. STEPPER_OK: rejected, try again. */
+/* Attempt one step towards limit. Returns STEPPER_MORE if it is accepted, STEPPER_OK if it is
+ * rejected and a shorter step is possible. */
 static int try_step(stepper *s, double *x, double limit) {
     double *m = s->memory, t = m[TIME], h = m[STEP], error = 0.0, factor;
     int status, cut = t + 1.01 * h >= limit;

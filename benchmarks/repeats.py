@@ -28,8 +28,8 @@ import mbs
 from mbs.assembly import System
 from mbs.native import find_compiler
 from mbs.native.compiler import flags_for
-from mbs.native.plain_source import plain_source
 from mbs.native.repeats import LEAST
+from mbs.native.scalar_source import plain_source
 from mbs.robots import n_four_bar
 
 MECHANISMS = "bars10,bars40,bars160,bars320,stewart_platform,chain30,chain100"

@@ -19,9 +19,9 @@ from mbs.errors import ExportError, ModelError
 from mbs.export.c_check import NO_FAST_MATH, STATUS, StatusCheck, check_of
 from mbs.export.c_step import StepTexts, step_texts
 from mbs.files import path_of, write_texts
-from mbs.native.bare_source import NOINLINE, Real, Target, bare_source, literal
 from mbs.native.compiled import generated, require_function, require_names, unwritten
 from mbs.native.handwritten import handwritten_text, names_declared
+from mbs.native.scalar_source import NOINLINE, Real, Target, bare_source, literal
 from mbs.text import in_c_comment, quoted
 
 # Names that C, C++ and CMake leave free.

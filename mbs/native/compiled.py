@@ -26,8 +26,8 @@ from mbs.native.derivatives_on_demand import (
 from mbs.native.handwritten import handwritten_text, is_handwritten
 from mbs.native.kernel import LoopCode, index_key, indexed_library, kernel_library
 from mbs.native.patterns import pattern_source, patterns_source
-from mbs.native.plain_source import external_source
 from mbs.native.repeats import LEAST
+from mbs.native.scalar_source import external_source
 from mbs.text import in_c_comment, quoted
 
 

@@ -16,7 +16,7 @@ from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.native import cached_library, compiler_found
 from mbs.native.compiled import calls_machine_code, generated, unwritten
 from mbs.native.compiler import flags_for, known_library
-from mbs.native.plain_source import plain_source
+from mbs.native.scalar_source import plain_source
 from mbs.solvers.control_c import control_c
 from mbs.solvers.problem import (
     Equations,

@@ -18,13 +18,12 @@ from support.random_trees import random_tree
 import mbs
 from mbs.export.c_library import example_input
 from mbs.native import batch, compiled, find_compiler, repeats
-from mbs.native.bare_source import bare_source
 from mbs.native.batch_source import batch_source
 from mbs.native.c_code import blocks, plain_order, slots
 from mbs.native.compiler import FLAGS
 from mbs.native.kernel import kernel_source
-from mbs.native.plain_source import external_source, plain_source
 from mbs.native.repeats import Calls, recurring, with_calls
+from mbs.native.scalar_source import bare_source, external_source, plain_source
 from mbs.operations.graph import graph_of
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror")
@@ -393,7 +392,7 @@ import functools
 import hashlib, sys
 sys.path.insert(0, "tests/native")
 from test_repeats import windows
-from mbs.native.plain_source import plain_source
+from mbs.native.scalar_source import plain_source
 print(hashlib.sha256(plain_source([windows(50)])[0].encode()).hexdigest())
 """
 
@@ -436,7 +435,7 @@ def test_an_fmu_moves_as_without_repeats(tmp_path, monkeypatch):
     for least in (0, sys.maxsize):
         monkeypatch.setattr(repeats, "_SHARE", 2.0)
         calls = functools.partial(_from, least)
-        monkeypatch.setattr("mbs.native.plain_source.with_calls", calls)
+        monkeypatch.setattr("mbs.native.scalar_source.with_calls", calls)
         path = mbs.export.fmu(system, tmp_path / f"fmu{len(ends)}.fmu")
         with zipfile.ZipFile(path) as archive:
             text = archive.read("sources/model.c").decode()

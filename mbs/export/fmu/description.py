@@ -14,7 +14,7 @@ from mbs.arguments import elements_of
 from mbs.assembly import System
 from mbs.errors import ExportError, ModelError
 from mbs.models.state.tree import TreeState
-from mbs.native.bare_source import Target
+from mbs.native.scalar_source import Target
 from mbs.text import quoted
 from mbs.units import UNITS
 from mbs.view.drawing import Drawing

@@ -21,7 +21,6 @@ from mbs.export.fmu.reference import reference_files
 from mbs.export.fmu.source import header, source
 from mbs.export.fmu.xml import terminals_and_icons
 from mbs.files import path_of, write_bytes
-from mbs.native.bare_source import Target
 from mbs.native.compiler import (
     Platform,
     cached_library,
@@ -29,7 +28,7 @@ from mbs.native.compiler import (
     host_platform,
     platform_named,
 )
-from mbs.native.plain_source import plain_flags
+from mbs.native.scalar_source import Target, plain_flags
 from mbs.text import quoted
 from mbs.view.drawing_files import icon, standalone
 

@@ -40,7 +40,7 @@ from mbs.files import PathLike, path_of
 from mbs.loops.examine import configuration_health, row_independence
 from mbs.models.state.independent import MinimalState, consistent_start, minimal_state
 from mbs.models.state.tree import tree_state
-from mbs.native.bare_source import Target
+from mbs.native.scalar_source import Target
 
 
 def fmu(

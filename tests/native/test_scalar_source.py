@@ -9,7 +9,7 @@ import pytest
 from mbs.errors import ModelError
 from mbs.native import find_compiler
 from mbs.native.compiler import FLAGS
-from mbs.native.plain_source import plain_flags, plain_source
+from mbs.native.scalar_source import plain_flags, plain_source
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror")
 

@@ -34,6 +34,12 @@ _LEVELS = ((20_000, "-O2"), (200_000, "-O1"))  # beyond, compilers need minutes 
 LIBRARY_SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 _KNOWN = ("cc", "gcc", "clang")
+_ZIG = (
+    *(sys.executable, "-m", "ziglang", "cc"),
+    # at -O0, zig adds checks of undefined behaviour, with which values differ in the last bits
+    "-fno-sanitize=all",
+    "-Wno-unused-command-line-argument",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +97,7 @@ def _find(chosen: str, path: str) -> Compiler:
         return compiler
     candidates: list[tuple[str, ...]] = [(name,) for name in _KNOWN]
     if importlib.util.find_spec("ziglang") is not None:
-        candidates.append((sys.executable, "-m", "ziglang", "cc"))
+        candidates.append(_ZIG)
     for command in candidates:
         compiler = _probe(command, path)
         if compiler is not None:
@@ -335,7 +341,7 @@ def cross_compiler(goal: Platform) -> Compiler:
             f"libraries for {goal.name} are made with ziglang, which is not installed; run: "
             + install_command("cross")
         )
-    command = (sys.executable, "-m", "ziglang", "cc", "-target", goal.target)
+    command = (*_ZIG, "-target", goal.target)
     return Compiler(command, metadata.version("ziglang"))
 
 

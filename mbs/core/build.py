@@ -35,7 +35,10 @@ _LIBRARIES = {
     "win32": (f"-L{Path(sys.base_prefix, 'libs')}", "-lpython3"),
 }
 """Libraries by platform. Symbols of Python come from the process, on Windows from python3.dll."""
-_KNOWN = ("cc", "gcc", "clang")
+COMPILERS = ("cc", "gcc", "clang")
+"""Commands of C compilers, in the order in which they are looked for."""
+ZIG = (sys.executable, "-m", "ziglang", "cc")
+"""Command of the C compiler in the package ziglang."""
 
 
 class BuildError(RuntimeError):
@@ -60,7 +63,7 @@ def installed_compiler() -> list[str] | None:
     chosen = os.environ.get("CC", "").strip()
     if chosen:
         return shlex.split(chosen, posix=os.name != "nt")
-    found = next((name for name in _KNOWN if shutil.which(name)), None)
+    found = next((name for name in COMPILERS if shutil.which(name)), None)
     return None if found is None else [found]
 
 
@@ -77,7 +80,7 @@ def build(target: Path = LIBRARY, sources: Sequence[Path] | None = None) -> Path
     Raises:
         BuildError: there is no compiler, or it reports an error.
     """
-    command = installed_compiler() or [sys.executable, "-m", "ziglang", "cc"]
+    command = installed_compiler() or [*ZIG]
     include = Path(sysconfig.get_path("include"))
     if not (include / "Python.h").is_file():
         raise BuildError(

@@ -15,6 +15,19 @@ from mbs.core.library import core_library
 Arrays = tuple[NDArray[np.float64], ...]
 
 
+def code_address(library: ctypes.CDLL, name: str) -> int:
+    """Return the address of a function in a library; zero if the library has none of this name."""
+    found = ctypes.cast(library[name], ctypes.c_void_p).value if hasattr(library, name) else None
+    return found or 0
+
+
+def work_sizes(library: ctypes.CDLL, name: str) -> tuple[int, ...]:
+    """Return the lengths of arg, res, iw and w that a function needs, by CasADi's convention."""
+    sizes = [ctypes.c_longlong() for _ in range(4)]
+    library[f"{name}_work"](*map(ctypes.byref, sizes))
+    return tuple(size.value for size in sizes)
+
+
 def compiled_evaluation(function: Function, library: ctypes.CDLL) -> Any:
     """Return the evaluation of machine code.
 
@@ -23,11 +36,9 @@ def compiled_evaluation(function: Function, library: ctypes.CDLL) -> Any:
         library: its code, in the calling convention of CasADi.
     """
     name = function.name()
-    work = [ctypes.c_longlong() for _ in range(4)]
-    library[f"{name}_work"](*map(ctypes.byref, work))
-    address = ctypes.cast(library[name], ctypes.c_void_p).value
     ports = function.n_in(), function.n_out()
-    return core_library().compiled(address, ports, tuple(size.value for size in work))
+    address = code_address(library, name)
+    return core_library().compiled(address, ports, work_sizes(library, name))
 
 
 def interpreted_evaluation(function: Function, examine: Callable[[BaseException], None]) -> Any:

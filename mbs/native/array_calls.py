@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from casadi import DM, MX, SX, Function, Sparsity
 
-from mbs.core import core_library
+from mbs.core import code_address, core_library, work_sizes
 from mbs.errors import ModelError
 from mbs.numbers import doubles
 
@@ -61,9 +61,7 @@ def array_builtin(
         the builtin; None when the function has dozens of inputs or outputs.
     """
     name, code = function.name(), ctypes.CDLL(str(library))
-    work = [ctypes.c_longlong() for _ in range(4)]
-    code[f"{name}_work"](*map(ctypes.byref, work))
-    work[3].value += more
+    *sizes, reals = work_sizes(code, name)
     inputs = [function.sparsity_in(k) for k in range(function.n_in())]
     outputs = [function.sparsity_out(k) for k in range(function.n_out())]
     if max(len(inputs), len(outputs)) > _MOST:
@@ -71,8 +69,8 @@ def array_builtin(
     if hasattr(code, f"{name}_incref"):
         code[f"{name}_incref"]()
     builtin: ArrayCall = core_library().array_call(
-        tuple(_address(code, f"{name}{end}") for end in ("", "_checkout", "_release")),
-        tuple(number.value for number in work),
+        tuple(code_address(code, f"{name}{end}") for end in ("", "_checkout", "_release")),
+        (*sizes, reals + more),
         (np.ndarray, np.ma.MaskedArray, np.empty),
         tuple(map(_shape, inputs)),
         tuple((_shape(pattern), _arguments_of_empty(pattern)) for pattern in outputs),
@@ -97,11 +95,6 @@ def _arguments_of_empty(pattern: Sparsity) -> tuple[Any, ...]:
     """What numpy.empty is given: one column is a vector, all else a matrix."""
     rows, columns = pattern.shape
     return ((rows,) if columns == 1 else (rows, columns)), np.float64, "F"
-
-
-def _address(code: ctypes.CDLL, name: str) -> int:
-    """Address of a function; zero if the library has none of this name."""
-    return (ctypes.cast(code[name], ctypes.c_void_p).value or 0) if hasattr(code, name) else 0
 
 
 def with_array_calls(

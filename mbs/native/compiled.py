@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import casadi
 
+from mbs.core import code_address, work_sizes
 from mbs.errors import ModelError
 from mbs.native.array_calls import with_array_calls
 from mbs.native.compiler import cached_library, compiler_found, flags_for
@@ -223,19 +224,12 @@ def machine_code(function: casadi.Function) -> MachineCode | None:
     if path is None:
         return None
     name, library = function.name(), ctypes.CDLL(str(path))
-    work = [ctypes.c_longlong() for _ in range(4)]
-    library[f"{name}_work"](*map(ctypes.byref, work))
     if hasattr(library, f"{name}_incref"):
         library[f"{name}_incref"]()
     ends = ("", "_checkout", "_release")
-    evaluate, checkout, release = (_address(library, f"{name}{end}") for end in ends)
-    arguments, results, integers, reals = (number.value for number in work)
+    evaluate, checkout, release = (code_address(library, f"{name}{end}") for end in ends)
+    arguments, results, integers, reals = work_sizes(library, name)
     return MachineCode(library, evaluate, checkout, release, (arguments, results, integers, reals))
-
-
-def _address(library: ctypes.CDLL, name: str) -> int:
-    found = ctypes.cast(library[name], ctypes.c_void_p).value if hasattr(library, name) else None
-    return found or 0
 
 
 def fetch_derivatives(record: str, number: int, table: int) -> None:

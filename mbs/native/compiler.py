@@ -23,6 +23,7 @@ from pathlib import Path
 
 import casadi
 
+from mbs.core.build import COMPILERS, ZIG
 from mbs.errors import CompilerError
 from mbs.text import did_you_mean, install_command, quoted
 
@@ -33,9 +34,8 @@ _LEVELS = ((20_000, "-O2"), (200_000, "-O1"))  # beyond, compilers need minutes 
 
 LIBRARY_SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
-_KNOWN = ("cc", "gcc", "clang")
 _ZIG = (
-    *(sys.executable, "-m", "ziglang", "cc"),
+    *ZIG,
     # at -O0, zig adds checks of undefined behaviour, with which values differ in the last bits
     "-fno-sanitize=all",
     "-Wno-unused-command-line-argument",
@@ -95,7 +95,7 @@ def _find(chosen: str, path: str) -> Compiler:
                 "or unset it"
             )
         return compiler
-    candidates: list[tuple[str, ...]] = [(name,) for name in _KNOWN]
+    candidates: list[tuple[str, ...]] = [(name,) for name in COMPILERS]
     if importlib.util.find_spec("ziglang") is not None:
         candidates.append(_ZIG)
     for command in candidates:

@@ -177,7 +177,8 @@ def gauss_newton(
     r_out, e_out, v_out = r.copy(), e.copy(), r.copy()
     evaluate = python_evaluation(equations, (own, np.empty(0)), (r_out, e_out))
     reduced = None if values is None else python_evaluation(alone, (own, np.empty(0)), (v_out,))
-    step = _sparse_step(first) if _is_large(first) else None
+    filled = int(np.count_nonzero(first.values))
+    step = _sparse_step(first.rows, first.columns, first.shape, filled)
     status, residual = core_library().gauss_newton(
         (evaluate, reduced, step),
         (x, np.empty(0), r, e),
@@ -198,18 +199,29 @@ def _all_entries(J: Vector) -> Entries:
     return Entries(rows, columns, J.ravel(), J.shape)
 
 
-def _is_large(J: Entries) -> bool:
-    """Whether the matrix has its own arithmetic."""
-    m, n = J.shape
-    return bool(n >= MANY and np.count_nonzero(J.values) < _FULL * m * n)
+def _sparse_step(
+    rows: NDArray[np.integer[Any]],
+    columns: NDArray[np.integer[Any]],
+    shape: tuple[int, int],
+    filled: int,
+) -> Any:
+    """Evaluation of the shortest solution of a large sparse matrix; None if it is small or dense.
 
-
-def _sparse_step(J: Entries) -> Any:
-    """Evaluation of the shortest solution of a large sparse matrix."""
-    e, b, x = np.empty(len(J.values)), np.empty(J.shape[0]), np.empty(J.shape[1])
+    Args:
+        rows: (k,) row of each element.
+        columns: (k,) column of each element; negative for an element that the matrix lacks.
+        shape: of the matrix.
+        filled: number of elements of the matrix that are not zero.
+    """
+    m, n = shape
+    if n < MANY or filled >= _FULL * m * n:
+        return None
+    kept = columns >= 0
+    e, b, x = np.empty(len(columns)), np.empty(m), np.empty(n)
+    own = rows[kept].astype(np.int64), columns[kept].astype(np.int64)
 
     def solve() -> None:
-        x[:] = sparse_solution(Entries(J.rows, J.columns, e, J.shape), b)
+        x[:] = sparse_solution(Entries(*own, e[kept], shape), b)
 
     return python_evaluation(solve, (e, b), (x,))
 
@@ -271,8 +283,10 @@ class _Workspace:
         number = np.full(len(q), -1, dtype=np.intc)
         number[unknowns] = np.arange(len(free))
         column = number[self.columns]
+        shape = self.shape[0], len(free)
+        step = _sparse_step(self.row, column, shape, int(np.count_nonzero(column >= 0)))
         status, residual = core_library().gauss_newton(
-            (*self.calls, self._step(column, len(free))),
+            (*self.calls, step),
             (found, np.array(p, dtype=float), self.r, self.e),
             (unknowns, self.row, column, np.array(tolerance, dtype=float)),
             _RANK,
@@ -281,22 +295,6 @@ class _Workspace:
         if status > _CONVERGED:
             raise RuntimeError("equations of a closure have no value there, or no memory is left")
         return found, LeastSquaresResult(found[unknowns], residual, status == _CONVERGED)
-
-    def _step(self, column: NDArray[np.intc], count: int) -> Any:
-        """Evaluation of the steps if the Jacobian by the unknowns is large and sparse."""
-        if count < MANY:
-            return None
-        kept = column >= 0
-        if np.count_nonzero(kept) >= _FULL * self.shape[0] * count:
-            return None
-        e, b, x = np.empty(len(column)), np.empty(self.shape[0]), np.empty(count)
-        rows, columns = (part[kept].astype(np.int64) for part in (self.row, column))
-        shape = self.shape[0], count
-
-        def solve() -> None:
-            x[:] = sparse_solution(Entries(rows, columns, e[kept], shape), b)
-
-        return python_evaluation(solve, (e, b), (x,))
 
 
 # The smallest sum of squares, where no root is near.

@@ -446,7 +446,8 @@ static PyMethodDef methods[] = {
     {"gauss_newton", py_gauss_newton, METH_VARARGS,
      "gauss_newton((equations, values, step), (q, p, r, e), (free, row, column, tolerance), gap,"
      " iterations) -> (status, residual): see least_squares.h."},
-    {"integration", integration, METH_VARARGS, "See mbs.core.integration."},
+    {"integration", integration, METH_VARARGS, "integration(functions, sizes, passage, p, tolerances, factors, (stops, jumps), t) ->"
+     " Integration: see driver.h."},
     {NULL, NULL, 0, NULL},
 };
 

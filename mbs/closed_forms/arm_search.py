@@ -54,7 +54,7 @@ def merged(arm: Arm, T: Array, q: Array) -> Merged:
     lengths.
 
     Args:
-        arm: whose configurations.
+        arm: the arm whose configurations are searched.
         T: (4, 4) target pose.
         q: (m, n) solutions [rad or m].
     """
@@ -80,7 +80,7 @@ def search(arm: Arm, T: Array, starts: int = 300, seed: int = SEED) -> Array:
     Nothing proves that they are all; `counted_search` tells how often each was met.
 
     Args:
-        arm: whose configurations.
+        arm: the arm whose configurations are searched.
         T: (4, 4) target pose.
         starts: how many random configurations.
         seed: of them.
@@ -137,7 +137,7 @@ def polish(arm: Arm, T: Array, q: Array) -> Polished:
     An arm of fewer than six joints comes as near as least squares do.
 
     Args:
-        arm: whose configurations.
+        arm: the arm whose configurations are searched.
         T: (4, 4) target pose of all, or (m, 4, 4) of each.
         q: (m, n) configurations [rad or m].
     """
@@ -174,7 +174,7 @@ def nearest(arm: Arm, T: Array) -> Nearest:
     to where the slope vanishes.
 
     Args:
-        arm: whose configurations.
+        arm: the arm whose configurations are searched.
         T: (4, 4) target pose [m].
     """
     return _measure(arm, T, core.nearest_by(core.core_of(arm), arm, T, _STARTS, SEED))

@@ -372,7 +372,7 @@ class SpringDamperSeries(ForceElement):
         return {"elongation": self._damper_force(at) / at.damping}
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The tension of both, each point towards the other."""
+        """Tension between the points. It is positive if it pulls them together."""
         return custom.pull(at.a, at.b, self._tension(at))
 
     def energy(self, at: Any) -> SX:
@@ -412,12 +412,12 @@ class SpringFrictionSeries(ForceElement):
 
     Attributes:
         a, b: the points, or bodies for their reference frames.
-        stiffness: of the spring [N/m].
-        friction: the force at which it slides [N].
+        stiffness: stiffness of the spring in series [N/m].
+        friction: force at which the friction slides [N].
         length: free length at z = 0 [m].
         parallel: stiffness of a spring parallel to the friction [N/m].
-        elongation: z where it sticks [m].
-        direction: of sliding, 1 while it becomes longer, -1 while it becomes shorter, 0 where it
+        elongation: z while the friction sticks [m].
+        direction: direction of sliding: 1 if z increases, -1 if z decreases, 0 if the friction
             sticks.
     """
 
@@ -433,7 +433,7 @@ class SpringFrictionSeries(ForceElement):
     slip = custom.output("m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The tension of both, each point towards the other."""
+        """Tension between the points. It is positive if it pulls them together."""
         return custom.pull(at.a, at.b, self._tension(at))
 
     def energy(self, at: Any) -> SX:
@@ -442,12 +442,12 @@ class SpringFrictionSeries(ForceElement):
         return SX(0.5 * (self._tension(at) ** 2 / at.stiffness + at.parallel * z**2))
 
     def dissipation(self, at: Any) -> SX:
-        """What the friction takes while it slides."""
+        """Power that the friction dissipates while it slides [W]."""
         share = at.stiffness / (at.stiffness + at.parallel)
         return SX(at.friction * share * at.direction * at.a.to(at.b).rate)
 
     def events(self, at: Any) -> Mapping[str, custom.Event]:
-        """It slides where the force reaches the friction, and sticks where the motion turns."""
+        """Sliding begins if the force reaches `friction`, and ends if the rate changes its sign."""
         sticks, rate = at.direction == 0, at.a.to(at.b).rate
         force = self._tension(at) - at.parallel * at.elongation
         found = {}

@@ -1,7 +1,7 @@
 """Compilation of the run-time library `mbs.core._core` from its C files.
 
-The build hook of the package and an editable checkout use these functions. They need nothing but
-the standard library, since mbs is not installed yet when the package is built.
+The build hook of the package and an editable checkout use these functions. They use the
+standard library only, since mbs is not installed when the package is built.
 """
 
 from __future__ import annotations

@@ -142,8 +142,9 @@ def _require_mobile(system: System, configurations: Sequence[Matrix]) -> None:
     """Raise an error for loops with velocities but no motion, such as bars in one line.
 
     Args:
-        system: with open loops.
-        configurations: the assembled one, and closed ones from random starts around it.
+        system: a system with closed loops.
+        configurations: the assembled configuration, and closed configurations that were found from
+            random starts around it.
     """
     first, *others = configurations
     apart = [float(np.max(np.abs(difference(system, q, first)))) for q in others]
@@ -173,8 +174,8 @@ def _branches(
 ) -> list[Matrix]:
     """Regular configurations on the branches that meet at q, the nearest to a target first.
 
-    The independent positions of all of them are those of the first one. Empty if none is found, or
-    if independent velocities have no positions of their own.
+    All of them have the same independent positions. The list is empty if none is found, or if
+    independent velocities have no positions of their own.
 
     Args:
         target: the guess, and q for other positions.

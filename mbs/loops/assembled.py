@@ -110,9 +110,9 @@ def _unknowns(system: System) -> set[int]:
 def _stages(
     system: System, unknown: set[int], guessed: set[int], rest: set[int]
 ) -> Iterator[list[set[int]]]:
-    """Indices of held positions, fewer in each stage; sets of one stage are compared.
+    """Yield the sets of indices of held positions to try, with fewer positions in each stage.
 
-    Indices from nq are those of positions of cut joints.
+    Results of all sets of a stage are compared. Indices from nq belong to positions of cut joints.
     """
     motors = {k for k, c in enumerate(system.coordinates) if c.actuated}
     stages = list[list[set[int]]]()

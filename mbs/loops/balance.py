@@ -6,8 +6,8 @@ dependent, and no force acts through the row, since the row is zero where the fo
 
 Where dampers act, the balance D v + f(q) = 0 is a row on velocities with a constant part: the
 position is a state, and its velocity follows. Dampers between nodes leave sums of forces without
-velocities; these are rows of positions. Dry friction beside a damper on a node holds the node up to
-a limit of the other forces: D v = f - limit sign(f), or v = 0.
+velocities; these are rows of positions. Dry friction parallel to a damper on a node holds the node
+up to a limit of the other forces: D v = f - limit sign(f), or v = 0.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def balance_rows(system: System, q: SX) -> list[tuple[str, list[tuple[str, Row]]
     """Return the rows of positions of the massless nodes: forces divided by typical stiffnesses.
 
     Args:
-        system: with or without such nodes.
+        system: a system with or without massless nodes.
         q: (nq, 1) symbols of positions.
     """
     return _rows(system, q, SX.zeros(system.nv), is_damped=False)
@@ -103,7 +103,7 @@ def velocity_balance_rows(system: System, q: SX, v: SX) -> list[tuple[str, list[
     They are linear in v, with a constant part.
 
     Args:
-        system: with or without such nodes.
+        system: a system with or without massless nodes.
         q: (nq, 1) symbols of positions.
         v: (nv, 1) velocities.
     """
@@ -144,8 +144,8 @@ def require_no_drift(system: System, what: str, velocities: Iterable[int]) -> No
     """Refuse a matrix of the independent velocities where massless nodes move without them.
 
     Args:
-        system: with or without massless nodes that dampers hold.
-        what: the matrix, for the message.
+        system: a system with or without massless nodes that dampers hold.
+        what: name of the matrix in the message.
         velocities: indices in v of the velocities that belong to it.
 
     Raises:
@@ -304,7 +304,7 @@ def _static_efforts(system: System, q: SX, v: SX) -> SX:
 def _balances(system: System, nodes: Sequence[tuple[int, int]]) -> tuple[Balance, ...] | None:
     """Balances of the forces on nodes; None if forces do not determine the nodes.
 
-    Forces on nodes must be linear in velocities, and depend on positions and parameters beside.
+    Forces on nodes must be linear in velocities, and may depend on positions and parameters.
     """
     positions, velocities = [k for k, _ in nodes], [k for _, k in nodes]
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)

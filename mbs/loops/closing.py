@@ -162,7 +162,7 @@ class Closing:
         axes: indices of the cosines that count; None for all.
         aims: indices in `system.cut_coordinates` of positions that must have a value. Each adds a
             row.
-        cut: (c,) values of `system.cut_coordinates`, of which those of the aims count.
+        cut: (c,) values of `system.cut_coordinates`. Only the values of the aims count.
     """
 
     system: System
@@ -199,7 +199,7 @@ class Closing:
 
     @property
     def position_units(self) -> Vector:
-        """(nq,) what differences of positions are divided by: 1, or the size of the mechanism."""
+        """(nq,) divisors of differences of positions: 1 for angles, else the size [m]."""
         return distance_units((row.unit for row in self.system.coordinates), self.size)
 
     @property

@@ -71,7 +71,7 @@ def slip_rows(system: System, q: SX) -> list[tuple[str, SX]]:
 
 
 def drift_rows(system: System, q: SX) -> SX | None:
-    """What the last velocity rows are at rest, those of massless nodes; None without such rows."""
+    """Values of the rows of damped massless nodes at rest. None without such rows."""
     rows = velocity_balance_rows(system, q, SX.zeros(system.nv))
     return casadi.vertcat(*(row.value for _, row in rows[0][1])) if rows else None
 

@@ -200,8 +200,8 @@ def _with_positions(q: Vector, target: Vector, indices: Sequence[int]) -> Vector
 def _guessed_configuration(closing: Closing, start: Vector, guess: Mapping[str, float]) -> Vector:
     """The configuration whose guessed positions are nearest to their guesses, (nq,).
 
-    The search is that of `mbs.loops.assembled`. Positions of cut joints without a guess are
-    compared with those of the assembled configuration.
+    The search is that of `mbs.loops.assembled`. The target of a cut joint without a guess
+    is its position in the assembled configuration.
     """
     system, p = closing.system, closing.p
     cut = cut_positions_and_slopes(system)(np.array(system.configuration), p)[0].ravel()

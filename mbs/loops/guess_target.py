@@ -108,7 +108,7 @@ class GuessTarget:
         return cut_positions_and_slopes(self.system)(q, self.p)[0].ravel()
 
     def units(self, closing: Closing) -> Vector:
-        """What differences of all positions are divided by: 1, or the size of the mechanism [m]."""
+        """Divisors of differences of all positions: 1 for angles, else the mechanism's size [m]."""
         return distance_units((row.unit for row in self.rows), closing.size)
 
     def miss(self, closing: Closing, q: Vector) -> float:

@@ -115,7 +115,7 @@ class _Objective:
         closing: the rows, and the positions that must not change.
         target: the guess.
         counted: (n,) 1 for the positions that count, among all positions, 0 for the others.
-        units: (n,) what differences of all positions are divided by [1 or m].
+        units: (n,) divisors of differences of all positions [1 or m].
     """
 
     closing: Closing
@@ -176,11 +176,11 @@ class _ManifoldPoint:
     """An objective on the manifold.
 
     Attributes:
-        value: of the objective.
-        gradient: (m,) in the directions of the basis.
+        value: value of the objective.
+        gradient: (m,) gradient in the directions of the basis.
         hessian: (m, m) Riemannian Hessian in these directions.
         basis: (n, m) orthonormal directions in which free positions can move.
-        units: (n,) of the free positions [1 or m].
+        units: (n,) divisors of differences of the free positions [1 or m].
     """
 
     value: float
@@ -235,7 +235,13 @@ def _newton_step(gradient: Vector, hessian: Vector, longest: float) -> Vector:
 
 
 def nearest_in_all(closing: Closing, target: GuessTarget, q: Vector) -> Vector:
-    """Of the configurations with the distance of the minimum q (nq,) the one nearest in all."""
+    """Return the minimum of the distance of all positions at a constant distance of the guess.
+
+    Args:
+        closing: the rows, and the positions that must not change.
+        target: the guess, and the start for other positions.
+        q: (nq,) configuration with the least distance from the guess.
+    """
     own = _objective(closing, target, target.guessed)
     every = _objective(closing, target, range(len(target.moves(q))))
     longest, value = _LONGEST, every.value(q)

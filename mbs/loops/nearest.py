@@ -109,7 +109,7 @@ def _met(closing: Closing, target: GuessTarget, found: list[Vector]) -> Vector:
     Args:
         closing: the rows, and the positions that must not change.
         target: first guess.
-        found: (nq,) closed configurations, the nearest one first.
+        found: (nq,) closed configurations. The nearest configuration is first.
     """
     q = found[0]
     if not target.guessed or target.miss(closing, q) <= MET or not is_movable(closing, q):
@@ -160,7 +160,7 @@ def _held(closing: Closing, target: GuessTarget, q: Vector | None) -> tuple[Clos
 
 
 def _others(closing: Closing, best: Vector, found: list[Vector]) -> tuple[Vector, ...]:
-    """Configurations that differ from the best one and from each other."""
+    """Configurations that differ from the best configuration and from each other."""
     turning = np.zeros(closing.system.nq, dtype=bool)
     for part in quaternion_slices(closing.system.tree):
         turning[part] = True

@@ -25,7 +25,7 @@ class Reduction:
     Attributes:
         G: (nv, m), v = G v_a + g.
         gamma: (nv, 1), a = G a_a + gamma; None unless velocities were given.
-        drift: (nv, 1) g, velocities of massless nodes that dampers hold; None where it is zero.
+        drift: (nv, 1) g, velocities of massless nodes that dampers hold; None without such nodes.
     """
 
     G: SX
@@ -41,7 +41,7 @@ class Reduction:
 def reduction_matrix(system: System) -> Function:
     """``reduction_matrix(q) -> G``: velocities of the tree from the independent ones, v = G v_a.
 
-    Massless nodes that dampers hold move besides, v = G v_a + g; G has the slopes.
+    With massless nodes that dampers hold, v = G v_a + g; the function returns G.
 
     Returns:
         Function of q (nq, 1) that closes the loops; G (nv, m).

@@ -56,7 +56,7 @@ def constraint_rows(system: System, q: SX) -> SX:
 
 
 def constraint_drift(system: System, q: SX) -> SX | None:
-    """G (m, 1) of J v + g = 0, every row, at the symbols q; None where rows are J v = 0."""
+    """Drift g (m, 1) of every row J v + g = 0 at the symbols q; None if all rows are J v = 0."""
     drift = drift_rows(system, q)
     if drift is None:
         return None
@@ -65,7 +65,7 @@ def constraint_drift(system: System, q: SX) -> SX | None:
 
 
 def constraint_drift_at(system: System) -> Function | None:
-    """``drift(q, p) -> g``: g of every row; None where rows are J v = 0."""
+    """``drift(q, p) -> g``: drift of every row; None if all rows are J v = 0."""
 
     def build() -> Function | None:
         q = SX.sym("q", system.nq)
@@ -77,7 +77,7 @@ def constraint_drift_at(system: System) -> Function | None:
 
 
 def independent_drift(system: System, q: SX) -> SX | None:
-    """G (r, 1) of the rows that the analysis kept; None where rows are J v = 0."""
+    """Drift g (r, 1) of the rows that the analysis kept; None if all rows are J v = 0."""
     drift = constraint_drift(system, q)
     return None if drift is None else drift[kept_rows(system)]
 
@@ -122,7 +122,7 @@ class DeterminingRows:
         J: (m, nv).
         mixed: (r, m) combinations of the rows, as many as there are passive velocities.
         square: (r, r) their columns of the passive velocities.
-        drift: (m, 1) g of the rows J v + g = 0; None where they are J v = 0.
+        drift: (m, 1) drift g of the rows J v + g = 0; None if all rows are J v = 0.
     """
 
     J: SX

@@ -204,7 +204,7 @@ def _passage(through: Passage | None) -> tuple[Any, ...] | None:
 
 
 def _places(pattern: casadi.Sparsity) -> npt.NDArray[np.intc] | None:
-    """Where a matrix has elements, as passage.h takes it; None if it has all of them."""
+    """Pattern of a sparse matrix in the form of `passage_patterns`; None for a dense matrix."""
     if pattern.is_dense():
         return None
     return np.array([*pattern.colind(), *pattern.row()], dtype=np.intc)
@@ -412,7 +412,7 @@ def integrate_events(
         sizes: (2, nx) factors of the absolute and of the relative tolerance of each state; one if
             left out.
         progress: called now and then with the time reached, s.
-        compiled: as in `integrate`.
+        compiled: whether functions may be compiled, see `integrate`.
         partial: True for what was reached, with its `stop`, where the integration cannot go on or
             is interrupted by control-C; nothing is raised for that then.
         prepared: what an earlier call made of the same functions and method, and what this one

@@ -210,7 +210,7 @@ def _sparse_step(
     Args:
         rows: (k,) row of each element.
         columns: (k,) column of each element; negative for an element that the matrix lacks.
-        shape: of the matrix.
+        shape: shape of the matrix.
         filled: number of elements of the matrix that are not zero.
     """
     m, n = shape

@@ -291,7 +291,7 @@ def _dense(name: str, inputs: list[casadi.MX], *outputs: casadi.MX) -> casadi.Fu
 
 
 def _scalar(function: casadi.Function) -> casadi.Function:
-    """The same function by scalar operations, if it has no other ones.
+    """The function, expanded to scalar operations if that is possible.
 
     Machine code in pieces is written from these operations. Interpreted and compiled functions give
     the same bits if all are evaluated from the same operations.

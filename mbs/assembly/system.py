@@ -610,7 +610,10 @@ class System:
         return self._fill(given, self.coordinates, start, "position")
 
     def positions_at_cuts(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return the positions of cut joints among positions by coordinate name.
+        """Return the given joint positions that belong to cut joints, with the same names.
+
+        Args:
+            values: joint positions by coordinate name [rad or m]. Other joints are left out.
 
         Raises:
             ModelError: a position of a cut joint is no finite number.

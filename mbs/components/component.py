@@ -321,7 +321,9 @@ C = TypeVar("C", bound="Component")
 
 
 def check_arguments(cls: type) -> None:
-    """Let the constructor of a class name wrong arguments by one error.
+    """Make the constructor of a class raise an ArgumentError for names and numbers of arguments.
+
+    The error names unknown, missing, surplus and repeated arguments.
 
     Args:
         cls: the class; only an `__init__` of its own is replaced.

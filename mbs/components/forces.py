@@ -404,9 +404,10 @@ class SpringFrictionSeries(ForceElement):
 
     With the distance L of the points and the elongation z of the friction, the tension is
     T = stiffness (L - length - z). The friction sticks while |T - parallel z| is below `friction`,
-    and slides with that force otherwise. The element does not depend on the rate: a cycle of the
-    amplitude X, without a parallel spring, takes 4 friction (X - friction / stiffness). In
-    simulations and FMUs it changes between sticking and sliding at events.
+    and slides otherwise; then |T - parallel z| is `friction`. The element does not depend on the
+    rate: a cycle of the amplitude X, without a parallel spring, dissipates the energy
+    4 friction (X - friction / stiffness). In simulations and FMUs it changes between sticking and
+    sliding at events.
 
     Source: Pfeiffer and Glocker 1996, chapter 5.
 
@@ -416,9 +417,9 @@ class SpringFrictionSeries(ForceElement):
         friction: force at which the friction slides [N].
         length: free length at z = 0 [m].
         parallel: stiffness of a spring parallel to the friction [N/m].
-        elongation: z while the friction sticks [m].
-        direction: direction of sliding: 1 if z increases, -1 if z decreases, 0 if the friction
-            sticks.
+        elongation: mode, z while the friction sticks [m]. Simulations set it.
+        direction: mode, direction of sliding: 1 if z increases, -1 if z decreases, 0 if the
+            friction sticks. Simulations set it.
     """
 
     a = custom.frame()

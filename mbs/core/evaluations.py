@@ -29,7 +29,7 @@ def work_sizes(library: ctypes.CDLL, name: str) -> tuple[int, ...]:
 
 
 def compiled_evaluation(function: Function, library: ctypes.CDLL) -> Any:
-    """Return the evaluation of machine code.
+    """Return an object by which algorithms in C evaluate machine code.
 
     Args:
         function: the function, with all inputs and outputs.
@@ -42,12 +42,13 @@ def compiled_evaluation(function: Function, library: ctypes.CDLL) -> Any:
 
 
 def interpreted_evaluation(function: Function, examine: Callable[[BaseException], None]) -> Any:
-    """Return the evaluation of a function that CasADi interprets.
+    """Return an object by which algorithms in C evaluate a function that CasADi interprets.
 
     Args:
-        function: its inputs and outputs are given by their stored elements.
-        examine: called with the error of an evaluation. It returns if the function has no value
-            there, and raises an error that ends the algorithm.
+        function: the function. C passes the nonzeros of its inputs and outputs.
+        examine: function that is called with the Python error of an evaluation. It returns if
+            this error means that there is no value for these inputs, and raises an error if the
+            algorithm must end.
     """
     bound: Any = function.buffer()
     buffer, call = bound
@@ -61,7 +62,7 @@ def interpreted_evaluation(function: Function, examine: Callable[[BaseException]
 
 
 def python_evaluation(call: Callable[[], None], inputs: Arrays, outputs: Arrays) -> Any:
-    """Return the evaluation of Python code. An error that it raises ends the algorithm.
+    """Return an object by which algorithms in C call Python. Its errors end the algorithm.
 
     Args:
         call: reads the inputs and writes the outputs.

@@ -88,7 +88,7 @@ def with_balance(system: System, mechanism: Mechanism) -> System:
 
 
 def balance_rows(system: System, q: SX) -> list[tuple[str, list[tuple[str, Row]]]]:
-    """Return the rows of positions of the massless nodes: forces divided by typical stiffnesses.
+    """Return the force balances of undamped massless nodes, divided by typical stiffnesses.
 
     Args:
         system: a system with or without massless nodes.
@@ -98,9 +98,10 @@ def balance_rows(system: System, q: SX) -> list[tuple[str, list[tuple[str, Row]]
 
 
 def velocity_balance_rows(system: System, q: SX, v: SX) -> list[tuple[str, list[tuple[str, Row]]]]:
-    """Return the rows of velocities of the massless nodes: forces divided by typical dampings.
+    """Return the force balances of damped massless nodes, which are zero in every motion.
 
-    They are linear in v, with a constant part.
+    Each is divided by a typical damping of its node, and is linear in v with a constant part. The
+    result has the name of the group of rows, and for each row the name of the node and the value.
 
     Args:
         system: a system with or without massless nodes.

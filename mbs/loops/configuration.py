@@ -399,11 +399,13 @@ def _spring_speeds(system: System) -> list[str]:
 
 
 def node_velocities(system: System, J: Vector, q: Vector, p: Vector) -> Vector | None:
-    """(nv,) velocities of massless nodes that dampers hold while all else rests; None without any.
+    """Return velocities (nv,) of damped massless nodes if all other velocities are zero.
+
+    They solve J v + g = 0. None if the system has no such nodes.
 
     Args:
         system: any.
-        J: (m, nv) every row.
+        J: (m, nv) every row of the constraints.
         q: (nq,) positions.
         p: (np,) parameters.
     """

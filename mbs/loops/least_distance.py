@@ -57,11 +57,11 @@ def is_movable(closing: Closing, q: Vector) -> bool:
 def least_distance(closing: Closing, target: GuessTarget, starts: Iterable[Vector]) -> list[Vector]:
     """Return the configurations of least distance that are reached from some closed ones.
 
-    The distance is the sum of squares of the differences from guessed positions, lengths in sizes
-    of the mechanism. Newton's method on the constraint manifold finds its minima from each start.
-    If the distance does not determine the configuration, the sum of squares of the differences of
-    all positions is minimal among those of the same distance. Minima whose distance is equal to
-    the least one are returned.
+    The distance is the sum of squares of the differences from the guessed positions. Lengths are
+    divided by the size of the mechanism. Newton's method on the constraint manifold finds its
+    minima from each start. If the distance does not determine the configuration, the result also
+    has the least sum of squares of the differences of all positions from `target.start`. Different
+    minima are returned if their distances are within 1e-6 of the least distance.
 
     Source: Absil, Mahony and Sepulchre 2008, chapter 6, Newton's method on manifolds.
 

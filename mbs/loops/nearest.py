@@ -94,7 +94,7 @@ def nearest_configuration(closing: Closing, target: GuessTarget) -> Assembled | 
 
 
 def moved_to_guess(closing: Closing, target: GuessTarget, starts: list[Vector]) -> list[Vector]:
-    """Configurations nearest to guessed positions that are not met, from closed starts."""
+    """Return `least_distance` if no start meets the guess and loops can move; else the starts."""
     if not target.guessed:
         return starts
     missed = [q for q in starts if target.miss(closing, q) > MET]

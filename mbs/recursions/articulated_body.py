@@ -148,9 +148,9 @@ class Pivot:
     Attributes:
         direction: index (0 to 5) of the velocity in a twist [linear; angular].
         column: (6, 1) wrench of a unit acceleration, with the momentum of the rotor but without
-            the inertia of the drive.
+            the inertia that only the joint has (`RotorDrive.inertia`).
         rest: (6, 1) column of the body after the elimination. Zero without a drive.
-        size: inertia D that the velocity moves.
+        size: inertia D, the effort of a unit acceleration.
         inverse: -1 / D. The minus sign prevents CasADi from rewriting products as divisions.
         gain: (6, 1) -column / D, with a zero at `direction`.
         ratio: fraction of D due to the inertia of the drive.

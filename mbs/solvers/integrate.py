@@ -382,49 +382,49 @@ def integrate_events(
     partial: bool = False,
     prepared: Prepared | None = None,
 ) -> EventMotion:
-    """States and modes at given times of a system whose state or equations jump at events.
+    """Integrate a system with events, and return its states and modes at given times.
 
-    An event is where an indicator is not positive any more. It is located to the rounding of time,
-    the earliest first; those that fall together are handed to one jump. After a jump the state is
-    projected; an indicator that is negative, or falls from zero, asks for another jump at the same
-    time, where zero is what is smaller than atol. So it is at the first time too. Indicators and
-    their slopes are looked at twice in each step; what falls at one look and rises at the next is
-    searched for a dip below zero. What moves faster than the steps needs `approaches` in the
-    events, or max_step.
+    An event is a time at which an indicator reaches zero from above. Its time is accurate to the
+    rounding of floating-point numbers. Events at the same time cause one call of `jump`, and the
+    state is projected afterwards. An indicator that is then below -atol, or decreases from zero,
+    causes another call at the same time. The same rules apply at the first time. The integrator
+    evaluates indicators and their rates twice in each step. If a rate changes from negative to
+    positive between two evaluations, it searches for a zero between them. Indicators that change
+    faster than the steps need `approaches` in the events, or max_step.
 
-    Source: Cellier and Kofman 2006, chapter 9; Mirtich 1996 for looks by the bound of a rate.
+    Source: Cellier and Kofman 2006, chapter 9; Mirtich 1996 for steps limited by rates.
 
     Args:
-        rhs: `rhs(t, x, p) -> xdot`; p ends with the modes, here and in all functions.
+        rhs: `rhs(t, x, p) -> xdot`. The input p of all functions ends with the modes.
         x0: (nx,) state at the first time.
-        times: (m,) s, increasing; a row at the time of an event is after it.
-        events: indicators, jump and the first modes; None where there are none.
+        times: (m,) increasing times [s]. A row at the time of an event has the state after it.
+        events: indicators, jump and the first modes; None for a system without events.
         p: (np,) parameters, without the modes.
-        project: as in `integrate`, likewise the arguments below.
-        passage: as in `integrate`; it has the modes of the present too.
+        project: one Newton step onto the constraints, see `integrate`.
+        passage: functions for steps through singular configurations, see `integrate`.
         method: "dopri5" or "rodas".
-        rtol: relative tolerance of the error of one step.
-        atol: absolute tolerance of the error of one step, in the units of the states.
-        max_step: the longest step, s; only the error limits it by default.
-        stops: times at which steps end, s, in increasing order, and for each whether functions may
-            jump there as functions of time. Up to such a time they are asked before it, then
-            behind it, and a step begins anew. None when left out.
+        rtol: relative tolerance of the error of a step.
+        atol: absolute tolerance of the error of a step, in the units of the states.
+        max_step: the longest step [s]. Only the error limits steps by default.
+        stops: increasing times [s] at which steps end, and for each time whether functions of time
+            may be discontinuous there. If so, the step before uses limits from the left, the step
+            behind limits from the right, and its size is estimated again. None without such times.
         sizes: (2, nx) factors of the absolute and of the relative tolerance of each state; one if
             left out.
-        progress: called now and then with the time reached, s.
+        progress: called repeatedly with the present time [s].
         compiled: whether functions may be compiled, see `integrate`.
-        partial: True for what was reached, with its `stop`, where the integration cannot go on or
-            is interrupted by control-C; nothing is raised for that then.
-        prepared: what an earlier call made of the same functions and method, and what this one
-            makes is kept in; nothing is kept when left out.
+        partial: whether the motion up to an error or control-C is returned, with the error in
+            `EventMotion.stop`. Otherwise the error is raised.
+        prepared: store of functions of earlier calls with the same functions. Functions of this
+            call are added.
 
     Returns:
         states, modes and the list of events.
 
     Raises:
         ModelError: an argument does not fit the functions.
-        SolverError: the integration cannot go on: as in `integrate`, or the jumps at one time do
-            not come to an end, or events crowd until time stands still.
+        SolverError: the integration cannot go on, see `integrate`; or jumps at one time do not
+            end; or the times of events accumulate.
         Interrupted: control-C was pressed.
         CompilerError: the compiler that CC names does not start.
     """

@@ -142,7 +142,7 @@ def test_refusals(monkeypatch):
         function(catalogue_system("scara"), "general", branches="all")
     with pytest.raises(ModelError, match="branches is 'both'"):
         function(catalogue_system("crx10"), branches="both")
-    monkeypatch.setattr("mbs.native.compiler._KNOWN", ())
+    monkeypatch.setattr("mbs.native.compiler.COMPILERS", ())
     monkeypatch.setenv("CC", "no_such_compiler")
     with pytest.raises(CompilerError):
         function(mbs.load("crx10").assemble(), branches="all")

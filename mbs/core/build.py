@@ -37,7 +37,9 @@ _LIBRARIES = {
 """Libraries by platform. Symbols of Python come from the process, on Windows from python3.dll."""
 COMPILERS = ("cc", "gcc", "clang")
 """Commands of C compilers, in the order in which they are looked for."""
-ZIG = (sys.executable, "-m", "ziglang", "cc")
+ZIG = (sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline")
+"""Command of the compiler in ziglang. Without -mcpu, it uses instructions of this processor only,
+which end a process on an older processor."""
 """Command of the C compiler in the package ziglang."""
 
 

@@ -36,6 +36,7 @@ LIBRARY_SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 _ZIG = (
     *ZIG,
+    "-g0",  # debug data contain names of temporary folders, which differ in each build
     # at -O0, zig adds checks of undefined behaviour, with which values differ in the last bits
     "-fno-sanitize=all",
     "-Wno-unused-command-line-argument",

@@ -22,6 +22,7 @@ from mbs.errors import ExportError
 from mbs.native import find_compiler
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion")
+STRICT += ("-Wno-strict-prototypes",)  # the header of FMI 3 has function types without prototypes
 CORTEX = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
 HEAP = {"malloc", "calloc", "realloc", "free"}
 NEEDED = {"sin", "cos", "sqrt", "pow", "fabs", "fmax", "fmin", "floor", "rint", "atan2"}

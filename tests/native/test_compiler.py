@@ -1,8 +1,11 @@
+import importlib.util
+import platform
+import shlex
 import subprocess
 
 import pytest
 
-from mbs.core.build import SOURCE
+from mbs.core.build import SOURCE, ZIG
 from mbs.errors import CompilerError
 from mbs.native import compile_library, compiler_found, find_compiler
 from mbs.native.compiler import FLAGS, chosen_flags, flags_for
@@ -15,7 +18,7 @@ def test_a_compiler_is_found():
 
 
 def test_cc_is_obeyed(monkeypatch):
-    monkeypatch.setenv("CC", "gcc -m64")
+    monkeypatch.setenv("CC", shlex.join([*find_compiler().command, "-m64"]))
     assert find_compiler().command[-1] == "-m64"
 
 
@@ -64,10 +67,23 @@ LIBRARY = sorted(file for file in SOURCE.glob("*.c") if file.stem not in PYTHON)
 
 
 def test_the_runtime_is_clean_c99(tmp_path):
-    strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wvla", "-Werror", "-fsyntax-only"]
+    strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wvla", "-Werror", "-c"]
     command = [*find_compiler().command, *strict, *map(str, LIBRARY)]
-    answer = subprocess.run(command, capture_output=True, text=True)
+    answer = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert answer.returncode == 0, answer.stderr
+
+
+@pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="no ziglang")
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="registers of x86-64")
+def test_ziglang_uses_no_instructions_of_this_processor_only(tmp_path):
+    (tmp_path / "sum.c").write_text(
+        "void f(double *x, const double *y) { for (int i = 0; i < 64; i++) x[i] += y[i]; }"
+    )
+    subprocess.run([*ZIG, "-O3", "-S", "sum.c", "-o", "sum.s"], cwd=tmp_path, check=True)
+    text = (tmp_path / "sum.s").read_text()
+    assert "xmm" in text
+    assert "ymm" not in text
+    assert "zmm" not in text
 
 
 def test_long_code_is_optimized_less():

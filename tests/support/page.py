@@ -1,9 +1,9 @@
 """Runs the Python blocks of a page, in order, in the current folder.
 
-A program for any Python that has mbs: `python page.py PAGE [REFUSED [CODE]]`. REFUSED are names of
-modules between commas, which cannot be imported: those of `absent(extras)` are what an installation
-with these extras alone would not have, so that an environment with every tool stands for it. CODE
-runs after the page, with its names.
+A program for any Python that has mbs: `python page.py PAGE [HIDDEN [CODE]]`. HIDDEN lists modules
+between commas, which the page cannot import. `absent(extras)` lists the modules that an
+installation with some extras does not have. With them, an environment with all tools represents
+that installation. CODE runs after the page, with the names of the page.
 """
 
 import importlib.metadata
@@ -11,8 +11,9 @@ import re
 import sys
 from collections.abc import Iterable, Mapping
 from functools import cache
-from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec
 from pathlib import Path
+from typing import Any
 
 PROGRAM = Path(__file__)
 DISTRIBUTION = "casadi-mbs"
@@ -84,21 +85,26 @@ def _provided() -> Mapping[str, list[str]]:
     return importlib.metadata.packages_distributions()
 
 
-class Absent(MetaPathFinder):
-    """Refuses to import some modules."""
+class Hiding:
+    """A finder of modules that does not find some of them."""
 
-    def __init__(self, modules: Iterable[str]) -> None:
-        self.modules = frozenset(modules)
+    def __init__(self, finder: Any, modules: Iterable[str]) -> None:
+        self._finder = finder
+        self._modules = frozenset(modules)
 
-    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
-        """Not there, as Python itself says it."""
-        if name.partition(".")[0] in self.modules:
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._finder, name)
+
+    def find_spec(self, name: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
+        """Return the place of a module, or None if the module is hidden or not installed."""
+        if name.partition(".")[0] in self._modules:
+            return None
+        return self._finder.find_spec(name, path, target)
 
 
-def main(page: str, refused: str = "", code: str = "") -> None:
+def main(page: str, hidden: str = "", code: str = "") -> None:
     """Run a page."""
-    sys.meta_path.insert(0, Absent(refused.split(",")))
+    sys.meta_path[:] = [Hiding(finder, hidden.split(",")) for finder in sys.meta_path]
     names: dict[str, object] = {"__name__": "__main__"}
     run(Path(page), names)
     exec(code, names)

@@ -20,8 +20,9 @@ import casadi
 from casadi import SX, Function
 
 import mbs
+from mbs import Mechanism
 from mbs.assembly import System
-from mbs.components import Body, Mechanism, Revolute
+from mbs.components import Body, Revolute
 from mbs.models import inverse_dynamics, inverse_dynamics_derivatives
 from mbs.operations import count
 

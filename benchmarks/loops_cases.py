@@ -13,8 +13,8 @@ import loops_references as references
 import numpy as np
 from plain_mechanism import PlainMechanism, plain
 
+from mbs import Mechanism
 from mbs.assembly import System
-from mbs.components import Mechanism
 from mbs.loops.configuration import start
 from mbs.models import transform
 from mbs.models.state.signals import effort_function

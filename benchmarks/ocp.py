@@ -33,7 +33,8 @@ from ocp_problems import (
 from robots import panda_like, urdf
 
 import mbs
-from mbs.components import Body, Mechanism, Revolute
+from mbs import Mechanism
+from mbs.components import Body, Revolute
 from mbs.native import compiled
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import pi
 from typing import Any
 
-from mbs.components import Mechanism
+from mbs import Mechanism
 from mbs.formats import from_dict, to_mechanism
 
 Row = dict[str, Any]

@@ -29,14 +29,14 @@ if TYPE_CHECKING:
         view,
     )
     from mbs.assembly import System
-    from mbs.components import Mechanism
     from mbs.errors import MbsError
     from mbs.expressions import Parameter
+    from mbs.mechanism import Mechanism
     from mbs.result import Result, State
     from mbs.robots import load
 
 _NAMES = {
-    "Mechanism": "mbs.components",
+    "Mechanism": "mbs.mechanism",
     "MbsError": "mbs.errors",
     "Parameter": "mbs.expressions",
     "Result": "mbs.result",

@@ -18,13 +18,13 @@ from dataclasses import dataclass, replace
 
 from casadi import SX
 
-from mbs.assembly.parts import as_fast, number_or_sx
+from mbs.assembly.parts import FlangeTurn, as_fast, number_or_sx
 from mbs.components import (
     Component,
     Coupling,
+    Description,
     IdealGear,
     Joint,
-    Mechanism,
     Point,
     Prismatic,
     Revolute,
@@ -40,7 +40,7 @@ from mbs.expressions import Expression, Number, Scalar, expression, to_float, to
 # What is refused in a drive line, and the errors that say so.
 
 
-def check_flanges(mechanism: Mechanism, parts: Sequence[Custom]) -> None:
+def check_flanges(mechanism: Description, parts: Sequence[Custom]) -> None:
     """Refuse flanges that are connected to nothing, or shafts that are connected to sliding parts.
 
     Raises:
@@ -71,7 +71,9 @@ def _slides(flange: Flange) -> bool | None:
     return isinstance(owner, Joint) and owner.freedoms[0].motion is Motion.PRISMATIC
 
 
-def _check_sliding(mechanism: Mechanism, start: Flange, joined: dict[Flange, list[Flange]]) -> None:
+def _check_sliding(
+    mechanism: Description, start: Flange, joined: dict[Flange, list[Flange]]
+) -> None:
     """Whatever is connected to a flange that slides must slide, or be the end of a gear."""
     seen, queue = {start}, deque([start])
     while queue:
@@ -90,7 +92,9 @@ def _check_sliding(mechanism: Mechanism, start: Flange, joined: dict[Flange, lis
 
 
 def _fixed_flanges(
-    mechanism: Mechanism, parts: Iterable[Custom], ties: Mapping[Key, list[tuple[Key, Expression]]]
+    mechanism: Description,
+    parts: Iterable[Custom],
+    ties: Mapping[Key, list[tuple[Key, Expression]]],
 ) -> dict[Key, FlangeTurn]:
     """The flanges that are fixed, which are those of the housing.
 
@@ -117,7 +121,7 @@ def _fixed_flanges(
 
 
 def ring_of_gears(
-    mechanism: Mechanism, key: tuple[str, str], first: Expression, second: Expression
+    mechanism: Description, key: tuple[str, str], first: Expression, second: Expression
 ) -> AssemblyError:
     """Gears that form a ring and do not agree."""
     return AssemblyError(
@@ -126,7 +130,7 @@ def ring_of_gears(
     )
 
 
-def inertia_missing(mechanism: Mechanism, flanges: Sequence[Flange]) -> AssemblyError:
+def inertia_missing(mechanism: Description, flanges: Sequence[Flange]) -> AssemblyError:
     """Flanges that move without any inertia."""
     names = ", ".join(str(flange) for flange in flanges)
     verb, part = ("slide", "SlidingMass") if _slides(flanges[0]) else ("turn", "ShaftInertia")
@@ -136,7 +140,7 @@ def inertia_missing(mechanism: Mechanism, flanges: Sequence[Flange]) -> Assembly
     )
 
 
-def same_shaft(mechanism: Mechanism, part: ShaftForce) -> AssemblyError:
+def same_shaft(mechanism: Description, part: ShaftForce) -> AssemblyError:
     """An elastic part between flanges that are rigidly connected."""
     return AssemblyError(
         f"{mechanism.name}: both flanges of {type(part).__name__} {part.name!r} are on one rigid"
@@ -155,14 +159,6 @@ _GOLDEN = (5**0.5 - 1) / 2
 """The golden ratio: multiples of it modulo one are irregular."""
 
 
-@dataclass(frozen=True, slots=True)
-class FlangeTurn:
-    """The rotation of a flange: `factor` times the coordinate; without one it is fixed."""
-
-    coordinate: str
-    factor: Expression
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class DriveLine:
     """A mechanism without flanges, and what became of them.
@@ -174,13 +170,13 @@ class DriveLine:
         links: for each coordinate that is no joint's, the part whose angle it is.
     """
 
-    mechanism: Mechanism
+    mechanism: Description
     turns: Mapping[Key, FlangeTurn]
     parts: tuple[Custom, ...]
     links: Mapping[str, str]
 
 
-def drive_line(mechanism: Mechanism) -> DriveLine:
+def drive_line(mechanism: Description) -> DriveLine:
     """The mechanism with its drive lines lowered to joints, couplings and forces.
 
     Raises:
@@ -205,7 +201,7 @@ def drive_line(mechanism: Mechanism) -> DriveLine:
 
 
 def _flange_rotations(
-    mechanism: Mechanism, parts: tuple[Custom, ...]
+    mechanism: Description, parts: tuple[Custom, ...]
 ) -> tuple[dict[str, Flange], dict[Key, FlangeTurn]]:
     """The reference flange of each rigid group, by its coordinate's name, and all rotations."""
     ties = _ties(mechanism, parts)
@@ -233,7 +229,7 @@ def _flange_rotations(
     return references, turns
 
 
-def _generic(mechanism: Mechanism) -> dict[str, float]:
+def _generic(mechanism: Description) -> dict[str, float]:
     """The values of parameters; for one without any a number that fulfils no rule by chance."""
     return {
         p.name: 1 + number * _GOLDEN % 1 if p.default is None else p.default
@@ -241,7 +237,7 @@ def _generic(mechanism: Mechanism) -> dict[str, float]:
     }
 
 
-def _candidates(mechanism: Mechanism, parts: tuple[Custom, ...]) -> Iterator[tuple[str, Flange]]:
+def _candidates(mechanism: Description, parts: tuple[Custom, ...]) -> Iterator[tuple[str, Flange]]:
     """Flanges whose angle may be the coordinate of a group, the best ones first."""
     used = {flange.owner.name for pair in mechanism.shafts for flange in pair}
     joints = [joint for joint in mechanism.joints() if joint.name in used]
@@ -256,7 +252,7 @@ def _candidates(mechanism: Mechanism, parts: tuple[Custom, ...]) -> Iterator[tup
 
 
 def _ties(
-    mechanism: Mechanism, parts: tuple[Custom, ...]
+    mechanism: Description, parts: tuple[Custom, ...]
 ) -> dict[Key, list[tuple[Key, Expression]]]:
     """For each flange those that rotate with it, and their angles per angle of it."""
     ties: dict[Key, list[tuple[Key, Expression]]] = {}
@@ -295,7 +291,7 @@ def _equal(a: Expression, b: Expression, values: Mapping[str, float]) -> bool:
 
 
 def _group_joint(
-    mechanism: Mechanism,
+    mechanism: Description,
     name: str,
     reference: Flange,
     parts: Iterable[Custom],
@@ -321,8 +317,8 @@ def _group_joint(
 
 
 def _lower(
-    mechanism: Mechanism, changed: Mapping[str, Joint], turns: Mapping[Key, FlangeTurn]
-) -> Mechanism:
+    mechanism: Description, changed: Mapping[str, Joint], turns: Mapping[Key, FlangeTurn]
+) -> Description:
     """The mechanism with the joints of the groups, couplings to the others, and forces."""
     result = _with_joints(mechanism, changed)
     joints = {joint.name: joint for joint in mechanism.joints()}
@@ -343,7 +339,7 @@ def _lower(
     return result
 
 
-def _with_joints(mechanism: Mechanism, joints: Mapping[str, Joint]) -> Mechanism:
+def _with_joints(mechanism: Description, joints: Mapping[str, Joint]) -> Description:
     """A copy of the mechanism in which these joints stand for those of the same name."""
 
     def point(old: Point) -> Point:
@@ -364,7 +360,7 @@ def _with_joints(mechanism: Mechanism, joints: Mapping[str, Joint]) -> Mechanism
 
 
 def _levers(
-    mechanism: Mechanism, part: ShaftForce, turns: Mapping[Key, FlangeTurn]
+    mechanism: Description, part: ShaftForce, turns: Mapping[Key, FlangeTurn]
 ) -> tuple[tuple[str, Expression], ...]:
     levers = []
     for flange, share in part.shares:

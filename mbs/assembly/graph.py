@@ -13,7 +13,7 @@ import casadi
 import numpy as np
 from casadi import SX
 
-from mbs.components import Component, Fixed, Joint, Mechanism, Point, RigidBody
+from mbs.components import Component, Description, Fixed, Joint, Point, RigidBody
 from mbs.components.component import KhalilStep
 from mbs.components.couplings import Transmission
 from mbs.errors import AssemblyError
@@ -75,7 +75,7 @@ class BodyGraph:
 
 
 def connection_graph(
-    mechanism: Mechanism, symbols: Mapping[str, SX], values: Mapping[str, float]
+    mechanism: Description, symbols: Mapping[str, SX], values: Mapping[str, float]
 ) -> BodyGraph:
     """The graph of a mechanism.
 
@@ -111,7 +111,7 @@ def connection_graph(
     return BodyGraph(tuple(nodes), edges, _size(len(nodes), edges, at))
 
 
-def _check_transmissions(mechanism: Mechanism) -> None:
+def _check_transmissions(mechanism: Description) -> None:
     """Refuse a gear, rack or screw between coordinates of other kinds than it needs."""
     motions = {
         freedom.coordinate_of(joint.name): freedom.motion
@@ -131,7 +131,7 @@ def _check_transmissions(mechanism: Mechanism) -> None:
                     )
 
 
-def inertia_of(node: BodyNode, mechanism: Mechanism, symbols: Mapping[str, SX]) -> Inertia:
+def inertia_of(node: BodyNode, mechanism: Description, symbols: Mapping[str, SX]) -> Inertia:
     """Inertia of all bodies of a node about the origin of its frame."""
     total = Inertia.zero()
     for (name, _), pose in node.members.items():
@@ -141,12 +141,12 @@ def inertia_of(node: BodyNode, mechanism: Mechanism, symbols: Mapping[str, SX]) 
     return total
 
 
-def is_weld(mechanism: Mechanism, joint: Joint) -> bool:
+def is_weld(mechanism: Description, joint: Joint) -> bool:
     """Whether a joint makes one rigid body of what it connects."""
     return isinstance(joint, Fixed) and joint.name not in mechanism.cuts
 
 
-def _ports(mechanism: Mechanism) -> Iterator[Port]:
+def _ports(mechanism: Description) -> Iterator[Port]:
     yield mechanism.world.name, ""
     yield from ((body.name, "") for body in mechanism.bodies())
     for joint in mechanism.joints():
@@ -157,7 +157,9 @@ def _ports(mechanism: Mechanism) -> Iterator[Port]:
 Weld = tuple[Port, Pose, Point]
 
 
-def _welds(mechanism: Mechanism, symbols: Mapping[str, SX]) -> dict[Port, list[tuple[Port, Pose]]]:
+def _welds(
+    mechanism: Description, symbols: Mapping[str, SX]
+) -> dict[Port, list[tuple[Port, Pose]]]:
     """For each port, the ports welded to it and where they are, seen from it."""
     welds: dict[Port, list[tuple[Port, Pose]]] = {port: [] for port in _ports(mechanism)}
 
@@ -174,7 +176,9 @@ def _welds(mechanism: Mechanism, symbols: Mapping[str, SX]) -> dict[Port, list[t
     return welds
 
 
-def _require_connected(mechanism: Mechanism, welds: Mapping[Port, list[tuple[Port, Pose]]]) -> None:
+def _require_connected(
+    mechanism: Description, welds: Mapping[Port, list[tuple[Port, Pose]]]
+) -> None:
     for (name, side), neighbours in welds.items():
         if not neighbours and name != mechanism.world.name:
             component: Component = mechanism.components[name]
@@ -235,7 +239,7 @@ def _require_same_place(port: Port, first: Pose, second: Pose, at: _Evaluator) -
 
 
 def _edge(
-    mechanism: Mechanism,
+    mechanism: Description,
     joint: Joint,
     nodes: list[BodyNode],
     home: Mapping[Port, int],
@@ -273,7 +277,7 @@ def _size(nodes: int, edges: Sequence[Edge], at: _Evaluator) -> float:
 
 
 def _given_khalil(
-    mechanism: Mechanism, joint: Joint, node: BodyNode, symbols: Mapping[str, SX]
+    mechanism: Description, joint: Joint, node: BodyNode, symbols: Mapping[str, SX]
 ) -> Khalil | None:
     """The Khalil parameters that place frame_a on the frame of its node, if written as such."""
     for a, b in mechanism.connections:

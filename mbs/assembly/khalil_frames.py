@@ -20,7 +20,7 @@ from casadi import DM, SX
 
 from mbs.assembly.graph import BodyGraph, Branch, Edge, SpanningTree, inertia_of
 from mbs.assembly.tree import CarriedRotor, Frame, Link, Tree
-from mbs.components import Mechanism
+from mbs.components import Description
 from mbs.components.joints import Freedom, Motion
 from mbs.expressions import to_sx
 from mbs.spatial import Inertia, Khalil, MatrixRotation, Pose, align_z, exact_product, frames_to
@@ -119,7 +119,7 @@ class _Chosen:
 
 
 def khalil_frames(
-    mechanism: Mechanism, graph: BodyGraph, spanning: SpanningTree, symbols: Mapping[str, SX]
+    mechanism: Description, graph: BodyGraph, spanning: SpanningTree, symbols: Mapping[str, SX]
 ) -> Framed:
     """Number the links, place their frames and gather their inertias.
 

@@ -34,15 +34,15 @@ from mbs.assembly.tables import (
     velocity_coordinates,
 )
 from mbs.assembly.tree import zero_position
-from mbs.components import Box, Component, Cylinder, Free, Joint, Mechanism
+from mbs.components import Box, Component, Cylinder, Description, Free, Joint
 from mbs.components.bodies import Mount, RigidBody
-from mbs.components.mechanism import OUTER_WORLD
+from mbs.components.description import OUTER_WORLD
 from mbs.errors import AssemblyError
 from mbs.expressions import Parameter, expression, to_float, to_sx
 from mbs.spatial import Pose
 
 
-def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
+def open_system(mechanism: Description, guessed: Collection[str] = ()) -> System:
     """Tree, cuts and tables of a mechanism, its loops still open.
 
     Args:
@@ -135,7 +135,7 @@ def _trial_values(parameters: Sequence[Parameter]) -> dict[str, float]:
     }
 
 
-def _check_names(mechanism: Mechanism, coordinates: Sequence[Coordinate]) -> None:
+def _check_names(mechanism: Description, coordinates: Sequence[Coordinate]) -> None:
     names = [coordinate.name for coordinate in coordinates]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -144,7 +144,7 @@ def _check_names(mechanism: Mechanism, coordinates: Sequence[Coordinate]) -> Non
         )
 
 
-def _owners(mechanism: Mechanism, coordinates: Collection[str]) -> set[str]:
+def _owners(mechanism: Description, coordinates: Collection[str]) -> set[str]:
     """The joints that have one of these coordinates."""
     return {
         joint.name
@@ -171,14 +171,14 @@ def _looped_joints(framed: Framed) -> set[str]:
     return {name for cut in framed.cuts for name in _loop_joints(framed, cut)}
 
 
-def _driven_joints(mechanism: Mechanism) -> set[str]:
+def _driven_joints(mechanism: Description) -> set[str]:
     """The joints that follow another one through a coupling."""
     driven = [coupling.driven for coupling in mechanism.couplings()]
     return _owners(mechanism, driven)
 
 
 def _loop_rows(
-    mechanism: Mechanism, framed: Framed, parts: Sequence[AttachedPart]
+    mechanism: Description, framed: Framed, parts: Sequence[AttachedPart]
 ) -> tuple[LoopRow, ...]:
     loops = [
         LoopRow(
@@ -218,7 +218,7 @@ def _cut_coordinates(cuts: Sequence[Cut]) -> tuple[Coordinate, ...]:
     return tuple(rows)
 
 
-def _bodies(mechanism: Mechanism, graph: BodyGraph, framed: Framed) -> tuple[BodyRow, ...]:
+def _bodies(mechanism: Description, graph: BodyGraph, framed: Framed) -> tuple[BodyRow, ...]:
     """The moving bodies, in the order in which their links are numbered."""
     homes = {
         name: framed.homes[number][0]
@@ -253,7 +253,7 @@ def _places(graph: BodyGraph, framed: Framed) -> Places:
 
 
 def _frames(
-    mechanism: Mechanism, places: Places, symbols: Mapping[str, SX]
+    mechanism: Description, places: Places, symbols: Mapping[str, SX]
 ) -> dict[str, tuple[int, Pose]]:
     """The base, every body's reference frame, and every frame that was given a name."""
     frames = {"base": places[mechanism.world.name, ""]}
@@ -279,7 +279,7 @@ def _frames(
 
 
 def _shapes(
-    mechanism: Mechanism, places: Places, symbols: Mapping[str, SX]
+    mechanism: Description, places: Places, symbols: Mapping[str, SX]
 ) -> tuple[ShapeRow, ...]:
     rows = []
     for point, shape in mechanism.shapes:
@@ -289,7 +289,7 @@ def _shapes(
 
 
 def _number(
-    mechanism: Mechanism, frames: Mapping[str, tuple[int, Pose]], links: int
+    mechanism: Description, frames: Mapping[str, tuple[int, Pose]], links: int
 ) -> dict[int, str]:
     """The bodies of the frames of a table, where their numbers are not those of the links."""
     same = len(mechanism.numbered) == links and all(
@@ -300,7 +300,7 @@ def _number(
 
 
 def _couplings(
-    mechanism: Mechanism, coordinates: Sequence[Coordinate], symbols: Mapping[str, SX]
+    mechanism: Description, coordinates: Sequence[Coordinate], symbols: Mapping[str, SX]
 ) -> tuple[CoordinateCoupling, ...]:
     numbers = {coordinate.name: number for number, coordinate in enumerate(coordinates)}
     result = []

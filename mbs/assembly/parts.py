@@ -5,27 +5,31 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import casadi
 from casadi import SX
 
 from mbs.assembly.tables import EFFORT_UNIT, AttachedSensor, Coordinate, Places, require_part
 from mbs.assembly.tree import Frame
-from mbs.components import Custom, JointSensor, Mechanism, Prismatic, Revolute
+from mbs.components import Custom, Description, JointSensor, Prismatic, Revolute
 from mbs.components.bodies import Mount
 from mbs.components.custom import EFFORT, port_of_flange
 from mbs.errors import AssemblyError
-from mbs.expressions import Scalar, to_sx
+from mbs.expressions import Expression, Scalar, to_sx
 from mbs.text import did_you_mean, listed
 from mbs.units import UNITS
-
-if TYPE_CHECKING:
-    from mbs.assembly.drive_line import FlangeTurn
 
 _Rows = Sequence[Coordinate]
 Quantity = tuple[str, str]
 """Full name and unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlangeTurn:
+    """Rotation of a flange: `factor` times the coordinate. A flange without coordinate is fixed."""
+
+    coordinate: str
+    factor: Expression
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,12 +174,12 @@ def as_fast(factor: float | SX, coordinate: str) -> str:
     return f"{text} times as fast as {coordinate}"
 
 
-def parts_of(mechanism: Mechanism) -> list[Custom]:
+def parts_of(mechanism: Description) -> list[Custom]:
     """Every component by its equations, in the order added."""
     return [c for c in mechanism.components.values() if isinstance(c, Custom) and c.has_equations]
 
 
-def with_unknowns(mechanism: Mechanism) -> Mechanism:
+def with_unknowns(mechanism: Description) -> Description:
     """The mechanism with a coordinate for every unknown: a joint that moves nothing."""
     unknowns = [
         (f"{part.name}.{name}", part.declared[name].unit)
@@ -194,7 +198,7 @@ def with_unknowns(mechanism: Mechanism) -> Mechanism:
     return result
 
 
-def guesses_of_unknowns(mechanism: Mechanism) -> dict[str, float]:
+def guesses_of_unknowns(mechanism: Description) -> dict[str, float]:
     """Where assembling looks for the unknowns, by the names of their coordinates."""
     return {
         f"{part.name}.{name}": float(getattr(part, name))
@@ -204,7 +208,7 @@ def guesses_of_unknowns(mechanism: Mechanism) -> dict[str, float]:
 
 
 def coordinates_needed(
-    mechanism: Mechanism, turns: Mapping[tuple[str, str], FlangeTurn]
+    mechanism: Description, turns: Mapping[tuple[str, str], FlangeTurn]
 ) -> list[str]:
     """The coordinates that components by their equations refer to, also along wires.
 
@@ -225,7 +229,7 @@ def coordinates_needed(
 
 
 def attached_parts(
-    mechanism: Mechanism,
+    mechanism: Description,
     places: Places,
     tables: tuple[_Rows, _Rows, _Rows],
     symbols: Mapping[str, SX],
@@ -254,7 +258,7 @@ def attached_parts(
 
 
 def _attached(
-    mechanism: Mechanism,
+    mechanism: Description,
     part: Custom,
     places: Places,
     tables: tuple[_Rows, _Rows, _Rows],
@@ -343,7 +347,7 @@ def _lever(part: Custom, name: str, factor: SX, tables: tuple[_Rows, _Rows, _Row
 
 
 def _wires(
-    mechanism: Mechanism, sensors: Sequence[AttachedSensor]
+    mechanism: Description, sensors: Sequence[AttachedSensor]
 ) -> dict[tuple[str, str], WireSource]:
     """The source of every input that is wired, by component and name.
 

@@ -21,7 +21,7 @@ from mbs.assembly.graph import Port, is_weld
 from mbs.assembly.khalil_frames import Framed
 from mbs.assembly.tables import Places
 from mbs.assembly.tree import Frame, Tree
-from mbs.components import Mechanism
+from mbs.components import Description
 from mbs.components.component import (
     ElementaryRotation,
     FixedRotation,
@@ -47,7 +47,7 @@ _FUNCTIONS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt, "ata
 
 
 def prove(
-    mechanism: Mechanism,
+    mechanism: Description,
     framed: Framed,
     places: Places,
     symbols: Mapping[str, SX],
@@ -110,7 +110,7 @@ def _positions(rng: np.random.Generator, motion: Motion, samples: int) -> Array:
 
 
 def _describe(
-    mechanism: Mechanism, framed: Framed, known: Mapping[str, Array], q: Mapping[str, Array]
+    mechanism: Description, framed: Framed, known: Mapping[str, Array], q: Mapping[str, Array]
 ) -> dict[tuple[str, str], Array]:
     """Where every body and joint stands in the world, and the free ends of kept cut joints."""
     ways: dict[Port, list[tuple[Port, Callable[[], Array]]]] = {}

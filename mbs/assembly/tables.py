@@ -16,8 +16,8 @@ from mbs.components import (
     Box,
     Component,
     Cylinder,
+    Description,
     Joint,
-    Mechanism,
     Point,
     RigidBody,
 )
@@ -330,7 +330,7 @@ class JointRow:
 
 
 def joint_rows(
-    mechanism: Mechanism, places: Places, cuts: Sequence[Cut], symbols: Mapping[str, SX]
+    mechanism: Description, places: Places, cuts: Sequence[Cut], symbols: Mapping[str, SX]
 ) -> tuple[JointRow, ...]:
     """Every joint in the order added, without those that close a ring of welds.
 
@@ -355,7 +355,7 @@ def joint_rows(
 
 
 def _part(
-    mechanism: Mechanism, joint: Joint, places: Places, symbols: Mapping[str, SX]
+    mechanism: Description, joint: Joint, places: Places, symbols: Mapping[str, SX]
 ) -> WeldedPart | None:
     """The side of a weld that is not the world; None where both sides are welded elsewhere."""
     sides = {port: _weld(mechanism, joint, port) for port in "ab"}
@@ -373,7 +373,7 @@ def _part(
     return WeldedPart(frozenset(sides[side]), inertia, sign)
 
 
-def _weld(mechanism: Mechanism, joint: Joint, port: str) -> list[Port]:
+def _weld(mechanism: Description, joint: Joint, port: str) -> list[Port]:
     """What is welded to one frame of a joint other than through the joint, in the order found."""
     found: dict[Port, None] = {(joint.name, port): None}
     queue = deque(found)
@@ -386,7 +386,7 @@ def _weld(mechanism: Mechanism, joint: Joint, port: str) -> list[Port]:
     return list(found)
 
 
-def _neighbours(mechanism: Mechanism, without: Joint, port: Port) -> Iterator[Port]:
+def _neighbours(mechanism: Description, without: Joint, port: Port) -> Iterator[Port]:
     for a, b in mechanism.connections:
         ends = (a.owner.name, a.port), (b.owner.name, b.port)
         if port in ends:
@@ -435,7 +435,7 @@ class CoordinateCoupling:
 # Where the sensors of a mechanism are, and how what they read is named.
 
 
-def require_part(mechanism: Mechanism, component: Component, point: Point, does: str) -> None:
+def require_part(mechanism: Description, component: Component, point: Point, does: str) -> None:
     """Refuse a point of something that is not in the mechanism.
 
     Raises:
@@ -501,13 +501,13 @@ class AttachedSensor:
         )
 
 
-def sensors_of(mechanism: Mechanism) -> Iterator[Sensor]:
+def sensors_of(mechanism: Description) -> Iterator[Sensor]:
     """Every sensor, in the order added."""
     return (c for c in mechanism.components.values() if isinstance(c, Sensor))
 
 
 def attached_sensors(
-    mechanism: Mechanism,
+    mechanism: Description,
     places: Places,
     joints: Sequence[JointRow],
     tables: tuple[Sequence[Coordinate], ...],
@@ -538,7 +538,7 @@ def attached_sensors(
 
 
 def _on_points(
-    mechanism: Mechanism, sensor: Sensor, places: Places, symbols: Mapping[str, SX]
+    mechanism: Description, sensor: Sensor, places: Places, symbols: Mapping[str, SX]
 ) -> AttachedSensor:
     frames = []
     for point in sensor.points:
@@ -555,7 +555,9 @@ def _on_points(
     return AttachedSensor(sensor, tuple(frames), "", None, sensor.measured, where)
 
 
-def _on_joint(mechanism: Mechanism, sensor: OnJoint, joints: Sequence[JointRow]) -> AttachedSensor:
+def _on_joint(
+    mechanism: Description, sensor: OnJoint, joints: Sequence[JointRow]
+) -> AttachedSensor:
     names = [row.name for row in joints]
     if sensor.joint not in names:
         known = {joint.name for joint in mechanism.joints()}

@@ -41,6 +41,7 @@ from mbs.components.curves import (
     PointOnCurve,
 )
 from mbs.components.custom import Custom, Flange
+from mbs.components.description import Description, Placed
 from mbs.components.drives import (
     BLDCMotor,
     DCMotor,
@@ -95,7 +96,6 @@ from mbs.components.joints import (
     Spherical,
     Universal,
 )
-from mbs.components.mechanism import Mechanism, Placed
 from mbs.components.motion_joint import MotionJoint
 from mbs.components.notes import Note
 from mbs.components.ropes import (
@@ -145,6 +145,9 @@ from mbs.components.translational import (
     SlidingSpring,
 )
 from mbs.components.wheels import WheelSet
+from mbs.deprecation import moved
+
+__getattr__ = moved(__name__, {"Mechanism": "mbs.Mechanism"})
 
 __all__ = [
     "PI",
@@ -173,6 +176,7 @@ __all__ = [
     "Cylindrical",
     "DCMotor",
     "Damper",
+    "Description",
     "DistanceSensor",
     "ElasticGear",
     "ElasticRope",
@@ -209,7 +213,6 @@ __all__ = [
     "Limiter",
     "LineForceInput",
     "LossyGear",
-    "Mechanism",
     "MotionJoint",
     "Note",
     "OneWayClutch",

@@ -34,7 +34,7 @@ from mbs.spatial import align_z, nearest_rotation
 from mbs.text import did_you_mean, quoted
 
 if TYPE_CHECKING:
-    from mbs.components.mechanism import Mechanism
+    from mbs.components.description import Description
 
 _AGREE = 1e-9
 """How far a coupling may be off between two locked joints [rad or m]; files have 10 digits."""
@@ -52,7 +52,7 @@ class _Locks:
         changed: couplings of more than two coordinates, as they are among those that are left.
     """
 
-    mechanism: Mechanism
+    mechanism: Description
     positions: dict[str, tuple[Expression, ...]] = field(default_factory=dict)
     values: dict[str, Expression] = field(default_factory=dict)
     gone: set[str] = field(default_factory=set)
@@ -183,7 +183,7 @@ def _polynomial(coupling: Coupling, driver: Expression) -> Expression:
     return value if number is None else Number(number)
 
 
-def lock(mechanism: Mechanism, positions: Mapping[str, Any]) -> None:
+def lock(mechanism: Description, positions: Mapping[str, Any]) -> None:
     """Weld joints of a mechanism at positions; see `Mechanism.lock`."""
     locks = _Locks(mechanism)
     for name, given in positions.items():
@@ -227,7 +227,7 @@ def _acts_on(component: Component, coordinates: Mapping[str, Expression]) -> boo
     )
 
 
-def _require_free_of_others(mechanism: Mechanism, locks: _Locks) -> None:
+def _require_free_of_others(mechanism: Description, locks: _Locks) -> None:
     """Refuse to lock joints that sensors read, drive lines move, or tendons share with others."""
     driven = {flange.owner.name for pair in mechanism.shafts for flange in pair}
     for name in locks.positions:
@@ -264,7 +264,7 @@ def _with_points(component: Component, reattach: Any) -> Component:
     return with_points(component, reattach) if isinstance(component, OnPoints) else component
 
 
-def _steps(mechanism: Mechanism, name: str, values: Sequence[Expression]) -> tuple[Step, ...]:
+def _steps(mechanism: Description, name: str, values: Sequence[Expression]) -> tuple[Step, ...]:
     """Frame_b seen from frame_a of a joint at a position."""
     joint = mechanism.components[name]
     assert isinstance(joint, Joint)
@@ -332,7 +332,7 @@ FREE_JOINT = "root_joint"
 """Name of the joint of a free root, as pinocchio has it; it has coordinates root_joint.x, .qw .."""
 
 
-def free_root(mechanism: Mechanism) -> None:
+def free_root(mechanism: Description) -> None:
     """Put a Free joint where one body is welded to the world; nothing where one is there already.
 
     Args:
@@ -358,7 +358,7 @@ def free_root(mechanism: Mechanism) -> None:
     mechanism.connect(a, Free(FREE_JOINT, actuated=False), b)
 
 
-def fix_root(mechanism: Mechanism) -> None:
+def fix_root(mechanism: Description) -> None:
     """Lock the Free joints on the world where the guess has them, or else at zero."""
     positions = {}
     for joint, forward in _free_joints(mechanism):
@@ -377,7 +377,7 @@ def _inverse(values: Sequence[float]) -> list[float]:
     return [*map(float, p), w, -x, -y, -z]
 
 
-def _free_joints(mechanism: Mechanism) -> list[tuple[str, bool]]:
+def _free_joints(mechanism: Description) -> list[tuple[str, bool]]:
     """The Free joints on the world or on what is welded to it, and whether by their frame_a."""
     neighbours: dict[str, list[str]] = {}
     for a, b in mechanism.connections:

@@ -21,7 +21,6 @@ from mbs.components import (
     Damper,
     Fixed,
     FixedTendon,
-    Mechanism,
     Revolute,
     Rod,
     Spherical,
@@ -37,6 +36,7 @@ from mbs.export.robot_files import (
     write_xml,
 )
 from mbs.expressions import to_sx
+from mbs.mechanism import Mechanism
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose
 

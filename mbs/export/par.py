@@ -13,7 +13,6 @@ from casadi import DM, SX, Function
 from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.tree import Link
-from mbs.components import Mechanism
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
 from mbs.export.robot_files import base_pose, mount_left_out, shapes_left_out, system_of
@@ -21,6 +20,7 @@ from mbs.files import path_of
 from mbs.formats import CutRow, FrameRow, InertiaRow, RobotTable, write_par
 from mbs.formats.base_pose import POSE, base_pose_texts
 from mbs.formats.table import BODY_SCALARS, GEOMETRY
+from mbs.mechanism import Mechanism
 from mbs.operations.graph import graph_of
 from mbs.spatial import Khalil, Pose, align_z, frames_to
 from mbs.spatial.inertia import TEN_PARAMETERS

@@ -12,11 +12,11 @@ from casadi import DM, SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.components import Mechanism
+from mbs.components.description import OUTER_WORLD
 from mbs.components.joints import Motion
-from mbs.components.mechanism import OUTER_WORLD
 from mbs.errors import ModelError
 from mbs.files import path_of, write_bytes
+from mbs.mechanism import Mechanism
 from mbs.recursions.poses import link_poses
 from mbs.spatial import origin
 from mbs.text import quoted

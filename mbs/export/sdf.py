@@ -17,12 +17,19 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.tree import Link, zero_position
-from mbs.components import Fixed, Mechanism, Prismatic, Revolute, Spherical, Universal
+from mbs.components import (
+    Fixed,
+    Prismatic,
+    Revolute,
+    Spherical,
+    Universal,
+)
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
 from mbs.export.robot_files import shapes_left_out, system_of, write_xml
 from mbs.export.urdf import Numbers, angles, inertia_of, inverse, limits_of, text_of
 from mbs.formats.urdf import UNLIMITED
+from mbs.mechanism import Mechanism
 from mbs.spatial.rotation import quaternion_rotation
 
 Array = NDArray[np.float64]

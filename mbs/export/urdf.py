@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.tree import Link
-from mbs.components import Mechanism
+from mbs.components.description import OUTER_WORLD
 from mbs.components.joints import Motion
-from mbs.components.mechanism import OUTER_WORLD
 from mbs.errors import ModelError
 from mbs.export.robot_files import (
     base_pose,
@@ -28,6 +27,7 @@ from mbs.export.robot_files import (
     write_xml,
 )
 from mbs.formats.urdf import UNLIMITED
+from mbs.mechanism import Mechanism
 from mbs.text import listed, quoted
 
 Array = NDArray[np.float64]

@@ -29,7 +29,6 @@ from mbs.components import (
     Force,
     Free,
     Joint,
-    Mechanism,
     Point,
     Prismatic,
     Revolute,
@@ -45,6 +44,7 @@ from mbs.formats.files import component_name
 from mbs.formats.meshes import MeshFiles
 from mbs.formats.notes import Notes
 from mbs.formats.xml import parse_xml
+from mbs.mechanism import Mechanism
 from mbs.text import install_command, quoted
 
 # What the flags of an MJCF file switch off.

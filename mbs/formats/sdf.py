@@ -28,7 +28,6 @@ from mbs.components import (
     Force,
     Free,
     Joint,
-    Mechanism,
     Point,
     Prismatic,
     Revolute,
@@ -42,6 +41,7 @@ from mbs.formats.files import component_name
 from mbs.formats.notes import Notes
 from mbs.formats.urdf import Inertial, KeptNames, Reader, Vector, body_of
 from mbs.formats.xml import line_of, parse_xml
+from mbs.mechanism import Mechanism
 from mbs.text import did_you_mean, quoted
 
 Array = NDArray[np.float64]

@@ -17,7 +17,6 @@ from mbs.components import (
     Fixed,
     Joint,
     KhalilBody,
-    Mechanism,
     Planar,
     Point,
     Prismatic,
@@ -32,6 +31,7 @@ from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, number, parameters_of, to_float
 from mbs.formats.base_pose import base_placement
 from mbs.formats.files import component_name
+from mbs.mechanism import Mechanism
 from mbs.spatial.inertia import TEN_PARAMETERS
 from mbs.text import did_you_mean, quoted
 

@@ -26,7 +26,6 @@ from mbs.components import (
     Coupling,
     Free,
     Joint,
-    Mechanism,
     Planar,
     Point,
     Prismatic,
@@ -41,6 +40,7 @@ from mbs.formats.files import component_name, read_bytes
 from mbs.formats.meshes import MeshFiles
 from mbs.formats.notes import Notes
 from mbs.formats.xml import line_of, parse_content
+from mbs.mechanism import Mechanism
 from mbs.text import did_you_mean, install_command, quoted
 
 # Numbers in URDF elements: vectors, origins and inertials.

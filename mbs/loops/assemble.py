@@ -12,7 +12,7 @@ from mbs.assembly.degrees import like_degrees
 from mbs.assembly.open_system import open_system
 from mbs.assembly.parts import guesses_of_unknowns
 from mbs.assembly.variable_names import GUESSES
-from mbs.components import Mechanism
+from mbs.components import Description
 from mbs.errors import AssemblyError, Unclosable
 from mbs.loops.analysis import analyse
 from mbs.loops.balance import with_balance
@@ -22,7 +22,7 @@ from mbs.text import did_you_mean, quoted
 
 
 def assemble(
-    mechanism: Mechanism, guess: Mapping[str, float], active: Sequence[str] = ()
+    mechanism: Description, guess: Mapping[str, float], active: Sequence[str] = ()
 ) -> System:
     """The frozen System of a mechanism.
 

@@ -24,7 +24,7 @@ from mbs.assembly import System
 from mbs.assembly.parts import AttachedPart
 from mbs.assembly.tables import Balance, LoopRow
 from mbs.assembly.tree import Link
-from mbs.components import Mechanism
+from mbs.components import Description
 from mbs.components.custom import Friction, OneWay, Row, Stop
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
@@ -48,7 +48,7 @@ _SEED, _REACH = 20261128, 0.3
 assembled one [rad or m]: springs are stretched there, also those that are relaxed as assembled."""
 
 
-def with_balance(system: System, mechanism: Mechanism) -> System:
+def with_balance(system: System, mechanism: Description) -> System:
     """Return the system with rows for its massless nodes, if the forces on them determine them.
 
     Args:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, default_in, model_function, require_system
-from mbs.components.mechanism import OUTER_WORLD
+from mbs.components.description import OUTER_WORLD
 from mbs.errors import NoClosedForm, Unclosable
 from mbs.loops.configuration import solve
 from mbs.loops.function import LoopFunction, follow_active

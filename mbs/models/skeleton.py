@@ -16,8 +16,8 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tables import JointRow
 from mbs.assembly.tree import Frame, normalised
+from mbs.components.description import OUTER_WORLD
 from mbs.components.joints import Motion
-from mbs.components.mechanism import OUTER_WORLD
 from mbs.models.geometry import terminal_frame
 from mbs.recursions.poses import base_poses, link_poses
 from mbs.spatial import Pose

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from mbs.components import Body, Mechanism, Revolute, Spring
+from mbs.components import Body, Revolute, Spring
+from mbs.mechanism import Mechanism
 
 _SOURCE = (
     "Schiehlen 1990, Multibody Systems Handbook; Hairer & Wanner 1996, section VII.7; Mazzia &"

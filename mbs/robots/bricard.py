@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from math import pi
 
-from mbs.components import Box, Mechanism, Revolute
+from mbs.components import Box, Revolute
+from mbs.mechanism import Mechanism
 
 _SOURCE = (
     "Gonzalez, Dopico, Lugris & Cuadrado 2006, multibody benchmark library, problem A04; Bricard"

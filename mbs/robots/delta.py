@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from math import pi, sqrt
 
-from mbs.components import Body, Cylinder, Free, Mechanism, PointMass, Revolute, Rod
+from mbs.components import (
+    Body,
+    Cylinder,
+    Free,
+    PointMass,
+    Revolute,
+    Rod,
+)
+from mbs.mechanism import Mechanism
 
 _SOURCE = (
     "Structure: Clavel 1988; forearms as point masses, two thirds at the elbow: Codourey 1998;"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from mbs.components import Body, Gear, Mechanism, Revolute
+from mbs.components import Body, Gear, Revolute
+from mbs.mechanism import Mechanism
 
 _SOURCE = "Textbook mechanism; ratio, masses and inertias are illustrative"
 

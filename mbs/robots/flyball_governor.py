@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from math import pi
 
-from mbs.components import Box, Mechanism, PointMass, Prismatic, Revolute, Spring
+from mbs.components import (
+    Box,
+    PointMass,
+    Prismatic,
+    Revolute,
+    Spring,
+)
+from mbs.mechanism import Mechanism
 
 _SOURCE = "Gonzalez, Dopico, Lugris & Cuadrado 2006, multibody benchmark library, problem A05"
 _DENSITY = 3000

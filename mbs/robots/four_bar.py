@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from mbs.components import Box, Mechanism, Revolute
+from mbs.components import Box, Revolute
+from mbs.mechanism import Mechanism
 
 
 def four_bar() -> Mechanism:

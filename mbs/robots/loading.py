@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
+from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
 from types import MappingProxyType
 from typing import Any
 
 from mbs.arguments import values_given
-from mbs.components import Mechanism
 from mbs.components.locking import Base, fix_root, free_root
 from mbs.components.mounting import Mounting
 from mbs.errors import DescriptionError
 from mbs.expressions import Scalar
 from mbs.formats import from_dict, read_mjcf, read_par, read_sdf, read_toml, read_urdf, to_mechanism
 from mbs.formats.files import component_name
+from mbs.mechanism import Mechanism
 from mbs.text import did_you_mean, quoted
 
 _READERS: Mapping[str, Callable[[str | Path], Mechanism]] = MappingProxyType(
@@ -30,11 +32,15 @@ _URDF, _SDF, _MJCF = (".urdf", ".xacro"), (".sdf", ".world"), ".xml"
 
 @cache
 def catalogue() -> Mapping[str, Callable[[], Mechanism]]:
-    """Every mechanism of the catalogue: name -> function that builds it."""
-    from mbs import robots  # the one list of them; it imports this module
+    """Return the functions that build the mechanisms of the catalogue, by name.
 
-    names = (name for name in robots.__all__ if name not in (catalogue.__name__, load.__name__))
-    return MappingProxyType({name: getattr(robots, name) for name in names})
+    Each module of this package that contains a function of its own name is an entry.
+    """
+    found = {}
+    for name in sorted(module.name for module in iter_modules([str(Path(__file__).parent)])):
+        if hasattr(module := import_module(f"{__package__}.{name}"), name):
+            found[name] = getattr(module, name)
+    return MappingProxyType(found)
 
 
 def load(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from mbs.components import Body, Mechanism, Prismatic, Revolute
+from mbs.components import Body, Prismatic, Revolute
+from mbs.mechanism import Mechanism
 from mbs.robots.bars import round_bar
 
 _SOURCE = (

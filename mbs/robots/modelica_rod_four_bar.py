@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from mbs.components import Mechanism, Prismatic, Revolute, Rod
+from mbs.components import Prismatic, Revolute, Rod
+from mbs.mechanism import Mechanism
 from mbs.robots.bars import round_bar
 from mbs.robots.modelica_four_bar import CRANK, DIAMETER, GRAVITY, ROCKER, ROD, STEEL
 

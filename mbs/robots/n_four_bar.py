@@ -5,8 +5,9 @@ from __future__ import annotations
 from itertools import pairwise
 from math import pi
 
-from mbs.components import Body, Mechanism, Revolute
+from mbs.components import Body, Revolute
 from mbs.errors import DescriptionError
+from mbs.mechanism import Mechanism
 from mbs.text import quoted
 
 _SOURCE = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbs.components import Mechanism
+from mbs.mechanism import Mechanism
 from mbs.robots.rows import cuboid, frame, robot
 
 _SOURCE = "Textbook arm; lengths, masses and inertias are illustrative"

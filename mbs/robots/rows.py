@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from mbs.components import Mechanism
 from mbs.formats import from_dict, to_mechanism
+from mbs.mechanism import Mechanism
 
 Row = dict[str, Any]
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from math import pi
 
-from mbs.components import Body, Mechanism, PointMass, Revolute
+from mbs.components import Body, PointMass, Revolute
+from mbs.mechanism import Mechanism
 
 _SOURCE = "Gonzalez, Dopico, Lugris & Cuadrado 2006, multibody benchmark library, problem A01"
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from mbs.components import Mechanism, Prismatic, Revolute
+from mbs.components import Prismatic, Revolute
+from mbs.mechanism import Mechanism
 from mbs.robots.bars import round_bar, square_bar
 
 _SOURCE = (

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from mbs.components import Body, Mechanism, Prismatic, Revolute
+from mbs.components import Body, Prismatic, Revolute
+from mbs.mechanism import Mechanism
 
 _SOURCE = (
     "Simeon 1996, Modelling a flexible slider crank mechanism; Mazzia & Magherini 2008, Test Set"

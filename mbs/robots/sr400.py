@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import pi
 
-from mbs.components import Mechanism
+from mbs.mechanism import Mechanism
 from mbs.robots.rows import cuboid, frame, robot
 
 _SOURCE = (

@@ -6,7 +6,7 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from mbs.components import Mechanism
+from mbs.mechanism import Mechanism
 from mbs.robots.rows import Row, about_origin, frame, robot
 
 _SOURCE = (

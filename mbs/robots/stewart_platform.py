@@ -7,7 +7,13 @@ from math import acos, atan2, hypot, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from mbs.components import Body, Mechanism, Prismatic, Spherical, Universal
+from mbs.components import (
+    Body,
+    Prismatic,
+    Spherical,
+    Universal,
+)
+from mbs.mechanism import Mechanism
 
 _SOURCE = (
     "Structure: Gough & Whitehall 1962, Stewart 1965; lengths, masses and inertias are illustrative"

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import math
 
-from mbs.components import Body, Mechanism, Prismatic, Revolute, RigidBody, RollingDisc
+from mbs.components import (
+    Body,
+    Prismatic,
+    Revolute,
+    RigidBody,
+    RollingDisc,
+)
+from mbs.mechanism import Mechanism
 
 _BASE, _TRAIL, _TILT = 1.02, 0.08, math.pi / 10
 _REAR, _FRONT = 0.3, 0.35

@@ -24,7 +24,7 @@ from mbs.assembly import System
 from mbs.assembly.degrees import like_degrees
 from mbs.assembly.model_function import require_system
 from mbs.assembly.parts import WireSource
-from mbs.assembly.system import Packed, content_of, packed, unpacked
+from mbs.assembly.pickling import Packed, content_of, packed, unpacked
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.assembly.variable_names import GUESSES, POSITIONS, VELOCITIES
 from mbs.components.custom import OneWay, Signal

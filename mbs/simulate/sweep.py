@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.system import packed, unpacked
+from mbs.assembly.pickling import packed, unpacked
 from mbs.errors import ExportError, Interrupted, MbsError, ModelError, SolverError
 from mbs.files import check_archive, path_of, write_text
 from mbs.numbers import numbers_given

@@ -1,6 +1,6 @@
 """Pictures of mechanisms: scenes for any viewer, files and notebooks, graphs of connections."""
 
-from mbs.view.diagram import Diagram
+from mbs.assembly.diagram import Diagram
 from mbs.view.page import SCRIPTS as SCRIPTS
 from mbs.view.page import assets_folder
 from mbs.view.picture import Picture, animate, show

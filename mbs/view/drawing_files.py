@@ -8,9 +8,10 @@ from html import escape
 
 import numpy as np
 
+from mbs.palette import Theme
 from mbs.view.drawing import LETTERS, Drawing, Name, Point, Stroke
 from mbs.view.posed import Array
-from mbs.view.primitives import Theme, rgb
+from mbs.view.primitives import rgb
 
 SIZE = 200
 """Width and height of the PNG picture in pixels."""

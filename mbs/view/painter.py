@@ -15,12 +15,13 @@ import numpy.typing as npt
 
 from mbs.errors import ExportError, ModelError
 from mbs.files import PathLike, whole_file
+from mbs.palette import PALETTE, Theme
 from mbs.progress import progress
 from mbs.result import optional_module
 from mbs.text import did_you_mean
 from mbs.view.mesh import Faces, faces_of, stretch
 from mbs.view.posed import Array
-from mbs.view.primitives import PALETTE, LabelShape, SpanShape, SpringShape, Theme, rgb
+from mbs.view.primitives import LabelShape, SpanShape, SpringShape, rgb
 from mbs.view.scene import Scene
 
 # Where a picture is seen from, and how points of space fall on it.

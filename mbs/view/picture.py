@@ -13,12 +13,12 @@ from mbs.assembly.model_function import require_system
 from mbs.errors import ExportError, ModelError
 from mbs.files import PathLike, path_of, write_text
 from mbs.loops.configuration import solve
+from mbs.palette import Theme
 from mbs.result import Result
 from mbs.text import quoted
 from mbs.view.page import Look, iframe, look_of, page
 from mbs.view.painter import Painter, painter, save_gif, save_mp4, save_still
 from mbs.view.posed import Array, Values
-from mbs.view.primitives import Theme
 from mbs.view.scene import Scene, scene
 
 _ENDINGS = (".html", ".png", ".svg", ".gif", ".mp4")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.assembly.tree import normalised
-from mbs.components.mechanism import OUTER_WORLD
+from mbs.components.description import OUTER_WORLD
 from mbs.models.skeleton import Skeleton, skeleton
 from mbs.recursions.poses import base_poses, link_poses
 from mbs.view.primitives import Rows, Vector

@@ -12,6 +12,7 @@ import numpy as np
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
+from mbs.palette import PALETTE
 from mbs.view.posed import (
     Array,
     BoundingSphere,
@@ -27,7 +28,6 @@ from mbs.view.posed import (
     views,
 )
 from mbs.view.primitives import (
-    PALETTE,
     BallShape,
     BarShape,
     BoxShape,

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from mbs.assembly.khalil_frames import Cut
 from mbs.components import Box, Cylinder, RollingDisc
+from mbs.components.description import OUTER_WORLD
 from mbs.components.joints import Motion
-from mbs.components.mechanism import OUTER_WORLD
 from mbs.components.shapes import Shape
 from mbs.errors import ModelError
 from mbs.expressions import Scalar, to_float

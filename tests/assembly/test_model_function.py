@@ -8,7 +8,8 @@ import pytest
 
 import mbs
 import mbs.models
-from mbs.components import Body, Mechanism, PointMass, Revolute
+from mbs import Mechanism
+from mbs.components import Body, PointMass, Revolute
 from mbs.errors import ModelError
 
 

@@ -7,8 +7,9 @@ from support.catalogue_systems import catalogue_system
 from support.rod_mechanisms import acrobot, four_bar
 
 import mbs
+from mbs import Mechanism
 from mbs.bridges import Grid, collocation, invariants, multiple_shooting, step
-from mbs.components import Body, Mechanism, Prismatic
+from mbs.components import Body, Prismatic
 from mbs.errors import ModelError
 from mbs.models import dae
 from mbs.native import batch

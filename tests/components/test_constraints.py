@@ -5,11 +5,11 @@ import math
 import pytest
 from support.messages import refused
 
+from mbs import Mechanism
 from mbs.components import (
     Body,
     ConstantVelocity,
     Gear,
-    Mechanism,
     PointOnLine,
     PointOnPlane,
     Prismatic,

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import mbs
+from mbs import Mechanism
 from mbs.components import (
     Body,
     Coupling,
@@ -13,7 +14,6 @@ from mbs.components import (
     Free,
     JointSensor,
     JointStop,
-    Mechanism,
     Planar,
     Prismatic,
     Revolute,

@@ -6,13 +6,13 @@ from support.messages import refused
 
 import mbs
 import mbs.simulate
+from mbs import Mechanism
 from mbs.components import (
     AbsoluteSensor,
     Body,
     FirstOrder,
     Gain,
     JointSensor,
-    Mechanism,
     Prismatic,
     Revolute,
     WrenchSensor,

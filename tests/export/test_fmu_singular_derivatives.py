@@ -8,7 +8,8 @@ from fmpy.fmi3 import FMU3Model, FMU3Slave
 from fmu_instances import Fmu, Fmu3
 
 import mbs
-from mbs.components import Body, Mechanism, Revolute
+from mbs import Mechanism
+from mbs.components import Body, Revolute
 
 SIZES = {"mm": 1e-3, "m": 1.0, "km": 1e3}
 ANGLES = (0.3, 0.1, 0.03, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)

@@ -5,6 +5,7 @@ import pytest
 from support.catalogue_systems import catalogue_system
 
 import mbs
+from mbs import Mechanism
 from mbs.components import (
     Body,
     Box,
@@ -16,7 +17,6 @@ from mbs.components import (
     Free,
     JointStop,
     KhalilBody,
-    Mechanism,
     PointMass,
     Prismatic,
     Revolute,

@@ -9,7 +9,13 @@ from fmpy.fmi2 import FMU2Model
 from fmu_instances import Fmu
 
 import mbs
-from mbs.components import Body, JointFriction, JointStop, Mechanism, Prismatic
+from mbs import Mechanism
+from mbs.components import (
+    Body,
+    JointFriction,
+    JointStop,
+    Prismatic,
+)
 from mbs.identification import known_efforts, regressor, values_of
 from mbs.models import ContactPoint, contact_phases, dae
 from mbs.models.state.tree import full_state

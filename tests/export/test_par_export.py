@@ -8,8 +8,15 @@ from support.random_trees import random_tree
 
 import mbs
 import mbs.models
+from mbs import Mechanism
 from mbs.app.tasks.exporting import toml
-from mbs.components import Body, Free, Mechanism, Revolute, Rotor, Spherical
+from mbs.components import (
+    Body,
+    Free,
+    Revolute,
+    Rotor,
+    Spherical,
+)
 from mbs.errors import DescriptionError, ExportError, ModelError
 from mbs.formats import FrameRow, InertiaRow, RobotTable, read_par, write_par
 

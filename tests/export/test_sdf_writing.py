@@ -13,12 +13,12 @@ from support.written_files import (
 )
 
 import mbs
+from mbs import Mechanism
 from mbs.components import (
     Body,
     Coupling,
     Free,
     JointStop,
-    Mechanism,
     Revolute,
     Spherical,
     Universal,

@@ -10,7 +10,14 @@ from support.random_trees import random_tree
 from support.written_files import assert_coupling_is_kept, assert_same_tree, names_of, written_arm
 
 import mbs
-from mbs.components import Body, Free, Mechanism, Revolute, Shape, Spherical
+from mbs import Mechanism
+from mbs.components import (
+    Body,
+    Free,
+    Revolute,
+    Shape,
+    Spherical,
+)
 from mbs.errors import ModelError
 from mbs.expressions import to_float
 

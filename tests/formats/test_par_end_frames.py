@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.components import KhalilBody, Mechanism, Revolute
+from mbs import Mechanism
+from mbs.components import KhalilBody, Revolute
 from mbs.errors import DescriptionError
 from mbs.formats import read_par, to_mechanism, write_par
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import mbs
+from mbs import Mechanism
 from mbs.components import (
     Body,
-    Mechanism,
     Revolute,
     Spherical,
     Universal,

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import mbs
+from mbs import Mechanism
 from mbs.app.web.document.document import Document
-from mbs.components import Fixed, Mechanism, Revolute, Shape
+from mbs.components import Fixed, Revolute, Shape
 from mbs.errors import DescriptionError
 from mbs.formats import read_urdf
 

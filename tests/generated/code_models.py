@@ -9,7 +9,13 @@ from support.catalogue_systems import catalogue_system
 
 import mbs
 import mbs.models
-from mbs.components import Body, Free, Mechanism, Prismatic, Revolute
+from mbs import Mechanism
+from mbs.components import (
+    Body,
+    Free,
+    Prismatic,
+    Revolute,
+)
 
 
 @functools.cache

@@ -14,7 +14,8 @@ from casadi import SX, Function
 
 import mbs
 import mbs.models
-from mbs.components import Body, Mechanism, Revolute
+from mbs import Mechanism
+from mbs.components import Body, Revolute
 from mbs.errors import ModelError
 from mbs.export.languages import LANGUAGES
 from mbs.formats import FrameRow, InertiaRow, RobotTable, read_par, write_par, write_toml

@@ -7,7 +7,15 @@ from fmpy.validation import validate_fmu
 from support.catalogue_systems import catalogue_system
 
 import mbs
-from mbs.components import Body, Box, Free, Mechanism, Prismatic, Revolute, Spherical
+from mbs import Mechanism
+from mbs.components import (
+    Body,
+    Box,
+    Free,
+    Prismatic,
+    Revolute,
+    Spherical,
+)
 from mbs.errors import ExportError, ModelError
 
 KINDS = ("CoSimulation", "ModelExchange")

@@ -5,8 +5,14 @@ import numpy as np
 import pytest
 
 import mbs
+from mbs import Mechanism
 from mbs import identification as ident
-from mbs.components import Body, Custom, Mechanism, Revolute, custom
+from mbs.components import (
+    Body,
+    Custom,
+    Revolute,
+    custom,
+)
 from mbs.errors import ModelError
 
 RATE = 200.0

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from support.catalogue_systems import catalogue_system
 
-from mbs.components import Box, Mechanism, Prismatic, Revolute
+from mbs import Mechanism
+from mbs.components import Box, Prismatic, Revolute
 from mbs.errors import LoopError, Unclosable
 from mbs.loops import closing, solve
 from mbs.loops.configuration import start_position

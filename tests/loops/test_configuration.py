@@ -7,7 +7,13 @@ from support.catalogue_systems import catalogue_system
 
 import mbs
 import mbs.models
-from mbs.components import Body, Box, Mechanism, Prismatic, Revolute
+from mbs import Mechanism
+from mbs.components import (
+    Body,
+    Box,
+    Prismatic,
+    Revolute,
+)
 from mbs.errors import AssemblyError, ModelError, Unclosable
 from mbs.loops import closure, modes, solve
 from mbs.loops.closing import TOLERANCE, Closing, closure_parameters

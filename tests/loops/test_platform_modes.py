@@ -10,8 +10,14 @@ from support.ring_loops import line_symmetric_loop, ring_loop
 
 import mbs
 import mbs.simulate
-from mbs import Parameter
-from mbs.components import Body, Mechanism, Prismatic, Revolute, Rod, WrenchSensor
+from mbs import Mechanism, Parameter
+from mbs.components import (
+    Body,
+    Prismatic,
+    Revolute,
+    Rod,
+    WrenchSensor,
+)
 from mbs.errors import LoopError, ModelError, NoClosedForm, Unclosable
 from mbs.export import fmu
 from mbs.loops import function, modes, solve

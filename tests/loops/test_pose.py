@@ -10,7 +10,8 @@ from support.parallel_geometry import LEGS, rotation
 from support.sweeps import examples
 
 import mbs
-from mbs.components import Body, Mechanism, Revolute
+from mbs import Mechanism
+from mbs.components import Body, Revolute
 from mbs.errors import LoopError, ModelError, Unclosable
 from mbs.loops.pose import goal
 

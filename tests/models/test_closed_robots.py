@@ -242,7 +242,13 @@ def test_out_of_reach_is_refused(systems):
 
 
 def test_platform_that_turns_freely_has_no_direct_geometry():
-    from mbs.components import Body, Mechanism, Revolute, Rod, Spherical
+    from mbs import Mechanism
+    from mbs.components import (
+        Body,
+        Revolute,
+        Rod,
+        Spherical,
+    )
 
     m = Mechanism("hung", guess={"j": 0.5})
     arm, plate = (m.add(Body(n, mass=1, inertia=(1, 1, 1))) for n in ("arm", "plate"))

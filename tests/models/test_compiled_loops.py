@@ -14,8 +14,8 @@ from support.driven_trees import driven_tree
 from support.random_trees import random_state, random_tree
 
 import mbs
-from mbs import models
-from mbs.components import Body, Mechanism, Revolute, Spring
+from mbs import Mechanism, models
+from mbs.components import Body, Revolute, Spring
 from mbs.errors import ModelError
 from mbs.models import tree_table
 from mbs.native import compiled, compiler_found

@@ -9,7 +9,8 @@ from support.legged import quadruped as walker
 from support.random_trees import random_state
 
 import mbs
-from mbs.components import Body, Free, Mechanism
+from mbs import Mechanism
+from mbs.components import Body, Free
 from mbs.errors import ModelError
 from mbs.models import ContactPoint, contact_phases
 

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from support.catalogue_systems import catalogue_system
 
-from mbs.components import Body, Free, JointStop, Mechanism, Prismatic, Revolute
+from mbs import Mechanism
+from mbs.components import (
+    Body,
+    Free,
+    JointStop,
+    Prismatic,
+    Revolute,
+)
 from mbs.errors import DescriptionError, ModelError
 from mbs.models import limits
 

@@ -7,8 +7,14 @@ from support.dae_mechanisms import four_bar
 from support.legged import FEET, hopping_leg, quadruped
 
 import mbs
+from mbs import Mechanism
 from mbs.bridges import Grid, collocation, multiple_shooting
-from mbs.components import Body, Free, Mechanism, Prismatic, Revolute
+from mbs.components import (
+    Body,
+    Free,
+    Prismatic,
+    Revolute,
+)
 from mbs.errors import ModelError, Unclosable
 from mbs.models import ContactPoint, contact_phases, dae
 

@@ -9,7 +9,8 @@ from support.random_trees import ALL_KINDS, random_state, random_tree
 
 import mbs
 import mbs.models
-from mbs.components import Body, Mechanism, Revolute
+from mbs import Mechanism
+from mbs.components import Body, Revolute
 from mbs.errors import ModelError
 from mbs.models import inverse_dynamics_derivatives
 from mbs.operations import count

@@ -6,7 +6,13 @@ import pytest
 from casadi import MX
 
 import mbs
-from mbs.components import Body, Custom, Mechanism, Revolute, custom
+from mbs import Mechanism
+from mbs.components import (
+    Body,
+    Custom,
+    Revolute,
+    custom,
+)
 from mbs.errors import ModelError
 from mbs.models import direct_dynamics_derivatives, inverse_dynamics_derivatives
 

@@ -11,7 +11,8 @@ from test_derivatives import TREES, arm_with_parameters, assert_close, differenc
 
 import mbs
 import mbs.models
-from mbs.components import Body, Mechanism, Revolute
+from mbs import Mechanism
+from mbs.components import Body, Revolute
 from mbs.errors import ModelError
 from mbs.models import direct_dynamics_derivatives, inverse_dynamics_derivatives
 from mbs.operations import count

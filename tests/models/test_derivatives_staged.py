@@ -8,7 +8,8 @@ from support.random_trees import ALL_KINDS, random_state, random_tree
 from test_derivatives import assert_close
 
 import mbs
-from mbs.components import Body, Mechanism, Revolute
+from mbs import Mechanism
+from mbs.components import Body, Revolute
 from mbs.errors import ModelError
 from mbs.models import direct_dynamics_derivatives
 from mbs.models.derivatives import accelerations_by_efforts

@@ -14,10 +14,10 @@ from support.random_trees import ALL_KINDS, random_state, random_tree
 
 import mbs
 import mbs.models
+from mbs import Mechanism
 from mbs.components import (
     Body,
     Box,
-    Mechanism,
     PointMass,
     Prismatic,
     Revolute,

@@ -5,7 +5,16 @@ import pytest
 
 import mbs
 import mbs.models
-from mbs.components import Body, Box, Cylindrical, Free, Mechanism, PointMass, Prismatic, Revolute
+from mbs import Mechanism
+from mbs.components import (
+    Body,
+    Box,
+    Cylindrical,
+    Free,
+    PointMass,
+    Prismatic,
+    Revolute,
+)
 from mbs.errors import AssemblyError, DescriptionError, ModelError
 from mbs.expressions import Parameter
 

@@ -11,8 +11,13 @@ import pytest
 from casadi import DM, SX, Function
 from support.random_trees import random_body, random_rotation
 
-from mbs import identification, models
-from mbs.components import Free, Mechanism, Prismatic, Revolute, Spherical
+from mbs import Mechanism, identification, models
+from mbs.components import (
+    Free,
+    Prismatic,
+    Revolute,
+    Spherical,
+)
 from mbs.recursions.route import relative_pose
 from mbs.simulate import run
 

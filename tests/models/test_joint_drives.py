@@ -8,12 +8,12 @@ from support.driven_trees import driven_tree, random_rotor
 from support.random_trees import random_body, random_rotation, random_state
 
 import mbs.models
+from mbs import Mechanism
 from mbs.components import (
     Body,
     Box,
     Coupling,
     Free,
-    Mechanism,
     Prismatic,
     Revolute,
     Rotor,

@@ -8,7 +8,8 @@ from casadi import evalf
 
 import mbs
 import mbs.models
-from mbs.components import Body, Free, Mechanism, Revolute
+from mbs import Mechanism
+from mbs.components import Body, Free, Revolute
 from mbs.operations import count
 
 

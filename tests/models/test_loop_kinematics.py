@@ -7,7 +7,8 @@ from support.catalogue_systems import catalogue_system
 from support.closed_mechanisms import CLOSING, closed_chain, planar_loop
 
 import mbs.models
-from mbs.components import Body, Coupling, Mechanism, Revolute
+from mbs import Mechanism
+from mbs.components import Body, Coupling, Revolute
 from mbs.errors import ModelError
 from mbs.loops import closure_jacobian, reduction_matrix
 from mbs.loops.closing import Closing, closure_parameters

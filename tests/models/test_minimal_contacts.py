@@ -16,12 +16,12 @@ from support.contact_mechanisms import (
 from support.minimal_runs import closing, moved, start_of
 
 import mbs
+from mbs import Mechanism
 from mbs.components import (
     Body,
     Box,
     CoulombFriction,
     Free,
-    Mechanism,
     Revolute,
     RigidStop,
 )

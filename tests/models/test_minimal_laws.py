@@ -7,12 +7,12 @@ from support.contact_mechanisms import stopped_rocker
 from support.minimal_runs import moved, start_of
 
 import mbs
+from mbs import Mechanism
 from mbs.components import (
     Box,
     CoulombFriction,
     DCMotor,
     Force,
-    Mechanism,
     Revolute,
     RigidStop,
     Torque,

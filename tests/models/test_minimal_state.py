@@ -8,13 +8,13 @@ from support.contact_mechanisms import five_bar, stick_slip, stopped_rocker
 from support.minimal_runs import moved, start_of
 
 import mbs
+from mbs import Mechanism
 from mbs.assembly.tree import normalised
 from mbs.components import (
     Box,
     CoulombFriction,
     Force,
     Free,
-    Mechanism,
     Revolute,
     Spherical,
     Torque,

@@ -13,8 +13,16 @@ from support.driven_trees import driven_tree
 from support.random_trees import ALL_KINDS, random_state, random_tree
 
 import mbs
-from mbs import models
-from mbs.components import Body, Box, Free, Mechanism, Prismatic, Revolute, Spherical, Spring
+from mbs import Mechanism, models
+from mbs.components import (
+    Body,
+    Box,
+    Free,
+    Prismatic,
+    Revolute,
+    Spherical,
+    Spring,
+)
 from mbs.errors import ModelError
 from mbs.models import tree_core
 

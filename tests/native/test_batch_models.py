@@ -10,7 +10,8 @@ from support.random_trees import random_state, random_tree
 
 import mbs
 import mbs.models
-from mbs.components import Body, Mechanism, Revolute
+from mbs import Mechanism
+from mbs.components import Body, Revolute
 from mbs.native import batch, compiled
 
 BUILDERS = (

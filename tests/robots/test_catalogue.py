@@ -1,7 +1,8 @@
 import pytest
 
 import mbs.robots
-from mbs.components import KhalilBody, Mechanism
+from mbs import Mechanism
+from mbs.components import KhalilBody
 from mbs.errors import DescriptionError
 from mbs.robots import catalogue, load
 

@@ -5,7 +5,15 @@ import pytest
 from support.driven_trees import driven_tree
 
 import mbs.simulate
-from mbs.components import Body, Free, Mechanism, PointMass, Prismatic, Revolute, Rotor
+from mbs import Mechanism
+from mbs.components import (
+    Body,
+    Free,
+    PointMass,
+    Prismatic,
+    Revolute,
+    Rotor,
+)
 
 
 def test_mass_on_a_spring_swings_about_where_gravity_is_held():

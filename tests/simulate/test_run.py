@@ -9,7 +9,15 @@ from support.dae_mechanisms import rssr
 
 import mbs
 import mbs.simulate.run
-from mbs.components import Body, Box, Free, Mechanism, PointMass, Prismatic, Revolute
+from mbs import Mechanism
+from mbs.components import (
+    Body,
+    Box,
+    Free,
+    PointMass,
+    Prismatic,
+    Revolute,
+)
 from mbs.errors import LoopError, ModelError, Unclosable
 
 LOOSE = casadi.SX.sym("loose")

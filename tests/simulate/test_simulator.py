@@ -13,7 +13,14 @@ from support.catalogue_systems import catalogue_system
 from support.messages import refused
 
 import mbs
-from mbs.components import Body, DCMotor, Mechanism, Prismatic, Revolute, RigidStop
+from mbs import Mechanism
+from mbs.components import (
+    Body,
+    DCMotor,
+    Prismatic,
+    Revolute,
+    RigidStop,
+)
 from mbs.errors import ModelError
 from mbs.simulate import Simulator, run
 

@@ -3,8 +3,8 @@
 import numpy as np
 from support.random_trees import random_body
 
-from mbs import Parameter
-from mbs.components import Mechanism, Revolute
+from mbs import Mechanism, Parameter
+from mbs.components import Revolute
 
 TWISTS = (0.9, 1.7)
 STARTS = {"j0": 1.0, "j1": 2.0, "j2": -1.0, "j3": -2.0}

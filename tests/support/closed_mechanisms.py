@@ -7,10 +7,10 @@ import numpy as np
 from support.random_trees import random_body, random_rotation, random_tree
 
 import mbs.models
+from mbs import Mechanism
 from mbs.components import (
     Cylindrical,
     Fixed,
-    Mechanism,
     Planar,
     Prismatic,
     Revolute,

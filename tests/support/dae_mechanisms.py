@@ -6,13 +6,13 @@ from support.catalogue_systems import catalogue_system
 from support.closed_mechanisms import closed_chain
 from support.random_trees import random_tree
 
+from mbs import Mechanism
 from mbs.components import (
     Body,
     Box,
     Damper,
     Free,
     JointFriction,
-    Mechanism,
     Prismatic,
     Revolute,
     RollingDisc,

@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 from support.random_trees import random_body, random_rotation
 
-from mbs.components import Free, Mechanism, Prismatic, Revolute, Rotor, Spherical
+from mbs import Mechanism
+from mbs.components import (
+    Free,
+    Prismatic,
+    Revolute,
+    Rotor,
+    Spherical,
+)
 
 KINDS = ("revolute", "prismatic", "spherical", "free")
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from support.random_trees import random_body, random_rotation
 
-from mbs.components import Mechanism, Prismatic, Revolute
+from mbs import Mechanism
+from mbs.components import Prismatic, Revolute
 
 
 def flat_loop(seed, kinds, active, closing=None, tilted=True):

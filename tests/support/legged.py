@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from mbs.components import Body, Free, Mechanism, Prismatic, Revolute, Spherical, Universal
+from mbs import Mechanism
+from mbs.components import (
+    Body,
+    Free,
+    Prismatic,
+    Revolute,
+    Spherical,
+    Universal,
+)
 
 FEET = {"fl": (0.3, 0.15), "fr": (0.3, -0.15), "hl": (-0.3, 0.15), "hr": (-0.3, -0.15)}
 """Where the hips of the quadruped are."""

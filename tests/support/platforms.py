@@ -6,7 +6,15 @@ import numpy as np
 from support.flat_loops import flat_joint, turn_about_z
 from support.random_trees import random_body, random_rotation
 
-from mbs.components import Free, Mechanism, Prismatic, Revolute, Rod, Spherical, Universal
+from mbs import Mechanism
+from mbs.components import (
+    Free,
+    Prismatic,
+    Revolute,
+    Rod,
+    Spherical,
+    Universal,
+)
 
 
 def planar_platform(seed, legs, driven=()):

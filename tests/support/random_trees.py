@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mbs import Mechanism
 from mbs.components import (
     Body,
     Cylindrical,
     Free,
-    Mechanism,
     Planar,
     Prismatic,
     Revolute,

@@ -9,7 +9,15 @@ from casadi import DM, SX, Function, casadi
 from support.random_trees import ALL_KINDS, random_state, random_tree
 
 import mbs
-from mbs.components import Body, Free, Mechanism, Prismatic, Revolute, Rotor, Spherical
+from mbs import Mechanism
+from mbs.components import (
+    Body,
+    Free,
+    Prismatic,
+    Revolute,
+    Rotor,
+    Spherical,
+)
 from mbs.loops.reduction import reduction
 
 OPEN = ("puma560", "stanford", "scara", "two_branch_tree", "cart_pole")

@@ -7,7 +7,14 @@ from functools import partial
 import numpy as np
 from support.random_trees import random_body, random_rotation
 
-from mbs.components import Cylindrical, Mechanism, Prismatic, Revolute, Spherical, Universal
+from mbs import Mechanism
+from mbs.components import (
+    Cylindrical,
+    Prismatic,
+    Revolute,
+    Spherical,
+    Universal,
+)
 
 KINDS = {
     "R": Revolute,

@@ -1,6 +1,7 @@
 """Mechanisms of thin rods whose optimal motions are known."""
 
-from mbs.components import Body, Mechanism, Revolute
+from mbs import Mechanism
+from mbs.components import Body, Revolute
 
 
 def rod(m, name, length, mass):

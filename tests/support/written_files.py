@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.components import Body, Coupling, Mechanism, Prismatic, Revolute
+from mbs import Mechanism
+from mbs.components import (
+    Body,
+    Coupling,
+    Prismatic,
+    Revolute,
+)
 
 CLOSE = 1e-12
 """Of the largest value: angles and tensors are computed anew from rotations, some 1e-16 each."""

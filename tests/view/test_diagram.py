@@ -6,9 +6,9 @@ import xml.etree.ElementTree as ET
 import pytest
 
 import mbs
+from mbs.assembly.diagram import PILL, connections, layout
 from mbs.components import Body, Box, Free, Revolute
 from mbs.errors import ExportError
-from mbs.view.diagram import PILL, connections, layout
 
 SVG = "{http://www.w3.org/2000/svg}"
 CATALOGUE = mbs.robots.catalogue()

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.components import Body, Mechanism, Revolute, Shape
+from mbs import Mechanism
+from mbs.components import Body, Revolute, Shape
 from mbs.errors import ModelError
 from mbs.view.drawing import drawing
 from mbs.view.mesh_files import MOST_TRIANGLES, read_mesh, thin

@@ -9,7 +9,7 @@ from mbs.app.cli.printing import note
 
 if TYPE_CHECKING:
     from mbs.assembly import System
-    from mbs.components import Mechanism
+    from mbs.mechanism import Mechanism
 
 _MOST_NOTES = 8
 """Notes of a file that are said; some files have hundreds."""

@@ -13,7 +13,7 @@ from mbs.app.cli.printing import PrintedTable, print_json, print_tables
 from mbs.app.cli.structure import structure
 
 if TYPE_CHECKING:
-    from mbs.components import Mechanism
+    from mbs.mechanism import Mechanism
 
 EXAMPLES = examples(
     "mbs robots",

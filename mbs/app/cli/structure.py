@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from mbs.components import Joint, Mechanism
+    from mbs.components import Joint
+    from mbs.mechanism import Mechanism
 
 _Port = tuple[str, str]
 

@@ -11,8 +11,9 @@ import numpy as np
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, Array
-from mbs.components import Body, Mechanism, Prismatic, Revolute
+from mbs.components import Body, Prismatic, Revolute
 from mbs.errors import ModelError
+from mbs.mechanism import Mechanism
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry.answer import NO_LOOP
 from mbs.models.inverse_geometry.chain import (

@@ -3,11 +3,11 @@ import math
 import numpy as np
 import pytest
 
-from mbs import MbsError
+from mbs import MbsError, Mechanism
 from mbs.app.web.document.document import Document
 from mbs.app.web.document.tables import Cell
 from mbs.app.web.session import Session, assembly_modes, carried, handles, mode_of, moved
-from mbs.components import Free, Mechanism, PointMass
+from mbs.components import Free, PointMass
 from mbs.errors import Unclosable
 from mbs.loops import examine
 from mbs.loops.configuration import require_closed

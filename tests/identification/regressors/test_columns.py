@@ -4,7 +4,8 @@ import pytest
 from support.regressor_states import system_of
 
 import mbs
-from mbs.components import Body, Mechanism, Prismatic, Revolute
+from mbs import Mechanism
+from mbs.components import Body, Prismatic, Revolute
 from mbs.errors import ModelError
 from mbs.identification import (
     Column,

@@ -10,12 +10,12 @@ from symbolic_robots import ROBOTS, symbolic_robot
 import mbs
 import mbs.export
 import mbs.models
+from mbs import Mechanism
 from mbs.components import (
     Body,
     ElasticGear,
     Force,
     IdealGear,
-    Mechanism,
     Revolute,
     ShaftInertia,
 )

@@ -7,8 +7,8 @@ from support.catalogue_systems import catalogue_system
 from support.configurations import active, same, searched
 from support.flat_loops import flat_loop
 
-from mbs import Parameter
-from mbs.components import Body, Coupling, Mechanism, Revolute
+from mbs import Mechanism, Parameter
+from mbs.components import Body, Coupling, Revolute
 from mbs.errors import LoopError
 from mbs.loops import closure, function, modes, reduction_matrix, solve
 from mbs.loops.plan import plan

@@ -5,7 +5,14 @@ import pytest
 from support.configurations import active, same, searched
 from support.random_trees import random_body, random_rotation
 
-from mbs.components import Cylindrical, Mechanism, Prismatic, Revolute, Spherical, Universal
+from mbs import Mechanism
+from mbs.components import (
+    Cylindrical,
+    Prismatic,
+    Revolute,
+    Spherical,
+    Universal,
+)
 from mbs.loops import function, modes, solve
 
 JOINTS = {

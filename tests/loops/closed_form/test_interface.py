@@ -12,7 +12,8 @@ from support.flat_loops import flat_loop
 from support.random_trees import random_body
 
 import mbs
-from mbs.components import Mechanism, Revolute
+from mbs import Mechanism
+from mbs.components import Revolute
 from mbs.errors import LoopError, ModelError, NoClosedForm, Unclosable
 from mbs.loops import function, modes, solve
 

@@ -10,10 +10,10 @@ from support.configurations import active, same, searched
 from support.flat_loops import flat_loop
 from support.random_trees import random_body
 
+from mbs import Mechanism
 from mbs.components import (
     ConstantVelocity,
     Cylindrical,
-    Mechanism,
     Planar,
     PointOnLine,
     Revolute,

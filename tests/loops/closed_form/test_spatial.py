@@ -6,8 +6,14 @@ import pytest
 from support.configurations import active, same, searched
 from support.random_trees import random_body, random_rotation
 
-from mbs import Parameter
-from mbs.components import Mechanism, Prismatic, Revolute, Rod, Spherical, Universal
+from mbs import Mechanism, Parameter
+from mbs.components import (
+    Prismatic,
+    Revolute,
+    Rod,
+    Spherical,
+    Universal,
+)
 from mbs.loops import function, modes, reduction_matrix, solve
 from mbs.loops.plan import plan
 

@@ -6,8 +6,9 @@ from support.configurations import same
 from support.ring_loops import ring_loop
 
 import mbs
+from mbs import Mechanism
 from mbs.assembly.tree import quaternion_slices
-from mbs.components import Body, Mechanism, Revolute, Spherical
+from mbs.components import Body, Revolute, Spherical
 from mbs.errors import ModelError, NoClosedForm, Unclosable
 from mbs.loops import function, modes, solve
 from mbs.loops.closing import Closing

@@ -7,8 +7,8 @@ from support.catalogue_systems import catalogue_system
 from support.configurations import active, same, searched
 from support.ring_loops import ring_loop
 
-from mbs import Parameter
-from mbs.components import Body, Mechanism, Revolute, Spherical
+from mbs import Mechanism, Parameter
+from mbs.components import Body, Revolute, Spherical
 from mbs.errors import NoClosedForm, Unclosable
 from mbs.loops import function, modes, reduction_matrix, solve
 from mbs.loops.plan import plan

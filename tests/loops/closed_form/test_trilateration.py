@@ -5,8 +5,14 @@ import numpy as np
 import pytest
 from support.configurations import active, same, searched
 
-from mbs import Parameter
-from mbs.components import Body, Mechanism, Prismatic, Revolute, Rod, Universal
+from mbs import Mechanism, Parameter
+from mbs.components import (
+    Body,
+    Prismatic,
+    Revolute,
+    Rod,
+    Universal,
+)
 from mbs.errors import Unclosable
 from mbs.loops import function, modes, reduction_matrix, solve
 from mbs.loops.plan import plan

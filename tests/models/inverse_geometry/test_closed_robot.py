@@ -7,8 +7,9 @@ from support.closed_mechanisms import closed_chain
 from support.configurations import same
 
 import mbs
+from mbs import Mechanism
 from mbs.closed_forms.arm_search import search
-from mbs.components import Body, Mechanism, Revolute, Spherical
+from mbs.components import Body, Revolute, Spherical
 from mbs.loops.closing import Closing
 from mbs.loops.modes import closed_configurations
 from mbs.loops.plan import complete

@@ -32,10 +32,10 @@ from mbs.app.web.document.tables import (
     tables_of,
 )
 from mbs.assembly import System
-from mbs.components import Mechanism
 from mbs.errors import DescriptionError, MbsError
 from mbs.expressions import Parameter
 from mbs.formats import RobotTable, to_mechanism, write_par, write_toml
+from mbs.mechanism import Mechanism
 from mbs.robots import catalogue
 from mbs.text import did_you_mean
 

@@ -16,7 +16,14 @@ from casadi import SX, Function
 from mbs.app.web.document.tables import GEOMETRY_COLUMNS, INERTIA_COLUMNS, Tables, Texts, written
 from mbs.assembly import System
 from mbs.assembly.tables import LinkRow
-from mbs.components import Joint, KhalilBody, Mechanism, Point, Prismatic, Revolute, RigidBody
+from mbs.components import (
+    Joint,
+    KhalilBody,
+    Point,
+    Prismatic,
+    Revolute,
+    RigidBody,
+)
 from mbs.components.component import KhalilStep
 from mbs.errors import DescriptionError
 from mbs.formats import (
@@ -34,6 +41,7 @@ from mbs.formats import (
 from mbs.formats.base_pose import POSE, base_pose_texts, placement_pose
 from mbs.formats.table import DRIVE, GEOMETRY, LOOP_JOINTS
 from mbs.formats.xml import parse_xml
+from mbs.mechanism import Mechanism
 from mbs.spatial.inertia import TEN_PARAMETERS
 from mbs.text import did_you_mean, quoted
 

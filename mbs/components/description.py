@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeVar, overload
+from typing import Any, ClassVar, TypeVar, overload
 
-from mbs.arguments import names_given, values_given
+from mbs.arguments import values_given
 from mbs.components.bodies import Mount, RigidBody, World, three
 from mbs.components.component import (
     Component,
@@ -22,7 +22,6 @@ from mbs.components.custom import Custom, Flange, Signal
 from mbs.components.drives import flange_pair
 from mbs.components.forces import Force
 from mbs.components.joints import Joint
-from mbs.components.locking import lock
 from mbs.components.motion_joint import MotionJoint
 from mbs.components.mounting import Mounting, mount_of, notes_on_degrees
 from mbs.components.notes import Note
@@ -30,12 +29,7 @@ from mbs.components.sensors import Sensor
 from mbs.components.shapes import Shape
 from mbs.errors import AssemblyError, DescriptionError
 from mbs.expressions import Parameter, Scalar, expression, parameters_of
-from mbs.result import Result, State, positions_of
 from mbs.text import did_you_mean, quoted
-
-if TYPE_CHECKING:
-    from mbs.assembly.system import System
-
 
 # A mechanism that is placed inside another one, and the handle to it.
 
@@ -44,7 +38,7 @@ if TYPE_CHECKING:
 class Placed:
     """A mechanism inside another one: `arm["forearm"]` is its component, `arm.base` its ground."""
 
-    outer: Mechanism
+    outer: Description
     scope: str
 
     def __getitem__(self, name: str) -> Component:
@@ -82,7 +76,7 @@ OUTER_WORLD = "outer_world"
 _SCOPE = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*", re.ASCII)
 
 
-def place(outer: Mechanism, inner: Mechanism, name: str) -> Placed:
+def place(outer: Description, inner: Description, name: str) -> Placed:
     """Copy the components of a mechanism into another one, their names scoped by its own.
 
     Raises:
@@ -129,7 +123,7 @@ def place(outer: Mechanism, inner: Mechanism, name: str) -> Placed:
     return Placed(outer, scope)
 
 
-def _frames_of(inner: Mechanism) -> dict[str, Point]:
+def _frames_of(inner: Description) -> dict[str, Point]:
     """Return the named frames of a mechanism; a mount adds the frame of the outer world."""
     if not inner.mount.steps:
         return inner.frames
@@ -166,35 +160,19 @@ _COMPENSATIONS = "_gravcomp", "_gravity"
 """Ends of the names of forces that readers of files make against the weight of bodies."""
 
 
-class Mechanism:
-    """Bodies and joints connected in any order; loops are found, never declared.
+class Description:
+    """Components and connections of a mechanism.
 
-    Args:
-        name: of the mechanism.
-        gravity: gravity acceleration in the world frame [m/s^2].
-        mount: rotation of the base relative to the axes in which gravity is given, such as
-            ("x", "pi") for a robot that hangs from the ceiling; or {"position": (0, 0, 2.5),
-            "rotation": ("x", "pi")}. Poses stay relative to the base. The frame "outer_world" is
-            the one in which gravity and the mount are given.
-        parameters: values of the symbols that the components use.
-        source: where the data come from, for catalogue entries and files.
-        keep_order: number the links in the order in which the joints were added, as a table of
-            frames does, instead of depth-first.
-        guess: joint positions that `assemble` starts from when it closes loops.
-
-    Attributes:
-        notes: what the reader of a file renamed, ignored, doubted or completed; print them.
-        numbered: the body of each frame of the table that it was made from, by its number.
-        shapes: what its bodies look like, and where on them.
-        values: number or Parameter of each symbol that has a value here. Units, descriptions and
-            bounds of the Parameter replace those of the components.
-        mount: position and rotation of the base in the frame "outer_world".
+    `mbs.Mechanism` adds the assembly. Its docstring describes arguments and attributes.
     """
+
+    has_fixed_attributes: ClassVar[bool] = True
+    """Set in the body of each class to which users cannot add attributes by assignment."""
 
     def __init__(
         self,
         name: str,
-        gravity: tuple[Scalar, ...] = (0.0, 0.0, -9.81),
+        gravity: tuple[Scalar, ...] = (0.0, 0.0, -9.81),  # standard gravity [m/s^2]
         parameters: Mapping[str, float] | None = None,
         source: str = "",
         keep_order: bool = False,
@@ -226,13 +204,13 @@ class Mechanism:
             self.change_gravity(mount=mount)
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Set an attribute. A class that derives from Mechanism may have attributes of its own.
+        """Set an attribute. A class that derives from Description may have attributes of its own.
 
         Raises:
             DescriptionError: a mechanism has no attribute of this name, or it is something else.
         """
-        is_plain = type(self) is Mechanism
-        if is_plain and name not in _ATTRIBUTES and not hasattr(Mechanism, name):
+        is_fixed = vars(type(self)).get("has_fixed_attributes", False)
+        if is_fixed and name not in _ATTRIBUTES and not hasattr(type(self), name):
             raise DescriptionError(
                 f"{self.__dict__.get('name', 'mechanism')}: a mechanism has no attribute {name!r};"
                 f" {did_you_mean(name, sorted(one for one in _ATTRIBUTES if one[0] != '_'))}"
@@ -293,9 +271,9 @@ class Mechanism:
     def add(self, component: C) -> C: ...
 
     @overload
-    def add(self, component: Mechanism, name: str | None = None) -> Placed: ...
+    def add(self, component: Description, name: str | None = None) -> Placed: ...
 
-    def add(self, component: C | Mechanism, name: str | None = None) -> C | Placed:
+    def add(self, component: C | Description, name: str | None = None) -> C | Placed:
         """Add a body, a joint or a whole mechanism, whose names are then scoped by its own.
 
         A mechanism that is placed in another one moves in the gravity of the outer one. Its base is
@@ -312,7 +290,7 @@ class Mechanism:
         Raises:
             DescriptionError: the name is taken.
         """
-        if isinstance(component, Mechanism):
+        if isinstance(component, Description):
             return place(self, component, name or component.name)
         if not isinstance(component, Component):
             raise DescriptionError(
@@ -460,50 +438,6 @@ class Mechanism:
             )
         self.cuts.append(joint.name)
 
-    def lock(self, positions: Mapping[str, Any]) -> None:
-        """Weld joints at positions, in loops too; what couplings tie to them is locked with them.
-
-        Each becomes a Fixed joint of its name. Its motor, friction, spring and rotor go with its
-        motion, as do forces along its coordinates and their guess.
-
-        Args:
-            positions: of joints by name: a number or an expression [rad or m]; as many numbers as
-                it has positions for a joint with several, those of a Spherical or Free joint of
-                its frame_b in frame_a.
-
-        Raises:
-            DescriptionError: there is no such joint, a position is of another length, couplings
-                contradict the positions, or a sensor or a drive line is on the joint.
-        """
-        lock(self, positions)
-
-    def assemble(
-        self, guess: Mapping[str, float] | State | Result | None = None, active: Sequence[str] = ()
-    ) -> System:
-        """The frozen `System` of this mechanism: tree, cut joints, equations.
-
-        Args:
-            guess: approximate joint positions by coordinate name [rad or m], where the loops are
-                to be closed near to; it is laid over the guess of the mechanism itself, and what
-                neither names starts at zero.
-            active: names of velocities that are to be independent in a system with loops, before
-                those of the motors; the others are proposed by pivoting. Where they are more than
-                the mobility, all of them have motors, and pivoting chooses among them.
-
-        Raises:
-            AssemblyError: the components do not form a mechanism, or nothing in it can move.
-            Unclosable: no configuration closes the loops.
-        """
-        from mbs.loops.assemble import assemble  # the one call upwards, see docs/decisions.md
-
-        guess = positions_of(guess)
-        if not isinstance(guess, Mapping | None):
-            raise DescriptionError(
-                f"{self.name}: guess is {quoted(guess)}; give a dict of names to positions"
-            )
-        names = names_given(f"{self.name}: active", active, "j1", DescriptionError)
-        return assemble(self, guess or {}, names)
-
     def _require_use(self, component: Component) -> None:
         """Refuse a component that no equation would know."""
         if isinstance(component, MotionJoint) and component.frame_a is None:
@@ -534,7 +468,7 @@ class Mechanism:
 
     def __repr__(self) -> str:
         bodies, joints = len(list(self.bodies())), len(list(self.joints()))
-        return f"<Mechanism {self.name}: {bodies} bodies, {joints} joints>"
+        return f"<Description {self.name}: {bodies} bodies, {joints} joints>"
 
     def joints(self) -> Iterator[Joint]:
         """Every joint, in the order added."""
@@ -667,7 +601,7 @@ class Mechanism:
         return (point.owner.name, point.port) in self._ports
 
 
-check_arguments(Mechanism)
+check_arguments(Description)
 
 
 def _what(value: object) -> str:

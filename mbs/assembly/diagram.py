@@ -7,12 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from html import escape
 
-from mbs.assembly import System
-from mbs.assembly.model_function import require_system
-from mbs.assembly.system import followed
+from mbs.assembly.report import followed
+from mbs.assembly.system_data import SystemData
 from mbs.errors import ExportError
 from mbs.files import PathLike, path_of, write_text
-from mbs.view.primitives import PALETTE, Theme
+from mbs.palette import PALETTE, Theme
 
 # The connection graph of a system: which bodies there are, and which joints join them.
 
@@ -70,7 +69,7 @@ class Connections:
     remarks: tuple[str, ...]
 
 
-def connections(system: System) -> Connections:
+def connections(system: SystemData) -> Connections:
     """The graph of a system; welds join nothing, since what they hold is one link."""
     edges = [_edge(system, k) for k, row in enumerate(system.joints) if row.part is None]
     edges = [edge for edge in edges if edge.ends[0] != edge.ends[1]]
@@ -92,7 +91,7 @@ def connections(system: System) -> Connections:
     return Connections(nodes, children, tuple(e for e in edges if e.cut), _remarks(system))
 
 
-def _edge(system: System, k: int) -> ConnectionEdge:
+def _edge(system: SystemData, k: int) -> ConnectionEdge:
     row = system.joints[k]
     speeds = (*system.speeds, *system.cut_coordinates)
     driven = any(speed.actuated for speed in speeds if speed.joint == row.name)
@@ -100,7 +99,7 @@ def _edge(system: System, k: int) -> ConnectionEdge:
     return ConnectionEdge(row.name, _KINDS.get(row.kind, row.kind), driven, row.cut, ends)
 
 
-def _names(system: System, number: int) -> tuple[str, ...]:
+def _names(system: SystemData, number: int) -> tuple[str, ...]:
     if number == 0:
         return ("base",)
     names = [body.name for body in system.bodies if body.link == number]
@@ -109,7 +108,7 @@ def _names(system: System, number: int) -> tuple[str, ...]:
     return tuple(names) or (f"link {number}",)
 
 
-def _remarks(system: System) -> tuple[str, ...]:
+def _remarks(system: SystemData) -> tuple[str, ...]:
     return tuple(
         f"{loop.name}: {followed(loop.joints)}"
         for loop in system.loops
@@ -331,13 +330,8 @@ class Diagram:
         write_text(self.svg, path)
 
 
-def diagram(system: System) -> Diagram:
-    """The connection graph of a system: the spanning tree from the base downwards, and the cuts.
-
-    Raises:
-        ModelError: `system` is not a System.
-    """
-    require_system(system)
+def diagram(system: SystemData) -> Diagram:
+    """Return the picture of the connection graph: spanning tree from the base down, cut joints."""
     graph = connections(system)
     placed = layout(graph)
     aside = sum(_rises(placed, pill) for pill in placed.cuts)
@@ -363,7 +357,7 @@ def diagram(system: System) -> Diagram:
     return Diagram(_document(total, height, body))
 
 
-def drawn(system: System, path: PathLike | None) -> Diagram:
+def drawn(system: SystemData, path: PathLike | None) -> Diagram:
     """`diagram`, written to a file where one is named."""
     made = diagram(system)
     if path is not None:
@@ -377,7 +371,7 @@ def _ascent(placed: Layout) -> float:
     return max(box, *(PILL / 2 + 16 - pill.y for pill in placed.tree))
 
 
-def _title(system: System) -> str:
+def _title(system: SystemData) -> str:
     moving, loops = len(connections(system).nodes) - 1, len(system.cuts)
     count = f"{moving} moving bod{'y' if moving == 1 else 'ies'}"
     rest = f", {loops} loop{'s' if loops > 1 else ''}" if loops else ", no loop"
@@ -520,8 +514,9 @@ def _across(pill: PlacedEdge, other: PlacedNode, order: int, placed: Layout) -> 
             f"M{start:.1f} {pill.y:.1f}H{lane + bend:.1f}q{-bend} 0 {-bend} {-6 * up}"
             f"V{y + 6 * up:.1f}q0 {-6 * up} {-bend} {-6 * up}H{x:.1f}"
         )
-    # several lines enter a box left and right of its middle, 7 px apart, and not at its corners
+    # Several lines enter a box left and right of its middle, 7 px apart.
     side = -1 if order % 2 else 1
+    # 42 % of the width is just inside the corner
     x = other.x + side * min(7.0 * (order // 2), 0.42 * other.width)
     y = other.y + other.height / 2
     low = max(foot, y) + 30 + 4 * order

@@ -1,4 +1,4 @@
-"""The assembled mechanism: frozen, with its tables; every model is built from it."""
+"""The assembled mechanism: immutable, with tables from which all models are built."""
 
 from __future__ import annotations
 
@@ -50,33 +50,34 @@ if TYPE_CHECKING:
     from mbs.view.diagram import Diagram
 
 
-# Pickles of what holds SX: graphs travel as one Function, all else as it is.
+# Pickles of objects with SX: all expressions are stored as one serialized Function.
 
 
 Packed = tuple[bytes, tuple[str, ...], str]
-"""Bytes, names of symbols, and graphs."""
+"""Pickle bytes, names of symbols, and the serialized Function of all expressions."""
 
 
 def packed(state: Any) -> Packed:
-    """Any object made of plain data, Functions and SX, as data alone.
+    """Return a serializable form of an object made of plain data, Functions and SX.
 
     Args:
-        state: what is to be packed; it may hold any number of SX.
+        state: object to pack, with any number of SX.
     """
     return _pack(state)[0]
 
 
 def unpacked(data: bytes, names: Sequence[str], graphs: str) -> Any:
-    """What was packed, all that `packed` gave; symbols have their names and are new."""
+    """Return the object packed by `packed`; its symbols are new, with their old names."""
     found = Function.deserialize(graphs).call([SX.sym(name) for name in names])
     return _Unpickler(io.BytesIO(data), found).load()
 
 
 def content_of(state: Any) -> Packed | None:
-    """What an object is known by beyond this process, equal for equal content.
+    """Return a key of an object across processes, equal for equal content.
 
-    None where it holds a class or a function of a user: a pickle has its name alone, and what it
-    says may be another the next time. Some have no pickle, and machine code has no text.
+    None if the object contains user-defined classes or functions: a pickle has only their names,
+    while their code may change. None also if it cannot be pickled or contains machine code without
+    source.
     """
     try:
         found, names_alone = _pack(state)
@@ -86,12 +87,12 @@ def content_of(state: Any) -> Packed | None:
 
 
 def _pack(state: Any) -> tuple[Packed, bool]:
-    """An object as data, and whether there are names in it that stand for code of a user."""
+    """Return a packed object, and whether it refers to user-defined code by name."""
     buffer = io.BytesIO()
     pickler = _Pickler(buffer)
     pickler.dump(state)
     graphs = pickler.graphs
-    # one symbol at least: without any, numbers would come back as DM
+    # at least one symbol: without symbols, numbers would be returned as DM
     symbols = casadi.symvar(casadi.veccat(SX.sym("any"), *graphs))
     names = tuple(symbol.name() for symbol in symbols)
     text = Function("graphs", symbols, graphs).serialize()
@@ -99,7 +100,7 @@ def _pack(state: Any) -> tuple[Packed, bool]:
 
 
 _KNOWN = frozenset({"mbs", "casadi", "numpy", *sys.stdlib_module_names})
-"""Packages whose classes say the same wherever a version of them is installed."""
+"""Packages whose classes have the same meaning in every process with the same version."""
 
 
 class _Pickler(pickle.Pickler):
@@ -117,7 +118,7 @@ class _Pickler(pickle.Pickler):
     def reducer_override(self, obj: Any) -> Any:
         if isinstance(obj, (type, FunctionType)) and obj.__module__.split(".")[0] not in _KNOWN:
             self.names_alone = True
-        if isinstance(obj, Function):  # a Callback of a user is in it by its name
+        if isinstance(obj, Function):  # a user-defined Callback is pickled by its name
             parts = (obj, *obj.find_functions())
             self.names_alone |= any(part.class_name() == "CallbackInternal" for part in parts)
         return NotImplemented
@@ -132,17 +133,17 @@ class _Unpickler(pickle.Unpickler):
         return self._graphs[pid]
 
 
-# What was assembled, in plain sentences.
+# Report of the assembled system.
 
 
 def report(system: System) -> str:
-    """Tree, cut joints, mobility, dropped rows, whether the cut forces are unique, what acts."""
+    """Return the report: tree, cut joints, mobility, dropped rows, parameters, components."""
     every = [*_tree(system), *_loops(system), *_parameters(system), *_acting(system)]
     return "\n".join([*every, *_degrees(system)])
 
 
 def _degrees(system: System) -> list[str]:
-    """Note on guesses that look like degrees; an open system is assembled at its guess."""
+    """Return a note on guesses that look like degrees. An open system is assembled at its guess."""
     names = [coordinate.name for coordinate in system.coordinates]
     given = dict(zip(names, system.configuration, strict=True))
     if system.closure is not None:
@@ -173,7 +174,7 @@ def _tree(system: System) -> list[str]:
 
 
 def followed(joints: Sequence[str]) -> str:
-    """Which coordinate follows which others, in words."""
+    """Return the text of a coupling, such as "j2 follows j1"."""
     driven, *others = joints
     return f"{driven} follows {' and '.join(others)}"
 
@@ -229,11 +230,11 @@ def _loops(system: System) -> list[str]:
 
 
 _SHOWN_POSITIONS, _SHOWN_MODES = 12, 3
-"""Most positions of a configuration, and other configurations, in a report."""
+"""Maximum number of positions of a configuration, and of other configurations, in a report."""
 
 
 def _configuration(system: System, closure: Closure) -> list[str]:
-    """The assembled configuration, the guess and other assembly modes."""
+    """Return the lines of the assembled configuration, unmet guesses and other assembly modes."""
 
     def shown(q: Sequence[float]) -> str:
         pairs = zip(system.coordinates, q, strict=True)
@@ -266,7 +267,7 @@ def _configuration(system: System, closure: Closure) -> list[str]:
 
 
 _GUESSED = 1e-9
-"""Difference from a guess that is met [rad or m]: closing moves no position that is locked."""
+"""Difference from a guess that counts as met [rad or m]: closing keeps locked positions."""
 
 
 def _parameters(system: System) -> list[str]:
@@ -280,14 +281,14 @@ def _parameters(system: System) -> list[str]:
 
 
 def _acting(system: System) -> list[str]:
-    """Parts of drive lines, force elements, sensors: a sentence for each."""
+    """Return a sentence for each part of drive lines, force element and sensor."""
     driving = {device.name for device in system.devices}
     return [
         *(row.sentence for row in system.shafts if row.name not in driving),
         *(
             part.sentence
             for part in system.parts
-            if not part.element.drives and not part.binds_alone  # those stand among the loops
+            if not part.element.drives and not part.binds_alone  # listed among the loops
         ),
         *(device.sentence for device in system.devices),
         *(sensor.sentence for sensor in system.sensors),
@@ -300,45 +301,44 @@ def _count(number: int, noun: str) -> str:
 
 
 _BUILDING = threading.RLock()
-"""Two threads that ask for the same model get the same Function."""
+"""Lock of the cache, so that two threads that request the same model get the same Function."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class System:
-    """A mechanism ready for equations.
+    """An assembled mechanism, from which models are built.
 
     Attributes:
-        name: of the mechanism.
-        source: where its data come from.
+        name: name of the mechanism.
+        source: origin of its data.
         tree: links with frames and inertias.
-        cuts: joints that were cut to open the loops.
+        cuts: joints that are cut to open the loops.
         couplings: relations between coordinates.
-        parameters: symbols in the order of the input p of the Functions.
-        p: (np, 1) these symbols.
-        coordinates: the elements of q.
-        speeds: the elements of v, and of efforts and accelerations.
-        cut_coordinates: the coordinates of cut joints, which are not in q.
-        bodies: the moving bodies of the description, in the order of external wrenches.
-        frames: named frames: link (-1 for the base) and pose in the link's frame.
-        named_frames: those of them that the description named by `add_frame`.
+        parameters: parameters in the order of the input p of the Functions.
+        p: (np, 1) symbols of the parameters.
+        coordinates: elements of q.
+        speeds: elements of v, and of efforts and accelerations.
+        cut_coordinates: coordinates of cut joints, which are not in q.
+        bodies: moving bodies of the description, in the order of external wrenches.
+        frames: link (-1 for the base) and pose in the link's frame of each named frame.
+        named_frames: names of the frames that were added by `add_frame`.
         loops: one row for each loop or coupling.
         configuration: a position q that closes the loops, or all zero.
-        closure: how the loops constrain velocities; None for an open chain.
-        parts: force elements, drives and all other components by their equations.
-        joints: every joint and constraint, those of the tree and those that were cut.
-        sensors: what reads the motion and changes nothing.
+        closure: constraints of the loops on velocities. None for an open chain.
+        parts: force elements, drives and all other equation-based components.
+        joints: all joints and constraints, in the tree and cut.
+        sensors: sensors on points and joints.
         shafts: inertias and rigid gears of drive lines, and the coordinates that they rotate with.
         z: (nz, 1) symbols of the states of parts.
         u: (nu, 1) symbols of the inputs of parts.
-        bounds: least and greatest value of the parameters that have one, by name.
-        bounded: what is computed from parameters and has bounds.
-        described: the components that hold parameters, as they were described.
-        numbered: the body of each frame of the table that it was made from, by the number there;
-            empty where these are the numbers of the links.
-        shapes: what the links and the base look like.
-        nodes: coordinates that move no mass and that the balance of forces determines: index in q
-            and index in v.
-        balances: balances of the forces on the nodes. Balances of positions come first.
+        bounds: least and greatest value of the parameters with a bound, by name.
+        bounded: fields of components that are computed from parameters and have bounds.
+        described: components with parameters, as described.
+        numbered: name of the body of each numbered frame of the source table. Empty if the numbers
+            are those of the links.
+        shapes: shapes of the links and the base, for pictures.
+        nodes: index in q and index in v of the massless coordinates that force balances determine.
+        balances: force balances of the nodes. Balances of positions come first.
     """
 
     name: str
@@ -373,10 +373,10 @@ class System:
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds everything except the models, which are built again.
+        """Pickle everything except the models, which are built again.
 
         Raises:
-            ModelError: a component is of a class that another process cannot import.
+            ModelError: another process cannot import the class of a component.
         """
         try:
             return _unpickle, packed(self._described())
@@ -407,7 +407,7 @@ class System:
 
     @property
     def devices(self) -> tuple[AttachedPart, ...]:
-        """The motors and torques that drive shafts."""
+        """Components that drive shafts: motors and imposed torques."""
         return tuple(part for part in self.parts if part.element.drives)
 
     @property
@@ -422,17 +422,17 @@ class System:
 
     @property
     def outputs(self) -> tuple[Quantity, ...]:
-        """Name and unit of what parts show: forces, speeds and other outputs."""
+        """Name and unit of the outputs of parts: forces, speeds and so on."""
         return tuple(row for part in self.parts for row in part.output_quantities)
 
     @property
     def z_start(self) -> list[float]:
-        """The starts of z that the components have."""
+        """Initial values of z from the components."""
         return [getattr(part.element, name) for part in self.parts for name in part.states]
 
     @property
     def u_default(self) -> list[float]:
-        """The values of u where nothing gives them."""
+        """Default values of u."""
         return [
             float(part.element.declared[name].default)
             for part in self.parts
@@ -442,7 +442,7 @@ class System:
 
     @property
     def links(self) -> tuple[LinkRow, ...]:
-        """The links of the tree and the Khalil parameters of their frames."""
+        """Links of the tree and Khalil parameters of their frames."""
         return link_rows(self.tree)
 
     @property
@@ -454,7 +454,7 @@ class System:
     def active(self) -> tuple[int, ...]:
         """Indices of the independent velocities: all of them in an open chain.
 
-        These are the velocities that models of a closed system take. `actuated` has the velocities
+        Models of a closed system are functions of these velocities. `actuated` has the velocities
         with motors.
         """
         return self.closure.active if self.closure else tuple(range(self.nv))
@@ -466,7 +466,7 @@ class System:
 
     @property
     def free(self) -> tuple[int, ...]:
-        """Indices of the velocities whose positions may be chosen: active, or those of discs."""
+        """Indices of the velocities whose positions may be chosen, see `Closure.free`."""
         return self.closure.free if self.closure else tuple(range(self.nv))
 
     @property
@@ -476,31 +476,31 @@ class System:
 
     @property
     def motors(self) -> tuple[int, ...]:
-        """Numbers of the velocities whose efforts direct and inverse dynamics have.
+        """Indices of the velocities whose efforts are in direct and inverse dynamics.
 
-        They are the active ones, but where motors are more than these, or depend on each other.
+        They are the independent velocities, unless there are more motors or dependent motors.
         """
         return self.closure.motors if self.closure else tuple(range(self.nv))
 
     @property
     def symbol_table(self) -> dict[str, SX]:
-        """The symbol of every parameter by its name."""
+        """Symbol of every parameter by name."""
         return {parameter.name: self.p[k] for k, parameter in enumerate(self.parameters)}
 
     @property
     def p_default(self) -> list[float]:
-        """The defaults of the parameters; NaN for a symbol without value."""
+        """Default values of the parameters; NaN for a parameter without value."""
         return [float("nan") if p.default is None else p.default for p in self.parameters]
 
     def report(self) -> str:
-        """What was assembled, in plain sentences."""
+        """Return a description of the assembled system in plain sentences."""
         return report(self)
 
     def draw(self, path: PathLike | None = None) -> Diagram:
-        """The connection graph: bodies, the joints of the tree, and those cut to open loops.
+        """Return a diagram of bodies, joints of the tree, and cut joints.
 
         Args:
-            path: .svg file to write as well.
+            path: .svg file to write in addition.
 
         Raises:
             ExportError: the file cannot be written.
@@ -510,7 +510,7 @@ class System:
         return drawn(self, path)
 
     def qdot(self, q: Any, v: Any) -> Any:
-        """(nq, 1) time derivative of q; it differs from v for quaternion joints only.
+        """Return the time derivative of q, (nq, 1). It differs from v for quaternions only.
 
         Args:
             q: (nq, 1) positions, as SX, MX, DM or numpy.
@@ -525,45 +525,46 @@ class System:
         return Function("qdot", [q, v], [rate], ["q", "v"], ["qdot"])
 
     def cached(self, key: Any, build: Callable[[], Any]) -> Any:
-        """What `build` made the first time it was asked for under this key."""
+        """Return the cached value of `build()` for a key; build it at the first request."""
         with _BUILDING:
             if key not in self._cache:
                 self._cache[key] = build()
             return self._cache[key]
 
     def content(self) -> Packed | None:
-        """What it is known by beyond this process; None where code of a user belongs to it."""
+        """Return a key of the system across processes; None if it contains user-defined code."""
 
         def build() -> Packed | None:
             found = content_of(self._described())
-            # equal texts may be one object or two, which pickles show; once unpacked they stay so
+            # equal texts may be one object or two, which pickles show; unpacking makes this
+            # reproducible
             return found and packed(unpacked(*found))
 
         content: Packed | None = self.cached("content", build)
         return content
 
     def recent(self, kind: str, key: Any, build: Callable[[], Any], most: int) -> Any:
-        """What `build` made under this key, of the last few of a kind that were asked for.
+        """Return the value of `build()` for a key, with a cache of the last values of a kind.
 
         Args:
-            kind: what is kept, of which there may be many.
-            key: of one of them.
-            build: makes it where it is not at hand.
-            most: how many are kept.
+            kind: kind of cached values.
+            key: key of the value within the kind.
+            build: function that computes a value that is not in the cache.
+            most: maximum number of cached values of the kind.
         """
         with _BUILDING:
             kept: dict[Any, Any] = self._cache.setdefault(("recent", kind), {})
             value = kept.pop(key) if key in kept else build()
-            kept[key] = value  # the last one now
+            kept[key] = value  # most recent
             while len(kept) > most:
                 del kept[next(iter(kept))]
             return value
 
     def frame(self, name: str | int) -> tuple[int, Pose]:
-        """A frame by name, or the frame of link number 1, 2, ... (0 is the base).
+        """Return link and pose of a frame by name, or of link number 1, 2, ... (0 is the base).
 
-        A number is that of a frame of the table from which the mechanism was made, which counts
-        fixed frames, too.
+        If the mechanism was made from a table, a number is that of a frame of the table, which also
+        counts fixed frames.
 
         Raises:
             ModelError: there is no such frame.
@@ -599,9 +600,9 @@ class System:
         return self.frames[self.numbered[number]]
 
     def position(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
-        """Positions q from values by coordinate name, the others as in the assembled configuration.
+        """Return positions q from values by coordinate name; others are as assembled.
 
-        Names of variables of FMUs, such as j1.q, are accepted in place of j1.
+        Names of variables of FMUs, such as j1.q, are accepted instead of j1.
 
         Raises:
             ModelError: a name is unknown, or a sequence has the wrong length.
@@ -623,12 +624,12 @@ class System:
         return {name: self._number(value, f"position of {name}") for name, value in found.items()}
 
     def velocity(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
-        """Velocities v from values by name, the others zero; errors as for `position`."""
+        """Return velocities v from values by name, others zero; errors as for `position`."""
         given = self.plain_names(values, VELOCITIES)
         return self._fill(given, self.speeds, [0.0] * self.nv, "velocity")
 
     def effort(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
-        """Joint efforts tau from values by name, the others zero; errors as for `position`."""
+        """Return joint efforts tau from values by name, others zero; errors as for `position`."""
         given = self.plain_names(values, EFFORTS)
         return self._fill(given, self.speeds, [0.0] * self.nv, "effort")
 
@@ -636,8 +637,8 @@ class System:
         """Return values by coordinate name, such as j1, for names such as j1.q.
 
         Args:
-            values: values by name; anything else is returned as it is.
-            kinds: ends of names that are accepted, such as ("q",).
+            values: values by name; other types are returned unchanged.
+            kinds: accepted ends of names, such as ("q",).
 
         Raises:
             ModelError: a value is given by both names, or the name is of another quantity.
@@ -680,7 +681,7 @@ class System:
         return start
 
     def _numbers(self, values: Any, what: str) -> list[float]:
-        if isinstance(values, (list, tuple)):  # numpy makes no array of several (1, 1) of CasADi
+        if isinstance(values, (list, tuple)):  # numpy cannot convert lists of (1, 1) DM
             values = [float(x) if isinstance(x, DM) and x.numel() == 1 else x for x in values]
         array = numbers_given(values)
         if isinstance(array, str):
@@ -706,16 +707,16 @@ class System:
     def parameter_values(
         self, values: Mapping[str, float] | None = None, needed: Container[str] | None = None
     ) -> list[float]:
-        """Parameters p from values by name, the others at their defaults.
+        """Return parameters p from values by name, others at their defaults.
 
         Args:
-            values: by name.
-            needed: names that must have a value, all of them when left out; the others are NaN
-                where they have none.
+            values: values by name.
+            needed: names of parameters that must have a value, by default all. Other parameters
+                without value are NaN.
 
         Raises:
-            ModelError: a name is unknown, a symbol has no value, or a value is out of its bounds or
-                refused by a component that holds it.
+            ModelError: a name is unknown, a parameter has no value, or a value is out of its bounds
+                or rejected by a component.
         """
         names = [parameter.name for parameter in self.parameters]
         if values is not None and not isinstance(values, Mapping):
@@ -748,10 +749,10 @@ class System:
         return result
 
     def parameter_fault(self, p: Iterable[float]) -> str:
-        """What is wrong with values of the parameters and what to give; empty where nothing is.
+        """Return the reason and remedy of invalid parameter values; empty if they are valid.
 
         Args:
-            p: (np,) values; a NaN is one that nobody gave.
+            p: (np,) values; NaN for a missing value.
         """
         values = {
             parameter.name: float(value)

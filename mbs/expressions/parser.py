@@ -1,4 +1,4 @@
-"""Recursive descent over the grammar of `mbs.expressions`; texts are never run."""
+"""Recursive descent parser of the grammar of `mbs.expressions`; texts are never executed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _DEEPEST_NESTING = 100
 
 @lru_cache(maxsize=4096)
 def parse(text: str) -> Expression:
-    """The expression that a text stands for."""
+    """Parse a text to an expression."""
     parser = _Parser(text)
     value = parser.sum()
     if parser.token is not None:
@@ -34,7 +34,7 @@ def parse(text: str) -> Expression:
 
 
 class _Parser:
-    """The text, one token ahead."""
+    """Parser of a text with one token of lookahead."""
 
     def __init__(self, text: str) -> None:
         self.text = text

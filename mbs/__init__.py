@@ -1,8 +1,8 @@
-"""Equations of robots and mechanisms with closed loops, on CasADi graphs.
+"""Equations of robots and mechanisms with closed loops, as CasADi graphs.
 
-Compose components in a `Mechanism` or `load` a robot, `assemble()` it, and ask `mbs.models` for
-its equations as `casadi.Function`s; `mbs.export` writes C and FMUs, `mbs.simulate` runs them.
-Everything but numpy and casadi is imported where it is used.
+Compose components in a `Mechanism` or `load` a robot and `assemble()` it. `mbs.models` returns its
+equations as `casadi.Function`s, `mbs.export` writes C code and FMUs, and `mbs.simulate` integrates
+the motion. All packages except numpy and casadi are imported when they are needed.
 """
 
 from __future__ import annotations

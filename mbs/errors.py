@@ -1,22 +1,22 @@
-"""The exception tree: every error that mbs raises on purpose.
+"""Exceptions: every error that mbs raises on purpose.
 
     MbsError
-    ├── DescriptionError      a component or a file says something impossible
-    │   ├── ArgumentError     a component has no such argument, or needs another one
+    ├── DescriptionError      a component or a file describes something impossible
+    │   ├── ArgumentError     a component has an unknown or a missing argument
     │   └── ExpressionError   a text is not a number or an expression of symbols
     ├── AssemblyError         the components do not form a mechanism
     ├── LoopError             a closed loop has no usable configuration
-    │   ├── NoClosedForm      a loop is solved by iteration only
-    │   ├── SingularPosture   the independent joints cannot lead the others there
+    │   ├── NoClosedForm      a loop has no closed form and requires iteration
+    │   ├── SingularPosture   the independent joints do not determine the dependent joints
     │   └── Unclosable        no configuration closes the loop
-    ├── ModelError            a model was asked for that the system does not have
-    ├── SolverError           a numerical method could not go on
-    ├── CompilerError         no compiler, or the compiler refused the code
+    ├── ModelError            a model does not exist for the system, or a call is invalid
+    ├── SolverError           a numerical method failed
+    ├── CompilerError         no compiler was found, or the code does not compile
     └── ExportError           a file could not be written
 
-A message is one sentence: which component, what value, which rule, what to do.
+A message is a single sentence: the component, the value, the violated rule and the remedy.
 
-`Interrupted` stands apart: a KeyboardInterrupt is no error, and `except Exception` lets it by.
+`Interrupted` is no MbsError: it is a KeyboardInterrupt, which `except Exception` does not catch.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,7 +24,7 @@ from typing import Any
 
 
 class MbsError(Exception):
-    """Base of all errors raised on purpose by mbs."""
+    """Base class of all errors raised on purpose by mbs."""
 
 
 class DescriptionError(MbsError, ValueError):
@@ -32,7 +32,7 @@ class DescriptionError(MbsError, ValueError):
 
 
 class ArgumentError(DescriptionError, TypeError):
-    """A component is made with an argument that it does not have, or without one that it needs."""
+    """The constructor of a component has an unknown argument, or a required one is missing."""
 
 
 class ExpressionError(DescriptionError):
@@ -48,11 +48,11 @@ class LoopError(MbsError):
 
 
 class SingularPosture(LoopError):
-    """A configuration at which the independent joints do not determine how the others move."""
+    """A configuration at which the independent joints do not determine the dependent joints."""
 
 
 class NoClosedForm(LoopError):
-    """A loop whose passive joints no closed form known here gives."""
+    """A loop has no known closed form of its passive joints."""
 
 
 class Unclosable(LoopError):
@@ -60,18 +60,18 @@ class Unclosable(LoopError):
 
 
 class ModelError(MbsError, ValueError):
-    """A model was asked for that the system does not have."""
+    """A model does not exist for the system, or a call of mbs has invalid arguments."""
 
 
 class SolverError(MbsError, RuntimeError):
-    """A numerical method could not go on.
+    """A numerical method failed.
 
     Attributes:
-        state: the last state that an integration reached; empty where there is none.
-        singular: whether it stopped at a singular configuration.
-        time: at which a motion stopped, s; None where there is no motion.
-        fired: numbers of the event indicators that are to blame; empty where none is.
-        result: what a simulation had reached, a `Result`; None where it is not one that stopped.
+        state: last state that an integration reached. Empty without an integration.
+        singular: Whether the method stopped at a singular configuration.
+        time: time at which a motion stopped [s]. None without a motion.
+        fired: indices of the event indicators that caused the failure. Empty if no event did.
+        result: `Result` of a simulation until it stopped. None for other methods.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class SolverError(MbsError, RuntimeError):
         time: float | None = None,
         fired: Sequence[int] = (),
     ) -> None:
-        """As of every exception, with what is known of where it happened."""
+        """Create the exception with a message and the data of the failure."""
         super().__init__(*args)
         self.state = tuple(state)
         self.singular = singular
@@ -92,15 +92,16 @@ class SolverError(MbsError, RuntimeError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """A run was interrupted by control-C; its result is the part that is complete.
+    """A run was interrupted by control-C. Its result contains the completed part.
 
     Attributes:
-        time: at which a motion stopped, s; None where it is not a motion.
-        compute: makes the result of a motion, which may take as long as its laws.
+        time: time at which a motion stopped [s]. None without a motion.
+        compute: function that returns the result of a motion. Evaluating all its outputs may take
+            long.
     """
 
     def __init__(self, *args: object, time: float | None = None) -> None:
-        """As of every exception, with the time."""
+        """Create the exception with a message and the time of the interruption."""
         super().__init__(*args)
         self.time = time
         self.compute: Callable[[], Any] | None = None
@@ -108,7 +109,7 @@ class Interrupted(KeyboardInterrupt):
 
     @property
     def result(self) -> Any:
-        """The `Result` of a simulation or the `Sweep` of a study; made when it is first read."""
+        """`Result` of a simulation or `Sweep` of a parameter sweep; computed on first access."""
         if self._result is None and self.compute is not None:
             self._result, self.compute = self.compute(), None
         return self._result
@@ -119,7 +120,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 class CompilerError(MbsError, RuntimeError):
-    """No C compiler was found, or it refused the code."""
+    """No C compiler was found, or the code does not compile."""
 
 
 class ExportError(MbsError, OSError):

@@ -1,4 +1,4 @@
-"""Files written as a whole, or not at all."""
+"""Atomic writing of files, and checks of zip archives."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ PathLike = str | os.PathLike[str]
 
 
 def path_of(path: object) -> Path:
-    """The path that a user gave.
+    """Return a path argument as a Path.
 
     Raises:
-        ExportError: it is neither a text nor a path.
+        ExportError: the argument is neither a text nor a path.
     """
     if isinstance(path, (str, os.PathLike)) and isinstance(text := os.fspath(path), str):
         return Path(text)
@@ -29,19 +29,20 @@ def path_of(path: object) -> Path:
 
 @contextlib.contextmanager
 def whole_file(path: PathLike, remedy: str = "choose a writable place") -> Iterator[Path]:
-    """A scratch file beside the target that takes its place when the block ends well.
+    """Provide a scratch file that replaces the target if the block succeeds.
 
-    The target has the permissions of any new file, and its old content until the end.
+    The scratch file is in the folder of the target. The target has the permissions of any new file,
+    and keeps its old content until the end.
 
     Args:
         path: file to write.
-        remedy: end of the message when it cannot be written.
+        remedy: end of the error message if the file cannot be written.
 
     Yields:
-        the scratch file, which has the ending of the target and which the block fills.
+        path of the scratch file, with the ending of the target, to be written by the block.
 
     Raises:
-        ExportError: the file cannot be written; nothing is left behind.
+        ExportError: the file cannot be written. The scratch file is deleted.
     """
     target = path_of(path)
     folder = os.fspath(path).endswith(tuple(filter(None, ("/", os.sep, os.altsep))))
@@ -63,7 +64,7 @@ def whole_file(path: PathLike, remedy: str = "choose a writable place") -> Itera
 
 
 def write_bytes(content: bytes, path: PathLike) -> None:
-    """Write a file as a whole or not at all.
+    """Write a file completely or not at all.
 
     Raises:
         ExportError: the file cannot be written.
@@ -82,11 +83,11 @@ def write_sealed(content: bytes, path: PathLike) -> None:
 
 
 def read_sealed(path: PathLike) -> bytes:
-    """What `write_sealed` wrote.
+    """Return the content of a file of `write_sealed`.
 
     Raises:
-        OSError: there is no such file, or it cannot be read.
-        ValueError: it is damaged.
+        OSError: the file does not exist or cannot be read.
+        ValueError: the file is damaged.
     """
     seal, _, content = path_of(path).read_bytes().partition(b"\n")
     if seal != hashlib.sha256(content).hexdigest().encode():
@@ -95,7 +96,7 @@ def read_sealed(path: PathLike) -> bytes:
 
 
 def write_text(text: str, path: PathLike) -> None:
-    """Write a file of UTF-8 as a whole or not at all; line ends are kept as they are.
+    """Write a text file in UTF-8 completely or not at all, with its line ends unchanged.
 
     Raises:
         ExportError: the file cannot be written.
@@ -104,11 +105,11 @@ def write_text(text: str, path: PathLike) -> None:
 
 
 def write_texts(files: Mapping[str, str], folder: PathLike) -> None:
-    """Write files of UTF-8 into a folder, made when it is not there; all of them or none.
+    """Write text files in UTF-8 into a folder, created if necessary: all of them or none.
 
     Args:
-        files: name to text.
-        folder: where.
+        files: dict from file name to text.
+        folder: folder of the files.
 
     Raises:
         ExportError: the folder cannot be written.
@@ -126,36 +127,36 @@ def write_texts(files: Mapping[str, str], folder: PathLike) -> None:
             scratch.write_bytes(text.encode("utf-8"))
 
 
-# Zip files of others, such as FMUs: what is refused before anything of them is unpacked.
+# Checks of zip archives of unknown origin, such as FMUs, before they are unpacked.
 
 
 MOST_BYTES = 2 * 1024**3
-"""Unpacked. FMUs with tables and libraries for several platforms have some hundred MB."""
+"""Largest unpacked size: FMUs with tables and libraries for several platforms have some 100 MB."""
 
 MOST_TIMES = 100
-"""Unpacked size by packed size. FMUs have about 4, an XML file alone about 15; a file made to fill
-a disk has 1000, the most that deflate can reach."""
+"""Largest ratio of unpacked and packed size. FMUs have about 4, a single XML file about 15. A
+malicious file that fills a disk has 1000, the maximum of deflate."""
 
 HARMLESS_BYTES = 64 * 1024**2
-"""Unpacked size to which any ratio is taken: a table of zeros shrinks like a bomb."""
+"""Unpacked size up to which any ratio is accepted: a table of zeros has a large ratio too."""
 
 MOST_ENTRIES = 20_000
-"""Each becomes a file. FMUs with a whole run-time of Python inside have some thousand."""
+"""Largest number of entries, each of which becomes a file. FMUs with Python have some thousand."""
 
 
 def check_archive(path: Path) -> None:
-    """Refuse a zip file that unpacks to too much, or outside of its folder.
+    """Raise if a zip file would unpack to too much data, or outside of its folder.
 
-    Its table of contents is read, and nothing else. Unpacking by `zipfile` writes no more of an
-    entry than that table says.
+    Only its table of contents is read. `zipfile` unpacks no more of an entry than the table
+    specifies.
 
     Args:
-        path: the file.
+        path: path of the zip file.
 
     Raises:
-        ValueError: says why, in the middle of a sentence about the file.
-        zipfile.BadZipFile: it is no zip file.
-        OSError: it cannot be read.
+        ValueError: the archive is not acceptable; the message is the end of a sentence about it.
+        zipfile.BadZipFile: the file is no zip file.
+        OSError: the file cannot be read.
     """
     with zipfile.ZipFile(path) as archive:
         entries = archive.infolist()
@@ -184,7 +185,7 @@ def check_archive(path: Path) -> None:
 
 
 def _leads_outside(name: str) -> bool:
-    """A name with `..`, a drive, a leading slash, or slashes of Windows, which hide them."""
+    """Return whether a name has `..`, a drive, a leading slash, a backslash or a null character."""
     parts = PurePosixPath(name).parts
     return ".." in parts or name.startswith("/") or any(sign in name for sign in "\\:\0")
 

@@ -1,4 +1,4 @@
-"""What counts as numbers in a call, what stands for zero, and Functions of arrays."""
+"""Conversion of arguments to numbers, a substitute for zero divisors, and Functions of arrays."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from mbs.text import quoted
 
 Array = NDArray[np.float64]
 OnArrays = Callable[..., list[Array]]
-"""A Function of arrays: an array for each input, a new one (rows, columns) for each output."""
+"""Callable with an array per input, which returns a new array (rows, columns) per output."""
 
 NONZERO = 1e-300
-"""Stands for zero where one divides: zero over it is zero, numbers up to 1e8 over it are finite,
-and it is below the square of every length and speed that means anything."""
+"""Substitute for a divisor of zero: zero divided by it is zero, numbers up to 1e8 divided by it are
+finite, and it is below the square of every physical length and speed."""
 
 
 def doubles(value: Any) -> NDArray[np.float64] | str:
-    """The numbers in a value as doubles; integers, booleans and shorter floats become doubles.
+    """Return the numbers in a value as an array of doubles.
 
     Args:
-        value: anything.
+        value: any value. Integers, booleans and shorter floats are converted.
 
     Returns:
-        an array, the value itself where it is one of doubles already; or, of what holds no
-        numbers, what is wrong and what to do, the end of a sentence.
+        array, which is the value itself if it is an array of doubles. If the value is not numeric:
+        end of an error message, with the remedy.
     """
     if isinstance(value, np.ma.MaskedArray):
         return "has a mask, which would be passed over; give array.filled(value)"
     try:
         array = np.asarray(value)
-    except (ValueError, TypeError, NotImplementedError):  # the last two for symbols of CasADi
+    except (ValueError, TypeError, NotImplementedError):  # last two: CasADi symbols
         return f"is {quoted(value)}; give numbers"
     if array.dtype.kind not in "biuf":
         what = f"an array of {array.dtype}" if isinstance(value, np.ndarray) else quoted(value)
@@ -43,7 +43,7 @@ def doubles(value: Any) -> NDArray[np.float64] | str:
 
 
 def numbers_given(value: Any) -> NDArray[np.float64] | str:
-    """Return the numbers in a value as `doubles` does, except that True and False are no numbers.
+    """Return the numbers in a value as `doubles` does, but reject True and False.
 
     Args:
         value: positions, velocities, efforts, parameters or limits that a user gives.
@@ -74,22 +74,22 @@ def is_vector(shape: tuple[int, ...]) -> bool:
 
 
 def on_arrays(function: Function) -> OnArrays:
-    """A Function of arrays, for where it is evaluated many times.
+    """Return a Function of arrays, for many evaluations.
 
-    In a call CasADi looks through its types for every argument and copies every result twice,
-    which takes as long as a thousand operations; here it reads and writes the arrays themselves.
-    Each call has memory of its own: threads may share what is returned.
+    A call by CasADi checks the type of every argument and copies every result twice, which takes as
+    long as a thousand operations. The returned callable reads and writes the arrays directly. Each
+    call has its own memory, so that threads may share the callable.
 
     Args:
-        function: any; what is zero by structure in its outputs is zero in the arrays.
+        function: any Function. Structural zeros of its outputs become zeros in the arrays.
 
     Returns:
-        what takes an array for each input, of as many elements column by column, and gives a new
-        array (rows, columns) for each output.
+        callable with an array per input, whose elements are column by column, that returns a new
+        array (rows, columns) per output.
 
     Raises:
-        ValueError: in a call, an array has another size than its input.
-        RuntimeError: in a call, machine code within it gives no value.
+        ValueError: the callable gets an array of another size than its input.
+        RuntimeError: machine code within the Function returns no value.
     """
     sizes = [function.nnz_in(k) for k in range(function.n_in())]
     patterns = [function.sparsity_out(k) for k in range(function.n_out())]
@@ -115,7 +115,7 @@ def on_arrays(function: Function) -> OnArrays:
 
 
 def _filled(values: Array, pattern: Any, places: tuple[list[int], list[int]] | None) -> Array:
-    """The matrix of these elements, zero where the pattern has none."""
+    """Return the matrix with elements of a sparsity pattern, zero outside the pattern."""
     if places is None:
         rows, columns = pattern.shape
         return np.ascontiguousarray(values.reshape(columns, rows).T)

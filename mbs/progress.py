@@ -1,4 +1,4 @@
-"""How far a long run has come, shown to people who wait for it."""
+"""Progress of long runs, shown on the terminal."""
 
 import sys
 import time
@@ -10,17 +10,17 @@ from typing import Any
 PATIENCE = 2.0
 
 Listener = Callable[[str, float], None]
-"""What hears of progress: the label of the run, and the part of it that is done, from 0 to 1."""
+"""Function of the label of a run and the completed fraction, from 0 to 1."""
 
 _LISTENER: ContextVar[Listener | None] = ContextVar("listener", default=None)
 
 
 @contextmanager
 def listen(listener: Listener) -> Iterator[None]:
-    """Tell a function about the progress of every run within the block, quiet ones as well.
+    """Report the progress of every run within the block to a function, even of quiet runs.
 
     Args:
-        listener: it is called in the thread of the run each time that progress is reported.
+        listener: function that is called in the thread of the run at each report.
     """
     token = _LISTENER.set(listener)
     try:
@@ -33,16 +33,16 @@ def listen(listener: Listener) -> Iterator[None]:
 def progress(
     label: str, start: float, stop: float, *, quiet: bool = False
 ) -> Iterator[Callable[[float], None]]:
-    """A function to call with what was reached; after two seconds it shows a bar on a terminal.
+    """Provide a function that reports progress; after two seconds it shows a bar on a terminal.
 
     Args:
-        label: what is running.
-        start: what is reached at the beginning, such as a simulated time, s.
-        stop: what is reached at the end.
-        quiet: never show anything on the terminal; a listener hears of it all the same.
+        label: name of the run.
+        start: initial value of the progress, such as a simulated time [s].
+        stop: final value of the progress.
+        quiet: Whether the bar is never shown. A listener still gets reports.
 
     Yields:
-        a function of what was reached.
+        function of the reached value.
     """
     bar = _DelayedBar(label, start, stop, shown=not quiet and sys.stderr.isatty())
     listener = _LISTENER.get()
@@ -53,7 +53,7 @@ def progress(
 
 
 class _DelayedBar:
-    """A rich progress bar that is made only when somebody has waited long enough."""
+    """A progress bar of rich that is created after a waiting time."""
 
     def __init__(self, label: str, start: float, stop: float, *, shown: bool) -> None:
         self.label = label
@@ -71,7 +71,7 @@ class _DelayedBar:
         self._bar.update(self._task, completed=simulated - self._start)
 
     def part(self, simulated: float) -> float:
-        """The part that is done, 0 to 1."""
+        """Return the completed fraction, 0 to 1."""
         whole = self._stop - self._start
         return min(max((simulated - self._start) / whole, 0.0), 1.0) if whole > 0 else 1.0
 
@@ -96,7 +96,7 @@ class _DelayedBar:
 
 
 def _told(bar: _DelayedBar, listener: Listener) -> Callable[[float], None]:
-    """Reach that also tells the listener."""
+    """Return a function that updates the bar and calls the listener."""
 
     def reach(simulated: float) -> None:
         bar.reach(simulated)

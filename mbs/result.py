@@ -1,4 +1,4 @@
-"""What a simulation or an identification returns: time and named, united columns."""
+"""Results of simulations and identifications: time, and named columns with units."""
 
 import csv
 import importlib
@@ -23,8 +23,8 @@ from mbs.text import install_command, quoted
 Array = npt.NDArray[np.float64]
 
 _AT_ONCE = 1 << 26
-"""Bytes of a result from which its archive is written piece by piece: it would be in memory twice
-otherwise."""
+"""Size of a result [bytes] above which its archive is written in pieces, since otherwise it would
+be in memory twice."""
 
 _QUANTITIES = {
     "1": "value",
@@ -47,15 +47,15 @@ _QUANTITIES = {
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """The state of a mechanism at one instant, from which a motion can go on.
+    """State of a mechanism at one instant, from which a simulation can start.
 
     Attributes:
-        q: positions by coordinate name [rad or m], all of them.
-        v: velocities by name [rad/s or m/s], all of them.
+        q: all positions by coordinate name [rad or m].
+        v: all velocities by coordinate name [rad/s or m/s].
         z: states of components by name, such as `motor.i`.
         modes: (k,) modes of rigid stops and of Coulomb friction.
-        time: [s].
-        name: of the mechanism.
+        time: time [s].
+        name: name of the mechanism.
     """
 
     q: Mapping[str, float]
@@ -81,11 +81,11 @@ class State:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedStates:
-    """The states of a motion at the times of its rows.
+    """States of a motion at the times of the rows of a result.
 
     Attributes:
-        names: of positions, velocities and states of components.
-        x: (n, nx) values of all of them.
+        names: names of positions, of velocities and of states of components.
+        x: (n, nx) values of positions, velocities and states.
         modes: (n, k) modes of rigid stops and of Coulomb friction.
     """
 
@@ -94,50 +94,49 @@ class RecordedStates:
     modes: Array
 
     def at(self, row: int, time: float, name: str) -> State:
-        """The state of a row."""
+        """Return the state of a row."""
         values = iter(self.x[row].tolist())
         q, v, z = ({one: next(values) for one in names} for names in self.names)
         return State(q, v, z, tuple(self.modes[row].tolist()), time, name)
 
 
 def state_of(given: Any) -> Any:
-    """Return the last state of a `Result`; any other value as it is."""
+    """Return the last state of a `Result`; any other value unchanged."""
     return given.state() if isinstance(given, Result) else given
 
 
 def positions_of(given: Any) -> Any:
-    """Return the positions by name of a `State`, or of the last one of a `Result`."""
+    """Return the positions by name of a `State`, or of the last state of a `Result`."""
     given = state_of(given)
     return given.q if isinstance(given, State) else given
 
 
 def velocities_of(given: Any) -> Any:
-    """Return the velocities by name of a `State`, or of the last one of a `Result`."""
+    """Return the velocities by name of a `State`, or of the last state of a `Result`."""
     given = state_of(given)
     return given.v if isinstance(given, State) else given
 
 
 def device_states_of(given: Any) -> Any:
-    """Return the states of components by name of a `State`, or of the last one of a `Result`."""
+    """Return the states of components by name of a `State` or the last state of a `Result`."""
     given = state_of(given)
     return given.z if isinstance(given, State) else given
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Result:
-    """Signals over time: `result["j1.q"]` is one of them, (n,).
+    """Signals over time: `result["j1.q"]` is the signal (n,) of a variable.
 
     Attributes:
-        time: (n,), s, never decreasing (an event repeats its instant).
+        time: (n,) times [s], never decreasing (an event repeats its instant).
         values: (n, k), a column for each signal, in the order of `units`.
-        units: name of a signal to the name of its unit, in the order of the columns.
-        name: what was simulated.
-        info: facts worth keeping with the numbers, such as the tolerance.
-        events: what happened at instants: time, s, the name of what it happened to, and words.
-        system: the mechanism whose motion it is, where that is known; not saved, not pickled.
-        stopped: time, s, and sentence of what stopped the motion early, after the last row; None
-            where it is complete.
-        states: the states of the rows, from which `state` takes one; not saved.
+        units: dict from signal name to unit name, in the order of the columns.
+        name: name of the simulated system.
+        info: further data of the run, such as the tolerance.
+        events: time [s], name of the affected component, and description of each event.
+        system: simulated mechanism, if known. It is not saved and not pickled.
+        stopped: time [s] and reason of an early stop after the last row. None if complete.
+        states: states of the rows, for the method `state`. They are not saved.
     """
 
     time: Array
@@ -176,14 +175,15 @@ class Result:
         return type(self), (self.time, self.values, *plain, self.states)
 
     def state(self, t: float | None = None) -> State:
-        """The state of a row, from which a motion, a linear model or an FMU can start.
+        """Return the state of a row, from which a motion, a linear model or an FMU can start.
 
         Args:
-            t: time of the row [s], the last one if an event repeats it; the last row if left out.
+            t: time of the row [s]; its last row if an event repeats it. The default is the last
+                row.
 
         Raises:
-            ModelError: there is no row of this time, or the result keeps no states, as one that was
-                read from a file.
+            ModelError: there is no row at this time, or the result has no states, such as a result
+                that was read from a file.
         """
         if self.states is None or not len(self.time):
             raise ModelError(
@@ -196,7 +196,7 @@ class Result:
         if t is not None:
             row = int(np.searchsorted(self.time, float(t), side="right")) - 1
             near = min((k for k in (row, row + 1) if 0 <= k < len(self.time)), key=self._far(t))
-            # times are sums of steps, which round
+            # times are sums of steps, with rounding errors
             if self._far(t)(near) > 1e-9 * max(1.0, abs(float(t))):
                 raise ModelError(
                     f"result {self.name!r}: there is no row at {float(t)!r} s, the nearest is at"
@@ -212,15 +212,15 @@ class Result:
     def from_structured(
         cls, array: npt.NDArray[Any], units: Mapping[str, str], name: str = ""
     ) -> "Result":
-        """Signals of a structured array whose first field is time, as fmpy returns them.
+        """Create a result from a structured array whose first field is time, as fmpy returns it.
 
         Args:
-            array: (n,) with one number a field.
-            units: unit of each field; a field that it leaves out gets "1".
-            name: what was simulated.
+            array: (n,) structured array with one number per field.
+            units: unit of each field. The default of a field is "1".
+            name: name of the simulated system.
 
         Returns:
-            the same numbers, with their units.
+            result with the same numbers.
         """
         fields = array.dtype.names or ()
         columns = fields[1:]
@@ -244,16 +244,16 @@ class Result:
         return len(self.time)
 
     def at(self, time: float) -> dict[str, float]:
-        """Value of every signal at one instant, on straight lines between rows.
+        """Return the value of every signal at one instant, by linear interpolation between rows.
 
         Args:
-            time: scalar, s, inside the result.
+            time: time [s] within the result.
 
         Returns:
-            name to value, in the unit of the signal.
+            dict from signal name to value, in the unit of the signal.
 
         Raises:
-            ModelError: the instant lies outside the result.
+            ModelError: the time is outside the result.
         """
         if not len(self) or not self.time[0] <= time <= self.time[-1]:
             span = f"{self.time[0]:g} to {self.time[-1]:g} s" if len(self) else "nothing"
@@ -261,13 +261,10 @@ class Result:
         return {n: float(np.interp(time, self.time, self[n])) for n in self.names}
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
-        """Write a header of names, then a row for each instant; numbers read back bit for bit.
+        """Write a CSV file: a header of names, then a row per instant, in full precision.
 
         Args:
-            path: file to write; it is replaced as a whole, or left alone.
-
-        Raises:
-            ExportError: the file cannot be written.
+            path: file to write. It is replaced completely or not at all.
         """
         rows = np.column_stack([self.time, self.values]).tolist()
         with whole_file(path) as scratch, scratch.open("w", newline="", encoding="utf-8") as stream:
@@ -276,12 +273,13 @@ class Result:
             writer.writerows([repr(v) for v in row] for row in rows)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write all but `info` and `system` to a NumPy archive; `load` reads it back bit for bit.
+        """Write the result without `info` and `system` to a NumPy archive, for `load`.
 
         Args:
-            path: file to write, such as run.npz; it is replaced as a whole, or left alone.
+            path: file to write, such as run.npz. It is replaced completely or not at all.
 
         Raises:
+            ExportError: the file cannot be written.
             ExportError: the file cannot be written.
         """
         rest = {
@@ -291,7 +289,7 @@ class Result:
             "stopped": self.stopped,
         }
         with whole_file(path) as scratch:
-            # many small pieces of one archive take a disk longer than all of them at once
+            # writing one block is faster than writing many small pieces of an archive
             stream = io.BytesIO() if self.values.nbytes < _AT_ONCE else scratch.open("wb")
             with stream:
                 np.savez(stream, time=self.time, values=self.values, rest=json.dumps(rest))
@@ -300,13 +298,13 @@ class Result:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> "Result":
-        """What `save` wrote.
+        """Return the result in a file of `save`.
 
         Args:
-            path: the file.
+            path: path of the file.
 
         Raises:
-            ModelError: it is no such file.
+            ModelError: the file was not written by `save`.
         """
         try:
             with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as archive:
@@ -323,9 +321,9 @@ class Result:
             ) from error
 
     def to_pandas(self) -> Any:
-        """The signals as a pandas DataFrame indexed by time.
+        """Return the signals as a pandas DataFrame indexed by time.
 
-        Units are in `.attrs["units"]`, what stopped the motion in `.attrs["stopped"]`.
+        Units are in `.attrs["units"]`, and the reason of an early stop is in `.attrs["stopped"]`.
         """
         pandas = optional_module("pandas", "tables")
         index = pandas.Index(self.time, name="time")
@@ -336,7 +334,7 @@ class Result:
         return frame
 
     def to_xarray(self) -> Any:
-        """The signals as an xarray Dataset over time, each with its unit as attribute."""
+        """Return the signals as an xarray Dataset over time, each with its unit as attribute."""
         xarray = optional_module("xarray", "tables")
         signals = {n: ("time", self[n].copy(), {"units": u}) for n, u in self.units.items()}
         stop = {} if self.stopped is None else {"stopped": self.stopped[1]}
@@ -351,14 +349,14 @@ class Result:
         names: str | Sequence[str] | None = None,
         path: str | os.PathLike[str] | None = None,
     ) -> Any:
-        """Draw signals over time, those of one unit together.
+        """Plot signals over time, with one panel per unit.
 
         Args:
-            names: signals to draw; all of them by default.
-            path: file to save the picture to, in the format that its ending names.
+            names: signals to plot. The default is all of them.
+            path: file to save the picture to, in the format of its ending.
 
         Returns:
-            the matplotlib Figure.
+            matplotlib Figure.
 
         Raises:
             ModelError: matplotlib is missing or a name is unknown.
@@ -377,7 +375,7 @@ class Result:
             for n in members:
                 axis.plot(self.time, self[n], label=n)
             axis.set_ylabel(_label(unit))
-            axis.grid(True, alpha=0.3)  # fainter than lines
+            axis.grid(True, alpha=0.3)  # less opaque than the lines
             axis.legend(loc="upper right", fontsize="small")
         axes[-1].set_xlabel("time [s]")
         if path is not None:
@@ -404,14 +402,14 @@ def _label(unit: str) -> str:
 
 
 def optional_module(module: str, extra: str) -> Any:
-    """A module that an extra brings.
+    """Return a module of an optional dependency of this package.
 
     Args:
-        module: its name.
-        extra: of this package.
+        module: name of the module.
+        extra: extra of this package that installs the module.
 
     Raises:
-        ModelError: it is not installed; the message says how to install the extra.
+        ModelError: the module is not installed. The message has the command to install the extra.
     """
     try:
         return importlib.import_module(module)
@@ -420,7 +418,7 @@ def optional_module(module: str, extra: str) -> Any:
 
 
 def _figure(rows: int, *, shown: bool) -> Any:
-    # inches: as wide as a page of text, flat panels, and room for the title and the axis of time
+    # inches: width of a text page, flat panels, and space for the title and the time axis
     size = (8.0, 1.0 + 2.5 * max(rows, 1))
     optional_module("matplotlib", "plot")
     if shown:

@@ -1,4 +1,4 @@
-"""Parts of messages, and texts of others inside of comments."""
+"""Parts of error messages, and foreign texts inside of comments."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
 DISTRIBUTION = "casadi-mbs"
-"""Name of the package on an index, where `mbs`, the name of the import, is another project."""
+"""Name of the package on PyPI, where `mbs` is another project."""
 _LONGEST_QUOTE = 80
 _LONGEST_LIST = 20
 _LONGEST_REASON = 200
@@ -16,28 +16,28 @@ _MOST_COMPARED = 1000
 
 
 def quoted(value: object) -> str:
-    """The value as Python writes it, on one line, its middle left out when it is long."""
+    """Return the repr of a value on one line, with the middle of a long text left out."""
     try:
         text = " ".join(repr(value).split())
-    except ValueError:  # an integer of more digits than Python converts
+    except ValueError:  # an integer with more digits than Python converts
         text = f"a {type(value).__name__} of more digits than can be read"
     return shortened(text)
 
 
 def shortened(text: str) -> str:
-    """The text, its middle left out when it is long."""
+    """Return the text, with the middle of a long text left out."""
     half = _LONGEST_QUOTE // 2
     return text if len(text) <= _LONGEST_QUOTE else f"{text[:half]}...{text[-half:]}"
 
 
 def listed(names: Sequence[str]) -> str:
-    """Names in a sentence: "a", "a and b", "a, b and c"."""
+    """Return names as an enumeration: "a", "a and b", "a, b and c"."""
     *first, last = names
     return f"{', '.join(first)} and {last}" if first else last
 
 
 def without_values(names: Sequence[str]) -> str:
-    """Return the message about parameters that have no value, and how to give values."""
+    """Return the message about parameters without value, and how to give values."""
     values = ", ".join(f"{name!r}: 1.0" for name in names)
     how = f"such as mbs.load(source, parameters={{{values}}}), or in the call"
     if len(names) == 1:
@@ -52,23 +52,23 @@ def without_values(names: Sequence[str]) -> str:
 
 
 def install_command(extra: str) -> str:
-    """What installs an extra of this package, from an index and in a clone of its source.
+    """Return the command that installs an extra of this package, from PyPI or in a clone.
 
     Args:
-        extra: a key of [project.optional-dependencies] in pyproject.toml.
+        extra: key of [project.optional-dependencies] in pyproject.toml.
     """
     return f'pip install "{DISTRIBUTION}[{extra}]" (or, in a clone, pip install -e ".[{extra}]")'
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:
-    """The end of a message about an unknown name.
+    """Return the end of an error message about an unknown name.
 
     Args:
-        name: what was written.
-        known: names that would have been understood.
+        name: unknown name.
+        known: valid names.
 
     Returns:
-        the nearest known names, then the others, the first 20 of them.
+        the nearest valid names, then the others, at most 20.
     """
     names = list(dict.fromkeys(shortened(str(one)) for one in known))
     near = get_close_matches(shortened(str(name)), names[:_MOST_COMPARED], n=3)
@@ -81,33 +81,32 @@ def did_you_mean(name: object, known: Iterable[str]) -> str:
     return f"{hint} {listed}".strip()
 
 
-# Texts of others inside of comments, which they can neither leave nor change the reading of.
+# Foreign texts inside of comments: they must not end the comment or change its meaning.
 #
-# Names, sources and units come from files, whose authors may be careless or hostile: a place such
-# as `D:\robots\*\arm.toml` may end a comment as well as an attack does. One function for each
-# syntax of comments; in what it returns neither an opening nor a closing mark of that syntax is
-# left, nor what joins lines.
+# Names, sources and units come from files of any origin. Even a path such as
+# `D:\robots\*\arm.toml` may end a comment. There is one function for each comment syntax. Its
+# result contains neither opening nor closing marks of that syntax, nor characters that join lines.
 
 
 _C_MARKS = re.compile(r"(?<=/)(?=\*)|(?<=\*)(?=/)|(?<=\?)(?=\?)")
-"""Between the letters of `/*`, `*/` and `??`, which begins a trigraph as that of a backslash."""
+"""Position between the characters of `/*`, `*/` and `??`, which begins a trigraph."""
 
 _BRACKET_MARKS = re.compile(r"(?<=\()(?=\*)|(?<=\*)(?=\))")
-"""Between the two letters of `(*` and `*)`."""
+"""Position between the two characters of `(*` and `*)`."""
 
 _UNSEEN = ("Cc", "Cf", "Cs")
-"""Categories of Unicode: control, format (which reorders text that stands beside it), surrogate."""
+"""Categories of Unicode: control, format (which may reorder adjacent text), surrogate."""
 
 
 def one_line(text: str) -> str:
-    """The text with a blank for any space or end of a line, without letters that are not seen."""
+    """Return the text on one line, with single blanks and without invisible characters."""
     return " ".join(seen(" ".join(text.split())).split())
 
 
 def error_text(error: BaseException) -> str:
-    """Return the type and the first line of an error, such as "KeyError: 'gain'".
+    """Return type and first line of an error, such as "KeyError: 'gain'".
 
-    CasADi adds lists of prototypes and lines of its code.
+    Errors of CasADi have further lines with prototypes and code.
     """
     lines = [line for line in map(one_line, str(error).splitlines()) if line]
     text, kind = lines[0] if lines else "", type(error).__name__
@@ -117,42 +116,42 @@ def error_text(error: BaseException) -> str:
 
 
 def seen(text: str) -> str:
-    """The text without control and format letters and halves of letters, blanks among others."""
+    """Return the text without control, format and surrogate characters."""
     return "".join(c for c in text if unicodedata.category(c) not in _UNSEEN)
 
 
 def ascii_line(text: str) -> str:
-    """The text on one line with accents left out, which every compiler takes."""
+    """Return the text on one line in ASCII, without accents, as every compiler accepts it."""
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode("ascii")
     return one_line(plain)
 
 
 def in_c_comment(text: str) -> str:
-    """The text for a comment `/* ... */`: without backslashes, `/*`, `*/` and trigraphs."""
+    """Return the text for a comment `/* ... */`: without backslashes, `/*`, `*/` and trigraphs."""
     return _C_MARKS.sub(" ", _without_backslashes(text))
 
 
 def in_line_comment(text: str) -> str:
-    """The text for a comment to the end of the line, behind a mark and a blank.
+    """Return the text for a comment that extends to the end of the line.
 
-    A backslash at the end of the line would join the next one to it in C, Rust and Maple; a
-    preprocessor of Fortran looks for comments of C.
+    A backslash at the end of the line would join the next line in C, Rust and Maple. A Fortran
+    preprocessor interprets comments of C.
     """
     return in_c_comment(text)
 
 
 def in_bracket_comment(text: str) -> str:
-    """The text for a comment `(* ... *)`, which nests in some languages: without both marks."""
+    """Return the text for a comment `(* ... *)`, which may be nested: without these marks."""
     return _BRACKET_MARKS.sub(" ", one_line(text))
 
 
 def in_wolfram_comment(text: str) -> str:
-    r"""The text for a comment `(* ... *)` of Mathematica, where `\.2a` may be read as a letter."""
+    r"""Return the text for a comment `(* ... *)` of Mathematica, where `\.2a` may be a letter."""
     return _BRACKET_MARKS.sub(" ", _without_backslashes(text))
 
 
 def in_docstring(text: str) -> str:
-    """The text for a string in triple quotes: without double quotes and backslashes."""
+    """Return the text for a string in triple quotes: without double quotes and backslashes."""
     return _without_backslashes(text).replace('"', "'")
 
 

@@ -1,8 +1,8 @@
-"""Units of every quantity that mbs names: one table for documentation, results and FMUs.
+"""Units of all quantities in mbs: one table for documentation, results and FMUs.
 
-Everything is SI. A `Unit` carries its exponents of the base units, which is what an FMU declares,
-and a display unit where people read another one (degrees). Products such as "kg/m" or "m3/s" are
-read from the units they are made of.
+All units are SI. A `Unit` has the exponents of its base units, which an FMU declares, and a display
+unit if another unit is usual (degrees). Products such as "kg/m" or "m3/s" are derived from their
+factors.
 """
 
 import re
@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A unit: its name, its exponents of SI base units, and the unit people like to read.
+    """A unit with exponents of SI base units, and a display unit.
 
     Attributes:
-        name: as written in tables and FMUs, such as `N.m`.
+        name: name in tables and FMUs, such as `N.m`.
         exponents: base unit (kg, m, s, rad) to exponent; zero exponents are left out.
         display: name of the display unit, or None.
         display_factor: value in the display unit = factor * value.
@@ -27,7 +27,7 @@ class Unit:
     display_factor: float = 1.0
 
 
-_DEGREES = 57.29577951308232  # 180 / pi
+_DEGREES = 57.29577951308232  # degrees per radian, 180 / pi
 
 _UNITS = (
     Unit("1"),
@@ -67,13 +67,13 @@ _FACTORS: Mapping[str, Mapping[str, int]] = {
     "C": {"A": 1, "s": 1},
     "T": {"kg": 1, "s": -2, "A": -1},
 }
-"""Units of which products are made."""
+"""Units from which products are made."""
 
 _FACTOR = re.compile(r"([A-Za-z]+)(\d?)")
 
 
 class _Units(Mapping[str, Unit]):
-    """Units by name: those of the table, and products such as "N.s2/m" of what is in it."""
+    """Dict of units by name: the table, and products of its units such as "N.s2/m"."""
 
     def __init__(self, table: tuple[Unit, ...]) -> None:
         self._known = {unit.name: unit for unit in table}
@@ -91,10 +91,10 @@ class _Units(Mapping[str, Unit]):
 
 
 def _exponents(name: str) -> dict[str, int]:
-    """Exponents of base units of a product such as "kg/m" or "m3/s".
+    """Return the exponents of base units of a product such as "kg/m" or "m3/s".
 
     Raises:
-        KeyError: it is not made of units.
+        KeyError: the name is no product of known units.
     """
     total: dict[str, int] = {}
     over, *under = name.split("/") if isinstance(name, str) else [""]
@@ -113,9 +113,9 @@ def _exponents(name: str) -> dict[str, int]:
 
 
 UNITS: Mapping[str, Unit] = _Units(_UNITS)
-"""Every unit by its name; it lists those of the table, and knows their products."""
+"""Unit by name. It contains the units of the table and accepts their products."""
 
 
 def rate_unit(unit: str) -> str:
-    """The unit of the rate of a quantity of this unit."""
+    """Return the unit of the time derivative of a quantity with this unit."""
     return f"{unit}.s" if "/" in unit else f"{unit}/s"

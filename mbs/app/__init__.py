@@ -1,1 +1,1 @@
-"""What people use without writing Python: the command line and the app in the browser."""
+"""User interfaces without Python programming: the command line and the app in the browser."""

@@ -1,4 +1,4 @@
-"""From connected components to a frozen `System`: graph, spanning tree, Khalil frames, tables."""
+"""Assembly of components into an immutable `System`: graph, tree, Khalil frames, tables."""
 
 from mbs.assembly.symbolic import symbolic
 from mbs.assembly.system import System

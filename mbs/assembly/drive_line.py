@@ -1,10 +1,10 @@
-"""Drive lines: which coordinate every flange rotates with, and the mechanism that this leaves.
+"""Drive lines: rotation of every flange, and reduction to a mechanism without flanges.
 
-Flanges that are connected rotate together, and rigid gears between them only multiply the angle:
-all of them have one coordinate. It is that of a joint, where one is among them, else the angle of
-an inertia, which becomes a revolute link on the base. Inertias are reflected to the coordinate
-through the squares of the ratios, elastic parts become forces on coordinates. A rotor has the
-energy of its spin relative to its housing alone.
+Connected flanges rotate together, and rigid gears between them multiply the angle, so that a rigid
+group has one coordinate. It is the coordinate of a joint in the group, or else the angle of an
+inertia, which becomes a revolute link on the base. Inertias are reflected to the coordinate by the
+squares of the ratios. Elastic parts become forces on coordinates. The kinetic energy of a rotor
+includes only its spin relative to its housing.
 
 Source: Spong 1987, for this assumption.
 """
@@ -37,14 +37,14 @@ from mbs.components.joints import Motion
 from mbs.errors import AssemblyError
 from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
 
-# What is refused in a drive line, and the errors that say so.
+# Checks of drive lines, and their errors.
 
 
 def check_flanges(mechanism: Description, parts: Sequence[Custom]) -> None:
-    """Refuse flanges that are connected to nothing, or shafts that are connected to sliding parts.
+    """Raise if flanges are unconnected, or if shafts are connected to sliding parts.
 
     Raises:
-        AssemblyError: which flange, and what to connect.
+        AssemblyError: the message has the flange and the remedy.
     """
     joined: dict[Flange, list[Flange]] = {}
     for a, b in mechanism.shafts:
@@ -64,7 +64,7 @@ def check_flanges(mechanism: Description, parts: Sequence[Custom]) -> None:
 
 
 def _slides(flange: Flange) -> bool | None:
-    """Whether a flange translates; None where it may also rotate."""
+    """Return whether a flange translates; None if it may also rotate."""
     owner = flange.owner
     if isinstance(owner, Custom):
         return owner.slides(flange)
@@ -74,7 +74,7 @@ def _slides(flange: Flange) -> bool | None:
 def _check_sliding(
     mechanism: Description, start: Flange, joined: dict[Flange, list[Flange]]
 ) -> None:
-    """Whatever is connected to a flange that slides must slide, or be the end of a gear."""
+    """Raise AssemblyError if a rotating flange is connected to a sliding flange."""
     seen, queue = {start}, deque([start])
     while queue:
         for other in joined[queue.popleft()]:
@@ -96,10 +96,10 @@ def _fixed_flanges(
     parts: Iterable[Custom],
     ties: Mapping[Key, list[tuple[Key, Expression]]],
 ) -> dict[Key, FlangeTurn]:
-    """The flanges that are fixed, which are those of the housing.
+    """Return the rotations of the flanges that are connected to the housing, all zero.
 
     Raises:
-        AssemblyError: a joint, an inertia, a gear or a motor is connected to one.
+        AssemblyError: a joint is connected to the housing.
     """
     turns: dict[Key, FlangeTurn] = {}
     for part in parts:
@@ -123,7 +123,7 @@ def _fixed_flanges(
 def ring_of_gears(
     mechanism: Description, key: tuple[str, str], first: Expression, second: Expression
 ) -> AssemblyError:
-    """Gears that form a ring and do not agree."""
+    """Return the error for rigid gears with contradictory ratios."""
     return AssemblyError(
         f"{mechanism.name}: rigid gears drive {key[0]!r} in two ways, with the ratios {first} and"
         f" {second}, so that nothing can turn; take one of them away or make it elastic"
@@ -131,7 +131,7 @@ def ring_of_gears(
 
 
 def inertia_missing(mechanism: Description, flanges: Sequence[Flange]) -> AssemblyError:
-    """Flanges that move without any inertia."""
+    """Return the error for moving flanges without inertia."""
     names = ", ".join(str(flange) for flange in flanges)
     verb, part = ("slide", "SlidingMass") if _slides(flanges[0]) else ("turn", "ShaftInertia")
     return AssemblyError(
@@ -141,7 +141,7 @@ def inertia_missing(mechanism: Description, flanges: Sequence[Flange]) -> Assemb
 
 
 def same_shaft(mechanism: Description, part: ShaftForce) -> AssemblyError:
-    """An elastic part between flanges that are rigidly connected."""
+    """Return the error for an elastic part between rigidly connected flanges."""
     return AssemblyError(
         f"{mechanism.name}: both flanges of {type(part).__name__} {part.name!r} are on one rigid"
         " shaft, which it cannot twist; connect one of them to another shaft"
@@ -149,25 +149,25 @@ def same_shaft(mechanism: Description, part: ShaftForce) -> AssemblyError:
 
 
 Key = tuple[str, str]
-"""A flange, by the name of its component and its port."""
+"""Key of a flange: name of its component and its port."""
 
 _ZERO, _ONE = Number(0.0), Number(1.0)
 _ROUNDING = 1e-12
-"""Relative difference of two ratios that are equal: products of some ratios round by 1e-15, and no
-gear is given with twelve digits."""
+"""Relative difference of two ratios that count as equal: products of ratios round by 1e-15, and no
+gear ratio is specified with twelve digits."""
 _GOLDEN = (5**0.5 - 1) / 2
-"""The golden ratio: multiples of it modulo one are irregular."""
+"""Golden ratio: its multiples modulo 1 are irregular."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DriveLine:
-    """A mechanism without flanges, and what became of them.
+    """A mechanism without flanges, and the rotations of the flanges.
 
     Attributes:
-        mechanism: with joints, couplings and forces in their stead.
-        turns: of every flange.
-        parts: of the drive line, in the order added.
-        links: for each coordinate that is no joint's, the part whose angle it is.
+        mechanism: mechanism with joints, couplings and forces instead of drive lines.
+        turns: rotation of every flange.
+        parts: parts of the drive lines, in the order of their addition.
+        links: name of the part whose angle is the coordinate, for each coordinate without a joint.
     """
 
     mechanism: Description
@@ -177,11 +177,11 @@ class DriveLine:
 
 
 def drive_line(mechanism: Description) -> DriveLine:
-    """The mechanism with its drive lines lowered to joints, couplings and forces.
+    """Return the mechanism with its drive lines replaced by joints, couplings and forces.
 
     Raises:
-        AssemblyError: a flange is connected to nothing, or to one that moves otherwise; a shaft
-            has no inertia; gears lock each other.
+        AssemblyError: a flange is unconnected or connected to a flange of another kind, a shaft has
+            no inertia, or gears lock each other.
     """
     parts = tuple(c for c in mechanism.components.values() if isinstance(c, Custom) and c.flanges)
     if not parts and not mechanism.shafts:
@@ -203,7 +203,7 @@ def drive_line(mechanism: Description) -> DriveLine:
 def _flange_rotations(
     mechanism: Description, parts: tuple[Custom, ...]
 ) -> tuple[dict[str, Flange], dict[Key, FlangeTurn]]:
-    """The reference flange of each rigid group, by its coordinate's name, and all rotations."""
+    """Return the reference flange of each rigid group, by coordinate name, and all rotations."""
     ties = _ties(mechanism, parts)
     values = _generic(mechanism)
     references: dict[str, Flange] = {}
@@ -230,7 +230,7 @@ def _flange_rotations(
 
 
 def _generic(mechanism: Description) -> dict[str, float]:
-    """The values of parameters; for one without any a number that fulfils no rule by chance."""
+    """Return the values of parameters, with irregular numbers for parameters without value."""
     return {
         p.name: 1 + number * _GOLDEN % 1 if p.default is None else p.default
         for number, p in enumerate(mechanism.parameters(), start=1)
@@ -238,7 +238,7 @@ def _generic(mechanism: Description) -> dict[str, float]:
 
 
 def _candidates(mechanism: Description, parts: tuple[Custom, ...]) -> Iterator[tuple[str, Flange]]:
-    """Flanges whose angle may be the coordinate of a group, the best ones first."""
+    """Yield the flanges whose angle may be the coordinate of a group, the best first."""
     used = {flange.owner.name for pair in mechanism.shafts for flange in pair}
     joints = [joint for joint in mechanism.joints() if joint.name in used]
     for joint in sorted(joints, key=lambda joint: joint.actuated is False):
@@ -254,7 +254,7 @@ def _candidates(mechanism: Description, parts: tuple[Custom, ...]) -> Iterator[t
 def _ties(
     mechanism: Description, parts: tuple[Custom, ...]
 ) -> dict[Key, list[tuple[Key, Expression]]]:
-    """For each flange those that rotate with it, and their angles per angle of it."""
+    """Return for each flange the rigidly connected flanges and their angle ratios."""
     ties: dict[Key, list[tuple[Key, Expression]]] = {}
 
     def tie(a: Flange, b: Flange, ratio: Expression) -> None:
@@ -272,7 +272,7 @@ def _ties(
 
 
 def times(a: Scalar, b: Scalar) -> Expression:
-    """The product, without factors of one and zero."""
+    """Return the product, without factors of one and zero."""
     x, y = expression(a), expression(b)
     if _ZERO in (x, y):
         return _ZERO
@@ -297,7 +297,7 @@ def _group_joint(
     parts: Iterable[Custom],
     turns: Mapping[Key, FlangeTurn],
 ) -> Joint:
-    """The joint whose coordinate a group has, with the inertias and motors of the group."""
+    """Return the joint of a rigid group, with the inertias and motors of the group."""
     devices = [part for part in parts if part.drives]
     total: Expression = _ZERO
     for part in parts:
@@ -319,7 +319,7 @@ def _group_joint(
 def _lower(
     mechanism: Description, changed: Mapping[str, Joint], turns: Mapping[Key, FlangeTurn]
 ) -> Description:
-    """The mechanism with the joints of the groups, couplings to the others, and forces."""
+    """Return the mechanism with joints of the groups, couplings to further joints, and forces."""
     result = _with_joints(mechanism, changed)
     joints = {joint.name: joint for joint in mechanism.joints()}
     for joint in joints.values():
@@ -340,7 +340,7 @@ def _lower(
 
 
 def _with_joints(mechanism: Description, joints: Mapping[str, Joint]) -> Description:
-    """A copy of the mechanism in which these joints stand for those of the same name."""
+    """Return a copy of the mechanism in which joints are replaced by those of the same name."""
 
     def point(old: Point) -> Point:
         is_joint = isinstance(old.owner, Joint)
@@ -372,22 +372,21 @@ def _levers(
     return moving
 
 
-# The tables of drive lines: what every rigid part rotates with, and the devices that drive.
+# Tables of drive lines: coordinate of every rigid part, and motors.
 
 
 @dataclass(frozen=True, slots=True)
 class ShaftRow:
-    """An inertia or a rigid gear of a drive line, and the coordinate it rotates with.
+    """An inertia or a rigid gear of a drive line, and the coordinate that it rotates with.
 
     Attributes:
-        name: of the component.
-        kind: ShaftInertia, SlidingMass, IdealGear, or DCMotor where its rotor has a coordinate of
-            its own.
-        coordinate: the coordinate that it rotates with.
-        own: whether this coordinate is its own, and not that of a joint or another inertia.
-        factor: its angle, of a gear that of flange_a, is factor times the coordinate; a number,
-            or an expression where a symbol is in it.
-        slides: whether it is a mass that translates.
+        name: name of the component.
+        kind: ShaftInertia, SlidingMass, IdealGear, or DCMotor if its rotor has its own coordinate.
+        coordinate: name of the coordinate that it rotates with.
+        own: Whether the coordinate is its own, and not that of a joint or another inertia.
+        factor: its angle (of a gear: the angle of flange_a) divided by the coordinate; a number, or
+            an expression if it contains a symbol.
+        slides: Whether it is a sliding mass.
     """
 
     name: str
@@ -399,7 +398,7 @@ class ShaftRow:
 
     @property
     def sentence(self) -> str:
-        """What it is and how it rotates."""
+        """Description in a report: kind, name and rotation."""
         if self.own:
             return f"{self.kind} {self.name} has a coordinate of its own, {self.coordinate}."
         turns = f"turns {as_fast(self.factor, self.coordinate)}"
@@ -413,7 +412,7 @@ class ShaftRow:
 
 
 def shaft_rows(line: DriveLine, symbols: Mapping[str, SX]) -> tuple[ShaftRow, ...]:
-    """Every inertia and rigid gear, and motors whose rotor is a link, in the order added."""
+    """Return a row for every inertia, rigid gear, and motor whose rotor is a link."""
     rows = []
     for part in line.parts:
         turn = line.turns[part.flanges[0].key]

@@ -1,4 +1,4 @@
-"""The connection graph: welded bodies are one node; which joints carry the tree, which are cut."""
+"""Connection graph: rigid bodies as nodes, joints as edges, spanning tree and cut joints."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from mbs.errors import AssemblyError
 from mbs.spatial import Inertia, Khalil, MatrixRotation, Pose
 
 _SAME_POSE = 1e-8
-"""Distance [m] or angle [rad] by which welds on two ways around may differ: angles that files give
-with nine digits, far less than any clearance."""
+"""Largest distance [m] or angle [rad] between two paths of welds to one body: angles in files have
+nine digits, and any clearance is much larger."""
 
 Port = tuple[str, str]
-"""A component's name and which of its frames: "" of a body, "a" or "b" of a joint."""
+"""Name of a component and its frame: "" of a body, "a" or "b" of a joint."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyNode:
-    """Bodies and joint frames that are welded together: one rigid body.
+    """A rigid body: bodies and joint frames that are welded together.
 
     Attributes:
-        name: of the body whose reference frame is the frame of the node.
-        members: pose of every body and joint frame in that frame.
+        name: name of the body whose reference frame is the frame of the node.
+        members: pose of every body and joint frame in the frame of the node.
     """
 
     name: str
@@ -45,10 +45,10 @@ class Edge:
     """A joint between two nodes.
 
     Attributes:
-        joint: its description.
-        a, b: the nodes that carry its frame_a and frame_b.
-        pose_a, pose_b: these frames in the frames of the nodes.
-        khalil: the parameters that place frame_a, when they were given as such.
+        joint: description of the joint.
+        a, b: indices of the nodes that carry its frame_a and frame_b.
+        pose_a, pose_b: poses of frame_a and frame_b in the frames of the nodes.
+        khalil: Khalil parameters of frame_a, if it is described by them.
     """
 
     joint: Joint
@@ -61,12 +61,12 @@ class Edge:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyGraph:
-    """Rigid bodies and the joints between them; node 0 holds the world.
+    """Rigid bodies and the joints between them; node 0 contains the world.
 
     Attributes:
-        nodes: the rigid bodies.
-        edges: the joints.
-        size: of the largest body, between joints on it; of the world where bodies have none [m].
+        nodes: rigid bodies.
+        edges: joints.
+        size: largest distance between joints on a moving body, or on the world if it is zero [m].
     """
 
     nodes: tuple[BodyNode, ...]
@@ -77,15 +77,15 @@ class BodyGraph:
 def connection_graph(
     mechanism: Description, symbols: Mapping[str, SX], values: Mapping[str, float]
 ) -> BodyGraph:
-    """The graph of a mechanism.
+    """Return the connection graph of a mechanism.
 
     Args:
         mechanism: components and connections.
         symbols: CasADi symbol of every parameter.
-        values: a number for every parameter, to compare positions with.
+        values: value of every parameter, for the comparison of positions.
 
     Raises:
-        AssemblyError: something is not connected, or welds contradict each other.
+        AssemblyError: a component is not connected, or welds contradict each other.
     """
     joints = {joint.name for joint in mechanism.joints() if not is_weld(mechanism, joint)}
     if not joints:
@@ -112,7 +112,7 @@ def connection_graph(
 
 
 def _check_transmissions(mechanism: Description) -> None:
-    """Refuse a gear, rack or screw between coordinates of other kinds than it needs."""
+    """Raise if a gear, rack or screw couples coordinates of the wrong kinds."""
     motions = {
         freedom.coordinate_of(joint.name): freedom.motion
         for joint in mechanism.joints()
@@ -132,7 +132,7 @@ def _check_transmissions(mechanism: Description) -> None:
 
 
 def inertia_of(node: BodyNode, mechanism: Description, symbols: Mapping[str, SX]) -> Inertia:
-    """Inertia of all bodies of a node about the origin of its frame."""
+    """Return the inertia of all bodies of a node about the origin of its frame."""
     total = Inertia.zero()
     for (name, _), pose in node.members.items():
         component = mechanism.components[name]
@@ -142,7 +142,7 @@ def inertia_of(node: BodyNode, mechanism: Description, symbols: Mapping[str, SX]
 
 
 def is_weld(mechanism: Description, joint: Joint) -> bool:
-    """Whether a joint makes one rigid body of what it connects."""
+    """Return whether a joint welds its two bodies into one rigid body."""
     return isinstance(joint, Fixed) and joint.name not in mechanism.cuts
 
 
@@ -160,7 +160,7 @@ Weld = tuple[Port, Pose, Point]
 def _welds(
     mechanism: Description, symbols: Mapping[str, SX]
 ) -> dict[Port, list[tuple[Port, Pose]]]:
-    """For each port, the ports welded to it and where they are, seen from it."""
+    """Return for each port the ports welded to it and their relative poses."""
     welds: dict[Port, list[tuple[Port, Pose]]] = {port: [] for port in _ports(mechanism)}
 
     def weld(a: Port, b: Port, pose: Pose) -> None:
@@ -194,7 +194,7 @@ def _grow(
     welds: Mapping[Port, list[tuple[Port, Pose]]],
     at: _Evaluator,
 ) -> dict[Port, Pose]:
-    """Every port welded to `start`, with its pose seen from there."""
+    """Return every port welded to `start`, with its pose relative to `start`."""
     members = {start: Pose.identity()}
     queue = deque([start])
     while queue:
@@ -210,7 +210,7 @@ def _grow(
 
 
 class _Evaluator:
-    """Numbers of expressions at given values of the parameters."""
+    """Callable that evaluates expressions at values of the parameters."""
 
     def __init__(self, symbols: Mapping[str, SX], values: Mapping[str, float]) -> None:
         self.p = casadi.vertcat(*symbols.values()) if symbols else SX(0, 1)
@@ -262,7 +262,7 @@ def _edge(
 
 
 def _size(nodes: int, edges: Sequence[Edge], at: _Evaluator) -> float:
-    """The largest distance between two joints of one body; one where there is none [m]."""
+    """Return the largest distance between two joints of one body; 1 if there is none [m]."""
     points = at(casadi.horzcat(SX(3, 0), *(p for e in edges for p in (e.pose_a.p, e.pose_b.p))))
     on: list[list[Any]] = [[] for _ in range(nodes)]
     for number, edge in enumerate(edges):
@@ -279,7 +279,7 @@ def _size(nodes: int, edges: Sequence[Edge], at: _Evaluator) -> float:
 def _given_khalil(
     mechanism: Description, joint: Joint, node: BodyNode, symbols: Mapping[str, SX]
 ) -> Khalil | None:
-    """The Khalil parameters that place frame_a on the frame of its node, if written as such."""
+    """Return Khalil parameters of frame_a relative to its node; None if described otherwise."""
     for a, b in mechanism.connections:
         if b.owner is joint and b.port == "a" and not b.placement.steps:
             steps = a.placement.steps
@@ -289,18 +289,18 @@ def _given_khalil(
     return None
 
 
-# Which joints carry the tree, and which are cut to open the loops.
+# Spanning tree and cut joints.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Branch:
-    """A joint of the tree, run through from the node nearer to the base.
+    """A joint of the tree, traversed from the node nearer to the base.
 
     Attributes:
         edge: the joint.
-        parent, child: nodes before and after it; the child is -1 for the free end of a joint
-            that had to stay in the tree although it closes a loop.
-        forward: whether frame_a is on the side of the base.
+        parent, child: indices of the nodes on the base side and on the other side. The child is -1
+            for the free end of a joint that stays in the tree although it closes a loop.
+        forward: Whether frame_a is on the side of the base.
     """
 
     edge: Edge
@@ -311,7 +311,7 @@ class Branch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpanningTree:
-    """Branches in the order in which links are numbered, and the joints that close loops."""
+    """Branches in the order of the link numbers, and the joints that close loops."""
 
     branches: tuple[Branch, ...]
     cuts: tuple[Edge, ...]
@@ -326,21 +326,21 @@ def spanning_tree(
     cut: Collection[str] = (),
     given_order: bool = False,
 ) -> SpanningTree:
-    """A spanning tree that keeps driven joints, cuts the freest passive ones, and stays shallow.
+    """Return a shallow spanning tree that keeps driven joints and cuts the freest passive joints.
 
-    Prim's algorithm from the world: among the joints that reach a new body, the one that is
-    least useful as a cut comes first, then the one with the fewest freedoms, then the one nearest
-    to the base, which keeps loops short. Least useful is a passive joint whose coordinate
-    something refers to, then a driven or guessed one, then any other; a driven joint that is cut
-    keeps its coordinate. Constraints, which place nothing, are always cut.
+    Prim's algorithm from the world. Among the joints that reach a new body, the joint that is least
+    useful as a cut has priority, then the joint with the fewest freedoms, then the joint nearest to
+    the base, which keeps loops short. Least useful as cuts are passive joints whose coordinates
+    couplings or forces refer to, then driven or guessed joints, then other joints. A driven joint
+    that is cut keeps its coordinate. Constraints, which have no coordinates, are always cut.
 
     Args:
-        name: of the mechanism, for messages.
+        name: name of the mechanism, for error messages.
         graph: nodes and joints.
-        need: joints whose coordinates couplings and forces refer to.
-        keep: joints that a user guessed a position for.
-        cut: joints that the description itself cuts.
-        given_order: number links in the order of the joints instead of depth-first.
+        need: names of joints whose coordinates couplings and forces refer to.
+        keep: names of joints with a guessed position.
+        cut: names of joints that the description cuts.
+        given_order: Whether links are numbered in the order of the joints instead of depth-first.
 
     Raises:
         AssemblyError: a body cannot be reached from the world, or only by a joint to be cut.
@@ -364,7 +364,7 @@ def spanning_tree(
 
 
 def _describe_unreached(name: str, graph: BodyGraph, number: int) -> str:
-    """That nothing places a node, and what to do."""
+    """Return the error message for a node without a path to the world."""
     holders = [e.joint for e in graph.edges if number in (e.a, e.b) and not e.joint.places]
     where = f"{name}: no chain of joints leads from the world to {graph.nodes[number].name!r}"
     if holders:
@@ -430,7 +430,7 @@ def _branches_from(node: int, edges: list[Edge]) -> list[Branch]:
 
 
 def _in_given_order(graph: BodyGraph, branches: list[Branch]) -> list[Branch]:
-    """The branches by the order of their joints, as far as antecedents allow."""
+    """Return the branches in the order of their joints, as far as antecedents allow."""
     rank = {edge.joint.name: number for number, edge in enumerate(graph.edges)}
     waiting = sorted(branches, key=lambda branch: rank[branch.edge.joint.name])
     reached, ordered = {0}, []

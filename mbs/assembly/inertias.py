@@ -1,4 +1,4 @@
-"""Inertias that no body has: an error if the body may rotate about several axes, else a note."""
+"""Impossible inertias: an error if the body may rotate about several axes, else a note."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ _PARALLEL = 1e-9
 
 
 def inertia_notes(tree: Tree, bodies: Iterable[tuple[RigidBody, int]]) -> list[Note]:
-    """Return notes of the inertias that no body has.
+    """Return notes on impossible inertias of bodies.
 
-    The motion of a body that rotates about one axis depends on one of its moments of inertia only.
+    The motion of a body with a single rotation axis depends only on the moment of inertia about it.
 
     Args:
-        tree: of the mechanism.
-        bodies: each with values of its parameters, and the number of its link, -1 for the base.
+        tree: tree of the mechanism.
+        bodies: bodies with values of their parameters, and indices of their links, -1 for the base.
 
     Raises:
-        DescriptionError: a body that may rotate about several axes has such an inertia.
+        DescriptionError: a body that may rotate about several axes has an impossible inertia.
     """
     faulty = [(body, link) for body, link in bodies if body.inertia_fault]
     several = _rotating_about_several(tree) if faulty else set()
@@ -46,9 +46,9 @@ def inertia_notes(tree: Tree, bodies: Iterable[tuple[RigidBody, int]]) -> list[N
 
 
 def _rotating_about_several(tree: Tree) -> set[int]:
-    """Numbers of the links that may rotate about axes that are not parallel."""
+    """Return the indices of the links that may rotate about axes that are not parallel."""
     several: set[int] = set()
-    axes: dict[int, NDArray[np.float64]] = {}  # of the rotation of each link, in its frame
+    axes: dict[int, NDArray[np.float64]] = {}  # rotation axis of each link, in its frame
     for j, link in enumerate(tree.links):
         i, R = link.antecedent, link.pose().R
         spins = link.motion is not Motion.PRISMATIC

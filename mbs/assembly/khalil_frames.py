@@ -1,11 +1,11 @@
 """Links and their frames: every joint axis becomes the z axis of a Khalil frame.
 
 The pose between two consecutive axes is decomposed into gamma, b, alpha, d, theta, r. Since
-Rz(gamma) Tz(b) commutes with the motion of the joint before, the gamma and b of the first joint on
-a link are absorbed into theta and r of the link itself: frame j then sits where the classical
-notation puts it, with x along the common perpendicular to the next axis. Frames that a table gave
-stay as they were given. Where the common perpendicular is far, or a symbol may move it anywhere,
-the frame stays at the described origin, and fixed frames lead to it (`spatial.khalil.frames_to`).
+Rz(gamma) Tz(b) commutes with the motion of the previous joint, the gamma and b of the first joint
+on a link are absorbed into theta and r of the link itself. Frame j is then at its position in the
+classical notation, with x along the common perpendicular to the next axis. Frames from a table are
+kept. If the common perpendicular is far, or its position depends on a symbol, the frame stays at
+the described origin, with fixed frames in between (`spatial.khalil.frames_to`).
 
 Source: Khalil & Kleinfinger 1986, section 2.
 """
@@ -27,20 +27,20 @@ from mbs.spatial import Inertia, Khalil, MatrixRotation, Pose, align_z, exact_pr
 
 _FLIP = Pose.rotation(SX(DM([[1, 0, 0], [0, -1, 0], [0, 0, -1]])))
 _EFFORTS = ("Ia", "Fv", "Fs", "Fs_width", "stiffness", "rest")
-"""What acts on the velocity and position of every freedom of a joint."""
+"""Attributes of a joint that act on the velocity and position of each of its freedoms."""
 
 _ALONG_Z = (Motion.REVOLUTE, Motion.PRISMATIC)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cut:
-    """A joint that was cut, and where its two frames are.
+    """A cut joint and the positions of its two frames.
 
     Attributes:
         edge: the joint.
-        link_a, link_b: links that carry frame_a and frame_b (-1 for the base).
-        pose_a, pose_b: these frames in the frames of the links.
-        welded: the joint itself stayed in the tree, and its free end is welded instead.
+        link_a, link_b: indices of the links that carry frame_a and frame_b (-1 for the base).
+        pose_a, pose_b: poses of frame_a and frame_b in the frames of the links.
+        welded: Whether the joint itself stays in the tree, with its free end welded.
     """
 
     edge: Edge
@@ -52,19 +52,19 @@ class Cut:
 
     @property
     def frames(self) -> tuple[Frame, Frame]:
-        """Frame_a and frame_b."""
+        """Link and pose of frame_a and of frame_b."""
         return (self.link_a, self.pose_a), (self.link_b, self.pose_b)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Framed:
-    """A tree with its cuts, and where every node of the graph went.
+    """A tree with its cuts, and the link of every node of the graph.
 
     Attributes:
         tree: links with frames and inertias.
-        joints: for each link, the name of the joint that moves it.
-        cuts: the cut joints.
-        homes: for each node its link (-1 for the base) and the pose of its frame in the link's.
+        joints: name of the joint of each link.
+        cuts: cut joints.
+        homes: link (-1 for the base) of each node, and pose of its frame in the link's frame.
     """
 
     tree: Tree
@@ -75,16 +75,17 @@ class Framed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _DescribedLink:
-    """A link as it was described, before its frame is chosen.
+    """A link as described, before its frame is chosen.
 
     Attributes:
-        name: of the motion.
-        joint: its name.
-        antecedent: number of the link before it, -1 for the base.
-        motion: that moves it; along or about z for revolute and prismatic ones.
+        name: name of the motion.
+        joint: name of the joint.
+        antecedent: index of the antecedent link, -1 for the base.
+        motion: motion of the link; along or about z for prismatic and revolute motions.
         backward: see `Link`.
-        pose: the frame of the motion at zero in that of the antecedent's motion, both as described.
-        given: the Khalil parameters of the pose, where it was described by them.
+        pose: frame of the motion at zero relative to the frame of the antecedent's motion, both as
+            described.
+        given: Khalil parameters of the pose, if it is described by them.
         edge: the joint.
         nodes: pose of every node on the link, and of the free end of a cut joint (-1), in the frame
             of the motion.
@@ -103,13 +104,13 @@ class _DescribedLink:
 
 @dataclass(slots=True)
 class _Chosen:
-    """The frame of a link: where its placement puts it, on the axis of its joint.
+    """The chosen frame of a link, on the axis of its joint.
 
     Attributes:
-        via, placement: the frames that lead to it.
-        shift: from the described frame of the motion to the chosen one, a rotation about and a
+        via, placement: successive frames from the antecedent to the chosen frame.
+        shift: chosen frame relative to the described frame of the motion: a rotation about and a
             translation along the axis of the joint.
-        settled: whether the frame stays where it is.
+        settled: Whether the frame is final.
     """
 
     via: tuple[Khalil, ...]
@@ -121,12 +122,12 @@ class _Chosen:
 def khalil_frames(
     mechanism: Description, graph: BodyGraph, spanning: SpanningTree, symbols: Mapping[str, SX]
 ) -> Framed:
-    """Number the links, place their frames and gather their inertias.
+    """Number the links, place their frames and sum their inertias.
 
     Args:
-        mechanism: the components.
+        mechanism: components and connections.
         graph: bodies and joints.
-        spanning: which joints are in the tree, in which order.
+        spanning: joints of the tree, in order, and cut joints.
         symbols: CasADi symbol of every parameter.
     """
     drafts: list[_DescribedLink] = []
@@ -175,7 +176,7 @@ def khalil_frames(
 
 
 def _keep(spanning: SpanningTree) -> list[Branch]:
-    """Cut joints with an effort, or without rows: they stay, and their free end is welded."""
+    """Return branches of cut joints that stay in the tree: with an effort or without rows."""
     return [
         Branch(edge, edge.a, -1, True)
         for edge in spanning.cuts
@@ -189,7 +190,7 @@ def _extend(
     parent: int,
     branch: Branch,
 ) -> tuple[int, Pose]:
-    """Add the links of one joint; the last of them, and the pose of the child node in it."""
+    """Add the links of one joint; return the last link and the pose of the child node on it."""
     edge = branch.edge
     near, far = (edge.pose_a, edge.pose_b) if branch.forward else (edge.pose_b, edge.pose_a)
     nodes = base if parent < 0 else drafts[parent].nodes
@@ -216,14 +217,15 @@ def _extend(
 
 
 def _chosen_frames(drafts: Sequence[_DescribedLink], size: float) -> list[_Chosen]:
-    """The frame of every link: as it was given, else Khalil's where it is near.
+    """Return the frame of every link: the described frame, or Khalil's frame if it is near.
 
-    The gamma and b of the first link behind a revolute or prismatic joint move the frame of that
-    joint along and about its axis, unless it was given, so that they are zero in what follows.
+    The gamma and b of the first link after a revolute or prismatic joint move the frame of that
+    joint along and about its axis, unless it was described by Khalil parameters. They are then zero
+    in the following frame.
 
     Args:
-        drafts: the links as described.
-        size: of the mechanism [m].
+        drafts: links as described.
+        size: size of the mechanism [m].
     """
     chosen: list[_Chosen] = []
     for draft in drafts:
@@ -249,7 +251,7 @@ def _chosen_frames(drafts: Sequence[_DescribedLink], size: float) -> list[_Chose
 
 
 def _align(freedom: Freedom, forward: bool) -> Pose:
-    """The frame with z along the axis of a freedom, reversed when the joint is run backwards."""
+    """Return the frame with z along the axis of a freedom, reversed for a backward joint."""
     if freedom.motion not in _ALONG_Z:
         return Pose.identity()
     pose = Pose.rotation(align_z(freedom.axis))
@@ -259,7 +261,7 @@ def _align(freedom: Freedom, forward: bool) -> Pose:
 def _rotor(
     edge: Edge, place: Callable[[int], tuple[int, Pose]], symbols: Mapping[str, SX]
 ) -> CarriedRotor | None:
-    """The rotor of a joint on the link that has the joint's frame_a."""
+    """Return the rotor of a joint, on the link that carries the joint's frame_a."""
     rotor = edge.joint.rotor
     if rotor is None:
         return None

@@ -1,4 +1,4 @@
-"""How every model becomes a casadi.Function: names, parameters with defaults, checked calls."""
+"""Models as casadi.Functions with element names, default parameters and checked calls."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from mbs.assembly.system import System
 
 
-# The table that says what each element of the inputs and outputs of a model is.
+# Table of the elements of the inputs and outputs of a model.
 
 
 _QUANTITIES = {
@@ -42,15 +42,15 @@ _QUANTITIES = {
 
 
 def function_table(function: ModelFunction) -> str:
-    """One line for each input and output, and one for each of its elements that has a name.
+    """Return a table with a line for each input and output, and for each of its named elements.
 
     Args:
-        function: the model; q, v, a and tau are in the order of the coordinates of its system, and
-            those that end in _a are of the independent joints.
+        function: model. The order of q, v, a and tau is that of the coordinates of its system.
+            Names that end in _a refer to the independent joints.
 
     Returns:
-        Lines of index, name, quantity and unit; parameters with their defaults, and positions,
-        velocities and efforts with the limits that the joints describe.
+        lines of index, name, quantity and unit. Parameters have their defaults, and positions,
+        velocities and efforts have the limits of the joints.
     """
     lines = [f"{function.name()} of {function.system.name}"]
     for kind, names, shape in (
@@ -81,7 +81,7 @@ def _rows_of_elements(function: ModelFunction, name: str, size: int) -> list[str
 
 
 def _limits(system: System, name: str) -> dict[str, str]:
-    """What to write of the limits of the elements of an input, by the name of the element."""
+    """Return the text of the limits of each element of an input, by name of the element."""
     ranges = {
         "q": [(row.name, row.limits) for row in system.coordinates],
         "v": [(row.name, row.limits) for row in system.speeds],
@@ -95,19 +95,19 @@ def _limits(system: System, name: str) -> dict[str, str]:
 
 
 Named = Sequence[tuple[str, SX]]
-"""Inputs or outputs of a model: name and value."""
+"""Named inputs or outputs of a model: pairs of name and value."""
 
 
 @dataclass(frozen=True, slots=True)
 class ConfigurationCheck:
-    """What a model asks of a configuration beside what every model does.
+    """Additional validity conditions of a model on its configuration.
 
     Attributes:
-        rows: `rows(system, q)` at symbols q and `system.p`.
-        refuse: `refuse(system, q, p)` raises the error that says why numbers are not taken.
+        rows: `rows(system, q)` returns the conditions at symbols q and `system.p`.
+        refuse: `refuse(system, q, p)` raises an error with the reason if numbers are invalid.
         verify: `verify(system, names, evaluate, inputs, outputs)` raises an error if numeric
-            outputs, in the order of their names, have no accuracy; `evaluate(inputs)` returns the
-            outputs at other inputs. None if nothing is verified.
+            outputs, in the order of their names, are inaccurate. `evaluate(inputs)` returns the
+            outputs at other inputs. None if outputs are not verified.
         delicate: `delicate(system, q)` is an expression of q and `system.p`, 1 at configurations at
             which outputs are verified, else 0. None if there are no such configurations.
     """
@@ -122,15 +122,15 @@ _SAME_UNIT = {unit: unit for unit in EFFORT_UNIT}
 
 
 class ModelFunction(Function):
-    """A casadi.Function that knows the names of its elements and the defaults of its parameters.
+    """A casadi.Function with names of its elements and defaults of its parameters.
 
-    It is called like any Function. The last input p may be left out: its defaults are taken
-    (CasADi's own `default_in` holds one number per input, so it cannot keep them). A call with a
-    wrong number of values says so by the names of the coordinates, and numbers in never give a
-    NaN out, but in `may_be_nan`.
+    It is called like any Function. The last input p may be left out and then has its defaults
+    (CasADi's own `default_in` has a single number per input). The error for a wrong number of
+    values lists the coordinates. NaN in the outputs of numeric inputs raises an error, except in
+    `may_be_nan`.
 
     Attributes:
-        may_be_nan: outputs of which some elements are NaN where there is nothing to say.
+        may_be_nan: names of outputs with elements that may be NaN if they are undefined.
     """
 
     may_be_nan: tuple[str, ...] = ()
@@ -143,14 +143,14 @@ class ModelFunction(Function):
         check: ConfigurationCheck | None = None,
         loops: Any = None,
     ) -> None:
-        """Take a Function for a model.
+        """Create a model from a Function.
 
         Args:
-            function: the equations.
-            system: the mechanism.
-            annotate: gives the Function with its intermediate quantities.
-            check: what is asked of a configuration.
-            loops: what `mbs.native.compiled` asks for code that loops over the links.
+            function: equations of the model.
+            system: system of the model.
+            annotate: callable that returns the Function with its intermediate quantities.
+            check: additional validity conditions on the configuration.
+            loops: source of code that loops over the links, for `mbs.native.compiled`.
         """
         Function.__init__(self, function)
         self.loops = loops
@@ -160,26 +160,26 @@ class ModelFunction(Function):
         self._sizes = {name: self.size_in(name) for name in self.name_in()}
         self._of_one: Function | None = None
         self._state: Function | None = None
-        # what a call asks beyond finite numbers; the rows themselves are made when first needed
+        # whether inputs have conditions beyond finite numbers; the rows are made when first needed
         ruled = system.bounds or system.bounded or quaternion_slices(system.tree)
         self._asks = bool(check or ruled)
 
     @property
     def system(self) -> System:
-        """The mechanism whose model it is."""
+        """System of the model."""
         return self._system
 
     def annotated(self) -> Function:
-        """The same Function with further outputs: the intermediate quantities that have a name.
+        """Return the Function with further outputs: the named intermediate quantities.
 
         Returns:
-            Function of the same inputs; after its own outputs come scalars such as W32, the third
-            element of the angular velocity of link 2. Names are those of docs/notation.md.
+            Function of the same inputs. After its own outputs it has scalars such as W32, the third
+            element of the angular velocity of link 2. The names are listed in docs/notation.md.
         """
         return Function(self) if self._annotate is None else self._annotate()
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        """Evaluate it on numbers or symbols, as a casadi.Function, its inputs checked."""
+        """Evaluate the model on numbers or symbols, as a casadi.Function, with checked inputs."""
         given = self._given(args, kwargs)
         inputs = {name: self._input(name, value) for name, value in given.items()}
         delicate = self._require_valid(inputs)
@@ -199,21 +199,21 @@ class ModelFunction(Function):
         return outputs
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds the System too, so that names, defaults and checks go with it."""
+        """Pickle the model with its System, so that names, defaults and checks are kept."""
         return _unpickle, (self.serialize(), self._system, self._check_configuration, self.loops)
 
     def __deepcopy__(self, dummy: Any = None) -> ModelFunction:
-        """Itself: a Function never changes."""
+        """Return the model itself: a Function is immutable."""
         return self
 
     def like(self, function: Function) -> ModelFunction:
-        """Another Function with the inputs of this one, checked and completed in the same way."""
+        """Return a model with another Function of the same inputs, with the same checks."""
         made = ModelFunction(function, self._system, check=self._check_configuration)
         made.may_be_nan = self.may_be_nan
         return made
 
     def asked(self) -> tuple[str, ...]:
-        """The inputs of which more than finite numbers is asked: positions q, parameters p."""
+        """Return the names of the inputs with validity conditions: positions q, parameters p."""
         sizes = {"q": self._system.nq, "p": len(self._system.parameters)}
         return tuple(
             name
@@ -222,10 +222,10 @@ class ModelFunction(Function):
         )
 
     def rows(self, q: SX) -> list[ValidityRow]:
-        """What is asked of the inputs `asked`; empty where it is nothing.
+        """Return the validity conditions on the inputs `asked`; empty if there are none.
 
         Args:
-            q: (nq, 1) symbols; parameters are those of the system.
+            q: (nq, 1) symbols. The parameters are those of the system.
         """
         asked, check = self.asked(), self._check_configuration
         if not asked:
@@ -235,10 +235,10 @@ class ModelFunction(Function):
         return [*rows, *(check.rows(self._system, q) if check and "q" in asked else [])]
 
     def valid(self) -> Function | None:
-        """``valid(q, p)``, of those of them that are asked: 1 where the model takes all columns.
+        """Return the Function ``valid(q, p)``, 1 if all columns of q and p are valid, else 0.
 
         Returns:
-            None where it asks for nothing but numbers.
+            Function of the inputs `asked`. None if the model requires finite numbers only.
         """
         one = self._valid_of_one()
         if one is None:
@@ -251,7 +251,7 @@ class ModelFunction(Function):
         return Function("valid", given, [every], one.name_in(), ["valid"])
 
     def _valid_of_one(self) -> Function | None:
-        """`valid` of one column."""
+        """Return `valid` for one column."""
         if self._of_one is None:
             q = SX.sym("q", self._system.nq)
             if not (rows := self.rows(q)):
@@ -263,7 +263,7 @@ class ModelFunction(Function):
         return self._of_one
 
     def _state_of_one(self) -> Function | None:
-        """``state(..) -> valid, delicate`` of one column; common parts are evaluated once."""
+        """Return ``state(..) -> valid, delicate`` of a column; common parts are evaluated once."""
         if self._state is None and (valid := self._valid_of_one()) is not None:
             symbols = {"q": SX.sym("q", self._system.nq), "p": self._system.p}
             given, check = [symbols[name] for name in valid.name_in()], self._check_configuration
@@ -277,41 +277,41 @@ class ModelFunction(Function):
         return self._state
 
     def default_of_p(self) -> NDArray[np.float64] | None:
-        """Values of the parameters where they are left out; None where one has no value."""
+        """Return the default parameters p; None if a parameter has no value."""
         try:
             return np.array(self._system.parameter_values(), dtype=float)
         except ModelError:
             return None
 
     def rewritten(self, function: Function) -> ModelFunction:
-        """An equal Function of other operations, its intermediate quantities named as here."""
+        """Return a copy with an equivalent Function `function`; named intermediates are kept."""
         made = self.like(function)
         if self._annotate is not None:
             made._annotate = lambda: names_found(Function(function), self.annotated())
         return made
 
     def map(self, *args: Any) -> Function:
-        """The Function over many columns, as `casadi.Function.map`."""
+        """Return the Function over many columns, as `casadi.Function.map`."""
         return self.like(Function.map(self, *args))
 
     def expand(self, *args: Any) -> Function:
-        """The Function on scalars alone, as `casadi.Function.expand`."""
+        """Return the Function on scalars only, as `casadi.Function.expand`."""
         return self.like(Function.expand(self, *args))
 
     def elements(self, name: str) -> list[tuple[str, str]]:
-        """Name and unit of every element of an input or output; empty where they have none."""
+        """Return name and unit of every element of an input or output; empty without names."""
         return _elements(self._system).get(name, [])
 
     def describe(self) -> str:
-        """A table of index, name, quantity and unit of every input and output; `print` shows it."""
+        """Return a table of index, name, quantity and unit of every input and output element."""
         return function_table(self)
 
     def __str__(self) -> str:
-        """The table of `describe`; `repr` is the one line of CasADi."""
+        """Return the table of `describe`; `repr` is the one line of CasADi."""
         return self.describe()
 
     def example(self, name: str) -> NDArray[np.float64] | None:
-        """Numbers that an input takes, where not all would do; None where any will do."""
+        """Return a valid value of an input with conditions; None if any number is valid."""
         return self.default_of_p() if name == "p" else None
 
     @property
@@ -319,7 +319,7 @@ class ModelFunction(Function):
         return f"{self.name()}({self._system.name})"
 
     def _given(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> dict[str, Any]:
-        """Every input by name, p completed by its defaults."""
+        """Return every input by name, with the default of p."""
         names = self._sizes
         given = dict(zip(names, args, strict=False))
         twice = [name for name in kwargs if name in given]
@@ -343,7 +343,7 @@ class ModelFunction(Function):
         return {name: given[name] for name in names}
 
     def _input(self, name: str, value: Any) -> Any:
-        """What CasADi takes for a value: finite numbers of the size of an input, or symbols."""
+        """Return an input for CasADi: finite numbers of the right size, or symbols."""
         if isinstance(value, (list, tuple)) and any(isinstance(e, (SX, MX, DM)) for e in value):
             value = casadi.vertcat(*value)
         if isinstance(value, (SX, MX, DM)):
@@ -355,7 +355,7 @@ class ModelFunction(Function):
                 raise ModelError(f"{self._title}: {name} {array}")
             self._check_size(name, array.shape, value)
             line = array.ndim == 1 and array.size > 0
-            # the sum of squares is the fastest question, which a large number may also answer
+            # the sum of squares is the fastest test, but may overflow for large numbers
             finite = (line and math.isfinite(array.dot(array))) or bool(np.isfinite(array).all())
             checked = self._asks and name in ("q", "p")
             value = array if line and not checked else _dm(array)
@@ -389,7 +389,7 @@ class ModelFunction(Function):
         raise ModelError(f"{self._title}: {name} has {has}, it needs {expected}{known}")
 
     def _require_valid(self, inputs: dict[str, Any]) -> bool:
-        """Refuse numbers at which the model has no sense; return whether to verify its outputs."""
+        """Raise ModelError for invalid numbers; return whether outputs are to be verified."""
         one = self._state_of_one() if self._asks else None
         if one is None:
             return False
@@ -421,7 +421,7 @@ class ModelFunction(Function):
         return is_delicate
 
     def _refuse(self, column: dict[str, NDArray[np.float64]]) -> None:
-        """Say what is wrong where no component and no quaternion has a sentence for it."""
+        """Raise ModelError with the violated condition of a column of inputs."""
         given = {name: _dm(values) for name, values in column.items()}
         if self._check_configuration is not None and "q" in given:
             self._check_configuration.refuse(self._system, given["q"], given.get("p", DM()))
@@ -433,7 +433,7 @@ class ModelFunction(Function):
         raise ModelError(f"{self._title}: {broken.sentence}")
 
     def _verify(self, inputs: dict[str, Any], outputs: Any) -> None:
-        """Raise an error if outputs of numeric inputs have no accuracy."""
+        """Raise an error if outputs of numeric inputs are inaccurate."""
         check = self._check_configuration
         every = outputs if isinstance(outputs, tuple) else (outputs,)
         if check is None or check.verify is None or not all(isinstance(o, DM) for o in every):
@@ -464,13 +464,13 @@ class ModelFunction(Function):
 
 
 def _dm(array: NDArray[np.float64]) -> DM:
-    """An array as CasADi takes it; given a pattern, it converts in half the time."""
+    """Return an array as DM; with a sparsity pattern CasADi converts it in half the time."""
     rows, columns = (*array.shape, 1, 1)[:2]
     return DM(Sparsity.dense(rows, columns), array.ravel(order="F"))
 
 
 def _columns(value: DM | SX | MX | None, rows: int) -> NDArray[np.float64] | None:
-    """(rows, n) the configurations in an input; None where it is symbolic or of another size."""
+    """Return the columns (rows, n) of an input; None if it is symbolic or has another size."""
     if not isinstance(value, DM) or rows == 0:
         return None
     full = value.full()
@@ -494,16 +494,16 @@ def model_function(
     check: ConfigurationCheck | None = None,
     loops: Any = None,
 ) -> Function:
-    """The model of a system under this key, built the first time it is asked for.
+    """Return the model of a system for a key, built at the first request.
 
     Args:
-        system: whose model it is; its cache keeps the Function.
-        key: the name of the Function, then whatever distinguishes it from others of the same name.
-        build: gives the named inputs and outputs on CasADi symbols and, where there are any, the
-            named scalars between them. When the system has parameters they become the last
+        system: system of the model, whose cache stores the Function.
+        key: name of the Function, then data that distinguish it from others of the same name.
+        build: callable that returns the named inputs and outputs in CasADi symbols and, optionally,
+            named intermediate scalars. The parameters of the system, if any, become the last
             input p.
-        check: what refuses positions q given in numbers.
-        loops: what `mbs.native.compiled` asks for code that loops over the links.
+        check: validity conditions on numeric positions q.
+        loops: source of code that loops over the links, for `mbs.native.compiled`.
 
     Raises:
         ModelError: `system` is not a System.
@@ -529,12 +529,12 @@ def model_function(
 
 
 def signals_in(system: System, inputs: Named, outputs: Named) -> Named:
-    """The states z and inputs u of components, where they are no inputs yet and outputs need them.
+    """Return the component states z and inputs u that outputs need and that are no inputs yet.
 
     Args:
-        system: whose components they are.
-        inputs: named ones of a model.
-        outputs: likewise.
+        system: system with the components.
+        inputs: named inputs of a model.
+        outputs: named outputs of the model.
     """
     given = {name for name, _ in inputs}
     found = [("z", system.z), ("u", system.u)]
@@ -547,7 +547,7 @@ def signals_in(system: System, inputs: Named, outputs: Named) -> Named:
 
 
 def default_in(system: System, others: int) -> list[float]:
-    """CasADi's own defaults: of p where one number can be it, else NaN, which shows."""
+    """Return the defaults for CasADi: 0, and for p the value common to all parameters or NaN."""
     if not system.parameters:
         return [0.0] * others
     values = set(system.p_default)
@@ -555,10 +555,10 @@ def default_in(system: System, others: int) -> list[float]:
 
 
 def require_system(system: object) -> None:
-    """Refuse what is not a System, such as a mechanism that was not assembled.
+    """Raise if the argument is not a System, such as a mechanism that was not assembled.
 
     Raises:
-        ModelError: says what to call.
+        ModelError: the argument is no System. The message has the required call.
     """
     if not isinstance(system, System):
         name = getattr(system, "name", None)

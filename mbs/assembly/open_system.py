@@ -1,4 +1,4 @@
-"""From a mechanism to a System whose loops are not yet analysed."""
+"""Assembly of a mechanism into a System whose loops are not yet analysed."""
 
 from __future__ import annotations
 
@@ -43,15 +43,15 @@ from mbs.spatial import Pose
 
 
 def open_system(mechanism: Description, guessed: Collection[str] = ()) -> System:
-    """Tree, cuts and tables of a mechanism, its loops still open.
+    """Return the System with tree, cut joints and tables of a mechanism, without loop analysis.
 
     Args:
-        mechanism: the components.
+        mechanism: components and connections.
         guessed: coordinates whose joints should stay in the tree.
 
     Raises:
         AssemblyError: the components do not form a mechanism.
-        DescriptionError: no body has the inertia of one that may rotate about several axes.
+        DescriptionError: a body that may rotate about several axes has an impossible inertia.
     """
     parameters = mechanism.parameters()
     known = {p.name: p.default for p in parameters if p.default is not None}
@@ -127,9 +127,9 @@ def open_system(mechanism: Description, guessed: Collection[str] = ()) -> System
 
 
 def _trial_values(parameters: Sequence[Parameter]) -> dict[str, float]:
-    """A number for every parameter; an irregular one where none is given."""
+    """Return a value of every parameter: its default, or an irregular number."""
     return {
-        # irregular numbers of about one, so that no rule among the parameters holds by chance
+        # irregular numbers near 1, so that no relation between parameters holds by chance
         p.name: 0.731 + 0.217 * number if p.default is None else p.default
         for number, p in enumerate(parameters)
     }
@@ -145,7 +145,7 @@ def _check_names(mechanism: Description, coordinates: Sequence[Coordinate]) -> N
 
 
 def _owners(mechanism: Description, coordinates: Collection[str]) -> set[str]:
-    """The joints that have one of these coordinates."""
+    """Return the names of the joints of these coordinates."""
     return {
         joint.name
         for joint in mechanism.joints()
@@ -161,7 +161,7 @@ def _is_actuated(joint: Joint, in_loops: set[str]) -> bool:
 
 
 def _loop_joints(framed: Framed, cut: Cut) -> list[str]:
-    """The joints in the loop that a cut opened, in the order of the links."""
+    """Return the names of the joints in the loop of a cut, in the order of the links."""
     a, b = (set(framed.tree.path(link)) for link in (cut.link_a, cut.link_b))
     names = [framed.joints[j] for j in sorted(a ^ b)]
     return list(dict.fromkeys(names))
@@ -172,7 +172,7 @@ def _looped_joints(framed: Framed) -> set[str]:
 
 
 def _driven_joints(mechanism: Description) -> set[str]:
-    """The joints that follow another one through a coupling."""
+    """Return the names of the driven joints of couplings."""
     driven = [coupling.driven for coupling in mechanism.couplings()]
     return _owners(mechanism, driven)
 
@@ -199,7 +199,7 @@ def _loop_rows(
 
 
 def _bound_joints(framed: Framed, part: AttachedPart) -> tuple[str, ...]:
-    """The joints that move what a component binds."""
+    """Return the names of the joints that move the ports of a component."""
     links = [k for link, _ in part.frames for k in framed.tree.path(link)]
     names = [framed.joints[k] for k in sorted(set(links))]
     return tuple(dict.fromkeys([*names, *(lever.name for lever in part.levers)]))
@@ -219,7 +219,7 @@ def _cut_coordinates(cuts: Sequence[Cut]) -> tuple[Coordinate, ...]:
 
 
 def _bodies(mechanism: Description, graph: BodyGraph, framed: Framed) -> tuple[BodyRow, ...]:
-    """The moving bodies, in the order in which their links are numbered."""
+    """Return the moving bodies, in the order of their links."""
     homes = {
         name: framed.homes[number][0]
         for number, node in enumerate(graph.nodes)
@@ -255,7 +255,7 @@ def _places(graph: BodyGraph, framed: Framed) -> Places:
 def _frames(
     mechanism: Description, places: Places, symbols: Mapping[str, SX]
 ) -> dict[str, tuple[int, Pose]]:
-    """The base, every body's reference frame, and every frame that was given a name."""
+    """Return the base, the reference frames of bodies, and named frames, by name."""
     frames = {"base": places[mechanism.world.name, ""]}
     for body in (mechanism.world, *mechanism.bodies()):
         link, pose = frames[body.name] = places[body.name, ""]
@@ -291,7 +291,7 @@ def _shapes(
 def _number(
     mechanism: Description, frames: Mapping[str, tuple[int, Pose]], links: int
 ) -> dict[int, str]:
-    """The bodies of the frames of a table, where their numbers are not those of the links."""
+    """Return the bodies of the numbered frames of a table; empty if the numbers are the links'."""
     same = len(mechanism.numbered) == links and all(
         frames[name][0] == number - 1 and frames[name][1].is_identity()
         for number, name in mechanism.numbered.items()

@@ -1,4 +1,4 @@
-"""Between which values parameters must lie: what the components that hold them take as numbers."""
+"""Bounds of parameters, from the values that their components accept."""
 
 from __future__ import annotations
 
@@ -22,28 +22,29 @@ from mbs.expressions import (
 )
 
 Bounds = tuple[float | None, float | None]
-"""The least and the greatest value; None where there is none."""
+"""Least and greatest value; None for no bound."""
 
-_BELOW_ZERO = (-1.0, -1e-5)  # far, and nearer than a limit is to zero: refused for the sign
-_ABOVE_ONE = (1.00001, 1.1, 1e3)  # near, and far: what is refused there is above one
-_ABOVE_ZERO = (MORE_THAN_ZERO, 1e-5, 1.0, 1e3)  # of which some are taken where zero is the limit
+_BELOW_ZERO = (-1.0, -1e-5)  # far from zero, and nearer than any bound: rejected for the sign
+_ABOVE_ONE = (1.00001, 1.1, 1e3)  # near 1, and far: if all are rejected, the upper bound is 1
+_ABOVE_ZERO = (MORE_THAN_ZERO, 1e-5, 1.0, 1e3)  # some are accepted if the lower bound is 0
 
 
 def parameter_bounds(
     components: Iterable[Component], parameters: Iterable[Parameter]
 ) -> dict[str, Bounds]:
-    """The bounds of parameters: their own, and zero and one by what components refuse.
+    """Return the bounds of parameters: their own, and bounds at 0 and 1 that components impose.
 
-    A component is asked with the values themselves, all other parameters left open, so that its
-    rule is stated in one place. Rules between several parameters, such as of an inner and an outer
-    radius, are no bounds; `BoundedField` and the components themselves know them.
+    A component is checked with trial values of one parameter and without values of other
+    parameters. Its rules are therefore defined only in the component. Rules between several
+    parameters, such as inner and outer radius, are not bounds; `BoundedField` and the components
+    check them.
 
     Args:
-        components: of a mechanism.
-        parameters: of it.
+        components: components of a mechanism.
+        parameters: parameters of the mechanism.
 
     Returns:
-        least and greatest value by name, of those that have one.
+        least and greatest value by name, for parameters with a bound.
     """
     found: dict[str, Bounds] = {p.name: (p.min, p.max) for p in parameters}
     for component in components:
@@ -59,11 +60,11 @@ def parameter_bounds(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoundedField:
-    """A number of a component that is made of parameters, and its bounds.
+    """A field of a component that is an expression of parameters, with its bounds.
 
     Attributes:
-        name: of the component and the field, such as "arm, mass".
-        value: (1, 1) on the symbols of the parameters.
+        name: names of the component and of the field, such as "arm, mass".
+        value: (1, 1) expression in the symbols of the parameters.
         bounds: least and greatest value.
     """
 
@@ -75,11 +76,11 @@ class BoundedField:
 def bounded_fields(
     components: Iterable[Component], symbols: Mapping[str, SX]
 ) -> Iterator[BoundedField]:
-    """What is computed from parameters and has bounds, such as a mass of "M1 + M2".
+    """Yield the fields that are expressions of parameters and have bounds, such as mass "M1 + M2".
 
     Args:
-        components: of a mechanism.
-        symbols: of its parameters.
+        components: components of a mechanism.
+        symbols: symbols of its parameters.
     """
     for component in components:
         unvalued, declared = component.without_defaults(), dict(_declared(component))
@@ -105,7 +106,7 @@ def _with_field(component: Component, name: str, value: float) -> None:
 
 
 def _declared(component: Component) -> Iterator[tuple[str, Bounds]]:
-    """The bounds that a component by its equations declares, by field."""
+    """Yield the declared bounds of an equation-based component, by field."""
     if isinstance(component, Custom):
         for name in component.names_of("parameter"):
             yield name, (component.declared[name].low, component.declared[name].high)
@@ -118,7 +119,7 @@ def _tighter(a: Bounds, b: Bounds) -> Bounds:
 
 
 def _bounds(check: Callable[[float], object]) -> Bounds:
-    """What a rule refuses among values below zero, of zero, and above one."""
+    """Return the bounds 0 and 1 of a rule, from the trial values that it rejects."""
     low: float | None = None
     taken = not all(_is_refused(check, value) for value in _ABOVE_ZERO)
     if taken and all(_is_refused(check, value) for value in _BELOW_ZERO):

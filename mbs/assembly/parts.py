@@ -1,4 +1,4 @@
-"""Components by their equations in a system: where their ports are, their states and signals."""
+"""Equation-based components in a system: links of their points, coordinates, states, signals."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from mbs.units import UNITS
 
 _Rows = Sequence[Coordinate]
 Quantity = tuple[str, str]
-"""Full name and unit."""
+"""Pair of full name and unit."""
 
 
 @dataclass(frozen=True, slots=True)
 class FlangeTurn:
-    """Rotation of a flange: `factor` times the coordinate. A flange without coordinate is fixed."""
+    """Rotation of a flange: `factor` times the coordinate, or fixed without a coordinate."""
 
     coordinate: str
     factor: Expression
@@ -34,14 +34,14 @@ class FlangeTurn:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lever:
-    """How much of a coordinate a component acts on.
+    """Moment arm of a component on a coordinate: weight of the coordinate in a port.
 
     Attributes:
-        position: number in q of the coordinate, None where it is no position.
-        velocity: number in v of the coordinate.
-        factor: what a unit of the coordinate contributes.
-        name: of the coordinate.
-        unit: of its velocity.
+        position: index of the coordinate in q. None if it is no position.
+        velocity: index of the coordinate in v.
+        factor: derivative of the port's value with respect to the coordinate.
+        name: name of the coordinate.
+        unit: unit of its velocity.
     """
 
     position: int | None
@@ -53,12 +53,12 @@ class Lever:
 
 @dataclass(frozen=True, slots=True)
 class WireSource:
-    """What feeds an input: an output of a component, or a reading of a sensor.
+    """Source of a wired input: an output of a component, or a reading of a sensor.
 
     Attributes:
         owner: name of the component.
-        signal: its output or state, or the reading without the name of the sensor, such as "q" or
-            "p.x".
+        signal: output or state of the component, or the reading without the name of the sensor,
+            such as "q" or "p.x".
     """
 
     owner: str
@@ -70,17 +70,17 @@ class WireSource:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AttachedPart:
-    """A component by its equations, and where it is.
+    """A component in a system, with the links, coordinates and symbols that it uses.
 
     Attributes:
-        element: its description.
+        element: description of the component.
         frames: link (-1 for the base) and pose in the link's frame, of each of its points.
-        coordinates: for each of its ports on coordinates and shafts, and each unknown, the
-            coordinates whose sum it is.
-        states: symbols of its states, by their names in it.
-        inputs: symbols of its inputs, or where they come from.
+        coordinates: moment arms of each of its ports on coordinates and shafts, and of each
+            unknown.
+        states: symbols of its states, by name in the component.
+        inputs: symbols of its inputs, or the sources to which they are wired.
         symbols: CasADi symbol of every parameter.
-        where: the components that it acts on, in words.
+        where: components that it acts on, as text.
     """
 
     element: Custom
@@ -93,12 +93,12 @@ class AttachedPart:
 
     @property
     def name(self) -> str:
-        """The name of the component."""
+        """Name of the component."""
         return self.element.name
 
     @property
     def levers(self) -> tuple[Lever, ...]:
-        """The coordinates that it acts on; none where it acts on points."""
+        """Moment arms on all its coordinates; empty if it acts on points only."""
         return tuple(lever for levers in self.coordinates.values() for lever in levers)
 
     @property
@@ -108,7 +108,7 @@ class AttachedPart:
 
     @property
     def input_quantities(self) -> tuple[Quantity, ...]:
-        """Full name and unit of every input that nothing feeds."""
+        """Full name and unit of every input that is not wired."""
         free = (n for n, given in self.inputs.items() if isinstance(given, SX))
         return tuple((f"{self.name}.{n}", self._unit(n)) for n in free)
 
@@ -119,17 +119,17 @@ class AttachedPart:
 
     @property
     def velocity(self) -> int:
-        """Number in v of the coordinate that a drive turns."""
+        """Index in v of the coordinate that a motor drives."""
         return self.levers[0].velocity
 
     @property
     def factor(self) -> SX:
-        """Speed of the flange of a drive for a unit velocity of its coordinate."""
+        """Speed of the flange of a motor per velocity of its coordinate."""
         return self.levers[0].factor
 
     @property
     def binds_alone(self) -> bool:
-        """Whether rows are all that it has."""
+        """Whether the component has constraint rows only."""
         others = self.element.acts or self.element.switches or self.inputs or self.states
         return self.element.binds and not others
 
@@ -139,7 +139,7 @@ class AttachedPart:
 
     @property
     def sentence(self) -> str:
-        """What it is, where it acts, what it takes and gives."""
+        """Description in a report: kind, name, ports and signals."""
         kind, name = type(self.element).__name__, self.name
         signals = [f"input {n} [{u}]" for n, u in self.input_quantities]
         signals += [
@@ -160,12 +160,12 @@ class AttachedPart:
 
 
 def number_or_sx(factor: SX) -> float | SX:
-    """A constant as a number."""
+    """Return a constant as a number; other expressions unchanged."""
     return float(factor) if factor.is_constant() else factor
 
 
 def as_fast(factor: float | SX, coordinate: str) -> str:
-    """How often something turns for a turn of a coordinate, in words."""
+    """Return the text of the speed of a shaft relative to a coordinate."""
     if not coordinate:
         return "not at all, since its shaft is fixed"
     if isinstance(factor, float) and factor == 1:
@@ -175,12 +175,12 @@ def as_fast(factor: float | SX, coordinate: str) -> str:
 
 
 def parts_of(mechanism: Description) -> list[Custom]:
-    """Every component by its equations, in the order added."""
+    """Return all equation-based components, in the order of their addition."""
     return [c for c in mechanism.components.values() if isinstance(c, Custom) and c.has_equations]
 
 
 def with_unknowns(mechanism: Description) -> Description:
-    """The mechanism with a coordinate for every unknown: a joint that moves nothing."""
+    """Return the mechanism with a massless joint for every unknown, whose coordinate it is."""
     unknowns = [
         (f"{part.name}.{name}", part.declared[name].unit)
         for part in parts_of(mechanism)
@@ -199,7 +199,7 @@ def with_unknowns(mechanism: Description) -> Description:
 
 
 def guesses_of_unknowns(mechanism: Description) -> dict[str, float]:
-    """Where assembling looks for the unknowns, by the names of their coordinates."""
+    """Return the initial guesses of the unknowns, by coordinate name."""
     return {
         f"{part.name}.{name}": float(getattr(part, name))
         for part in parts_of(mechanism)
@@ -210,18 +210,18 @@ def guesses_of_unknowns(mechanism: Description) -> dict[str, float]:
 def coordinates_needed(
     mechanism: Description, turns: Mapping[tuple[str, str], FlangeTurn]
 ) -> list[str]:
-    """The coordinates that components by their equations refer to, also along wires.
+    """Return the coordinates that equation-based components refer to, also by wires.
 
     Args:
-        mechanism: without flanges.
-        turns: how flanges turn, by their keys.
+        mechanism: mechanism without flanges.
+        turns: rotation of each flange, by its key.
     """
     found = list(guesses_of_unknowns(mechanism))
     for part in parts_of(mechanism):
         found += [name for levers in part.coordinates.values() for name, _ in levers]
         shafts = [turns[part.name, port_of_flange(port)] for port in part.shaft_ports]
         found += [turn.coordinate for turn in shafts if turn.coordinate]
-    # a wire takes what its sensor reads from the tree
+    # a wire from a joint sensor needs the sensor's coordinate in the tree
     sensors = [c for c in mechanism.components.values() if isinstance(c, JointSensor)]
     sources = [str(source) for source, _ in mechanism.wires]
     found += [s.joint for s in sensors if any(one.startswith(f"{s.name}.") for one in sources)]
@@ -236,19 +236,19 @@ def attached_parts(
     turns: Mapping[tuple[str, str], FlangeTurn],
     sensors: Sequence[AttachedSensor],
 ) -> tuple[AttachedPart, ...]:
-    """Every component by its equations, with the links of its points and its coordinates.
+    """Return every equation-based component with the links of its points and its coordinates.
 
     Args:
-        mechanism: the components.
-        places: where bodies and joints are.
-        tables: the coordinates of q, of v, and of cut joints.
+        mechanism: components and connections.
+        places: link and pose of bodies and joint frames.
+        tables: coordinates of q, of v, and of cut joints.
         symbols: CasADi symbol of every parameter.
-        turns: how flanges turn, by their keys.
-        sensors: what wires may come from.
+        turns: rotation of each flange, by its key.
+        sensors: sensors that may be sources of wires.
 
     Raises:
-        AssemblyError: one acts on nothing that is there, or on nothing that moves; or a wire comes
-            from nothing.
+        AssemblyError: a component acts on an unknown or immovable part, or the source of a wire is
+            unknown.
     """
     wires = _wires(mechanism, sensors)
     return tuple(
@@ -266,13 +266,13 @@ def _attached(
     turns: Mapping[tuple[str, str], FlangeTurn],
     wires: Mapping[tuple[str, str], WireSource],
 ) -> AttachedPart:
-    # where its points are
+    # links and poses of its points
     frames = []
     for point in part.points:
         require_part(mechanism, part, point, "acts on")
         link, pose = places[point.owner.name, point.port]
         frames.append((link, pose @ point.placement.pose(symbols)))
-    # which coordinates its other ports are
+    # coordinates of its other ports
     given: dict[str, Iterable[tuple[str, Scalar]]] = dict(part.coordinates)
     for name in part.shaft_ports:
         turn = turns[part.name, port_of_flange(name)]
@@ -305,9 +305,9 @@ def _require_moving(
     coordinates: Mapping[str, tuple[Lever, ...]],
     names: Sequence[str],
 ) -> None:
-    """Refuse loads and rows on what cannot move."""
+    """Raise AssemblyError if loads and rows act on bodies that cannot move."""
     links = {link for link, _ in frames}
-    bodiless = not frames and not coordinates  # such as a capacitor, which only stores
+    bodiless = not frames and not coordinates  # such as a capacitor, which has no ports
     if not (part.acts or part.binds or part.switches) or bodiless or any(coordinates.values()):
         return
     if links <= {-1} or (len(links) == 1 and len(frames) > 1):
@@ -324,7 +324,7 @@ def _where(names: Sequence[str]) -> str:
 
 
 def _lever(part: Custom, name: str, factor: SX, tables: tuple[_Rows, _Rows, _Rows]) -> Lever:
-    """Where a coordinate of a component stands in q and in v."""
+    """Return the moment arm of a component on a coordinate; raise if the coordinate is unknown."""
     coordinates, speeds, cut = tables
     q, v = ([row.name for row in table] for table in (coordinates, speeds))
     known = [speed for speed in v if speed in q or not part.needs_position]
@@ -343,16 +343,16 @@ def _lever(part: Custom, name: str, factor: SX, tables: tuple[_Rows, _Rows, _Row
     return Lever(position, v.index(name), factor, name, speeds[v.index(name)].unit)
 
 
-# Wires: what feeds the inputs of components.
+# Wires: sources of the inputs of components.
 
 
 def _wires(
     mechanism: Description, sensors: Sequence[AttachedSensor]
 ) -> dict[tuple[str, str], WireSource]:
-    """The source of every input that is wired, by component and name.
+    """Return the source of every wired input, by component and name.
 
     Raises:
-        AssemblyError: a wire comes from nothing that gives a signal, or its ends have other units.
+        AssemblyError: the source of a wire is no signal, or its ends have different units.
     """
     outputs = {
         f"{part.name}.{name}": (WireSource(part.name, name), part.declared[name].unit)
@@ -397,7 +397,7 @@ def _wires(
 
 
 def _may_be_wired(source: str, target: str) -> bool:
-    """Whether units may be those of the two ends of a wire: 1 is that of any signal."""
+    """Return whether units of source and target of a wire agree; 1 agrees with all units."""
     free = ("1", EFFORT)
     if source in free or target in free:
         return True
@@ -409,6 +409,6 @@ def _may_be_wired(source: str, target: str) -> bool:
 
 
 def symbols_in_order(symbols: Iterable[SX]) -> SX:
-    """(n, 1) symbols one after the other; (0, 1) where there are none."""
+    """Return symbols as one column (n, 1); (0, 1) if there are none."""
     every = list(symbols)
     return casadi.vertcat(*every) if every else SX(0, 1)

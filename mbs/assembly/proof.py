@@ -1,9 +1,9 @@
-"""The proof of an assembly: the bodies of the tree stand where the description puts them.
+"""Check of an assembly: bodies in the tree have the poses of the description.
 
-Two walks from the world, in numpy alone, at random positions and values of the symbols. One
-multiplies what the components say, connection by connection; the other the frames of the links.
-They share no formula, so that a convention which holds for one sign of a symbol only, or digits
-that cancel, cannot be right in both.
+The poses of all bodies and joints are computed twice, in numpy only, at random positions and
+symbol values: from the description, connection by connection, and from the frames of the links.
+The two computations share no formula. A convention that holds for one sign of a symbol only, or a
+cancellation of digits, therefore cannot be wrong in both.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ from mbs.expressions import Expression, Number, Operation, Parameter
 from mbs.expressions.expression import arithmetic
 
 Array = NDArray[np.float64]
-"""(..., 4, 4) transforms, (samples, 4, 4) where symbols are in them."""
+"""(..., 4, 4) transforms, (samples, 4, 4) if they contain symbols."""
 
 _SEED = 20261122
 
 _SAME = 1e-12
-"""Difference of an element that rounding does not make: a chain of a hundred joints is off by some
-1e-14, a frame on the wrong side by the length of a link. Positions count in reaches."""
+"""Difference of an element that is above rounding: a chain of a hundred joints has errors of 1e-14,
+a frame on the wrong side an error of a link length. Positions are relative to the reach."""
 
 _FUNCTIONS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt, "atan2": np.arctan2}
 
@@ -53,22 +53,22 @@ def prove(
     symbols: Mapping[str, SX],
     values: Mapping[str, float],
 ) -> None:
-    """Refuse a tree whose bodies or joints stand elsewhere than their description says.
+    """Raise if the pose of a body or joint in the tree differs from the description.
 
     Args:
-        mechanism: the components.
-        framed: the tree made of them.
-        places: link and pose of every body and every frame of a joint.
+        mechanism: components and connections.
+        framed: tree of the mechanism.
+        places: link and pose of every body and every joint frame.
         symbols: CasADi symbol of every parameter.
-        values: a number for every parameter, the default where there is one.
+        values: value of every parameter; the default if there is one.
 
     Raises:
-        AssemblyError: names the body or joint, and the values of the symbols.
+        AssemblyError: the message has the body or joint, and the values of the symbols.
     """
     rng = np.random.default_rng(_SEED)
-    # of about one, so that no symbol drops out beside another, and none near zero
+    # magnitudes near 1, so that each symbol has an effect, and far from zero
     some = rng.uniform(0.3, 1.7, len(symbols)) * rng.choice([-1.0, 1.0], len(symbols))
-    # the defaults, numbers of both signs, and the same with all signs reversed
+    # three samples: the defaults, numbers of both signs, and the same numbers with opposite signs
     rows = np.array(
         [[values[n] for n in symbols], *([some, -some] if symbols else [])], dtype=float
     )
@@ -76,7 +76,7 @@ def prove(
     q = {link.name: _positions(rng, link.motion, len(rows)) for link in framed.tree.links}
     free = {(c.edge.joint.name, "free"): c.frames[0] for c in framed.cuts if c.welded}
     frames = {**places, **free}
-    with np.errstate(all="ignore"):  # an expression need not have a value everywhere
+    with np.errstate(all="ignore"):  # some expressions may be undefined
         described = _describe(mechanism, framed, known, q)
         expected = np.array(
             [np.broadcast_to(described[port], (len(rows), 4, 4)) for port in frames]
@@ -84,7 +84,8 @@ def prove(
         found = _assembled(framed.tree, list(frames.values()), symbols, rows, q)
         off = np.abs(found - expected)
         off[..., :3, 3] /= float(np.nanmax(np.abs(expected[..., :3, 3]), initial=0.0)) or 1.0
-    # where the description has no value, such as the root of a negative number, there is none
+    # a sample at which the description is undefined, such as the root of a negative number, is
+    # ignored
     off = np.where(np.isfinite(expected), np.where(np.isfinite(off), off, np.inf), 0.0)
     if np.max(off, initial=0.0) > _SAME:
         number, sample, *_ = np.unravel_index(int(np.argmax(off)), off.shape)
@@ -99,20 +100,20 @@ def prove(
 
 
 def _positions(rng: np.random.Generator, motion: Motion, samples: int) -> Array:
-    """(samples, nq) random positions of a joint; quaternions are unit."""
+    """Return (samples, nq) random positions of a joint, with unit quaternions."""
     values = rng.uniform(-2.0, 2.0, (samples, motion.nq))
     if motion in (Motion.SPHERICAL, Motion.FREE):
         values[:, -4:] /= np.linalg.norm(values[:, -4:], axis=1, keepdims=True)
     return values
 
 
-# --- what the components say ---------------------------------------------------------------------
+# --- poses from the description -----------------------------------------------------------------
 
 
 def _describe(
     mechanism: Description, framed: Framed, known: Mapping[str, Array], q: Mapping[str, Array]
 ) -> dict[tuple[str, str], Array]:
-    """Where every body and joint stands in the world, and the free ends of kept cut joints."""
+    """Return the poses of bodies and joints in the world, and of free ends of kept cut joints."""
     ways: dict[Port, list[tuple[Port, Callable[[], Array]]]] = {}
 
     def connect(a: Port, b: Port, out: Callable[[], Array], back: Callable[[], Array]) -> None:
@@ -172,7 +173,7 @@ def _placement(placement: Placement, known: Mapping[str, Array]) -> Array:
 
 
 def _number(value: Expression, known: Mapping[str, Array]) -> Any:
-    """The value of an expression, a number or one for every sample."""
+    """Return the value of an expression: a number, or an array over the samples."""
     if isinstance(value, Number):
         return value.value
     if isinstance(value, Parameter):
@@ -184,7 +185,7 @@ def _number(value: Expression, known: Mapping[str, Array]) -> Any:
 
 
 def _motion(name: str, freedoms: Sequence[Freedom], q: Mapping[str, Array]) -> Array:
-    """Frame_b of a joint in its frame_a."""
+    """Return the pose of frame_b of a joint in its frame_a."""
     T: Array = np.eye(4)
     for freedom in freedoms:
         T = T @ _elementary_motion(freedom, q[freedom.coordinate_of(name)])
@@ -192,12 +193,12 @@ def _motion(name: str, freedoms: Sequence[Freedom], q: Mapping[str, Array]) -> A
 
 
 def _motion_back(name: str, freedoms: Sequence[Freedom], q: Mapping[str, Array]) -> Array:
-    """Frame_a of a joint in its frame_b."""
+    """Return the pose of frame_a of a joint in its frame_b."""
     return _inverse(_motion(name, freedoms, q))
 
 
 def _elementary_motion(freedom: Freedom, q: Array) -> Array:
-    """(samples, 4, 4) what one elementary motion does; Rodrigues' formula for a rotation."""
+    """Return (samples, 4, 4) transforms of an elementary motion, by Rodrigues' formula."""
     T = np.tile(np.eye(4), (len(q), 1, 1))
     x, y, z = freedom.axis
     match freedom.motion:
@@ -215,7 +216,7 @@ def _elementary_motion(freedom: Freedom, q: Array) -> Array:
 
 
 def _of_quaternion(q: Array) -> Array:
-    """(samples, 3, 3) of unit quaternions w, x, y, z."""
+    """Return the (samples, 3, 3) rotations of unit quaternions w, x, y, z."""
     w, e = q[:, 0, None, None], q[:, 1:]
     x, y, z = e.T
     zero = np.zeros_like(x)
@@ -243,7 +244,7 @@ def _turn(axis: str, angle: Any) -> Array:
 
 
 def _inverse(T: Array) -> Array:
-    """The transform back."""
+    """Return the inverse transform."""
     back = np.zeros_like(T)
     R = np.swapaxes(T[..., :3, :3], -1, -2)
     back[..., :3, :3] = R
@@ -252,7 +253,7 @@ def _inverse(T: Array) -> Array:
     return back
 
 
-# --- what the tree says --------------------------------------------------------------------------
+# --- poses from the tree ------------------------------------------------------------------------
 
 
 def _assembled(
@@ -262,11 +263,11 @@ def _assembled(
     rows: Array,
     q: Mapping[str, Array],
 ) -> Array:
-    """(frames, samples, 4, 4) where frames on the links stand."""
+    """Return the (frames, samples, 4, 4) poses of frames on the links."""
     own = [casadi.vertcat(*frame.parameters) for link in tree.links for frame in link.frames]
     six = np.moveaxis(_at_samples(own, symbols, rows)[..., 0], -1, 0)
     placed = iter(_khalil(*six))
-    poses = [np.tile(np.eye(4), (len(rows), 1, 1))]  # of the base, then of the links
+    poses = [np.tile(np.eye(4), (len(rows), 1, 1))]  # poses of the base, then of the links
     for link in tree.links:
         T = poses[link.antecedent + 1]
         for _ in link.frames:
@@ -278,7 +279,7 @@ def _assembled(
 
 
 def _at_samples(values: Sequence[SX], symbols: Mapping[str, SX], rows: Array) -> Array:
-    """(values, samples, rows, columns) matrices of one shape at every sample."""
+    """Return (values, samples, rows, columns) matrices of equal shape at every sample."""
     if not values:
         return np.zeros((0, len(rows), 0, 0))
     shape = values[0].shape
@@ -292,7 +293,7 @@ def _at_samples(values: Sequence[SX], symbols: Mapping[str, SX], rows: Array) ->
 
 
 def _khalil(gamma: Array, b: Array, alpha: Array, d: Array, theta: Array, r: Array) -> Array:
-    """(..., 4, 4) the transform of Khalil & Kleinfinger 1986, written out."""
+    """Return the (..., 4, 4) transform of Khalil & Kleinfinger 1986, written out."""
     cg, sg, ca, sa = np.cos(gamma), np.sin(gamma), np.cos(alpha), np.sin(alpha)
     ct, st = np.cos(theta), np.sin(theta)
     zero, one = np.zeros_like(cg * b * ca * d * ct * r), np.ones_like(cg * b * ca * d * ct * r)

@@ -1,4 +1,4 @@
-"""A system some of whose numbers are symbols: masses, inertias, lengths, friction."""
+"""Systems with symbols instead of numeric masses, inertias, lengths or friction."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from mbs.spatial import Inertia, Khalil, Pose, elements
 from mbs.spatial.inertia import TEN_PARAMETERS
 from mbs.text import did_you_mean, quoted
 
-# The numbers of a system that may become symbols: their names, units and values.
+# Numbers of a system that may become symbols: names, units and values.
 
 
 GROUPS = {
@@ -34,13 +34,13 @@ GROUPS = {
     "rotors": ("Ia", "Jm"),
     "gravity": ("G",),
 }
-"""Kinds of numbers by the name of their group."""
+"""Kinds of numbers, by the name of their group."""
 
 MAGNITUDES = ("M", "XX", "YY", "ZZ", "Ia", "Jm", "Fv", "Fs")
-"""Kinds that are never negative, of bodies and joints as of links."""
+"""Kinds that are never negative."""
 
 PLACEMENT = ("gamma", "b", "alpha", "d", "theta", "r")
-"""Kinds that place the frame of a link."""
+"""Kinds of the placement of a link's frame: Khalil parameters."""
 
 _TEXTS = {
     "M": "mass of link {link}",
@@ -66,18 +66,18 @@ _SLIDING = {"Ia": "kg", "Fv": "N.s/m", "Fs": "N"}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Adjustable:
-    """A number of a system, or an expression of its symbols, by the name it would have as a symbol.
+    """A number of a system, or an expression of its symbols, that may become a symbol.
 
     Attributes:
-        name: kind and number of the link, such as M3, d4, Fv1; d4_1 for the first fixed frame on
-            the path to link 4; G1, G2, G3 for gravity; of the position of a cut joint
-            `joint.frame_a.x`.
+        name: name as a symbol: kind and number of the link, such as M3, d4, Fv1; d4_1 for the first
+            fixed frame on the path to link 4; G1, G2, G3 for gravity; `joint.frame_a.x` for the
+            position of a cut joint.
         kind: a member of `GROUPS`.
-        owner: what it belongs to: ("link", number from 0), ("fixed frame", "4_1"), ("gravity",
+        owner: owner of the number: ("link", index from 0), ("fixed frame", "4_1"), ("gravity",
             row), or the name of a cut joint and its frame, "a" or "b".
-        value: the number or expression.
-        unit: of it.
-        description: one line.
+        value: number or expression.
+        unit: unit of the value.
+        description: description in one line.
     """
 
     name: str
@@ -89,7 +89,7 @@ class Adjustable:
 
 
 def adjustables(system: System) -> list[Adjustable]:
-    """Every number that may become a symbol: links in order, then cut joints, then gravity."""
+    """Return all numbers that may become symbols: links in order, cut joints, gravity."""
     rows = [row for j, link in enumerate(system.tree.links) for row in _of_link(j, link)]
     return [*rows, *_of_cuts(system), *_of_gravity(system)]
 
@@ -133,36 +133,35 @@ def _of_gravity(system: System) -> Iterator[Adjustable]:
 
 _Symbols = Mapping[str, SX]
 _Given = Mapping[tuple[str, int | str], _Symbols]
-"""Symbols by kind, by the owner of the number that they take the place of."""
+"""Symbols by kind, by the owner of the numbers that they replace."""
 
 _OF_THE_JOINT = ("Ia", "Fv", "Fs")
 
 
 def symbolic(system: System, what: Sequence[str]) -> System:
-    """The same system with some of its numbers as symbols, whose defaults are these numbers.
+    """Return a system with some of its numbers as symbols, whose defaults are the numbers.
 
-    The symbols follow the parameters that the system has already, in p of every model. Inertial
-    parameters are those of a whole link about the origin of its frame and in its axes, as SYMORO
-    names them: M3 alone changes the mass and leaves first moments and inertia where they are, so
-    that the centre of mass moves. Where Fixed joints divide a link, the change is one of the body
-    that none of them holds. Lengths are the Khalil parameters of the frames and the positions of
-    joints that were cut; what is fixed on a link stays where it is on the link. The configuration
-    stays too.
+    The symbols follow the existing parameters in p of every model. Inertial parameters belong to a
+    whole link, about the origin of its frame and in its axes, with the names of SYMORO. M3 alone
+    changes the mass and keeps first moments and inertia, so that the centre of mass moves. If Fixed
+    joints divide a link, the change belongs to the body that no Fixed joint carries. Lengths are
+    the Khalil parameters of the frames and the positions of cut joints. Points on a link keep their
+    position on the link. The configuration is unchanged.
 
     Args:
-        system: open or closed.
+        system: open or closed system.
         what: groups: "masses" (M), "first_moments" (MX, MY, MZ), "inertias" (XX .. ZZ), "lengths"
             (b, d, r, cut joints), "angles" (gamma, alpha, theta), "friction" (Fv, Fs), "rotors"
             (Ia, Jm), "gravity" (G1, G2, G3), whose exact zeros stay zero; single numbers such as
-            "M3", "XX2", "d4", "Fv1", also where they are zero; the name of a body for the ten
+            "M3", "XX2", "d4", "Fv1", also if they are zero; or the name of a body for the ten
             parameters of its link.
 
     Returns:
-        a System of its own; the given one is unchanged.
+        new System; the original system is unchanged.
 
     Raises:
-        ModelError: there is no such group, number or body, something is given twice, or a number
-            is an expression of other symbols already.
+        ModelError: there is no such group, number or body, a name is given twice, or a number is
+            already an expression of symbols.
     """
     require_system(system)
     rows = _choose(system, _names(system, what))
@@ -193,7 +192,7 @@ def _names(system: System, what: Sequence[str]) -> list[str]:
 
 
 def _choose(system: System, names: Sequence[str]) -> list[Adjustable]:
-    """The numbers with these names or in these groups, in the order of the system."""
+    """Return the numbers with these names or in these groups, in the order of the system."""
     rows = adjustables(system)
     single = {row.name: row for row in rows}
     own = {parameter.name for parameter in system.parameters}
@@ -216,7 +215,7 @@ def _is_number(row: Adjustable) -> bool:
 
 
 def _is_itself(row: Adjustable, parameters: set[str]) -> bool:
-    """Whether the value is the symbol of that name already."""
+    """Return whether the value is already the symbol of that name."""
     return row.name in parameters and row.value.is_symbolic() and row.value.name() == row.name
 
 
@@ -230,7 +229,7 @@ def _check_number(system: System, row: Adjustable) -> None:
 
 
 def _of_body(system: System, rows: Sequence[Adjustable], name: str) -> list[Adjustable]:
-    """The ten parameters of the link of a body, those of no symbol."""
+    """Return the ten inertial parameters of the link of a body that are no symbols."""
     links = {body.name: body.link for body in system.bodies}
     if name not in links:
         known = [*GROUPS, *links, *(row.name for row in rows)]
@@ -249,7 +248,7 @@ def _of_body(system: System, rows: Sequence[Adjustable], name: str) -> list[Adju
 
 
 def _check_welds(system: System, rows: Sequence[Adjustable]) -> None:
-    """Refuse inertial symbols of links every body of which some Fixed joint holds."""
+    """Raise if Fixed joints carry all bodies of a link with inertial symbols."""
     for number in sorted({int(r.owner[1]) for r in rows if r.kind in TEN_PARAMETERS}):
         carriers = [j for j in system.joints if j.part is not None and j.frame_b[0] == number]
         bodies = [body.name for body in system.bodies if body.link == number + 1]
@@ -268,7 +267,7 @@ def _with(
     symbols: _Symbols,
     parameters: Sequence[Parameter],
 ) -> System:
-    """The system with symbols in place of the numbers."""
+    """Return the system with symbols instead of the numbers."""
     given: dict[tuple[str, int | str], dict[str, SX]] = {}
     for row in rows:
         given.setdefault(row.owner, {})[row.kind] = symbols[row.name]
@@ -339,7 +338,7 @@ def _cut(cut: Cut, given: _Given) -> Cut:
 
 
 def _joint(row: JointRow, cuts: Sequence[Cut], given: _Given) -> JointRow:
-    """The row of a joint, its frames where the cut joint has them."""
+    """Return the row of a joint, with its frames at the changed positions of the cut joint."""
     moves = [m for cut in cuts if cut.edge.joint.name == row.name for m in _moves(cut, given)]
     if not moves:
         return row
@@ -351,7 +350,7 @@ def _joint(row: JointRow, cuts: Sequence[Cut], given: _Given) -> JointRow:
 
 
 def _moves(cut: Cut, given: _Given) -> Iterator[tuple[Frame, Frame]]:
-    """Each frame of a cut that has symbols, and the same with them."""
+    """Yield each frame of a cut joint with symbols, before and after the substitution."""
     for side, (link, pose) in zip("ab", cut.frames, strict=True):
         values = given.get((cut.edge.joint.name, side), {})
         if values:

@@ -1,4 +1,4 @@
-"""The tables of a system: coordinates, joints, bodies, loops, force elements, sensors."""
+"""Tables of a system: coordinates, links, joints, bodies, loops, couplings and sensors."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ from mbs.spatial import Inertia, MatrixRotation, Pose
 from mbs.text import did_you_mean
 
 Places = Mapping[tuple[str, str], tuple[int, Pose]]
-"""Link and pose of every body, by its name and "", and of the frames "a" and "b" of every joint."""
+"""Link and pose of every body, by (name, ""), and of the frames "a" and "b" of every joint."""
 
 QUATERNION = ("qw", "qx", "qy", "qz")
 """Elements of the quaternion of a joint."""
 
 ANGULAR = ("wx", "wy", "wz")
-"""Elements of its angular velocity."""
+"""Elements of the angular velocity of a joint."""
 
 _POSITIONS = {
     Motion.REVOLUTE: (("", "revolute", "rad"),),
@@ -63,13 +63,13 @@ _VELOCITIES = {
     ),
 }
 EFFORT_UNIT = {"rad/s": "N.m", "m/s": "N"}
-"""Unit of the effort that does work with a velocity of this unit."""
+"""Unit of the effort that does work with a velocity, by unit of the velocity."""
 
 RATE_UNIT = {"m": "m/s", "rad": "rad/s", "1": "1/s"}
-"""Unit of the rate of a position of this unit."""
+"""Unit of the rate of a position, by unit of the position."""
 
 ACCELERATION_UNIT = {"rad/s": "rad/s2", "m/s": "m/s2"}
-"""Unit of the rate of a velocity of this unit."""
+"""Unit of the rate of a velocity, by unit of the velocity."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,14 +77,14 @@ class Coordinate:
     """One element of q or of v.
 
     Attributes:
-        name: the joint's name, with a suffix when the joint has several coordinates.
+        name: name of the joint, with a suffix if the joint has several coordinates.
         kind: revolute, prismatic, translation, rotation or quaternion.
-        unit: of its value.
-        joint: name of the joint it belongs to.
-        actuated: whether a motor drives it.
-        cut: whether its joint is cut, so that it is not in q.
+        unit: unit of its value.
+        joint: name of its joint.
+        actuated: Whether a motor drives it.
+        cut: Whether its joint is cut, so that it is not in q.
         limits: (lower, upper), or None.
-        effort: of an element of v, (lower, upper) of the effort of its motor, or None.
+        effort: (lower, upper) limit of the motor effort of an element of v, or None.
     """
 
     name: str
@@ -102,14 +102,14 @@ class LinkRow:
     """A link of the tree and the Khalil parameters of its frame.
 
     Attributes:
-        number: of the link, from 1.
-        name: of the motion that moves it.
-        antecedent: number of the link it is placed on, 0 for the base.
+        number: number of the link, from 1.
+        name: name of the motion of the link.
+        antecedent: number of the antecedent link, 0 for the base.
         motion: revolute, prismatic, spherical or free.
         gamma, b, alpha, d, theta, r: placement at the zero position [rad, m]; numbers, or
-            expressions where a symbol is in them.
-        via: the same six of fixed frames between the antecedent and the placement; the link is
-            placed on the last of them. There are none where one frame says it.
+            expressions if they contain symbols.
+        via: Khalil parameters of fixed frames between the antecedent and the placement. The link is
+            placed on the last of these frames. Empty if one frame is sufficient.
     """
 
     number: int
@@ -127,12 +127,12 @@ class LinkRow:
 
 @dataclass(frozen=True, slots=True)
 class ShapeRow:
-    """What a part of a link looks like.
+    """A shape on a link, for pictures.
 
     Attributes:
-        link: that carries it, -1 for the base.
-        pose: of the shape in the frame of the link.
-        shape: what is there.
+        link: index of the link that carries the shape, -1 for the base.
+        pose: pose of the shape in the frame of the link.
+        shape: the shape.
     """
 
     link: int
@@ -142,13 +142,13 @@ class ShapeRow:
 
 @dataclass(frozen=True, slots=True)
 class BodyRow:
-    """A body of the description and where it is.
+    """A body of the description and its link.
 
     Attributes:
-        name: of the body.
-        link: number of the link that carries it, from 1.
-        mass: [kg], None when a symbol without value is in it.
-        solid: the body itself where it was described by its dimensions.
+        name: name of the body.
+        link: number of the link that carries the body, from 1.
+        mass: mass [kg]. None if it contains a symbol without value.
+        solid: the body itself if it is described by its dimensions.
     """
 
     name: str
@@ -162,11 +162,11 @@ class LoopRow:
     """A closed loop, or a coupling of coordinates.
 
     Attributes:
-        name: of the joint that was cut, or of the coupling.
+        name: name of the cut joint, or of the coupling.
         closing: kind of the closing joint in lower case, or "coupling".
-        joints: joints in the loop that remain in the tree.
+        joints: joints of the loop that remain in the tree.
         rows: label of every closure row, such as "j3: force x".
-        dropped: those rows that depend on the others.
+        dropped: labels of the rows that depend on the other rows.
     """
 
     name: str
@@ -178,13 +178,13 @@ class LoopRow:
 
 @dataclass(frozen=True, slots=True)
 class Balance:
-    """The balance of the forces on a massless node.
+    """Force balance of a massless node.
 
     Attributes:
         velocity: index in v of the node.
         size: divisor of the force: a typical stiffness [N/m or N m/rad], or damping
             [N s/m or N m s/rad].
-        is_damped: whether dampers act, so that it determines a velocity.
+        is_damped: Whether dampers act on the node, so that the balance determines a velocity.
         frictions: names of the components whose dry friction acts on the node.
     """
 
@@ -196,27 +196,27 @@ class Balance:
 
 @dataclass(frozen=True, slots=True)
 class Closure:
-    """How the loops of a system constrain its velocities.
+    """Constraints of the loops of a system on its velocities.
 
     Attributes:
-        rows: numbers of the independent closure rows.
-        slips: numbers of the independent rows of rolling discs, which bind velocities alone.
-        active: numbers of the independent velocities.
-        passive: numbers of the velocities that follow from them.
-        motors: numbers of the velocities whose efforts drive the mechanism: the active ones, or
-            where there are more motors than these, or others, the motors.
-        free: numbers of the velocities whose positions may be chosen: the active ones, and what
-            rolling discs alone hold.
-        varies: whether the dropped rows follow from the kept ones in a manner that changes with the
-            configuration, so that other rows may be independent elsewhere.
+        rows: indices of the independent closure rows.
+        slips: indices of the independent rows on velocities only, such as those of rolling discs.
+        active: indices of the independent velocities.
+        passive: indices of the dependent velocities.
+        motors: indices of the velocities whose efforts drive the mechanism: the independent
+            velocities, or the motors if there are more motors, or others.
+        free: indices of the velocities whose positions may be chosen: the independent velocities,
+            and velocities that only rolling without slip constrains.
+        varies: Whether the relation between dropped and kept rows changes with the configuration,
+            so that other rows may be independent in other configurations.
         gruebler: mobility by the Gruebler-Kutzbach count of rows.
         residual: largest closure residual at the assembled configuration.
-        guess: approximate positions by name that the user gave [rad or m].
+        guess: approximate positions by name from the user [rad or m].
         at_cut: positions by name of guessed joints that are cut, as assembled [rad or m].
         others: further configurations with the same locked or independent positions, (nq,) each.
-        meets: whether the configuration next to the guess is singular, so that branches of motion
-            meet there.
-        dead: whether the independent joints are at a dead centre in the assembled configuration.
+        meets: Whether the configuration nearest to the guess is singular, so that branches of
+            motion meet there.
+        dead: Whether the independent joints are at a dead centre in the assembled configuration.
     """
 
     rows: tuple[int, ...]
@@ -241,7 +241,7 @@ class Closure:
 
 
 def link_rows(tree: Tree) -> tuple[LinkRow, ...]:
-    """The links and the parameters of their frames."""
+    """Return the links and the Khalil parameters of their frames."""
     rows = []
     for number, link in enumerate(tree.links, start=1):
         *via, (gamma, b, alpha, d, theta, r) = (
@@ -258,14 +258,14 @@ def link_rows(tree: Tree) -> tuple[LinkRow, ...]:
 def position_coordinates(
     links: Sequence[tuple[Motion, str, Joint]], actuated: Sequence[bool], *, cut: bool = False
 ) -> tuple[Coordinate, ...]:
-    """The elements of q of motions given as (motion, name, joint)."""
+    """Return the elements of q for motions (motion, name, joint)."""
     return _coordinates(_POSITIONS, links, actuated, cut)
 
 
 def velocity_coordinates(
     links: Sequence[tuple[Motion, str, Joint]], actuated: Sequence[bool]
 ) -> tuple[Coordinate, ...]:
-    """The elements of v of motions given as (motion, name, joint)."""
+    """Return the elements of v for motions (motion, name, joint)."""
     rows = _coordinates(_VELOCITIES, links, actuated, False)
     described = {joint.name: joint for _, _, joint in links}
     return tuple(
@@ -291,17 +291,17 @@ def _coordinates(
     return tuple(rows)
 
 
-# The joints of a system: those of the tree, those that were cut, and those that weld.
+# Joints of a system: joints of the tree, cut joints and welds.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WeldedPart:
-    """What a Fixed joint holds: the bodies of a link on one side of it.
+    """Bodies that a Fixed joint carries: the bodies of a link on one side of the joint.
 
     Attributes:
-        ports: its bodies, by their names and "", and the frames "a" and "b" of joints on it.
-        inertia: of its bodies, about the origin of the link's frame and in its axes.
-        sign: 1 where it has the frame_b of the joint, -1 where it has frame_a.
+        ports: bodies, as (name, ""), and the frames "a" and "b" of joints on them.
+        inertia: inertia of the bodies, about the origin of the link's frame and in its axes.
+        sign: 1 if the bodies are on the side of the joint's frame_b, -1 on the side of frame_a.
     """
 
     ports: frozenset[Port]
@@ -314,11 +314,12 @@ class JointRow:
     """A joint or constraint between two bodies.
 
     Attributes:
-        name: of the joint.
-        kind: of joint, in lower case.
-        cut: whether it was cut to open a loop.
-        frame_a, frame_b: link (-1 for the base) that carries the frame, and pose in the link's.
-        part: what a joint that welds two bodies into one link holds, None of all others.
+        name: name of the joint.
+        kind: kind of joint, in lower case.
+        cut: Whether the joint is cut to open a loop.
+        frame_a, frame_b: link (-1 for the base) that carries the frame, and pose in the link's
+            frame.
+        part: bodies on one side of a weld within a link. None for all other joints.
     """
 
     name: str
@@ -332,14 +333,14 @@ class JointRow:
 def joint_rows(
     mechanism: Description, places: Places, cuts: Sequence[Cut], symbols: Mapping[str, SX]
 ) -> tuple[JointRow, ...]:
-    """Every joint in the order added, without those that close a ring of welds.
+    """Return every joint in order of addition, except welds that close a ring of welds.
 
-    In such a ring rigid bodies do not determine what a joint transmits.
+    In such a ring the constraint wrenches of the welds are not determined.
 
     Args:
-        mechanism: the components.
-        places: where bodies and joints are.
-        cuts: the joints that were cut.
+        mechanism: components and connections.
+        places: link and pose of bodies and joint frames.
+        cuts: cut joints.
         symbols: CasADi symbol of every parameter.
     """
     cut = {row.edge.joint.name for row in cuts}
@@ -357,7 +358,7 @@ def joint_rows(
 def _part(
     mechanism: Description, joint: Joint, places: Places, symbols: Mapping[str, SX]
 ) -> WeldedPart | None:
-    """The side of a weld that is not the world; None where both sides are welded elsewhere."""
+    """Return the bodies on the side of a weld without the world; None in a ring of welds."""
     sides = {port: _weld(mechanism, joint, port) for port in "ab"}
     if (joint.name, "a") in sides["b"]:
         return None
@@ -374,7 +375,7 @@ def _part(
 
 
 def _weld(mechanism: Description, joint: Joint, port: str) -> list[Port]:
-    """What is welded to one frame of a joint other than through the joint, in the order found."""
+    """Return the ports welded to one frame of a joint, except through the joint itself."""
     found: dict[Port, None] = {(joint.name, port): None}
     queue = deque(found)
     while queue:
@@ -396,15 +397,15 @@ def _neighbours(mechanism: Description, without: Joint, port: Port) -> Iterator[
         yield joint.name, "b" if port[1] == "a" else "a"
 
 
-# A relation between coordinates, such as a gear makes.
+# Relations between coordinates, such as gears.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoordinateCoupling:
-    """driven = sum of c_k driver^k + sum of the others, each times its factor, in elements of q.
+    """driven = sum of c_k driver^k + sum of further coordinates times factors, in elements of q.
 
     Attributes:
-        name: of the coupling.
+        name: name of the coupling.
         driven, driver: indices in q.
         coefficients: c_0, c_1, ...
         others: index in q and factor of each further coordinate.
@@ -418,28 +419,34 @@ class CoordinateCoupling:
 
     @property
     def coordinates(self) -> tuple[int, ...]:
-        """The numbers of all that it relates, the driven one first."""
+        """Indices of all coordinates of the relation, the driven coordinate first."""
         return (self.driven, self.driver, *(number for number, _ in self.others))
 
     def value(self, q: SX) -> SX:
-        """The driven coordinate for positions of the others."""
+        """Return the value of the driven coordinate for positions of the other coordinates."""
         driver = q[self.driver]
         value = sum((c * driver**k for k, c in enumerate(self.coefficients)), SX(0))
         return value + self.shift(q)
 
     def shift(self, q: SX) -> SX:
-        """What the coordinates beside the driver add to the driven one."""
+        """Return the sum of the further coordinates times their factors."""
         return sum((factor * q[number] for number, factor in self.others), SX(0))
 
 
-# Where the sensors of a mechanism are, and how what they read is named.
+# Positions of sensors, and names of their readings.
 
 
 def require_part(mechanism: Description, component: Component, point: Point, does: str) -> None:
-    """Refuse a point of something that is not in the mechanism.
+    """Raise if a component refers to a point that is not in the mechanism.
+
+    Args:
+        mechanism: components and connections.
+        component: component that refers to the point.
+        point: the point.
+        does: verb of the message, such as "acts on".
 
     Raises:
-        AssemblyError: what the component does, such as "acts on", it does to a stranger.
+        AssemblyError: the owner of the point is not in the mechanism.
     """
     known, is_nested = mechanism.components.get(point.owner.name), type(point.owner) is Component
     if known is None or not (is_nested or known is point.owner):
@@ -450,22 +457,22 @@ def require_part(mechanism: Description, component: Component, point: Point, doe
 
 
 _INPUTS = ("q_a", "v_a", "a_a", "tau_a")
-"""Names of inputs of models that could be those of a quantity as well."""
+"""Names of inputs of models that the outputs of sensors must not have."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AttachedSensor:
-    """A sensor and where it is.
+    """A sensor and its position.
 
     Attributes:
-        sensor: its description.
+        sensor: description of the sensor.
         frames: link (-1 for the base) and pose in the link's frame, of each of its points, or of
-            frame_a and frame_b of its joint; none for a coordinate, except that of a spherical
-            joint that is cut.
-        coordinate: name of the coordinate that it reads, or nothing.
-        joint: number of its joint in `system.joints`, None where it is on none.
-        quantities: what it reads.
-        where: the components that it is on, in words.
+            frame_a and frame_b of its joint. Empty for a coordinate, except that of a cut
+            spherical joint.
+        coordinate: name of the measured coordinate, or an empty text.
+        joint: index of its joint in `system.joints`. None if it is not on a joint.
+        quantities: measured quantities.
+        where: components that it is on, as text.
     """
 
     sensor: Sensor
@@ -477,15 +484,16 @@ class AttachedSensor:
 
     @property
     def sentence(self) -> str:
-        """What it is, what it reads and where."""
+        """Description of the sensor in a report: kind, name, quantities and position."""
         names = ", ".join(quantity.name for quantity in self.quantities)
         return f"{type(self.sensor).__name__} {self.sensor.name} reads {names} of {self.where}."
 
     @property
     def outputs(self) -> tuple[tuple[str, Quantity], ...]:
-        """The name that each quantity has as an output of a Function: tip_p of the sensor tip.
+        """Name of each quantity as an output of a Function: tip_p of the sensor tip.
 
-        What CasADi does not take in a name becomes an underscore, as the dot in arm.tip does.
+        Characters that CasADi does not allow in names, such as the dot in arm.tip, become
+        underscores.
         """
         stem = re.sub(r"[^A-Za-z0-9]+", "_", self.sensor.name).strip("_")
         stem = stem if stem[:1].isalpha() else f"sensor_{stem}".rstrip("_")
@@ -502,7 +510,7 @@ class AttachedSensor:
 
 
 def sensors_of(mechanism: Description) -> Iterator[Sensor]:
-    """Every sensor, in the order added."""
+    """Yield all sensors, in the order of their addition."""
     return (c for c in mechanism.components.values() if isinstance(c, Sensor))
 
 
@@ -513,17 +521,17 @@ def attached_sensors(
     tables: tuple[Sequence[Coordinate], ...],
     symbols: Mapping[str, SX],
 ) -> tuple[AttachedSensor, ...]:
-    """Every sensor with the links of its points, or its joint.
+    """Return every sensor with the links of its points, or with its joint.
 
     Args:
-        mechanism: the components.
-        places: where bodies and joints are.
-        joints: of the system.
-        tables: the coordinates of q, of v, and of cut joints.
+        mechanism: components and connections.
+        places: link and pose of bodies and joint frames.
+        joints: joints of the system.
+        tables: coordinates of q, of v, and of cut joints.
         symbols: CasADi symbol of every parameter.
 
     Raises:
-        AssemblyError: one is on nothing that is there, or two readings have the same name.
+        AssemblyError: a sensor refers to an unknown part, or two readings have the same name.
     """
     found: list[AttachedSensor] = []
     for sensor in sensors_of(mechanism):
@@ -605,7 +613,7 @@ def _on_coordinate(
 def _require_names(
     sensors: Sequence[AttachedSensor], tables: tuple[Sequence[Coordinate], ...]
 ) -> None:
-    """Refuse two readings of one name, in Functions or in results."""
+    """Raise AssemblyError if two readings have the same name, in Functions or in results."""
     owners = dict.fromkeys(_INPUTS, "an input of the models")
     columns = {
         f"{row.name}.{kind}": f"coordinate {row.name}"

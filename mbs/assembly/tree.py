@@ -1,4 +1,4 @@
-"""The tree of links that every recursion runs over, and dq/dt = N(q) v along it."""
+"""Tree of links, over which all recursions run, and the relation dq/dt = N(q) v."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mbs.components.joints import Motion
 from mbs.spatial import Inertia, Khalil, Pose, quaternion_rate, quaternion_rotation
 
 Frame = tuple[int, Pose]
-"""A link, -1 for the base, and a pose in its frame."""
+"""Pair of a link index, -1 for the base, and a pose in the link's frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,10 +19,10 @@ class CarriedRotor:
     """A rotor that spins with a joint, mounted on one of the two links that the joint connects.
 
     Attributes:
-        carrier: number of the link it is mounted on, or -1 for the base.
+        carrier: index of the link that carries the rotor, or -1 for the base.
         axis: (3, 1) unit vector of its axis, in the frame of that link.
-        inertia: about the axis [kg m^2].
-        ratio: velocity relative to the carrier for a unit velocity of the joint.
+        inertia: moment of inertia about the axis [kg m^2].
+        ratio: velocity relative to the carrier per velocity of the joint.
     """
 
     carrier: int
@@ -32,39 +32,40 @@ class CarriedRotor:
 
     @property
     def momentum(self) -> SX:
-        """(3, 1) angular momentum in the carrier for a unit velocity of the joint."""
+        """(3, 1) angular momentum relative to the carrier per velocity of the joint."""
         return self.ratio * self.inertia * self.axis
 
     @property
     def seen_at_joint(self) -> SX:
-        """Inertia that the joint feels [kg m^2 or kg]."""
+        """Inertia reflected to the joint [kg m^2 or kg]."""
         return self.ratio * self.ratio * self.inertia
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Link:
-    """A moving link j and the elementary motion that carries it from its antecedent i.
+    """A moving link j and its elementary motion relative to its antecedent i.
 
     Attributes:
-        name: of the motion: the joint's name, with a suffix when the joint has several.
-        antecedent: number of link i, or -1 for the base.
-        motion: how frame j moves from its placement.
-        backward: whether the tree passes a SPHERICAL or FREE motion from frame_b to frame_a. Its
+        name: name of the motion: the joint, with a suffix if the joint has several motions.
+        antecedent: index of link i, or -1 for the base.
+        motion: motion of frame j relative to its placement.
+        backward: Whether the tree passes a SPHERICAL or FREE motion from frame_b to frame_a. Its
             positions are then the pose of link i in link j; its velocities are in axes of link i.
-        via: fixed frames between frame i and the placement, one after the other; none where the
-            common perpendicular of the axes of i and j is near.
-        placement: frame j with respect to the last of them, or to frame i, at the zero position of
-            the motion.
-        inertia: of everything fixed on the link, about the origin of frame j and in its axes.
-        Ia: inertia of the rotor seen at the joint [kg m^2 or kg].
+        via: successive fixed frames between frame i and the placement. Empty if the common
+            perpendicular of the axes of i and j is near.
+        placement: frame j relative to the last frame of `via`, or to frame i, at the zero position
+            of the motion.
+        inertia: inertia of all bodies on the link, about the origin of frame j and in its axes.
+        Ia: rotor inertia reflected to the joint [kg m^2 or kg].
         Fv: viscous friction [N m s/rad or N s/m].
         Fs: Coulomb friction [N m or N].
-        Fs_width: velocity over which it changes sign [rad/s or m/s], zero for a step.
-        stiffness: of the spring of a joint of one degree of freedom [N m/rad or N/m].
-        rest: position at which the spring is at rest [rad or m].
-        rotor: that spins with the joint, or None.
-        q: where its positions stand in q.
-        v: where its velocities stand in v.
+        Fs_width: velocity over which Coulomb friction changes sign [rad/s or m/s], zero for a step.
+        stiffness: stiffness of the spring of a joint with a single degree of freedom
+            [N m/rad or N/m].
+        rest: position at which the spring is relaxed [rad or m].
+        rotor: rotor that spins with the joint, or None.
+        q: slice of its positions in q.
+        v: slice of its velocities in v.
     """
 
     name: str
@@ -86,11 +87,11 @@ class Link:
 
     @property
     def frames(self) -> tuple[Khalil, ...]:
-        """The fixed frames on link i, then frame j at the zero position."""
+        """Fixed frames on link i, then frame j at the zero position."""
         return *self.via, self.placement
 
     def pose(self) -> Pose:
-        """Frame j seen from frame i at the zero position of the motion."""
+        """Return frame j relative to frame i at the zero position of the motion."""
         pose = self.placement.pose()
         for frame in reversed(self.via):
             pose = frame.pose() @ pose
@@ -99,10 +100,10 @@ class Link:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tree:
-    """Links in topological order: an antecedent has a smaller number than its link.
+    """Links in topological order: an antecedent has a smaller index than its link.
 
     Attributes:
-        links: the moving links.
+        links: moving links.
         gravity: (3, 1) gravity acceleration in the base frame [m/s^2].
     """
 
@@ -111,16 +112,16 @@ class Tree:
 
     @property
     def nq(self) -> int:
-        """Number of positions; those of the last link end q."""
+        """Number of positions: the end of the slice of the last link."""
         return self.links[-1].q.stop if self.links else 0
 
     @property
     def nv(self) -> int:
-        """Number of velocities; those of the last link end v."""
+        """Number of velocities: the end of the slice of the last link."""
         return self.links[-1].v.stop if self.links else 0
 
     def path(self, j: int) -> list[int]:
-        """The links from the base to link j, itself included; empty for the base (-1)."""
+        """Return the link indices on the path from the base to link j; empty for the base (-1)."""
         numbers = []
         while j >= 0:
             numbers.append(j)
@@ -128,11 +129,11 @@ class Tree:
         return numbers[::-1]
 
 
-# How positions change with velocities: dq/dt = N(q) v.
+# Relation of positions and velocities: dq/dt = N(q) v.
 
 
 def position_rate(tree: Tree, q: SX, v: SX) -> SX:
-    """(nq, 1) time derivative of the positions; equal to v where no quaternion is involved."""
+    """Return the time derivative of the positions (nq, 1), equal to v without quaternions."""
     return casadi.vertcat(*(_rate(link, q[link.q], v[link.v]) for link in tree.links))
 
 
@@ -147,7 +148,7 @@ def _rate(link: Link, q: SX, v: SX) -> SX:
 
 
 def quaternion_slices(tree: Tree) -> list[slice]:
-    """Where the unit quaternions stand in q."""
+    """Return the slice of each unit quaternion in q."""
     found = {Motion.SPHERICAL: 0, Motion.FREE: 3}
     return [
         slice(link.q.start + found[link.motion], link.q.stop)
@@ -157,18 +158,18 @@ def quaternion_slices(tree: Tree) -> list[slice]:
 
 
 def norm_rows(tree: Tree, q: SX) -> SX:
-    """(k, 1) squared length less one of every quaternion in the positions q, (nq, 1)."""
+    """Return (k, 1) squared length minus one of every quaternion in the positions q (nq, 1)."""
     rows = [norm for _, norm in norms_of(tree, q)]
     return casadi.vertcat(*rows) if rows else SX(0, 1)
 
 
 def norms_of(tree: Tree, q: SX) -> list[tuple[slice, SX]]:
-    """Where each quaternion stands in q, and its squared length less one."""
+    """Return the slice of each unit quaternion in q, and its squared length minus one."""
     return [(part, casadi.sumsqr(q[part]) - 1) for part in quaternion_slices(tree)]
 
 
 def normalised(tree: Tree, q: SX) -> SX:
-    """The positions with their quaternions brought back to unit length."""
+    """Return the positions with quaternions normalised to unit length."""
     result = SX(q)
     for part in quaternion_slices(tree):
         result[part] = q[part] / casadi.sqrt(casadi.sumsqr(q[part]))
@@ -176,7 +177,7 @@ def normalised(tree: Tree, q: SX) -> SX:
 
 
 def zero_position(tree: Tree) -> list[float]:
-    """Positions with every joint at zero, quaternions at the identity."""
+    """Return positions with every joint at zero and quaternions at the identity."""
     q = [0.0] * tree.nq
     for part in quaternion_slices(tree):
         q[part.start] = 1.0

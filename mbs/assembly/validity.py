@@ -1,6 +1,6 @@
-"""What makes positions and parameters valid: quaternions of unit length, parameters within bounds.
+"""Validity conditions of positions and parameters: unit quaternions, and bounds of parameters.
 
-Loops add rows of their own; `mbs.models.validity` has all of them.
+Loops add further conditions; `mbs.models.validity` contains all conditions.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 
 UNIT = 1e-5
-"""How far the length of a quaternion may be from one: finite differences move it by 1e-6."""
+"""Largest deviation of a quaternion's length from 1: finite differences change it by 1e-6."""
 
 Kind = Literal["quaternion", "parameter", "open", "undetermined"]
-"""A quaternion not of unit length, a parameter out of its bounds, open loops, and independent
-joints that do not determine the others."""
+"""Violation: quaternion not of unit length, parameter out of bounds, open loops, or independent
+joints that do not determine the dependent joints."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ValidityRow:
-    """A number of a configuration and parameters that must not be larger than its bound.
+    """Validity condition: a function of configuration and parameters that must not exceed a bound.
 
     Attributes:
-        kind: what is wrong where it is larger.
-        name: what it states.
-        residual: (1, 1).
+        kind: kind of the violation.
+        name: name of the condition.
+        residual: (1, 1) value.
         bound: (1, 1) or a number.
-        sentence: what is wrong where it is larger, and what to do.
+        sentence: error message for a violation: the reason and the remedy.
     """
 
     kind: Kind
@@ -52,23 +52,23 @@ class ValidityRow:
 
 
 def plain_rows(system: System, q: SX) -> list[ValidityRow]:
-    """Rows of quaternions, of parameters that have bounds, and of what is computed from them.
+    """Return the conditions of quaternions, and of parameters and fields with bounds.
 
     Args:
-        system: any.
-        q: (nq, 1).
+        system: system.
+        q: (nq, 1) positions.
     """
     quaternions = quaternion_rows(system, q, quaternion_slices(system.tree))
     return [*quaternions, *_parameter_rows(system), *field_rows(system)]
 
 
 def quaternion_rows(system: System, q: SX, parts: Iterable[slice]) -> list[ValidityRow]:
-    """The lengths of some quaternions.
+    """Return the conditions for unit quaternions.
 
     Args:
-        system: any.
-        q: (nq, 1).
-        parts: where they stand in q.
+        system: system.
+        q: (nq, 1) positions.
+        parts: slices of the quaternions in q.
     """
     rows = []
     for part in parts:
@@ -86,10 +86,10 @@ def _parameter_rows(system: System) -> list[ValidityRow]:
 
 
 def field_rows(system: System) -> list[ValidityRow]:
-    """What is computed from parameters, such as a mass of "M1 + M2", and has bounds.
+    """Return the conditions of fields computed from parameters, such as a mass of "M1 + M2".
 
     Args:
-        system: any.
+        system: system.
     """
     return [row for own in system.bounded for row in _bound_rows(own.name, own.value, own.bounds)]
 
@@ -109,18 +109,18 @@ def _bound_rows(name: str, value: SX, bounds: Bounds) -> list[ValidityRow]:
 def all_hold(
     system: System, key: Hashable, inputs: Mapping[str, SX], rows: Iterable[ValidityRow]
 ) -> Function:
-    """``valid(..)`` of the inputs: 1 where every row holds, else 0, NaN too.
+    """Return ``valid(..)`` of the inputs: 1 if every condition holds, else 0, also for NaN.
 
     Args:
-        system: whose cache keeps it.
-        key: distinguishes it from others of the system.
-        inputs: the symbols of the rows by name.
-        rows: of which it is made.
+        system: system whose cache stores the Function.
+        key: key that distinguishes the Function from others of the system.
+        inputs: symbols of the conditions by name.
+        rows: conditions.
     """
 
     def build() -> Function:
         value = SX(1)
-        for row in rows:  # a comparison with NaN is false, a maximum would lose it
+        for row in rows:  # comparisons with NaN are false, a maximum would drop it
             value = casadi.logic_and(value, row.residual <= row.bound)
         return Function("valid", [*inputs.values()], [value], [*inputs], ["valid"], {"cse": True})
 
@@ -129,11 +129,11 @@ def all_hold(
 
 
 def plain_fault(system: System, q: Vector | None, p: Vector | None) -> str:
-    """What is wrong with a configuration or parameters and what to give; empty where nothing is.
+    """Return reason and remedy of invalid quaternions or parameters; empty if they are valid.
 
     Args:
-        system: any.
-        q: (nq,) positions, or None where they are not known.
+        system: system.
+        q: (nq,) positions, or None if unknown.
         p: (np,) parameters, or None.
     """
     for part in quaternion_slices(system.tree):

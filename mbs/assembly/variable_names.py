@@ -1,4 +1,4 @@
-"""Names of the variables of FMUs and results, such as j1.q, in place of names of coordinates."""
+"""Names of variables of FMUs and results, such as j1.q, as alternatives to coordinate names."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _KINDS = {
     "tau": ("an effort", "tau"),
     "solved": ("a guess", "guess"),
 }
-"""End of the name of a variable: the quantity, and the argument of `run` that takes it."""
+"""Quantity and argument of `run`, by the end of the name of a variable."""
 
 POSITIONS = ("q",)
 """Ends of the names of positions."""

@@ -1,4 +1,4 @@
-"""Models where users of CasADi's optimal control tools need them: Opti, rockit, acados, JAX."""
+"""Interfaces of models to optimal control tools of CasADi (Opti, rockit, acados) and to JAX."""
 
 from mbs.bridges.acados_model import acados_fields
 from mbs.bridges.collocation import collocation, invariants

@@ -16,23 +16,23 @@ _HIGHER = ("index2", "index3", "ggl")
 
 
 def acados_fields(dae: Dae, name: str = "model") -> dict[str, Any]:
-    """Fields of an `AcadosModel`, to set one by one: ``setattr(model, field, value)``.
+    """Return the fields of an `AcadosModel`, to set one by one: ``setattr(model, field, value)``.
 
-    f_impl_expr is [xdot - ode; alg] = 0. Its derivative by (xdot, z) is regular where that of
-    `alg` by z is: always for "reduced" and for open chains, and for "index1" wherever the closure
-    rows are independent. f_expl_expr is there when there are no algebraic states.
+    f_impl_expr is [xdot - ode; alg] = 0. Its Jacobian in (xdot, z) is regular if the Jacobian of
+    `alg` in z is regular. This holds always for "reduced" and for open chains, and for "index1" if
+    the closure rows are independent. f_expl_expr exists only without algebraic states.
 
     Args:
-        dae: "reduced" for the integrator ERK, or with "index1" for IRK and GNSF.
-        name: of the model: letters, digits and single underscores, for it becomes a part of names
-            in C.
+        dae: "reduced" for the integrator ERK; "reduced" or "index1" for IRK and GNSF.
+        name: name of the model: letters, digits and single underscores, since it becomes part of C
+            identifiers.
 
     Returns:
-        name, x, xdot, u, z, p, f_impl_expr and perhaps f_expl_expr.
+        Dict with name, x, xdot, u, z, p, f_impl_expr and, without algebraic states, f_expl_expr.
 
     Raises:
-        ModelError: the form is of index 2 or 3, which acados does not integrate; or the name does
-            not serve in C.
+        ModelError: the form has index 2 or 3, which acados does not support, or the name is not
+            valid in C.
     """
     require_dae(dae)
     if not isinstance(name, str) or not Function.check_name(name):

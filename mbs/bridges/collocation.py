@@ -33,30 +33,32 @@ def collocation(
     scheme: str = "radau",
     p: Any = None,
 ) -> Transcription:
-    """Polynomials of states on each stage that fulfil the equations at the collocation points.
+    """Add the equations of motion to an Opti problem by direct collocation.
 
-    The equations at one point are a Function, compiled once and mapped over all points; the
-    polynomials are a few products of matrices for all stages together. For every form of
-    `mbs.models.dae`; those of index 2 and 3 want "radau". With "radau" the last point of a stage
-    is the next knot, which then is no variable of its own.
+    The states are polynomials on each stage that satisfy the equations at the collocation points.
+    The equations at one point are a Function that is compiled once and mapped over all points; the
+    polynomials are a few matrix products for all stages. All forms of `mbs.models.dae` are
+    supported; forms of index 2 and 3 require "radau". With "radau", the last point of a stage is
+    the next knot, which is then not a separate variable.
 
     Source: Hairer and Wanner 1996, IV.5; Biegler 2010, chapter 10.
 
     Args:
-        opti: takes the variables and constraints; cost, ends and limits are the caller's. The
-            invariants of a Dae are not among them: ask them at one knot, see `invariants`.
-        model: a Dae, or a Function of (x, u) or (x, u, p) that gives dx/dt.
-        grid: stages, their duration, how they are evaluated.
-        points: K of each stage, 1 to 9.
+        opti: problem that receives the variables and constraints. Cost, boundary conditions and
+            limits are added by the caller. The invariants of a Dae are not included; add them at
+            one knot, see `invariants`.
+        model: Dae, or Function of (x, u) or (x, u, p) that returns dx/dt.
+        grid: stages, their duration and evaluation.
+        points: number K of collocation points per stage, 1 to 9.
         scheme: "radau", of order 2K - 1 and stiffly accurate, or "legendre", of order 2K.
-        p: parameters, numbers or an expression of `opti`, such as variables; or numbers by name.
-            Of a Dae, what is left out has its default.
+        p: parameters as numbers or an expression of `opti`, such as variables; or a dict of numbers
+            by name. Parameters of a Dae that are not given have their default values.
 
     Returns:
-        the variables.
+        Variables of the problem.
 
     Raises:
-        ModelError: there is no such scheme, or parameters have no values.
+        ModelError: the scheme is unknown, or parameters have no values.
     """
     require_counts(opti, grid, points=points)
     nodes = _nodes(points, scheme)
@@ -94,15 +96,17 @@ def collocation(
 
 
 def invariants(model: Dae, x: MX, p: Any = None) -> MX:
-    """What is zero along every motion, at one knot; ask it there only, where x is not given.
+    """Return the invariants of a Dae at a knot, which are zero along every motion.
+
+    Constrain them to zero at one knot only, and only if x is not fixed there.
 
     Args:
-        model: whose states they are.
-        x: (nx, 1) a knot.
-        p: (np, 1) parameters, as the transcription has them; the defaults when left out.
+        model: Dae of the states.
+        x: (nx, 1) states at a knot.
+        p: (np, 1) parameters of the transcription; default values if None.
 
     Raises:
-        ModelError: the model is no Dae, or p does not fit.
+        ModelError: the model is not a Dae, or the number of parameters is wrong.
     """
     p = parameter_values(require_dae(model), model.p.numel(), p)
     function = Function("invariants", [model.x, model.p], [model.invariants], {"cse": True})
@@ -119,12 +123,12 @@ def _nodes(points: int, scheme: str) -> np.ndarray[Any, np.dtype[np.float64]]:
 
 
 def _widths(points: int, count: int, scheme: str) -> list[tuple[str, int]]:
-    """How many columns x, z and u have; knots that are points are no variables."""
+    """Return the numbers of columns of x, z and u; knots at points are not variables."""
     return [("x", 1 if scheme == "radau" else count + 1), ("z", points * count), ("u", count)]
 
 
 def _residual(model: Model) -> Function:
-    """``residual(x, rate, z, u, p, h)``: h dx/dt - rate of the stage's own time, then alg."""
+    """``residual(x, rate, z, u, p, h)``: h dx/dt - rate (in normalised stage time), then alg."""
     names = ["x", "rate", "z", "u", "p", "h"]
     if isinstance(model, Dae):
         rate, h = casadi.SX.sym("rate", model.x.numel()), casadi.SX.sym("h")

@@ -1,4 +1,4 @@
-"""Explicit equations dx/dt = f(x, u, p), of whatever a user has of them."""
+"""Explicit equations dx/dt = f(x, u, p) from a Dae or a Function."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from mbs.models.dae import Dae
 from mbs.text import quoted
 
 Model = Dae | Function
-"""Equations: a `Dae`, or a Function of (x, u) or (x, u, p) that gives dx/dt."""
+"""Equations of motion: a `Dae`, or a Function of (x, u) or (x, u, p) that returns dx/dt."""
 
 
 def require_dae(model: object) -> Dae:
-    """The model, refused where it is no Dae.
+    """Return the model, or raise if it is not a Dae.
 
     Raises:
-        ModelError: says what to give.
+        ModelError: the model is not a Dae; the message describes the required argument.
     """
     if not isinstance(model, Dae):
         raise ModelError(f"{quoted(model)} is not a Dae; give mbs.models.dae(system)")
@@ -29,10 +29,10 @@ def explicit(model: Model) -> Function:
     """``ode(x, u, p) -> dx/dt`` of equations without algebraic states.
 
     Args:
-        model: a Dae with no z; or a Function of (x, u) or (x, u, p) whose first output is dx/dt.
+        model: Dae without z, or Function of (x, u) or (x, u, p) whose first output is dx/dt.
 
     Raises:
-        ModelError: there are algebraic states, or the Function has other inputs.
+        ModelError: the Dae has algebraic states, or the Function has other inputs.
     """
     names = ["x", "u", "p"], ["ode"]
     if isinstance(model, Dae):

@@ -1,4 +1,4 @@
-"""A Function as a JAX callable that runs its machine code, with its exact derivatives."""
+"""CasADi Function as a JAX callable that runs compiled code, with exact derivatives."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ _Outputs = Callable[..., tuple[Any, ...]]
 
 
 def jax_function(function: Function) -> Callable[..., Any]:
-    """The Function for JAX: under `jit`, `vmap`, `grad`, `jacfwd`, `jacrev` and `hessian`.
+    """Return a Function as a JAX callable for `jit`, `vmap`, `grad`, `jacfwd`, `jacrev`, `hessian`.
 
-    JAX calls machine code on the host by `jax.pure_callback`, once for all points of a `vmap`:
-    they are a batch, see `mbs.native.batch`. Derivatives are products with the Function's own
-    Jacobian, which is again such a callable, so they can be taken to any order and in both
-    directions; each order is compiled when JAX first asks for it. For use on the CPU; an
+    JAX calls the compiled code on the host by `jax.pure_callback`, once for all points of a `vmap`,
+    which form a batch; see `mbs.native.batch`. Derivatives are products with the Jacobian Function,
+    which is converted in the same way, so forward and reverse derivatives of any order are
+    available. Each order is compiled at its first use. The callable is intended for the CPU; an
     accelerator waits for the host at every call.
 
     Args:
-        function: any Function of vectors without free symbols, such as a model.
+        function: Function of vectors without free symbols, such as a model.
 
     Returns:
-        a callable of arrays, in their order or by name; the parameters of a model may be left
-        out. An input of n rows is (n,), or () where n is 1; an output of one column is (n,), of
-        several a matrix (m, n); several outputs are a tuple.
+        Callable of arrays, by position or by name. The parameters of a model are optional. An input
+        of n rows is (n,), or () if n is 1. An output with one column is (n,), and with several
+        columns a matrix (m, n). Several outputs are a tuple.
 
     Raises:
-        ModelError: JAX is not installed or calculates with 32 bits; it is no Function, or an
+        ModelError: JAX is not installed or uses 32 bits, the argument is not a Function, or an
             input has several columns.
     """
     jax = _jax()
@@ -68,7 +68,7 @@ def _jax() -> Any:
 
 
 def _differentiable(jax: Any, function: Function, machine: Batch) -> _Outputs:
-    """A callable of its outputs, and by the rule of its tangents all its derivatives."""
+    """Return a callable of the outputs with a JVP rule, which JAX uses for all derivatives."""
     values = _on_host(jax, machine)
     slopes: list[_Outputs] = []
 
@@ -87,7 +87,7 @@ def _differentiable(jax: Any, function: Function, machine: Batch) -> _Outputs:
 
 
 def _slopes(jax: Any, function: Function) -> _Outputs:
-    """Sum over the inputs of d(output)/d(input) times a direction, for every output."""
+    """Return a callable of Jacobian-vector products, summed over the inputs, for every output."""
     inputs, outputs = function.n_in(), function.n_out()
     point = function.mx_in()
     blocks = function.jacobian().call([*point, *function.call(point)])
@@ -110,16 +110,16 @@ def _slopes(jax: Any, function: Function) -> _Outputs:
 
 
 def _shape(column: Any, size: tuple[int, int]) -> Any:
-    """What CasADi stacks by columns, as a vector or a matrix."""
+    """Reshape a column-major stacked output to a vector or matrix."""
     rows, columns = size
     return column if columns == 1 else column.reshape(columns, rows).T
 
 
 def _vectors(jax: Any, machine: Batch, given: Sequence[Any]) -> list[Any]:
-    """Every input as a vector.
+    """Return every input as a vector.
 
     Raises:
-        ModelError: one has another size.
+        ModelError: an input has another size.
     """
     arrays = [jax.numpy.asarray(value, dtype=float).reshape(-1) for value in given]
     for port, array in zip(machine.inputs, arrays, strict=True):
@@ -132,7 +132,7 @@ def _vectors(jax: Any, machine: Batch, given: Sequence[Any]) -> list[Any]:
 
 
 def _on_host(jax: Any, machine: Batch) -> _Outputs:
-    """The machine code behind a callback; the points of a `vmap` are rows of one batch."""
+    """Return a host callback of the compiled code; the points of a `vmap` are rows of one batch."""
     wanted = tuple(jax.ShapeDtypeStruct(port.shape, np.float64) for port in machine.outputs)
 
     def evaluate(*points: Any) -> tuple[NDArray[np.float64], ...]:
@@ -153,7 +153,7 @@ def _on_host(jax: Any, machine: Batch) -> _Outputs:
 
 
 def _rows(array: NDArray[np.float64], lead: tuple[int, ...]) -> NDArray[np.float64]:
-    """Points as rows; a vector where all have the same."""
+    """Return points as rows, or one vector if all points are equal."""
     size = array.shape[-1]
     if array.size == size:
         return array.reshape(size)

@@ -23,29 +23,30 @@ from mbs.bridges.step import advance
 def multiple_shooting(
     opti: Opti, model: Model, grid: Grid, *, substeps: int = 1, p: Any = None
 ) -> Transcription:
-    """States at knots, efforts on stages, and x[k + 1] = step(x[k], u[k]) as constraints.
+    """Add the equations of motion to an Opti problem by direct multiple shooting.
 
-    The equations are compiled once and mapped over the stages; the method of Runge and Kutta
-    runs on all stages at once, so that the graph of the problem is as small as that of one step.
-    For explicit equations that are not stiff: open chains, and loops with a closed form, on
-    which the state then stays exactly.
+    The variables are states at knots and efforts on stages, with the constraints x[k + 1] =
+    step(x[k], u[k]). The equations are compiled once and mapped over the stages; the Runge-Kutta
+    method runs on all stages at once, so the graph of the problem is as small as that of one step.
+    The method is for explicit equations that are not stiff: open chains, and loops with a closed
+    form, for which the loops remain exactly closed.
 
     Source: Bock and Plitt 1984; Kutta 1901.
 
     Args:
-        opti: takes the variables and constraints; cost, ends and limits are the caller's.
-        model: a Dae without algebraic states, or a Function of (x, u) or (x, u, p) that gives
-            dx/dt.
-        grid: stages, their duration, how they are evaluated.
-        substeps: steps of the classical method of order 4 within a stage.
-        p: parameters, numbers or an expression of `opti`, such as variables; or numbers by name.
-            Of a Dae, what is left out has its default.
+        opti: problem that receives the variables and constraints. Cost, boundary conditions and
+            limits are added by the caller.
+        model: Dae without algebraic states, or Function of (x, u) or (x, u, p) that returns dx/dt.
+        grid: stages, their duration and evaluation.
+        substeps: number of steps of the classical Runge-Kutta method of order 4 per stage.
+        p: parameters as numbers or an expression of `opti`, such as variables; or a dict of numbers
+            by name. Parameters of a Dae that are not given have their default values.
 
     Returns:
-        the variables.
+        Variables of the problem.
 
     Raises:
-        ModelError: the model has algebraic states, or parameters without values.
+        ModelError: the model has algebraic states, or parameters have no values.
     """
     require_counts(opti, grid, substeps=substeps)
     ode, count = explicit(model), grid.stages

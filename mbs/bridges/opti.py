@@ -1,4 +1,4 @@
-"""What a transcription into `casadi.Opti` gives back, and what both transcriptions share."""
+"""Result and shared parts of the transcriptions into `casadi.Opti`."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ CODES: Mapping[str, Callable[[Function], Function]] = {
     "compiled": partial(compiled, derivatives=2),
     "interpreted": Function,
 }
-"""How stage Functions are evaluated."""
+"""Functions that prepare a stage Function for evaluation, by the name of `Grid.code`."""
 
 PARALLEL = ("serial", "thread", "openmp")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """Stages of equal length.
+    """Time grid of stages of equal length.
 
     Attributes:
-        stages: how many.
-        duration: of all together [s]; a number, or an expression of `opti` such as a variable.
-        code: "compiled" for machine code of the stage Function, with exact first and second
-            derivatives, kept in a cache on disk; or "interpreted".
-        parallel: of `casadi.Function.map`: "serial", "thread" with a thread for each core, or
-            "openmp", which CasADi's wheels do not have.
+        stages: number of stages.
+        duration: total duration [s]: a number, or an expression of `opti` such as a variable.
+        code: "compiled" for machine code of the stage Function with exact first and second
+            derivatives, which is cached on disk; or "interpreted".
+        parallel: parallelization of `casadi.Function.map`: "serial", "thread" with one thread per
+            core, or "openmp", which the CasADi wheels do not support.
     """
 
     stages: int
@@ -65,11 +65,11 @@ class Grid:
 
     @property
     def step(self) -> MX:
-        """The length of a stage [s]."""
+        """Length of a stage [s]."""
         return MX(self.duration) / self.stages
 
     def mapped(self, function: Function, columns: int) -> Function:
-        """The stage Function, in its code, over so many columns."""
+        """Return the stage Function (compiled or interpreted), mapped over `columns` columns."""
         threads = cores() if self.parallel == "thread" else columns
         mapped: Function = CODES[self.code](function).map(columns, self.parallel, threads)
         return mapped
@@ -77,22 +77,22 @@ class Grid:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Transcription:
-    """Variables of an Opti whose constraints hold the equations of motion.
+    """Variables of an Opti problem whose constraints include the equations of motion.
 
     Attributes:
-        opti: that has them.
+        opti: Opti problem of the variables.
         x: (nx, stages + 1) states at the knots.
         u: (nu, stages) efforts, constant on each stage.
         p: (np, 1) parameters.
         step: length of a stage [s].
-        x_points: (nx, points) states where the equations are asked: collocation points, or the
+        x_points: (nx, points) states at the points of the equations: collocation points, or the
             first knot of each stage.
-        z_points: (nz, points) algebraic states there.
-        u_points: (nu, points) efforts there.
-        weights: (points / stages,) of the quadrature of a stage of length 1.
-        nodes: (points / stages,) where the points of a stage of length 1 are.
-        variables: the decision variables by name: "x", "u", "z", "x_points".
-        elements: of a Dae, for "x", "z", "u" and "p" the name and unit of each row; see `row`.
+        z_points: (nz, points) algebraic states at these points.
+        u_points: (nu, points) efforts at these points.
+        weights: (points / stages,) quadrature weights for a stage of length 1.
+        nodes: (points / stages,) positions of the points in a stage of length 1.
+        variables: decision variables by name: "x", "u", "z", "x_points".
+        elements: (name, unit) of each row of "x", "z", "u" and "p" of a Dae; see `row`.
     """
 
     opti: Opti
@@ -109,14 +109,17 @@ class Transcription:
     elements: Mapping[str, tuple[tuple[str, str], ...]]
 
     def row(self, name: str) -> MX:
-        """What has this name, such as "j1.q", "j1.v", "j1.tau" or a parameter.
+        """Return a state, effort or parameter by name, such as "j1.q", "j1.v" or "j1.tau".
+
+        Args:
+            name: name in `elements`.
 
         Returns:
-            (1, stages + 1) of a state, (1, stages) of an effort, (1, points) of an algebraic
-            state, (1, 1) of a parameter.
+            (1, stages + 1) for a state, (1, stages) for an effort, (1, points) for an algebraic
+            state, (1, 1) for a parameter.
 
         Raises:
-            ModelError: nothing has the name.
+            ModelError: the name is unknown.
         """
         every: dict[str, MX] = {}
         for kind, rows in (("x", self.x), ("u", self.u), ("z", self.z_points), ("p", self.p)):
@@ -127,14 +130,15 @@ class Transcription:
         return every[name]
 
     def integral(self, values: MX) -> MX:
-        """The integral over time of a row of values.
+        """Return the integral over time of a row of values.
 
-        Values at points, (1, points), go by the quadrature of the points: it is of order 2K - 1
-        or 2K with K collocation points, and with shooting the sum of stage lengths times values.
-        Values of stages, (1, stages), such as those of u, are constant on each: it is exact.
+        Values at points (1, points) are integrated by the quadrature of the points, of order 2K-1
+        ("radau") or 2K ("legendre") for K collocation points. For multiple shooting it is the sum
+        of stage length times value. Values of stages (1, stages), such as a row of u, are constant
+        on each stage, so the integral is exact.
 
         Raises:
-            ModelError: it is no row of one of these lengths.
+            ModelError: the values do not have one of these shapes.
         """
         stages, points = self.u.shape[1], self.u_points.shape[1]
         if values.shape == (1, stages):
@@ -148,16 +152,17 @@ class Transcription:
         return self.step * casadi.dot(weights, values)
 
     def guess(self, x: ArrayLike, u: ArrayLike | None = None, z: ArrayLike | None = None) -> None:
-        """Where the solver starts.
+        """Set the initial guess of the solver.
 
         Args:
-            x: (nx, stages + 1) states at the knots, or (nx,), the same everywhere. Points of a
-                stage take those of its end, so that states that close the loops stay so.
-            u: (nu, stages) or (nu,) efforts; zero when left out.
-            z: (nz, stages + 1) or (nz,) algebraic states, as x.
+            x: (nx, stages + 1) states at the knots, or (nx,) for the same state at all knots.
+                Points inside a stage get the state at its end, so that states that close the loops
+                remain consistent.
+            u: (nu, stages) or (nu,) efforts; zero by default.
+            z: (nz, stages + 1) or (nz,) algebraic states, in the same form as x.
 
         Raises:
-            ModelError: one has another shape.
+            ModelError: an array has another shape.
         """
         stages = self.u.shape[1]
         knots = _columns("x", x, self.x.shape)
@@ -179,20 +184,23 @@ class Transcription:
 
 
 def elements_of(model: Model) -> Mapping[str, tuple[tuple[str, str], ...]]:
-    """Names of the rows of a Dae; a Function has none."""
+    """Return the (name, unit) of the rows of a Dae; empty for a Function."""
     return model.elements if isinstance(model, Dae) else {}
 
 
 def variable(opti: Opti, rows: int, columns: int) -> MX:
-    """A variable; of no rows an empty matrix, of which `opti.initial` cannot speak."""
+    """Return an Opti variable, or an empty matrix if it has no rows.
+
+    `opti.initial` does not accept variables without rows.
+    """
     return opti.variable(rows, columns) if rows else MX(0, columns)
 
 
 def require_counts(opti: Any, grid: Any, **counts: Any) -> None:
-    """Refuse what is no Opti, no Grid or no count.
+    """Raise if an argument is not an Opti, not a Grid or not a positive integer.
 
     Raises:
-        ModelError: says what to give.
+        ModelError: the message describes the required argument.
     """
     if not isinstance(opti, Opti):
         raise ModelError(f"{quoted(opti)} is not an Opti; give casadi.Opti()")
@@ -203,10 +211,11 @@ def require_counts(opti: Any, grid: Any, **counts: Any) -> None:
 
 
 def parameter_values(model: Model, count: int, p: Any) -> MX:
-    """(np, 1) the parameters of a model: given, or the defaults of a Dae.
+    """Return the parameters (np, 1) of a model: the given values, or the default values of a Dae.
 
     Raises:
-        ModelError: there are none, not as many as the model takes, or a name is unknown.
+        ModelError: no values are given to a Function with parameters, their number differs from
+            that of the model, or a name is unknown.
     """
     if isinstance(model, Dae) and (p is None or isinstance(p, Mapping)):
         return MX(DM(_by_name(model, p or {})))
@@ -235,10 +244,10 @@ def _require_count(what: str, count: Any) -> None:
 
 
 def _columns(name: str, values: ArrayLike, shape: tuple[int, int]) -> NDArray[np.float64]:
-    """A guess in its full shape; one column serves for all.
+    """Return a guess as an array of the full shape; a single column is repeated.
 
     Raises:
-        ModelError: it has another shape.
+        ModelError: the guess has another shape.
     """
     try:
         array = np.array(values, dtype=float)

@@ -1,4 +1,4 @@
-"""Equations of motion on an `rockit.Ocp` or one of its stages."""
+"""Equations of motion on a `rockit.Ocp` or one of its stages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mbs.text import quoted
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RockitStage:
-    """Signals of a stage.
+    """Signals of a rockit stage.
 
     Attributes:
         x: (nx, 1) differential states.
@@ -25,7 +25,8 @@ class RockitStage:
         p: (np, 1) parameters.
         q: (nq, 1) positions of the tree, for constraints on paths and poses.
         v: (nv, 1) velocities of the tree.
-        invariants: ask `stage.at_t0(invariants) == 0` where x is not given at the start.
+        invariants: constraint residuals. Add `stage.at_t0(invariants) == 0` if x is not fixed at
+            the start.
     """
 
     x: MX
@@ -38,24 +39,26 @@ class RockitStage:
 
 
 def rockit_stage(stage: Any, dae: Dae, *, code: str = "interpreted", p: Any = None) -> RockitStage:
-    """States, controls and parameters on a stage, with `set_der` and `add_alg` of a Dae.
+    """Add states, controls, parameters and the equations of a Dae to a rockit stage.
 
-    rockit chooses the method afterwards: "reduced" goes with all of them, forms with algebraic
-    states with `DirectCollocation`. Initial guesses are the start of the Dae.
+    The equations are set by `set_der` and `add_alg`. The method of rockit is chosen by the user:
+    "reduced" is compatible with all methods, forms with algebraic states with `DirectCollocation`.
+    Initial guesses are the start values of the Dae.
 
     Args:
         stage: `rockit.Ocp` or `rockit.Stage`.
-        dae: equations, of any form that the method takes.
+        dae: equations, in any form that the method supports.
         code: "interpreted", or "compiled" for machine code of the equations with exact first and
             second derivatives.
-        p: parameters: an expression of the stage, such as `stage.variable(np)`, or numbers, by
-            name or all. When left out they are `stage.parameter`, set to the defaults.
+        p: parameters: an expression of the stage, such as `stage.variable(np)`, a vector of
+            numbers, or a dict of numbers by name. By default they are `stage.parameter`, set to the
+            default values.
 
     Returns:
-        the signals.
+        Signals of the stage.
 
     Raises:
-        ModelError: there is no such code, it is no Dae, or p does not fit.
+        ModelError: `code` is unknown, `dae` is not a Dae, or the number of parameters is wrong.
     """
     require_dae(dae)
     if code not in CODES:
@@ -77,7 +80,7 @@ def rockit_stage(stage: Any, dae: Dae, *, code: str = "interpreted", p: Any = No
 
 
 def _parameters(stage: Any, dae: Dae, given: Any) -> MX:
-    """Those given, else parameters of the stage."""
+    """Return the given parameters, or else new parameters of the stage."""
     if given is not None or not dae.p.numel():
         return parameter_values(dae, dae.p.numel(), given)
     p: MX = stage.parameter(dae.p.numel())

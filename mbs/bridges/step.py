@@ -1,4 +1,4 @@
-"""One step of the classical method of Runge and Kutta, as a Function."""
+"""One step of the classical Runge-Kutta method, as a CasADi Function."""
 
 from __future__ import annotations
 
@@ -19,48 +19,48 @@ _T = TypeVar("_T", SX, MX)
 
 
 _NEWTON = 1e-6
-"""Largest second correction of a projection [rad or m]: the error after it is its square."""
+"""Largest second Newton correction of a projection [rad or m]; the remaining error is its
+square."""
 
 _KINK = 0.01
-"""How far velocities in the middle of a step may be from the mean of those at its ends, as a part
-of the largest: what a step resolves stays far below, a change of branch is far above."""
+"""Largest distance of the velocities in the middle of a step from the mean at its ends, as a
+fraction of the largest velocity. A resolved step stays far below it, a change of branch is far
+above."""
 
 _NO_MOTION = 1e-9
-"""Kinks that move nothing further than this [rad or m] are rounding."""
+"""Displacement [rad or m] below which a velocity kink counts as a rounding error."""
 
 _LARGEST = sys.float_info.max
-"""What is not above it is a number."""
+"""Values with at most this magnitude are finite numbers."""
 
 
 def step(model: Model, substeps: int = 1, *, checked: bool = True) -> Function:
-    """``step(x, u, p, dt) -> x_next``: the classical fourth-order method, u constant.
+    """``step(x, u, p, dt) -> x_next``: classical fourth-order Runge-Kutta step with constant u.
 
-    A Function without loops or branches, for `mbs.native.compiled`, to map over stages, and for
-    `mbs.native.batch` to advance many copies of a mechanism.
+    The Function has no loops or branches. It can be compiled by `mbs.native.compiled`, mapped over
+    stages, and used by `mbs.native.batch` to advance many copies of a mechanism.
 
-    Invariants of a Dae, such as loops that are closed and quaternions of unit length, hold after
-    every substep: x is moved onto them, as little as possible, by two steps of Newton's method.
-    Where that fails, and where velocities of a closed mechanism have a kink within the substep,
-    x_next is NaN: the loops do not close any more, the step is too long, or it passed a singular
-    configuration, through which `mbs.simulate.run` goes. Of a Dae the whole of x_next is NaN also
-    where an input or an element of it is no finite number, and where parameters are out of their
-    bounds.
+    Invariants of a Dae, such as closed loops and quaternions of unit length, hold after every
+    substep: x is projected onto them by two Newton steps of minimum norm. x_next is NaN if the
+    projection fails or if the velocities of a closed mechanism have a kink within the substep. The
+    loops can then no longer be closed, the step is too long, or it crosses a singular
+    configuration; `mbs.simulate.run` can cross it. For a Dae, all of x_next is also NaN if an input
+    or an element of x_next is not finite, or if parameters are out of bounds.
 
     Source: Kutta 1901; projection as in Hairer and Wanner 1996, section VII.2.
 
     Args:
-        model: a Dae without algebraic states, or a Function of (x, u) or (x, u, p) that gives
-            dx/dt.
-        substeps: how many equal steps dt is divided into.
-        checked: whether x_next is NaN rather than false.
+        model: Dae without algebraic states, or Function of (x, u) or (x, u, p) that returns dx/dt.
+        substeps: number of equal steps in dt.
+        checked: whether x_next is set to NaN if it is invalid.
 
     Returns:
-        a Function of SX operations where the model is one, else of MX. x (nx, 1) state,
-        u (nu, 1) efforts, p (np, 1) parameters, dt [s]. Give p: CasADi takes zeros for an input
-        that is left out.
+        Function of SX operations if the model is an SX Function, otherwise of MX operations. Its
+        inputs are the state x (nx, 1), efforts u (nu, 1), parameters p (np, 1) and dt [s]. Always
+        pass p, since CasADi uses zeros for omitted inputs.
 
     Raises:
-        ModelError: the model has algebraic states or other inputs, or substeps is below 1.
+        ModelError: the model has algebraic states or other inputs, or substeps is less than 1.
     """
     ode = explicit(model)
     kind: Any = SX if ode.is_a("SXFunction") else MX
@@ -76,8 +76,8 @@ def step(model: Model, substeps: int = 1, *, checked: bool = True) -> Function:
 
 
 def _flag(dae: Dae, x: Any, inputs: Sequence[Any]) -> Any:
-    """The states x, all of them NaN where an input or one of them has no meaning."""
-    # a sum is finite where everything is, and one comparison
+    """Return the states x, all NaN if an input or a state is invalid."""
+    # a sum is finite if all its terms are finite, and needs only one comparison
     given, reached = (
         sum((casadi.sum1(value) for value in values), 0.0) for values in (inputs, [x])
     )
@@ -89,7 +89,7 @@ def _flag(dae: Dae, x: Any, inputs: Sequence[Any]) -> Any:
 
 
 def _settle(dae: Dae, checked: bool) -> Function | None:
-    """``settle(x, middle, end, p, h) -> x``: what follows a substep; None where nothing does."""
+    """``settle(x, middle, end, p, h) -> x``: correction after a substep; None if not needed."""
     closed = dae.x.numel() < dae.q.numel() + dae.v.numel()
     if not dae.invariants.numel() and not closed:
         return None
@@ -116,10 +116,10 @@ def _settle(dae: Dae, checked: bool) -> Function | None:
 
 
 def _correction(dae: Dae) -> Function:
-    """``correction(x, p)``: the least change that brings the invariants to zero, to first order."""
+    """``correction(x, p)``: minimum-norm Newton step that reduces the invariants to zero."""
     J = casadi.jacobian(dae.invariants, dae.x)
     square = casadi.mtimes(J, J.T)
-    # rows that depend on others in a configuration ask for no more than these
+    # regularisation for dependent rows in some configurations
     square += 1e-12 * casadi.trace(square) * SX.eye(square.shape[0])
     D, LT, order = casadi.ldl(casadi.sparsify(square))
     change = -casadi.mtimes(J.T, casadi.ldl_solve(dae.invariants, D, LT, order))
@@ -133,18 +133,18 @@ def advance(
     substeps: int,
     after: Callable[[_T, _T, _T, _T], _T] | None = None,
 ) -> _T:
-    """States after equal steps of the classical method, for every column of x.
+    """Return the states after equal Runge-Kutta steps, for every column of x.
 
     Args:
-        rate: dx/dt at states.
+        rate: function that returns dx/dt at states.
         x: states at the start.
-        duration: of all steps together [s].
-        substeps: how many steps.
-        after: what makes of the states at the start, in the middle and at the end of a step, and
-            of its length, those at the end.
+        duration: duration of all steps together [s].
+        substeps: number of steps.
+        after: callable (x_start, x_mid, x_end, h) -> x that corrects the states at the end of each
+            step of length h [s], such as a projection; None for no correction.
 
     Raises:
-        ModelError: substeps is below 1.
+        ModelError: substeps is less than 1.
     """
     if isinstance(substeps, bool) or not isinstance(substeps, int) or substeps < 1:
         raise ModelError(f"substeps is {quoted(substeps)}; use 1 or more")

@@ -1,4 +1,4 @@
-"""A chain in numbers: its pose, its Jacobian, for one configuration or many at once."""
+"""Numeric serial arm: pose and Jacobian, for one configuration or many at once."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from mbs.recursions.chain import Chain, transforms
 
 Array = NDArray[np.float64]
 Field = TypeVar("Field", NDArray[np.float64], NDArray[np.complex128])
-"""Real numbers, or complex ones."""
+"""Real or complex array."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arm:
-    """A `Chain` of revolute and prismatic joints in flat numbers, made by `arm_of` alone.
+    """Numeric serial arm of revolute and prismatic joints, made from a `Chain` by `arm_of`.
 
-    `mbs/core/source/arm.c` reads the same numbers. All its chains run forwards.
+    `mbs/core/source/arm.c` uses the same numbers. All joints have positive signs.
 
     Attributes:
-        names: of the joints.
-        prismatic: (n,) whether each is prismatic.
-        gaps: (n + 1, 4, 4) the constant transforms before, between and after them.
-        length: a length of the arm's size [m], 1 where all gaps are rotations alone.
-        units: (n,) what joints are measured by: 1 rad, or the length of the arm [m].
+        names: names of the joints.
+        prismatic: (n,) whether each joint is prismatic.
+        gaps: (n + 1, 4, 4) constant transforms before, between and after the joints.
+        length: typical length of the arm [m]; 1 if all transforms are pure rotations.
+        units: (n,) unit of each joint: 1 rad, or the length of the arm [m].
     """
 
     names: tuple[str, ...]
@@ -46,33 +46,33 @@ class Arm:
 
     @property
     def size(self) -> int:
-        """The number of joints."""
+        """Number of joints."""
         return len(self.prismatic)
 
     @property
     def between(self) -> list[Array]:
-        """The gaps."""
+        """Constant transforms `gaps`, as a list."""
         return list(self.gaps)
 
     def displacements(self, q: Array) -> list[Array]:
-        """(..., 4, 4) of every joint at configurations q, (..., n) [rad or m]."""
+        """Return the displacements (..., 4, 4) of all joints at q (..., n) [rad or m]."""
         return [motion(q[..., k], bool(self.prismatic[k])) for k in range(self.size)]
 
     def wrapped(self, way: Array) -> Array:
-        """Differences (..., n) of configurations, those of turns brought into [-pi, pi)."""
+        """Return differences (..., n) of configurations, with angles in [-pi, pi)."""
         return np.where(self.prismatic, way, np.mod(way + np.pi, 2 * np.pi) - np.pi)
 
     def residual(self, q: Array, T: Array) -> Array:
-        """(...) largest element of pose(q) - T [m or 1], at configurations q, (..., n)."""
+        """Return the largest element of |pose(q) - T| (...) [m or 1] at q (..., n)."""
         error: Array = np.max(np.abs(self.pose(q) - T), axis=(-2, -1))
         return error
 
     def pose(self, q: Array) -> Array:
-        """(..., 4, 4) pose of the frame at configurations q, (..., n) [rad or m]."""
+        """Return the poses (..., 4, 4) of the end frame at configurations q (..., n) [rad or m]."""
         return transforms(self, np.asarray(q, dtype=float))[-1]
 
     def pose_and_jacobian(self, q: Array) -> tuple[Array, Array]:
-        """The poses, and the Jacobians (..., 6, n) of [V; w] of the frame, in the base."""
+        """Return poses and Jacobians (..., 6, n) of [V; w] of the end frame, in the base."""
         T, axes, origins = self._frames(q)
         arms = T[..., None, :3, 3] - origins
         turning = np.where(self.prismatic[:, None], 0.0, axes)
@@ -80,11 +80,11 @@ class Arm:
         return T, np.swapaxes(np.concatenate([linear, turning], axis=-1), -1, -2)
 
     def lines(self, q: Array) -> tuple[Array, Array]:
-        """The directions of all axes and a point on each, (..., n, 3) [m], in the base."""
+        """Return directions of all axes and a point on each, (..., n, 3) [m], in the base."""
         return self._frames(q)[1:]
 
     def _frames(self, q: Array) -> tuple[Array, Array, Array]:
-        """The poses, then the axes and the origins of all joints, (..., n, 3), in the base."""
+        """Return the poses, and axes and origins of all joints (..., n, 3), in the base."""
         q = np.asarray(q, dtype=float)
         *frames, T = transforms(self, q)
         axes, origins = np.empty((*q.shape, 3)), np.empty((*q.shape, 3))
@@ -94,12 +94,12 @@ class Arm:
 
 
 def arm_of(chain: Chain, symbols: SX, p: Array) -> Arm:
-    """The numbers of a chain.
+    """Return the numeric arm of a chain for values of its symbols.
 
     Args:
-        chain: of revolute and prismatic joints that run forwards; its gaps hold no pivots.
-        symbols: (np, 1) of its gaps.
-        p: (np,) their values.
+        chain: chain of revolute and prismatic joints with positive signs, without pivots.
+        symbols: (np, 1) symbols in its transforms.
+        p: (np,) values of the symbols.
     """
     stacked = casadi.vertcat(*(pose.matrix for pose in chain.between))
     function = Function("gaps", [symbols], [casadi.densify(stacked)])
@@ -109,7 +109,7 @@ def arm_of(chain: Chain, symbols: SX, p: Array) -> Arm:
 
 
 def motion(q: Field, prismatic: bool) -> Field:
-    """(..., 4, 4) translation along z by q [m], or rotation about z by q [rad]."""
+    """Return (..., 4, 4) translations along z by q [m], or rotations about z by q [rad]."""
     T = np.empty((*np.shape(q), 4, 4), np.result_type(q, float))
     T[...] = np.eye(4)
     if prismatic:
@@ -121,7 +121,7 @@ def motion(q: Field, prismatic: bool) -> Field:
 
 
 def inverse(T: Field) -> Field:
-    """(..., 4, 4) inverse of rigid transforms."""
+    """Return the inverses (..., 4, 4) of rigid transforms."""
     back = np.zeros_like(T)
     R = np.swapaxes(T[..., :3, :3], -1, -2)
     back[..., :3, :3], back[..., 3, 3] = R, 1.0
@@ -130,16 +130,16 @@ def inverse(T: Field) -> Field:
 
 
 _STRAIGHT = 1e-9
-"""Sine of an angle below which it is zero or a half turn: angle / sine is there one but for its
-square, 1e-18, and next to a half turn the differences that give the axis are rounding, 1e-16, to
-seven digits."""
+"""Sine of an angle below which it counts as zero or half a rotation. At zero, angle / sine is then
+1 up to 1e-18. At half a rotation, the differences that determine the axis have rounding of 1e-16,
+so that only seven digits remain."""
 
 
 def gap_to(target: Array, T: Array) -> Array:
-    """(..., 6) what is missing from poses T to the target one: translation [m], rotation [rad].
+    """Return translation [m] and rotation vector [rad] (..., 6) from poses T to the target.
 
-    To first order it is the [V; w] that leads there in unit time; it vanishes at the target pose
-    alone.
+    To first order it is the [V; w] that reaches the target in unit time. It is zero at the target
+    pose only.
     """
     R = target[..., :3, :3] @ np.swapaxes(T[..., :3, :3], -1, -2)
     vector = np.stack(
@@ -158,7 +158,7 @@ def gap_to(target: Array, T: Array) -> Array:
 
 
 def _half_turn_axis(R: Array) -> Array:
-    """(..., 3) the axis of turns by pi."""
+    """Return the axes (..., 3) of rotations by pi."""
     B = 0.5 * (R + np.eye(3))
     column = np.argmax(B[..., range(3), range(3)], axis=-1)
     axis: Array = np.take_along_axis(B, column[..., None, None], axis=-1)[..., 0]

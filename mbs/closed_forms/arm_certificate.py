@@ -1,9 +1,9 @@
-"""All complex configurations of an arm of six joints at a pose, each certified: a proof of a list.
+"""All complex configurations of a six-joint arm at a pose, certified: a proof of completeness.
 
-The elimination of `raghavan_roth` gives the complex angles of one joint as eigenvalues; the others
-follow from null vectors, and Newton's method makes them exact. At almost every pose an arm has as
-many configurations, sixteen at most, and nowhere more that are isolated: where that many are
-certified, none is missing.
+The elimination of `raghavan_roth` gives the complex angles of one joint as eigenvalues. The other
+joints follow from null vectors, and Newton's method refines them. The number of configurations is
+the same for almost all poses, sixteen at most, and no pose has more isolated configurations. If
+this number is certified, no configuration is missing.
 
 Source: Raghavan & Roth 1993; Primrose 1986 for sixteen; Ortega & Rheinboldt 1970, section 12.6, for
 the theorem of Newton and Kantorovich; Sommese & Wampler 2005, chapter 7, for the count.
@@ -36,22 +36,22 @@ from mbs.solvers.homotopy import solved
 
 Complex = NDArray[np.complex128]
 
-# Where configurations may be: from eigenvalues, with complex cosines and sines.
+# Candidates for configurations: from eigenvalues, with complex cosines and sines.
 
 
 _FAR_ANGLE = 12.0
-"""Imaginary part [rad] beyond which an angle is taken for infinite: those of random loops stay
-below 11, and the fourfold eigenvalues at infinity come back as 28 or more."""
+"""Imaginary part [rad] above which an angle counts as infinite: angles of random loops stay below
+11, and the fourfold eigenvalues at infinity have 28 or more."""
 _SHARED = 1e-7
-"""Singular values, as parts of the largest, that count as zero at an eigenvalue: a simple one
-leaves 1e-12, one of a fold the root of 1e-15."""
+"""Relative singular value that counts as zero at an eigenvalue: a simple eigenvalue leaves 1e-12,
+an eigenvalue at a fold the root of 1e-15."""
 _FLAT = 1e-6
-"""Ratio of singular values below which joint 2 has two angles: its axis and that of joint 1 meet or
-are parallel, which holds by structure and leaves 1e-14."""
+"""Ratio of singular values below which joint 2 has two angles, because its axis and that of joint 1
+intersect or are parallel: this is structural and leaves 1e-14."""
 
 
 def complex_candidates(prepared: Prepared, T: Array) -> Complex:
-    """(m, 6) complex configurations [rad or m] near which an arm may reach a pose T (4, 4) [m]."""
+    """Return complex configurations (m, 6) [rad or m] near which an arm may reach T (4, 4) [m]."""
     prepared = for_poses(prepared, T[None])[0][0]
     loop = prepared.arrangement
     ways = loop.all_ways(T[None])
@@ -62,7 +62,7 @@ def complex_candidates(prepared: Prepared, T: Array) -> Complex:
     values = np.linalg.svd(matrices, compute_uv=False)
     shared = np.maximum(np.sum(values < _SHARED * values[:, :1], axis=1), 1)
     every = [np.zeros((0, 6), dtype=np.complex128)]
-    with np.errstate(all="ignore"):  # of what is no configuration angles may be infinite
+    with np.errstate(all="ignore"):  # angles without a configuration may be infinite
         for count in np.unique(shared):
             own = shared == count
             x4, x5 = middle_joints(matrices[own], prepared.pencil.elimination.grid, int(count))
@@ -75,7 +75,7 @@ def complex_candidates(prepared: Prepared, T: Array) -> Complex:
 
 
 def _completed(ways: Array, loop: Arrangement, middle: Complex) -> Complex:
-    """(m, 6) configurations of the arm with joints 3, 4 and 5 of its loop at (n, 3) positions."""
+    """Return arm configurations (m, 6) for positions (n, 3) of joints 3, 4 and 5 of its loop."""
     beyond, goal = np.tile(ways[1].astype(np.complex128), (len(middle), 1, 1)), inverse(ways[5])
     for k in (2, 3, 4):
         beyond = beyond @ motion(middle[:, k - 2], bool(loop.prismatic[k])) @ ways[k]
@@ -92,15 +92,15 @@ def _completed(ways: Array, loop: Arrangement, middle: Complex) -> Complex:
 
 
 def _angle(c: Complex, s: Complex) -> Complex:
-    """The complex angle of which these are multiples of the cosine and the sine."""
+    """Return the complex angle whose cosine and sine are c and s, up to one factor."""
     q: Complex = -0.5j * np.log((c + 1j * s) / (c - 1j * s))
-    # the logarithm of a square: the other half where the cosine has the other sign
+    # half the logarithm of a square is unique up to pi: the sign of the cosine decides
     size = np.where(np.abs(np.cos(q)) > np.abs(np.sin(q)), c / np.cos(q), s / np.sin(q))
     return np.where(np.real(size) < 0, q + np.pi, q)
 
 
 def _first(prismatic: bool, near: Complex, goal: Array) -> Complex:
-    """(n,) the position of joint 1 that takes the origin and z axis of frames near to the goal."""
+    """Return positions (n,) of joint 1 that move the origin and z axis of `near` to the goal."""
     if prismatic:
         slide: Complex = goal[2, 3] - near[:, 2, 3]
         return slide
@@ -114,7 +114,7 @@ def _first(prismatic: bool, near: Complex, goal: Array) -> Complex:
 def _second(
     way: Array, prismatic: NDArray[np.bool_], beyond: Complex, goal: Array
 ) -> tuple[NDArray[np.int64], Complex]:
-    """Numbers of the rows, and positions of joint 2: two where there is but one equation."""
+    """Return row indices and positions of joint 2: two per row if only one equation exists."""
     kept = KEPT_BY_SLIDE if prismatic[0] else KEPT_BY_TURN
     moved = np.einsum("iab,nb->nai", motion_parts(bool(prismatic[1])), pair(beyond))
     A = (rho(way) @ moved)[:, kept]
@@ -131,7 +131,7 @@ def _second(
 
 
 def _crossings(prismatic: bool, n: Complex, g: Complex) -> tuple[Complex, Complex]:
-    """Both roots of n0 r + n1 r^2 = g, or of n0 cos q + n1 sin q = g."""
+    """Return both roots of n0 r + n1 r^2 = g, or of n0 cos q + n1 sin q = g."""
     if not prismatic:
         # (n0 - i n1) z^2 - 2 g z + n0 + i n1 = 0 with z = e^(i q)
         root, below = np.sqrt(g**2 - n[:, 0] ** 2 - n[:, 1] ** 2), n[:, 0] - 1j * n[:, 1]
@@ -140,33 +140,33 @@ def _crossings(prismatic: bool, n: Complex, g: Complex) -> tuple[Complex, Comple
     root = np.where(np.real(n[:, 0].conj() * root) < 0, -root, root)
     larger = -0.5 * (n[:, 0] + root)
     low = -g / larger
-    # less is rounding, and the second root is infinite
+    # a smaller n1 is rounding, and the second root is infinite
     return low, np.where(np.abs(n[:, 1]) > _FLAT * np.abs(n[:, 0]), larger / n[:, 1], low)
 
 
-# Which of them are configurations, each its own: a certificate.
+# Certificate: candidates with exactly one root near them.
 
 
 _NEWTON = 4
-"""Steps: candidates are known to 1e-6 at least, from where two or three are enough, or they are
-none."""
+"""Number of Newton steps: candidates are accurate to 1e-6, from where two or three steps suffice,
+or they are no configurations."""
 _CERTAIN = 0.03
-"""Of the product of Newton's step, the norm of the inverse and the bend: below one half there is
-one root near; room for rounding."""
+"""Largest product of Newton's step, the norm of the inverse and the second derivative: below one
+half one root is near; the margin is for rounding."""
 _NEAR = 0.1
-"""Of |X - 1| and of what a change moves it: the bound of the second derivative is below two then,
+"""Largest |X - 1| and largest change of X: the bound of the second derivative is then below two,
 and a rotation whose skew part vanishes is the identity."""
 _ROUNDING = 1e-14
-"""Of a pose, in lengths of the loop: what Newton's step cannot fall below."""
+"""Rounding of a pose, in lengths of the loop: lower limit of Newton's step."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CertifiedRoots:
-    """Complex configurations of an arm, each with one root near it.
+    """Complex configurations of an arm, each with exactly one root near it.
 
     Attributes:
-        q: (r, 6) [rad or lengths of the loop].
-        radius: (r,) farther away its root is not, in any position.
+        q: (r, 6) configurations [rad or lengths of the loop].
+        radius: (r,) error bound of each position of the root.
     """
 
     q: Complex
@@ -174,23 +174,23 @@ class CertifiedRoots:
 
     @property
     def real(self) -> NDArray[np.bool_]:
-        """(r,) whether a root is real: the conjugate of one that is not would be near too."""
+        """Whether each root is real (r,): the conjugate root would lie within the same radius."""
         real: NDArray[np.bool_] = np.max(np.abs(self.q.imag), axis=1, initial=0.0) <= self.radius
         return real
 
 
 def certified_roots(arm: Arm, T: Array, candidates: Complex) -> CertifiedRoots:
-    """The roots near candidates, each once.
+    """Return the certified roots near candidates, each once.
 
-    X = e^(S4 d4) e^(S5 d5) e^(S6 d6) X0 e^(S1 d1) e^(S2 d2) e^(S3 d3) for a change d of a
-    configuration, S its twists seen from the middle, so that the second derivative of X is at most
-    |S_j| |S_k| e^(sum |S d|) |X0|. The rows are the place of X and the skew part of its rotation,
-    which vanish near the identity only there.
+    For a change d of a configuration, X = e^(S4 d4) e^(S5 d5) e^(S6 d6) X0 e^(S1 d1) e^(S2 d2)
+    e^(S3 d3), where S are the joint twists relative to the middle of the arm. The second derivative
+    of X is then at most |S_j| |S_k| e^(sum |S d|) |X0|. The equations are the position of X and the
+    skew part of its rotation, which vanish near the identity only at a solution.
 
     Args:
-        arm: of six joints.
+        arm: arm of six joints.
         T: (4, 4) target pose [m].
-        candidates: (m, 6) [rad or m].
+        candidates: (m, 6) complex configurations [rad or m].
     """
     length = loop_length(arm)
     inner, target = _inner(arm, T, length)
@@ -201,7 +201,7 @@ def certified_roots(arm: Arm, T: Array, candidates: Complex) -> CertifiedRoots:
             finite = np.all(np.isfinite(J), axis=(1, 2)) & np.all(np.isfinite(rows), axis=1)
             q, rows, J = q[finite], rows[finite], J[finite]
             q = q - solved(J, rows[..., None])[..., 0]
-        # of two that are conjugate rounding may have spoilt one
+        # rounding may have spoilt one of two conjugate roots
         q = np.concatenate([q, q.conj()])
         rows, J, norms, gap = _rows(inner, target, q)
         W = solved(J, np.broadcast_to(np.eye(6, dtype=np.complex128), J.shape))
@@ -221,7 +221,7 @@ def certified_roots(arm: Arm, T: Array, candidates: Complex) -> CertifiedRoots:
 
 
 def _inner(arm: Arm, T: Array, length: float) -> tuple[Arm, Array]:
-    """The arm between its first and its last joint, lengths in units, and its target."""
+    """Return the arm between its first and last joint, with lengths divided, and its target."""
     first, last = inverse(arm.gaps[0]), inverse(arm.gaps[-1])
     gaps, target = arm.gaps.copy(), first @ T @ last
     gaps[0], gaps[-1] = np.eye(4), np.eye(4)
@@ -231,9 +231,9 @@ def _inner(arm: Arm, T: Array, length: float) -> tuple[Arm, Array]:
 
 
 def _rows(arm: Arm, target: Array, q: Complex) -> tuple[Complex, Complex, Array, Array]:
-    """The rows (m, 6), derivatives (m, 6, 6), norms of the twists (m, 6) and |X - 1| (m,).
+    """Return equations (m, 6), derivatives (m, 6, 6), norms of twists (m, 6), and |X - 1| (m,).
 
-    All are seen from the middle of the arm, where complex angles lengthen the twists least.
+    The reference is the middle of the arm, where complex angles increase the twists least.
     """
     moved = [motion(q[:, k], bool(prismatic)) for k, prismatic in enumerate(arm.prismatic)]
     half = moved[0] @ arm.gaps[1] @ moved[1] @ arm.gaps[2] @ moved[2] @ arm.gaps[3]
@@ -265,26 +265,27 @@ def _skew(axis: Complex) -> Complex:
 
 
 def _six(X: Complex) -> Complex:
-    """(..., 6) the place of matrices (..., 4, 4), and the skew parts of their rotations."""
+    """Return the positions of matrices (..., 4, 4) and the skew parts of rotations, (..., 6)."""
     R = X[..., :3, :3]
     turned = [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]]
     return np.concatenate([X[..., :3, 3], 0.5 * np.stack(turned, axis=-1)], axis=-1)
 
 
-# All real configurations, and whether that is proved.
+# All real configurations, with the proof of completeness.
 
 
 _POSES, _SEED = 4, 20260411
-"""Of which the most roots count: at one of them a root may be too far away to be certified."""
+"""Number of random poses, of which the largest root count is taken, because a root may be too far
+away to be certified; and seed of the random numbers."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CertifiedArm:
-    """An arm ready for the general method, and how many complex configurations a pose has.
+    """Arm prepared for the general method, with its number of complex configurations.
 
     Attributes:
-        general: the arm.
-        count: at almost every pose.
+        general: prepared arm.
+        count: number of complex configurations at almost all poses.
     """
 
     general: General
@@ -292,7 +293,7 @@ class CertifiedArm:
 
 
 def certified_arm(arm: General) -> CertifiedArm:
-    """The configurations of some random poses, counted."""
+    """Return the prepared arm with the largest number of certified roots at random poses."""
     q = random_configurations(arm.arm, np.eye(4), _POSES, _SEED)
     return CertifiedArm(
         arm,
@@ -305,12 +306,12 @@ def certified_arm(arm: General) -> CertifiedArm:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Configurations:
-    """The configurations that reach a pose.
+    """Configurations that reach a pose.
 
     Attributes:
-        q: (m, 6) [rad or m].
-        proof: what is certain, as part of a sentence.
-        complete: whether that proves that these are all.
+        q: (m, 6) configurations [rad or m].
+        proof: text on the certificate, as part of a phrase.
+        complete: whether the certificate proves that no configuration is missing.
     """
 
     q: Array
@@ -319,7 +320,7 @@ class Configurations:
 
 
 def certified_configurations(arm: CertifiedArm, T: Array) -> Configurations:
-    """The real configurations of a pose, T (4, 4) [m], with what proves them."""
+    """Return the real configurations of a pose T (4, 4) [m], with their certificate."""
     own, found = arm.general.arm, general(arm.general, T)
     candidates = np.concatenate([complex_candidates(arm.general.prepared, T), found])
     roots = certified_roots(own, T, candidates)
@@ -331,9 +332,9 @@ def certified_configurations(arm: CertifiedArm, T: Array) -> Configurations:
             alone -= 1
         else:
             q.append(own.wrapped(root))
-    # configurations that are no roots of their own: two roots meet in each
+    # uncertified configurations are double roots, which count twice
     certain = len(roots.q)
-    # of an arm that reaches no general pose nothing is counted
+    # an arm without certified roots at general poses (count 0) has no certificate
     complete = certain + 2 * alone == arm.count > 0
     meet = f", and {2 * alone} where configurations meet" if alone and complete else ""
     proof = f"the general inverse geometric model, certified: {certain} of {arm.count} roots{meet}"
@@ -341,5 +342,5 @@ def certified_configurations(arm: CertifiedArm, T: Array) -> Configurations:
 
 
 _SAME = 1e-6
-"""Difference [rad or m] between a certified root and the configuration that it is: both are exact
-to 1e-9 unless roots all but meet."""
+"""Largest difference [rad or m] between a certified root and the same configuration from
+elimination: both are accurate to 1e-9, except close to double roots."""

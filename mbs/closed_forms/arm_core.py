@@ -1,4 +1,4 @@
-"""Algorithms of arms in the run-time library, on numpy arrays."""
+"""Arm algorithms of the compiled run-time library, as functions of numpy arrays."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _SOURCES = (
     "raghavan_roth_rest.c",
     "raghavan_roth_solve.c",
 )
-_JOINTS = 64  # ARM_JOINTS of arm.h: at most
+_JOINTS = 64  # largest number of joints, ARM_JOINTS of arm.h
 
 _pointer, _real, _integer = ctypes.c_void_p, ctypes.c_double, ctypes.c_longlong
 _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
@@ -71,7 +71,7 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
 
 
 class _ArmStruct(ctypes.Structure):
-    """`arm` of arm.h: the numbers of an `Arm`."""
+    """C structure `arm` of arm.h, with the numbers of an `Arm`."""
 
     _fields_ = (
         ("n", ctypes.c_int),
@@ -97,18 +97,18 @@ def core_of(arm: Arm) -> ctypes.CDLL:
 
 
 def path_of(library: ctypes.CDLL) -> Path:
-    """The file of the core."""
+    """Return the path of the file of a loaded library."""
     return Path(library._name)
 
 
 def _files(sources: tuple[str, ...]) -> dict[str, str]:
-    """The text of the core: the C files and headers of `_PAIRS`, and other C files."""
+    """Return the C files and headers of `_PAIRS` and other C files, as text by name."""
     return core_files([*(name + end for name in _PAIRS for end in (".c", ".h")), *sources])
 
 
 @functools.cache
 def core() -> ctypes.CDLL:
-    """The run-time library, with the signatures of its functions for arms.
+    """Return the run-time library, with the signatures of its arm functions.
 
     Raises:
         CompilerError: the library is missing and cannot be built.
@@ -117,7 +117,7 @@ def core() -> ctypes.CDLL:
 
 
 def library_at(path: str) -> ctypes.CDLL:
-    """A run-time library, with the signatures of its functions for arms."""
+    """Return the run-time library in a file, with the signatures of its arm functions."""
     library = ctypes.CDLL(path)
     for name, (result, arguments) in _SIGNATURES.items():
         function = getattr(library, name)
@@ -126,11 +126,11 @@ def library_at(path: str) -> ctypes.CDLL:
 
 
 def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
-    """Polished configurations, (m, n), and their residuals, (m,).
+    """Return polished configurations (m, n) and their residuals (m,) [m or 1].
 
     Args:
-        library: the core.
-        arm: whose configurations.
+        library: run-time library.
+        arm: arm of the configurations.
         T: (4, 4) target pose of all, or (m, 4, 4) of each.
         q: (m, n) configurations [rad or m].
     """
@@ -145,7 +145,7 @@ def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Arr
 def found_by(
     library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int
 ) -> tuple[Array, Hits]:
-    """Configurations (m, n) that multi-start Levenberg-Marquardt finds, and how often, (m,)."""
+    """Return solutions (m, n) of multi-start Levenberg-Marquardt, and starts for each (m,)."""
     target = _wanted(T, 4, 4)
     q, residual, hits = _rooms(starts, arm.size)
     handed = handed_of(arm)
@@ -156,7 +156,7 @@ def found_by(
 
 
 def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Hits]:
-    """The distinct ones of configurations q, (m, n), and how many are each of them."""
+    """Return the distinct configurations of q (m, n), and the number of copies of each."""
     target = _wanted(T, 4, 4)
     own, residual, hits = _rooms(len(q), arm.size)
     own[:] = q
@@ -168,7 +168,7 @@ def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array
 
 
 def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int) -> Array:
-    """The configuration, (n,), whose pose is nearest to T."""
+    """Return the configuration (n,) whose pose is nearest to T, from random starts."""
     target, q = _wanted(T, 4, 4), np.empty(arm.size)
     handed = handed_of(arm)
     library.mbs_nearest(handed.address, _at(target), starts, seed, _at(q))
@@ -176,7 +176,7 @@ def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int)
 
 
 def singular_by(library: ctypes.CDLL, arm: Arm, q: Array, bound: float) -> NDArray[np.bool_]:
-    """Which of configurations q, (m, n), have a singular value below a bound, (m,)."""
+    """Return whether each configuration of q (m, n) has a singular value below a bound (m,)."""
     own, singular = _wanted(q, len(q), arm.size), np.empty(len(q), dtype=bool)
     handed = handed_of(arm)
     library.mbs_singular(handed.address, bound, len(q), _at(own), singular.ctypes.data)
@@ -186,16 +186,16 @@ def singular_by(library: ctypes.CDLL, arm: Arm, q: Array, bound: float) -> NDArr
 def corrected_by(
     library: ctypes.CDLL, arm: Arm, T: Array, x: Array, held: Array, value: Array, iterations: int
 ) -> Array:
-    """Solutions (m, n) near x = q / unit, (m, n), at which held . x = value.
+    """Return solutions (m, n) near x = q / unit (m, n), with the constraint held . x = value.
 
     Args:
-        library: the core.
-        arm: whose configurations.
+        library: run-time library.
+        arm: arm of the configurations.
         T: (4, 4) target pose of all, or (m, 4, 4) of each.
-        x: first guesses.
-        held: (m, n) or (n,).
-        value: (m,).
-        iterations: at most.
+        x: (m, n) first guesses.
+        held: (m, n) or (n,) coefficients of the constraint.
+        value: (m,) right sides of the constraint.
+        iterations: maximum number of iterations.
     """
     m, n = len(x), arm.size
     own = np.array(np.broadcast_to(x, (m, n)), dtype=float, order="C")
@@ -209,7 +209,7 @@ def corrected_by(
 
 
 def residual_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> Array:
-    """(m,) largest element of pose(q) - T, T (4, 4) or (m, 4, 4), at q, (m, n)."""
+    """Return the largest element of |pose(q) - T| (m,), T (4, 4) or (m, 4, 4), at q (m, n)."""
     own, target, residual = _wanted(q, *q.shape), _targets(T, len(q)), np.empty(len(q))
     handed = handed_of(arm)
     stride = 16 if target.ndim == 3 else 0
@@ -218,7 +218,7 @@ def residual_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> Array:
 
 
 def examined_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
-    """Gaps (m, 6) to T and Jacobians (m, 6, n), lengths in arm lengths, at q, (m, n)."""
+    """Return gaps to T (m, 6) and Jacobians (m, 6, n) at q (m, n), lengths in arm lengths."""
     m, n = q.shape
     own, target = _wanted(q, m, n), _targets(T, m)
     gap, J = np.empty((m, 6)), np.empty((m, n, 6))
@@ -231,14 +231,14 @@ def examined_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Arr
 def on_sphere_by(
     library: ctypes.CDLL, arm: Arm, T: Array, centre: Array, radius: float, x: Array
 ) -> Array:
-    """Configurations (m, n) of x = q / unit, (m, n), brought to the pose and a distance.
+    """Return configurations x = q / unit (m, n) with a given pose and distance from a centre.
 
     Args:
-        library: the core.
-        arm: whose configurations.
-        T: (4, 4) the pose that is held.
-        centre: (n,) from where the distance counts.
-        radius: the distance.
+        library: run-time library.
+        arm: arm of the configurations.
+        T: (4, 4) target pose.
+        centre: (n,) centre of the sphere in x.
+        radius: distance from the centre.
         x: (m, n) first guesses.
     """
     own, middle = np.array(x, dtype=float, order="C"), _wanted(centre, arm.size)
@@ -248,7 +248,7 @@ def on_sphere_by(
 
 
 class _ReductionStruct(ctypes.Structure):
-    """`arm_reduction` of arm_reduce.h."""
+    """C structure `arm_reduction` of arm_reduce.h."""
 
     _fields_ = (
         ("corank", ctypes.c_int),
@@ -259,15 +259,15 @@ class _ReductionStruct(ctypes.Structure):
 def reduced_by(
     library: ctypes.CDLL, arm: Arm, T: Array, parts: tuple[Array, Array, Array, Array], h: Array
 ) -> tuple[Array, Array, bool]:
-    """X (m, n) and g (m, 6 - rank) for h, (m, corank), and whether all were found.
+    """Return X (m, n) and g (m, 6 - rank) for h (m, corank), and whether all iterations converged.
 
     Args:
-        library: the core.
-        arm: whose configurations.
-        T: (4, 4) the pose.
-        parts: of a reduction: its centre (n,), and the directions solved (rank, 6), left
-            (6 - rank, 6) and null (corank, n).
-        h: the unknowns that remain.
+        library: run-time library.
+        arm: arm of the configurations.
+        T: (4, 4) target pose.
+        parts: reduction at a singular configuration: centre (n,), solved directions of equations
+            (rank, 6), remaining directions (6 - rank, 6), null directions of x (corank, n).
+        h: coordinates along the null directions.
     """
     count, corank = h.shape
     held = [np.ascontiguousarray(part, dtype=float) for part in parts]
@@ -290,17 +290,17 @@ def walked_by(
     most: int,
     sided: bool,
 ) -> tuple[Array, bool]:
-    """Points (k, n) of a self-motion, in x = q / unit, and whether it closes.
+    """Return points (k, n) of a self-motion in x = q / unit, and whether it is a closed curve.
 
     Args:
-        library: the core.
-        arm: whose configurations.
-        T: (4, 4) the pose that is held.
-        start: (n,) the first point.
-        tangent: (n,) where it leads to.
-        limit: of the residuals.
-        most: points.
-        sided: whether it stays on one of two curves that pass close by.
+        library: run-time library.
+        arm: arm of the configurations.
+        T: (4, 4) pose that is kept.
+        start: (n,) first point.
+        tangent: (n,) direction of the curve at the first point.
+        limit: largest residual of a point.
+        most: maximum number of points.
+        sided: whether the path must stay on one of two curves that pass close by each other.
     """
     points, target = np.empty((most + 1, arm.size)), _wanted(T, 4, 4)
     points[0] = start
@@ -319,7 +319,7 @@ def walked_by(
 
 
 def rounded_by(library: ctypes.CDLL, T: Array) -> Array | None:
-    """The rigid transform nearest to T, (4, 4); None where it is none but for 1e-6."""
+    """Return the rigid transform nearest to T (4, 4); None if T is not rigid within 1e-6."""
     own = np.array(T, dtype=float, order="C")
     return own if library.mbs_round(_at(own)) else None
 
@@ -331,19 +331,20 @@ def settled_by(
     every: tuple[Array, ...],
     bounds: tuple[float, float],
 ) -> tuple[Array, Array, Array, bool]:
-    """The solutions among the branches of a closed form for one pose.
+    """Return the solutions among the branches of a closed form for one pose.
 
     Args:
-        library: the core.
-        handed: the arm.
-        T: (4, 4) a rigid transform [m].
-        every: (branches, n) q and (branches,) residual, which are written over, real and regular.
-        bounds: of the last two, from which on the Jacobian is not asked, and of singular values,
-            below which solutions may be missing.
+        library: run-time library.
+        handed: arm as a C structure.
+        T: (4, 4) rigid transform [m].
+        every: q (branches, n) and residual (branches,), both overwritten; real and regular
+            (branches,).
+        bounds: value of real and regular from which the Jacobian is not examined, and singular
+            value of the Jacobian below which solutions may be missing.
 
     Returns:
-        (m, n) configurations, (m,) residuals, (m,) numbers of branches, and whether none may be
-        missing.
+        (m, n) configurations, (m,) residuals, (m,) branch indices, and whether the solutions are
+        certainly complete.
     """
     q, residual = every[:2]
     number, count = np.empty(len(residual)), ctypes.c_longlong(0)
@@ -362,7 +363,7 @@ def settled_by(
 
 
 class Handed:
-    """An arm as C sees it; keeps the arrays alive that it points to."""
+    """C structure of an arm, and the arrays that it points to."""
 
     def __init__(self, arm: Arm) -> None:
         self.gaps = np.ascontiguousarray(arm.gaps, dtype=float)
@@ -373,19 +374,19 @@ class Handed:
 
 @functools.lru_cache(maxsize=256)
 def handed_of(arm: Arm) -> Handed:
-    """The same, made once for an arm, which never changes."""
+    """Return the C structure of an arm, cached, because an arm is immutable."""
     return Handed(arm)
 
 
 def _wanted(T: Array, *shape: int) -> Array:
-    """Numbers as C reads them; a wrong shape is refused, for C would read beyond the array."""
+    """Return a C-contiguous double array of a shape; a wrong shape raises, to protect C code."""
     if type(T) is np.ndarray and T.shape == shape and T.dtype == np.float64:
         return T if T.flags.c_contiguous else np.ascontiguousarray(T)
     return np.ascontiguousarray(np.broadcast_to(np.asarray(T, dtype=float), shape))
 
 
 def _targets(T: Array, count: int) -> Array:
-    """One target pose of all configurations, or one of each."""
+    """Return one target pose for all configurations, or one for each."""
     return _wanted(T, *((4, 4) if np.ndim(T) == 2 else (count, 4, 4)))
 
 
@@ -397,13 +398,13 @@ def _at(array: Array) -> int:
     return int(array.ctypes.data)
 
 
-# What the compiled general method knows of an arm, and its calls.
+# Structures of the compiled general method, and its calls.
 
 
 Numbers: TypeAlias = NDArray[np.int64]
 
-_ROOM = 4096  # configurations of one call
-_CANDIDATES = 144  # ROTH_CONFIGURATIONS: those of one pose, at most
+_ROOM = 4096  # largest number of configurations that one call returns
+_CANDIDATES = 144  # ROTH_CONFIGURATIONS of raghavan_roth.h: most candidates of a pose
 
 _int, _double = ctypes.c_int, ctypes.c_double
 
@@ -430,7 +431,7 @@ class _LoopStruct(ctypes.Structure):
 
 
 class HandedLoop:
-    """A prepared arm as C reads it; keeps the arrays alive that it points to."""
+    """C structure of a prepared arm, and the arrays that it points to."""
 
     def __init__(self, arm: Arm, prepared: Prepared) -> None:
         loop, pencil = prepared.arrangement, prepared.pencil
@@ -466,10 +467,10 @@ class HandedLoop:
 
 
 def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbers, Array]:
-    """The solutions for poses T, (N, 4, 4).
+    """Return the solutions of the general method for poses T (N, 4, 4).
 
     Returns:
-        (m,) numbers of the poses, ascending, and (m, 6) configurations for them.
+        (m,) indices of the poses, ascending, and (m, 6) configurations for them.
     """
     target = np.ascontiguousarray(T, dtype=float)
     room = min(_ROOM, _CANDIDATES * len(target))
@@ -497,16 +498,16 @@ def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbe
 
 
 def candidates_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> Array:
-    """(m, 6) configurations that may reach a pose (4, 4), before they are polished and checked."""
+    """Return configurations (m, 6) that may reach a pose (4, 4), not polished and not checked."""
     target, q = _wanted(T, 4, 4), np.empty((_CANDIDATES, 6))
     return q[: library.mbs_candidates(handed.address, _at(target), _at(q))].copy()
 
 
-# The general method of one arm as a Function of C text, its numbers written out.
+# General method of an arm as a Function with C code that contains the numbers of the arm.
 
 
 COLUMNS = 16
-"""POSE_COLUMNS: configurations that `general_function` has room for."""
+"""Number of configurations that `general_function` returns, POSE_COLUMNS of pose.h."""
 
 _TABLES = """\
 #include <math.h>
@@ -536,7 +537,7 @@ EXPORT int jac_FUNCTION(const double **arg, double **res, long long *iw, double 
 
 
 class SolverStruct(ctypes.Structure):
-    """`pose_solver` of pose.h."""
+    """C structure `pose_solver` of pose.h."""
 
     _fields_ = (
         *((name, ctypes.c_void_p) for name in ("robot", "loop", "evaluate", "checkout", "release")),
@@ -552,17 +553,17 @@ class SolverStruct(ctypes.Structure):
 def general_function(
     name: str, handed: HandedLoop, indices: Sequence[int], others: Array, nearly: float
 ) -> Function:
-    """``name(T) -> q, valid, count, certain``, see `pose_all` of pose.h, of this computer's code.
+    """Return ``name(T) -> q, valid, count, certain`` with C code, see `pose_all` of pose.h.
 
     Args:
-        name: what its name begins with.
-        handed: the arm, ready for the general method.
-        indices: (6,) of its joints among the coordinates.
-        others: (nq,) positions of all coordinates; those of the arm do not count [rad or m].
-        nearly: smallest singular value below which configurations may be missing.
+        name: prefix of the name of the function.
+        handed: arm prepared for the general method.
+        indices: (6,) indices of the joints of the arm among the coordinates.
+        others: (nq,) positions of all coordinates [rad or m]. Joints of the arm are ignored.
+        nearly: singular value of the Jacobian below which configurations may be missing.
 
     Raises:
-        CompilerError: there is no compiler.
+        CompilerError: no C compiler was found.
     """
     nq, arm = len(others), handed.arm
     solver = SolverStruct(nearly=nearly, nq=nq)
@@ -596,7 +597,7 @@ def general_function(
 
 
 def _loop_tables(handed: HandedLoop, number: int = 0) -> str:
-    """C text of a loop of an arm, after the text of the loops that take its place."""
+    """Return C text of a loop of an arm, after the text of its alternative loops."""
     owned, text = dict[str, str](), ""
     if handed.next is not None:
         text += _loop_tables(handed.next, number + 1)
@@ -610,7 +611,7 @@ def _loop_tables(handed: HandedLoop, number: int = 0) -> str:
 
 
 def _initializer(value: Any, owned: Mapping[str, str] = MappingProxyType({})) -> str:
-    """C text of numbers, or of a structure, whose pointers are names or null."""
+    """Return the C initializer of numbers or of a structure; its pointers are names or null."""
     if isinstance(value, ctypes.Structure):
         pairs = [(field[0], field[1]) for field in value._fields_]
         texts = (

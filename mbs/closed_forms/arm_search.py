@@ -1,4 +1,4 @@
-"""Solutions by many descents, polished and merged; the general method; the nearest pose."""
+"""Solutions of arms by random descents, polishing, merging, elimination, and the nearest pose."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from mbs.closed_forms.arm_core import HandedLoop, Numbers, solved_by
 from mbs.closed_forms.raghavan_roth.numbers import Prepared, prepare
 from mbs.errors import NoClosedForm
 
-# The distance of configurations from a target pose, on numpy arrays.
+# Distance of configurations from a target pose.
 
 
 def examine_arm(arm: Arm, T: Array, q: Array) -> tuple[Array, Array, Array]:
-    """Costs (m,), gaps (m, 6) and Jacobians (m, 6, n) of configurations q, (m, n).
+    """Return costs (m,), gaps (m, 6) and Jacobians (m, 6, n) of configurations q (m, n).
 
-    Lengths are measured by that of the arm; the cost is the square of the gap.
+    Lengths are divided by the length of the arm. A gap is the displacement to the target pose T
+    (translation, rotation vector); the cost is its squared norm.
     """
     pose, J = arm.pose_and_jacobian(q)
     gap = gap_to(T, pose)
@@ -29,7 +30,7 @@ def examine_arm(arm: Arm, T: Array, q: Array) -> tuple[Array, Array, Array]:
     return np.sum(gap**2, axis=-1), gap, J
 
 
-# Which of many solutions for one pose are the same configuration.
+# Merging of solutions for one pose that are the same configuration.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +39,7 @@ class Merged:
 
     Attributes:
         q: (m, n) configurations [rad or m].
-        hits: (m,) how many of the given configurations are each of them.
+        hits: (m,) number of the given configurations that are equal to each.
     """
 
     q: Array
@@ -46,15 +47,15 @@ class Merged:
 
 
 def merged(arm: Arm, T: Array, q: Array) -> Merged:
-    """The distinct ones of several solutions for one pose, in their order.
+    """Return the distinct solutions among several for one pose, in their order.
 
-    Two are one when they are closer than 1e-9, or closer than 1e-2 with a solution half way, to
-    1e-14 or as good as they are, as between scattered copies of a multiple root. Of two that are
-    one the better stays. Angles that differ by whole turns are equal, slides are measured in arm
-    lengths.
+    Two solutions are the same if they are closer than 1e-9, or if they are closer than 1e-2 and
+    their mean is a solution too, to 1e-14 or as exact as they are, as for scattered copies of a
+    multiple root. The better of two equal solutions is kept. Angles are compared modulo 2 pi.
+    Displacements are compared in arm lengths.
 
     Args:
-        arm: the arm whose configurations are searched.
+        arm: arm of the configurations.
         T: (4, 4) target pose.
         q: (m, n) solutions [rad or m].
     """
@@ -62,42 +63,42 @@ def merged(arm: Arm, T: Array, q: Array) -> Merged:
 
 
 def wrapped(arm: Arm, q: Array) -> Array:
-    """Configurations with all angles in (-pi, pi]."""
+    """Return configurations with all angles in (-pi, pi]."""
     turns = np.pi - np.mod(np.pi - q, 2 * np.pi)
     within = (q > -np.pi) & (q <= np.pi)
     return np.where(arm.prismatic | within, q, turns)
 
 
-# All solutions by many descents from random configurations.
+# All solutions by descents from many random configurations.
 
 
 SEED = 20260105
 
 
 def search(arm: Arm, T: Array, starts: int = 300, seed: int = SEED) -> Array:
-    """The solutions that Levenberg and Marquardt's steps lead to from random configurations.
+    """Return the solutions that Levenberg-Marquardt finds from random configurations.
 
-    Nothing proves that they are all; `counted_search` tells how often each was met.
+    Completeness is not proved. `counted_search` also returns the number of starts per solution.
 
     Args:
-        arm: the arm whose configurations are searched.
+        arm: arm whose configurations are searched.
         T: (4, 4) target pose.
-        starts: how many random configurations.
-        seed: of them.
+        starts: number of random configurations.
+        seed: seed of the random numbers.
 
     Returns:
-        (m, n) distinct configurations [rad or m]; samples of the families where there are such.
+        (m, n) distinct configurations [rad or m]; samples of a self-motion if one exists.
     """
     return counted_search(arm, T, starts, seed).q
 
 
 def counted_search(arm: Arm, T: Array, starts: int = 300, seed: int = SEED) -> Merged:
-    """`search`, and how many of the starts lead to each solution."""
+    """Return the result of `search`, and the number of starts that converged to each solution."""
     return Merged(*core.found_by(core.core_of(arm), arm, T, starts, seed))
 
 
 def random_configurations(arm: Arm, T: Array, count: int, seed: int) -> Array:
-    """(count, n) configurations: angles in (-pi, pi], slides as far as arm and pose reach."""
+    """Return random configurations (count, n): angles, and displacements within reach of T."""
     indices = np.arange(1, count * arm.size + 1, dtype=np.uint64)
     chance = _split_mix(np.array([seed % 2**64], dtype=np.uint64), indices).reshape(count, arm.size)
     reach = arm.length + np.linalg.norm(T[:3, 3])
@@ -105,7 +106,7 @@ def random_configurations(arm: Arm, T: Array, count: int, seed: int) -> Array:
 
 
 def _split_mix(seed: NDArray[np.uint64], indices: NDArray[np.uint64]) -> Array:
-    """Numbers in [0, 1). Source: Steele, Lea and Flood 2014."""
+    """Return random numbers in [0, 1). Source: Steele, Lea and Flood 2014."""
     z = seed + indices * np.uint64(0x9E3779B97F4A7C15)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -114,15 +115,15 @@ def _split_mix(seed: NDArray[np.uint64], indices: NDArray[np.uint64]) -> Array:
     return chance
 
 
-# Configurations made as exact as rounding allows.
+# Configurations refined to rounding.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Polished:
-    """Configurations and how well they reach the target pose.
+    """Configurations and their distances from the target pose.
 
     Attributes:
-        q: (m, n) configurations, angles in (-pi, pi] where they were improved [rad or m].
+        q: (m, n) configurations [rad or m]. Angles of improved configurations are in (-pi, pi].
         residual: (m,) max |pose(q) - T| [m and 1].
     """
 
@@ -131,20 +132,20 @@ class Polished:
 
 
 def polish(arm: Arm, T: Array, q: Array) -> Polished:
-    """The solutions beside configurations.
+    """Return the solutions near given configurations.
 
-    A configuration stays as it is where nothing better lies beside it, so that no residual grows.
-    An arm of fewer than six joints comes as near as least squares do.
+    A configuration changes only if its residual decreases. An arm
+    of fewer than six joints gets a least-squares solution.
 
     Args:
-        arm: the arm whose configurations are searched.
-        T: (4, 4) target pose of all, or (m, 4, 4) of each.
+        arm: arm of the configurations.
+        T: (4, 4) target pose of all configurations, or (m, 4, 4) of each.
         q: (m, n) configurations [rad or m].
     """
     return Polished(*core.polished_by(core.core_of(arm), arm, T, q))
 
 
-# The reachable pose that is nearest to a wanted one.
+# Reachable pose nearest to a target pose.
 
 
 _STARTS = 100
@@ -152,13 +153,13 @@ _STARTS = 100
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nearest:
-    """The reachable pose nearest to a wanted one.
+    """Reachable pose nearest to a target pose.
 
     Attributes:
-        q: (n,) a configuration that has this pose [rad or m].
-        distance: between the origins of both poses [m].
-        angle: between their orientations [rad].
-        T: (4, 4) the pose.
+        q: (n,) configuration with this pose [rad or m].
+        distance: distance between the origins of both poses [m].
+        angle: angle between their orientations [rad].
+        T: (4, 4) nearest pose.
     """
 
     q: Array
@@ -168,13 +169,13 @@ class Nearest:
 
 
 def nearest(arm: Arm, T: Array) -> Nearest:
-    """The pose of least distance^2 + (arm.length * angle)^2 from a wanted one.
+    """Return the pose of least distance^2 + (arm.length * angle)^2 from a target pose.
 
-    The best of several descents from random configurations, each followed by Newton's method down
-    to where the slope vanishes.
+    It is the best result of several descents from random configurations, each refined by Newton's
+    method until the gradient vanishes.
 
     Args:
-        arm: the arm whose configurations are searched.
+        arm: arm whose configurations are searched.
         T: (4, 4) target pose [m].
     """
     return _measure(arm, T, core.nearest_by(core.core_of(arm), arm, T, _STARTS, SEED))
@@ -186,17 +187,17 @@ def _measure(arm: Arm, T: Array, q: Array) -> Nearest:
     return Nearest(q, float(np.linalg.norm(gap[:3])), float(np.linalg.norm(gap[3:])), pose)
 
 
-# All configurations of a general arm of six joints that reach a pose.
+# All configurations of a general six-joint arm for a pose.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class General:
-    """An arm ready for the general method.
+    """Arm prepared for the general (Raghavan-Roth) method.
 
     Attributes:
-        arm: of six joints.
-        prepared: what the method chose for it.
-        handed: both for the compiled core.
+        arm: arm of six joints.
+        prepared: loop and matrices that the method selected for the arm.
+        handed: arm and selection as structures for the compiled library.
     """
 
     arm: Arm
@@ -205,11 +206,11 @@ class General:
 
 
 def general_of(arm: Arm) -> General:
-    """An arm made ready, once, for `general`.
+    """Prepare an arm for `general`; this is done once per arm.
 
     Raises:
-        ModelError: it has not six joints, or none that turns.
-        NoClosedForm: the method does not hold for it.
+        ModelError: the arm does not have six joints, or has no revolute joint.
+        NoClosedForm: the method is singular for this arm.
     """
     prepared = prepare(arm)
     if not prepared.regular:
@@ -222,28 +223,28 @@ def general_of(arm: Arm) -> General:
 
 
 def general(arm: General, T: Array) -> Array:
-    """The configurations that reach a pose, by elimination; polished.
+    """Return the polished configurations that reach a pose, by elimination.
 
     Source: Raghavan & Roth 1993.
 
     Args:
-        arm: see `general_of`.
+        arm: arm from `general_of`.
         T: (4, 4) target pose [m].
 
     Returns:
-        (m, 6) all isolated solutions, each once [rad or m]; samples where there are families.
+        (m, 6) all isolated solutions, each once [rad or m]; samples if self-motions exist.
     """
     return general_many(arm, np.asarray(T, dtype=float)[None])[1]
 
 
 def general_many(arm: General, T: Array) -> tuple[Numbers, Array]:
-    """Likewise for many poses.
+    """Return the polished configurations that reach each of many poses, by elimination.
 
     Args:
-        arm: see `general_of`.
-        T: (N, 4, 4) target pose [m].
+        arm: arm from `general_of`.
+        T: (N, 4, 4) target poses [m].
 
     Returns:
-        (m,) numbers of the poses, ascending, and (m, 6) configurations for them.
+        (m,) indices of the poses, ascending, and (m, 6) configurations for them.
     """
     return solved_by(core.core_of(arm.arm), arm.handed, T)

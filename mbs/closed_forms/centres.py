@@ -1,4 +1,4 @@
-"""Centres of rotation in a loop: what lies beyond one only sees a point, whatever its joints do."""
+"""Centres of rotation in a loop: the other joints depend on the position of the centre only."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from mbs.spatial import Pose, vector
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Centre:
-    """Consecutive unknown joints that leave one point where it is, the centre of their rotations.
+    """Consecutive unknown joints that keep one point fixed, the centre of their rotations.
 
     Attributes:
-        first: number of the first of them in the loop.
-        count: how many: one spherical joint, or two or three revolute ones.
-        before: (3, 1) the point in the frame before the first one.
-        after: (3, 1) the point in the frame after the last one.
+        first: index of the first of these joints in the loop.
+        count: number of joints: one spherical joint, or two or three revolute joints.
+        before: (3, 1) centre in the frame before the first of these joints.
+        after: (3, 1) centre in the frame after the last of these joints.
     """
 
     first: int
@@ -29,12 +29,12 @@ class Centre:
     after: SX
 
     def joints(self, size: int) -> list[int]:
-        """Its joints in a loop of so many joints."""
+        """Return the indices of its joints in a loop of `size` joints."""
         return [(self.first + k) % size for k in range(self.count)]
 
 
 def centres(ring: Ring, q: SX, p: SX) -> list[Centre]:
-    """Of spherical joints, and of two or three revolute neighbours whose axes meet in a point."""
+    """Return centres: spherical joints, and 2 or 3 neighbouring revolute joints that intersect."""
     found = list[Centre]()
     for k, joint in enumerate(ring.joints):
         if joint.motion is Motion.SPHERICAL:
@@ -51,7 +51,7 @@ def centres(ring: Ring, q: SX, p: SX) -> list[Centre]:
 
 
 def with_spherical(ring: Ring, q: SX, p: SX) -> Ring:
-    """The loop with a spherical joint for every three revolute ones whose axes meet in a point."""
+    """Return the loop with a spherical joint for every three intersecting revolute joints."""
     for centre in centres(ring, q, p):
         if centre.count == 3 and len(ring.joints) > 3:
             return with_spherical(merge_centre(ring, centre), q, p)
@@ -59,7 +59,7 @@ def with_spherical(ring: Ring, q: SX, p: SX) -> Ring:
 
 
 def merge_centre(ring: Ring, centre: Centre) -> Ring:
-    """The loop begun at a centre, which is one spherical joint."""
+    """Return the loop that starts with a centre, as one spherical joint."""
     begun = ring.rotated(centre.first)
     joints, gaps = begun.joints[centre.count :], begun.gaps[centre.count :]
     name = ", ".join(joint.name for joint in begun.joints[: centre.count])
@@ -72,12 +72,12 @@ def merge_centre(ring: Ring, centre: Centre) -> Ring:
 
 
 def gap_pose(ring: Ring, k: int) -> Pose:
-    """The known transform before joint k, counted around the loop."""
+    """Return the known transform before joint k, counted around the loop."""
     return ring.gaps[k % len(ring.gaps)].pose
 
 
 def are_revolute(ring: Ring, first: int, count: int) -> bool:
-    """Whether so many different neighbours are revolute."""
+    """Whether `count` different neighbouring joints from `first` on are revolute."""
     n = len(ring.joints)
     among = [ring.joints[(first + k) % n] for k in range(count)]
     return count <= n and all(joint.motion is Motion.REVOLUTE for joint in among)

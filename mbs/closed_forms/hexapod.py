@@ -1,9 +1,10 @@
-"""A platform on six legs of known lengths, in numbers: every pose of it, by certified homotopy.
+"""All poses of a platform on six legs of known lengths, by certified homotopy.
 
-The pose is a unit quaternion e and g = p e, p the place of the platform; with it the length of a
-leg from a on the ground to b on the platform is a quadratic form in (e, g). The forty complex poses
-of a platform that is kept are followed while its legs become the given ones, with complex lengths;
-from there, once for each platform, those are followed that it has to any lengths.
+The pose is a unit quaternion e and the product g = p e, where p is the position of the platform.
+The length of a leg from a on the ground to b on the platform is then a quadratic form in (e, g).
+The forty complex poses of a stored platform are followed while its legs change to the given leg
+ends, with complex lengths. This is done once for each platform. From there the poses are followed
+to any leg lengths.
 
 Source: Wampler 1996 for the equations; Dietmaier 1998 for forty real poses.
 """
@@ -27,7 +28,7 @@ from mbs.solvers.homotopy import TOLERANCE, solved
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# The equations: quadratic forms of x = (e, g), whose values vanish where the legs fit.
+# Equations: quadratic forms of x = (e, g), which are zero if the legs have their lengths.
 
 
 LEGS = 6
@@ -36,7 +37,7 @@ _ROWS = LEGS + 1
 
 
 def _left(a: Complex) -> Complex:
-    """(..., 4, 4) the matrices of quaternion products a q, of vectors a (..., 3)."""
+    """Return the matrices (..., 4, 4) of quaternion products a q for vectors a (..., 3)."""
     x, y, z = np.moveaxis(a, -1, 0)
     o = np.zeros_like(x)
     rows = np.array([[o, -x, -y, -z], [x, o, -z, y], [y, z, o, -x], [z, -y, x, o]])
@@ -45,7 +46,7 @@ def _left(a: Complex) -> Complex:
 
 
 def _right(b: Complex) -> Complex:
-    """(..., 4, 4) the matrices of quaternion products q b, of vectors b (..., 3)."""
+    """Return the matrices (..., 4, 4) of quaternion products q b for vectors b (..., 3)."""
     x, y, z = np.moveaxis(b, -1, 0)
     o = np.zeros_like(x)
     rows = np.array([[o, -x, -y, -z], [x, o, z, -y], [y, -z, o, x], [z, y, -x, o]])
@@ -55,12 +56,12 @@ def _right(b: Complex) -> Complex:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Legs:
-    """Six legs, in numbers that may be complex.
+    """Six legs, with real or complex values.
 
     Attributes:
-        a: (6, 3) their ends on the ground.
-        b: (6, 3) those on the platform, in its frame.
-        c: (6,) a.a + b.b less the square of the length.
+        a: (6, 3) ends of the legs on the ground.
+        b: (6, 3) ends on the platform, in its frame.
+        c: (6,) a.a + b.b minus the square of the length.
     """
 
     a: Complex
@@ -68,7 +69,7 @@ class Legs:
     c: Complex
 
     def forms(self) -> Complex:
-        """(7, 8, 8) symmetric matrices; the last one makes p a vector."""
+        """Return the symmetric matrices (7, 8, 8) of the equations; the last makes p a vector."""
         Q = np.zeros((_ROWS, _SIZE, _SIZE), dtype=np.complex128)
         Q[:LEGS, 4:, 4:] = np.eye(4)
         N = _right(self.b) - _left(self.a)
@@ -82,16 +83,16 @@ class Legs:
 _SEED = 20260302
 
 
-# Following the roots while the legs become others, all roots at once.
+# Path tracking of all roots at once while the legs change.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Homotopy:
-    """From one platform to another: Q(t) = Q0 + t Q1 + t^2 Q2, or Q0 and t times constants.
+    """Path from one platform to another: Q(t) = Q0 + t Q1 + t^2 Q2, or Q0 plus t times constants.
 
     Attributes:
-        Q: (3, 7, 8, 8), or (1, 7, 8, 8) where the ends of the legs stay.
-        c: (7,) by how much the constants of the rows change where the ends stay.
+        Q: (3, 7, 8, 8) coefficients of t; (1, 7, 8, 8) if the ends of the legs are constant.
+        c: (7,) changes of the constants of the rows, used if the ends are constant.
     """
 
     Q: Complex
@@ -99,7 +100,7 @@ class Homotopy:
 
     @staticmethod
     def between(start: Legs, end: Legs) -> Homotopy:
-        """Along a straight line of a, b and c."""
+        """Return the path along a straight line of a, b and c."""
         c = np.append(end.c - start.c, 0)
         first, last = start.forms(), end.forms()
         if np.array_equal(start.a, end.a) and np.array_equal(start.b, end.b):
@@ -109,7 +110,7 @@ class Homotopy:
         return Homotopy(np.array([first, last - first - bend, bend]), c)
 
     def slopes(self, x: Complex, t: Real) -> tuple[Complex, Complex]:
-        """Derivatives by x, (r, 7, 8), and by t, (r, 7), of the rows at x (r, 8) and t (r,)."""
+        """Return derivatives of the rows by x, (r, 7, 8), and by t, (r, 7), at x (r, 8), t (r,)."""
         Y = (x @ self.Q.reshape(-1, _SIZE).T).reshape(len(x), len(self.Q), _ROWS, _SIZE)
         J, e = Y[:, 0], x[:, :4]
         if len(self.Q) == 1:
@@ -121,12 +122,12 @@ class Homotopy:
 
 
 def _square(J: Complex, patch: Complex) -> Complex:
-    """With the patch as the last row: the length of x does not change to first order."""
+    """Append the patch as the last row: the length of x is constant to first order."""
     return np.concatenate([J, patch.conj()[:, None, :]], axis=1)
 
 
 def _correction(path: Homotopy, x: Complex, t: Real, patch: Complex) -> tuple[Complex, Complex]:
-    """Newton's step, and how x goes on with t, both (r, 8)."""
+    """Return Newton's step and dx/dt, both (r, 8)."""
     J, rate = path.slopes(x, t)
     sides = np.zeros((len(x), _SIZE, 2), dtype=np.complex128)
     sides[:, :_ROWS, 0], sides[:, :_ROWS, 1] = np.einsum("rij,rj->ri", J, x) / 2, rate
@@ -135,37 +136,37 @@ def _correction(path: Homotopy, x: Complex, t: Real, patch: Complex) -> tuple[Co
 
 
 def follow(path: Homotopy, x: Complex, tolerance: float = TOLERANCE) -> tuple[Complex, Real]:
-    """The roots (r, 8) at the end of a path, of length one, and how far each came: see homotopy."""
+    """Return the roots (r, 8) of length one at the end of a path, and the reached t (r,)."""
     return homotopy.follow(functools.partial(_correction, path), x, _in_patch, tolerance)
 
 
 def _in_patch(x: Complex, slope: Complex) -> tuple[Complex, Complex]:
-    """Roots of length one, and slopes that do not change these lengths to first order."""
+    """Return roots of length one, and slopes that keep this length to first order."""
     size = np.linalg.norm(x, axis=1, keepdims=True)
     x, slope = x / size, slope / size
     return x, slope - np.sum(x.conj() * slope, axis=1, keepdims=True) * x
 
 
-# Which ends are regular roots, each its own: a certificate.
+# Certificate: path ends that are regular and different roots.
 
 
 _CERTAIN = 0.03
-"""Of |J^-1 F| |J^-1 H / 2|: below 0.157 Newton's method converges quadratically to one root; room
-for rounding and for the norm of matrices."""
+"""Largest |J^-1 F| |J^-1 H / 2| of a certified root: below 0.157 Newton's method converges
+quadratically to one root; the margin is for rounding and for the norm of matrices."""
 _APART = 1e-6
-"""Distance, as a part of |x| = 1, above which two roots are two: certified ones differ by more than
-ten times what Newton's method still moves them, 1e-12."""
+"""Distance, relative to |x| = 1, above which two roots are different: certified different roots
+differ by more than ten times the last Newton step, 1e-12."""
 _FLAT = 1e-6
-"""Length of e, as a part of |x| = 1, below which a root is at infinity."""
+"""Length of e, relative to |x| = 1, below which a root is at infinity."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ends:
-    """Where the paths end.
+    """Ends of the paths.
 
     Attributes:
-        x: (r, 8) roots, of length one.
-        regular: (r,) whether each is certified to be near a regular root of its own.
+        x: (r, 8) roots of length one.
+        regular: (r,) whether an end is certified to be near a regular root that no other end has.
     """
 
     x: Complex
@@ -173,7 +174,7 @@ class Ends:
 
 
 def certify(legs: Legs, x: Complex, t: Real) -> Ends:
-    """The ends of the paths, refined, and which of them are certified.
+    """Return the refined ends of paths that reached t, and which of them are certified.
 
     Source: Blum, Cucker, Shub & Smale 1998, chapter 8; in floating point, with room for rounding.
     """
@@ -202,16 +203,16 @@ def certify(legs: Legs, x: Complex, t: Real) -> Ends:
     return Ends(x, regular)
 
 
-# The platform whose forty roots are kept, and how they were found: by monodromy.
+# Stored platform with forty roots, and its computation by monodromy.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Start:
-    """A platform with complex legs, and its forty roots.
+    """Platform with complex legs, and its roots.
 
     Attributes:
-        legs: of it.
-        x: (40, 8) roots.
+        legs: legs of the platform.
+        x: (40, 8) roots; fewer for special ends of the legs.
     """
 
     legs: Legs
@@ -222,7 +223,7 @@ DEGREE = 40
 
 
 def random_legs(rng: np.random.Generator) -> Legs:
-    """Complex legs about the origin, of about unit size."""
+    """Return random complex legs about the origin, of about unit size."""
 
     def drawn(*shape: int) -> Complex:
         z = rng.normal(size=shape) + 1j * rng.normal(size=shape)
@@ -236,11 +237,11 @@ def _centred(legs: Legs) -> Legs:
 
 
 def monodromy(seed: int, most: int = 200) -> Start:
-    """Roots of random legs, by carrying those that are known around closed ways of other legs.
+    """Return roots of random legs, by tracking known roots along closed paths of other legs.
 
     Args:
-        seed: of all numbers.
-        most: ways that are tried before forty are given up.
+        seed: seed of the random numbers.
+        most: maximum number of closed paths.
     """
     rng = np.random.default_rng(seed)
     legs = random_legs(rng)
@@ -249,7 +250,7 @@ def monodromy(seed: int, most: int = 200) -> Start:
         rng.normal(size=3) + 1j * rng.normal(size=3),
     )
     first = np.concatenate([e, _left(p) @ e])
-    # the constants that make this a root
+    # constants for which `first` is a root
     rest = np.einsum("i,kij,j->k", first, legs.forms()[:LEGS], first)
     legs = Legs(legs.a, legs.b, legs.c - rest / (e @ e))
     x = first[None] / np.linalg.norm(first)
@@ -268,14 +269,14 @@ def monodromy(seed: int, most: int = 200) -> Start:
 
 
 def text_of(start: Start) -> str:
-    """The numbers of a start, to be kept in a file."""
+    """Return the values of a start as JSON text for a file."""
     parts = {"a": start.legs.a, "b": start.legs.b, "c": start.legs.c, "x": start.x}
     return json.dumps({name: [z.real.tolist(), z.imag.tolist()] for name, z in parts.items()})
 
 
 @functools.cache
 def kept_start(number: int) -> Start:
-    """One of the two starts that are kept beside this file."""
+    """Return one of the two starts that are stored next to this file."""
     file = resources.files("mbs.closed_forms") / "hexapod_starts" / f"{number}.json"
     told = json.loads(file.read_text(encoding="utf-8"))
     parts = {name: np.array(told[name][0]) + 1j * np.array(told[name][1]) for name in "abcx"}
@@ -285,16 +286,16 @@ def kept_start(number: int) -> Start:
 
 @functools.lru_cache(maxsize=16)
 def own_start(a: bytes, b: bytes) -> Start:
-    """All roots of a platform with complex lengths of its legs, from which any others are reached.
+    """Return all roots of a platform with complex leg lengths, the start for any other lengths.
 
-    Special ends of the legs leave fewer than forty: 28 for semi-regular hexagons, 16 where the legs
-    meet in pairs. They are regular, since lengths at which some are not make no open set. Both kept
-    starts must lead to the same ones; where they do not, ways around other lengths are gone until
-    three of them bring nothing new.
+    Special ends of the legs have fewer than forty roots: 28 for semi-regular hexagons, 16 for legs
+    that meet in pairs. The roots are regular, because lengths with singular roots form no open set.
+    Both stored starts must lead to the same roots. If they do not, monodromy around other lengths
+    is repeated until three closed paths find no new root.
 
     Args:
-        a: the bytes of (6, 3) ends on the ground, in sizes of the platform about their mean.
-        b: of those on the platform.
+        a: bytes of (6, 3) ends on the ground, in sizes of the platform about their mean.
+        b: bytes of (6, 3) ends on the platform, in the same form.
     """
     ends = [np.frombuffer(told).reshape(LEGS, 3).astype(complex) for told in (a, b)]
     rng = np.random.default_rng(_SEED)
@@ -319,7 +320,7 @@ def own_start(a: bytes, b: bytes) -> Start:
 
 
 _IDLE = 3
-"""Ways without new roots after which all are taken to be known."""
+"""Number of closed paths without new roots after which the roots count as complete."""
 
 
 def _lengths(rng: np.random.Generator) -> Complex:
@@ -331,46 +332,47 @@ def _distinct_roots(legs: Legs, x: Complex) -> Complex:
     return ends.x[ends.regular]
 
 
-# The real poses of a platform.
+# Real poses of a platform.
 
 
 _RIGID = 1e-9
-"""Least singular value of the legs' lines, as a part of the largest, below which the legs hold the
-platform at no pose: similar hexagons leave 1e-15."""
+"""Smallest relative singular value of the lines of the legs, below which the legs hold the platform
+at no pose: similar hexagons leave 1e-15."""
 _POSES = 4
 _REAL = 1e-6
-"""Imaginary part of a root, as a part of |x| = 1, below which it may be real; Newton's method on
-real numbers decides."""
+"""Largest imaginary part, relative to |x| = 1, of a root that may be real; Newton's method on real
+numbers decides."""
 _NEARLY_REAL = 0.1
-"""The same where a path stopped before its end, at a root where two meet: t misses 1 by some
-hundredths at most there, and the root by as much as the root of that."""
+"""Largest imaginary part if a path stopped before its end, at a root where two roots meet: t misses
+1 by some hundredths there, and the root by about the square root of that."""
 _CLOSED = 1e-11
-"""Lengths of legs that fit, in parts of the size of the platform: Newton's method leaves 1e-15, and
+"""Largest error of squared leg lengths at a solution, in sizes: Newton's method leaves 1e-15, and
 at a fold, where it is slow, 1e-13."""
 _REFINEMENTS = 60
-"""At a fold each halves the distance: as many as halvings of numbers of sixteen digits."""
+"""Maximum number of Newton steps: at a fold each step halves the distance, and a double has sixteen
+digits."""
 _NEARLY, _HALF, _LEAST = 1e-13, 0.3, 1e-4
-"""Errors of squares below which a second halving of the step is not tried, as rounding is all that
-is left, and the least part of a step that is tried elsewhere."""
+"""Error of squares below which the step is halved at most once, because only rounding remains;
+smallest fraction of a step there; smallest fraction of a step for larger errors."""
 _EXACT, _LOOSE = 1e-16, 1e-12
-"""Squares of lengths that are exact but for rounding, and relative singular values below which a
-pose is not moved along: those of folds."""
+"""Error of squared lengths that are exact up to rounding, and relative singular value of directions
+along which a pose is not moved, as at folds."""
 _SAME = 1e-6
-"""Distance of e, and of p in sizes, below which two real roots are one: a fold, met from both
-sides."""
+"""Distance of e, and of p in sizes, below which two real roots are the same: a fold that is reached
+from both sides."""
 _FOLD = 1e-2
-"""By how much t may miss 1 where two roots meet at the end."""
+"""Largest distance of t from 1 at the end of a path where two roots meet."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Poses:
-    """Every pose of a platform.
+    """All poses of a platform.
 
     Attributes:
-        e: (r, 4) unit quaternions, the first number not negative.
-        p: (r, 3) places of the frame of the platform.
-        proof: what is certain, as part of a sentence.
-        complete: whether that proves that these are all.
+        e: (r, 4) unit quaternions, with a first element that is not negative.
+        p: (r, 3) positions of the platform frame [m].
+        proof: text on the certificate, for use within a sentence.
+        complete: whether the certificate proves that no pose is missing.
     """
 
     e: Real
@@ -380,12 +382,12 @@ class Poses:
 
 
 def poses(a: Real, b: Real, length: Real) -> Poses:
-    """Every pose in which six legs have their lengths.
+    """Return all poses in which six legs have given lengths.
 
     Args:
         a: (6, 3) ends of the legs on the ground [m].
         b: (6, 3) ends on the platform, in its frame [m].
-        length: (6,) of the legs [m].
+        length: (6,) lengths of the legs [m].
 
     Raises:
         LoopError: the legs hold the platform at no pose.
@@ -407,7 +409,7 @@ def poses(a: Real, b: Real, length: Real) -> Poses:
         ends = certify(legs, x, t)
         found = _real(a0, b0, square, ends, t)
         certain = int(np.sum(ends.regular))
-        # each root where two of them meet is the end of two paths
+        # a double root is the end of two paths
         complete = certain + 2 * found.folds == expected
         if complete:
             break
@@ -427,7 +429,7 @@ def _rotations(e: Real) -> Real:
 
 
 def _slopes(a: Real, b: Real, e: Real, p: Real) -> tuple[Real, Real]:
-    """Squares of the lengths (r, 6), and half their derivatives by [p; turn], (r, 6, 6)."""
+    """Return squared lengths (r, 6), and half their derivatives by [p; rotation], (r, 6, 6)."""
     arm = np.einsum("rij,kj->rki", _rotations(e), b)
     way = p[:, None, :] + arm - a
     return np.sum(way**2, axis=2), np.concatenate([way, np.cross(arm, way)], axis=2)
@@ -438,11 +440,11 @@ def _size(a: Real, b: Real) -> float:
 
 
 def holds(a: Real, b: Real) -> bool:
-    """Whether six legs hold a platform at some pose.
+    """Whether six legs of suitable lengths hold a platform at some pose.
 
     Args:
-        a: (6, 3) their ends on the ground [m].
-        b: (6, 3) those on the platform, in its frame [m].
+        a: (6, 3) ends of the legs on the ground [m].
+        b: (6, 3) ends on the platform, in its frame [m].
     """
     a, b = (a - a.mean(axis=0)) / _size(a, b), (b - b.mean(axis=0)) / _size(a, b)
     rng = np.random.default_rng(_SEED)
@@ -453,7 +455,7 @@ def holds(a: Real, b: Real) -> bool:
 
 
 class _RealRoots(NamedTuple):
-    """Quaternions (r, 4), places (r, 3) in sizes, and how many of them lie at folds."""
+    """Quaternions (r, 4), positions (r, 3) in sizes, and the number of roots at folds."""
 
     e: Real
     p: Real
@@ -461,7 +463,7 @@ class _RealRoots(NamedTuple):
 
 
 def _real(a: Real, b: Real, square: Real, ends: Ends, t: Real) -> _RealRoots:
-    """The real roots among the ends."""
+    """Return the real roots among the ends of paths that reached t (r,)."""
     near = t > 1 - _FOLD
     near &= np.linalg.norm(ends.x[:, :4], axis=1) > _FLAT**0.5
     order = np.argsort(~ends.regular[near], kind="stable")
@@ -473,7 +475,7 @@ def _real(a: Real, b: Real, square: Real, ends: Ends, t: Real) -> _RealRoots:
     x, regular = x[candidate].real, regular[candidate]
     e = x[:, :4] / np.linalg.norm(x[:, :4], axis=1, keepdims=True)
     g = x[:, 4:] / np.linalg.norm(x[:, :4], axis=1, keepdims=True)
-    # p = g e*: the vector part
+    # p = g e*: its vector part
     p = -g[:, :1] * e[:, 1:] + e[:, :1] * g[:, 1:] - np.cross(g[:, 1:], e[:, 1:])
     e, p, error = _refined(a, b, square, e, p)
     kept = list[int]()
@@ -490,9 +492,9 @@ def _is_same(e: Real, p: Real, other_e: Real, other_p: Real) -> bool:
 
 
 def _refined(a: Real, b: Real, square: Real, e: Real, p: Real) -> tuple[Real, Real, Real]:
-    """Newton's method on real poses, and the largest errors of squares of lengths (r,).
+    """Refine real poses by Newton's method; return e, p, largest errors of squared lengths (r,).
 
-    Steps that bring nothing are halved: at a fold they have no bounds.
+    Steps without improvement are halved, because their length has no bound at a fold.
     """
     share = np.ones(len(e))
     value, J = _slopes(a, b, e, p)
@@ -521,7 +523,7 @@ def _refined(a: Real, b: Real, square: Real, e: Real, p: Real) -> tuple[Real, Re
 
 
 def _products(e: Real, other: Real) -> Real:
-    """(r, 4) products of quaternions."""
+    """Return products (r, 4) of quaternions."""
     scalar = e[:, :1] * other[:, :1] - np.sum(e[:, 1:] * other[:, 1:], axis=1, keepdims=True)
     vector = e[:, :1] * other[:, 1:] + other[:, :1] * e[:, 1:] + np.cross(e[:, 1:], other[:, 1:])
     return np.concatenate([scalar, vector], axis=1)

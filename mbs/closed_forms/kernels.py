@@ -1,4 +1,4 @@
-"""The kernel for a loop: the first that finds some of its unknown joints."""
+"""Selection of the closed form of a loop: the first kernel that finds some of its joints."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ _KERNELS: tuple[Callable[[Ring, SX, SX], LoopBranches | None], ...] = (
 
 
 def closed_form(ring: Ring, q: SX, p: SX) -> LoopBranches | str:
-    """The ways to find some of the positions of a loop, or why no kernel fits.
+    """Return the branches of some unknown positions of a loop, or text on why no kernel fits.
 
-    The others follow once these are known.
+    The other positions can be solved once these are known.
 
     Args:
-        ring: the loop.
-        q: symbols of positions, those of cut joints included.
+        ring: loop chain.
+        q: symbols of positions, cut joints included.
         p: (np, 1) symbols of parameters.
     """
     if any(joint.motion is Motion.FREE for joint in ring.joints) and len(ring.joints) > 1:

@@ -1,4 +1,4 @@
-"""Pieper's method: arms with three axes through one point, or with three prismatic joints."""
+"""Pieper's method: arms with three intersecting axes, or with three prismatic joints."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from mbs.errors import NoClosedForm
 from mbs.recursions.chain import ChainJoint, Gap, Ring
 from mbs.spatial import Pose, axis_rotation, vector
 
-# Quantities that depend on one joint, and equations X e^(i q) = U in another.
+# Forms: quantities that depend on one joint, as coefficients of its elementary functions.
 #
-# A linear form holds three factors: of cos q, sin q and 1 for a revolute joint, of r^2, r and 1
-# for a prismatic one. A symmetric (3, 3) matrix A of such factors stands for the sum of the
-# products, b^T A b with b = (cos q, sin q, 1) or (r^2, r, 1).
+# A linear form has three coefficients: of cos q, sin q and 1 for a revolute joint, of r^2, r and 1
+# for a prismatic joint. A symmetric matrix A (3, 3) of such coefficients represents b^T A b with
+# b = (cos q, sin q, 1) or (r^2, r, 1).
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PieperLoop:
-    """The loop as Pieper sees it.
+    """Loop in the arrangement that Pieper's method requires.
 
     Attributes:
-        problem: to be solved.
-        ring: the loop, begun and walked so that the joints to be found last are its last ones.
-        length: of the size of the arm and of the pose [m].
+        problem: problem to be solved.
+        ring: loop chain, with start and direction chosen so that the joints solved last come last.
+        length: typical length of the arm and of the pose [m].
     """
 
     problem: Problem
@@ -49,25 +49,25 @@ class PieperLoop:
     length: SX
 
     def x(self, k: int) -> SX:
-        """The symbol of the position of joint k of the ring."""
+        """Return the symbol of the position of joint k of the loop chain."""
         return SX(self.problem.x[self.index(k)])
 
     def index(self, k: int) -> int:
-        """The place of joint k of the ring."""
+        """Return the index in x of joint k of the loop chain."""
         index = self.ring.joints[k].index
         assert index is not None
         return index
 
     def after(self, k: int) -> Gap:
-        """The way from joint k to the next."""
+        """Return the known transform from joint k to the next joint."""
         return self.ring.gaps[(k + 1) % len(self.ring.gaps)]
 
     def motion(self, k: int) -> Pose:
-        """The motion of joint k, walked along the ring."""
+        """Return the displacement of joint k in the direction of the loop chain."""
         return self.ring.joints[k].displacement(self.x(k))
 
     def suffix(self, k: int) -> str:
-        """What the names of the coefficients of joint k end with: its number."""
+        """Return the suffix of the names of the coefficients of joint k: its number."""
         joints = self.problem.ring.joints
         digits = ["".join(c for c in joint.name if c.isdigit()) for joint in joints]
         number = joints.index(self._named(k))
@@ -79,12 +79,12 @@ class PieperLoop:
         return next(joint for joint in self.problem.ring.joints if joint.name == name)
 
     def zero(self, values: SX) -> bool:
-        """Whether the values, free of units, vanish wherever the loop closes."""
+        """Whether dimensionless values are zero in all closed configurations."""
         return self.problem.always_zero(values)
 
 
 def basis(scene: PieperLoop, k: int) -> SX:
-    """(3, 1) what the factors of a form in joint k multiply."""
+    """Return the functions (3, 1) that the coefficients of a form in joint k multiply."""
     x = scene.x(k)
     if scene.ring.joints[k].is_rotational:
         return casadi.vertcat(casadi.cos(x), casadi.sin(x), 1)
@@ -92,7 +92,7 @@ def basis(scene: PieperLoop, k: int) -> SX:
 
 
 def moved_point(joint: ChainJoint, point: SX) -> SX:
-    """(3, 3) forms of the coordinates of a point that the joint moves."""
+    """Return the forms (3, 3) of the coordinates of a point that the joint moves."""
     x, y, z, sign = point[0], point[1], point[2], joint.sign
     if joint.is_rotational:
         return casadi.vertcat(
@@ -104,19 +104,20 @@ def moved_point(joint: ChainJoint, point: SX) -> SX:
 
 
 def constant(value: SX) -> SX:
-    """The form of what does not depend on the joint."""
+    """Return the form of a quantity that does not depend on the joint."""
     return casadi.vertcat(0, 0, value)
 
 
 def product(a: SX, b: SX) -> SX:
-    """(3, 3) of the product of two forms."""
+    """Return the symmetric matrix (3, 3) of the product of two forms."""
     outer = casadi.mtimes(a, b.T)
     return SX((outer + outer.T) / 2)
 
 
-# Three revolute joints whose axes meet, or are taken by themselves, from the rotation they make.
+# Three revolute joints from the rotation that they produce, if their axes intersect or if only
+# orientations matter.
 #
-# Z(q1) A Z(q2) B Z(q3) = G; the element G_zz holds the middle one alone.
+# Z(q1) A Z(q2) B Z(q3) = G; the element G_zz depends on the middle joint only.
 #
 # Source: Pieper 1968; Khalil & Creusot 1997, section 3.3 for the types of equations.
 
@@ -124,14 +125,14 @@ def product(a: SX, b: SX) -> SX:
 def three_angle_steps(
     scene: PieperLoop, revolute: tuple[int, int, int], A: SX, B: SX, G: SX
 ) -> list[SequenceStep]:
-    """The steps of three revolute joints.
+    """Return the steps of three revolute joints, from Z(q1) A Z(q2) B Z(q3) = G.
 
     Args:
-        scene: whose joints they are.
-        revolute: their numbers in the ring.
-        A: (3, 3) rotation between the first two; no rotation about z.
-        B: (3, 3) rotation between the last two, likewise.
-        G: (3, 3) what they make, of joints that are known.
+        scene: loop with the joints.
+        revolute: indices of the joints in the loop chain.
+        A: (3, 3) rotation between the first two joints, not about z.
+        B: (3, 3) rotation between the last two joints, not about z.
+        G: (3, 3) rotation that the three joints produce, in terms of known joints.
     """
     first, middle, last = revolute
     Z1, Z2 = (_axis_rotation(scene, k) for k in (first, middle))
@@ -149,7 +150,7 @@ def _axis_rotation(scene: PieperLoop, k: int) -> SX:
 
 
 def _middle(scene: PieperLoop, k: int, row: SX, column: SX, G: SX) -> SequenceStep:
-    """The joint in the middle, from row^T Z column = G_zz."""
+    """Return the step of the joint in the middle, from row^T Z column = G_zz."""
     joint = scene.ring.joints[k]
     sign = SX.sym(joint.name)
     X = row[0] * column[0] + row[1] * column[1]
@@ -170,7 +171,7 @@ def _middle(scene: PieperLoop, k: int, row: SX, column: SX, G: SX) -> SequenceSt
 
 
 def _square_angle(X: SX, Y: SX, Z: SX, sign: SX, G: SX) -> Root:
-    """The root where both neighbours are at right angles: X^2 + Y^2 = 1, Z^2 + W^2 = 1."""
+    """Return the root for perpendicular neighbours: X^2 + Y^2 = 1 and Z^2 + W^2 = 1."""
     W = sign * casadi.sqrt(G[0, 2] * G[0, 2] + G[1, 2] * G[1, 2])
     angle = casadi.atan2(Y * Z + X * W, X * Z - Y * W)
     return Root(SX(angle), SX(1), SX(1))
@@ -183,14 +184,14 @@ def _outer(scene: PieperLoop, k: int, start: SX, end: SX) -> SequenceStep:
 def angle_step(
     scene: PieperLoop, k: int, vectors: tuple[SX, SX], scale: SX | float, regular: Sequence[SX] = ()
 ) -> SequenceStep:
-    """The angle of joint k that brings one vector of the plane onto the direction of another.
+    """Return the step of an angle that rotates a vector of the plane into a given direction.
 
     Args:
-        scene: whose joint it is.
-        k: its number in the ring.
-        vectors: (2, 1) before the rotation, and (2, 1) after it, of the same length.
-        scale: of the size of both, in their unit.
-        regular: what else must not vanish, free of units.
+        scene: loop with the joint.
+        k: index of the joint in the loop chain.
+        vectors: vector (2, 1) before the rotation, and vector (2, 1) after it, of equal length.
+        scale: typical length of both vectors, in their unit.
+        regular: further dimensionless quantities that must not vanish.
     """
     joint = scene.ring.joints[k]
     start, end = vectors
@@ -205,22 +206,22 @@ def angle_step(
     return step(scene.problem, "type 3", text, {}, found)
 
 
-# Steps that find one joint from one equation: of degree 1 or 2 in its form.
+# Steps that solve one joint from one equation, of degree 1 or 2 in its form.
 
 
 _SMALL = 1e-30
-"""Added to the square of the first factor of a quadratic, free of units: factors below 1e-15 are
-rounding, and the root is then finite."""
+"""Value added to the square of the first coefficient of a quadratic equation, dimensionless:
+coefficients below 1e-15 are rounding, and the root is finite with it."""
 
 
 def root_of_form(scene: PieperLoop, k: int, form: SX, unit: SX) -> SequenceStep | None:
-    """Joint k from form = 0; None where the form does not depend on the joint.
+    """Return the step of joint k from form = 0; None if the form does not depend on the joint.
 
     Args:
-        scene: whose joint it is.
-        k: its number in the ring.
-        form: (3, 1) factors, see `forms`.
-        unit: of the size of what the form is a sum of, in its unit.
+        scene: loop with the joint.
+        k: index of the joint in the loop chain.
+        form: (3, 1) coefficients of the functions `basis`.
+        unit: typical size of the terms of the form, in its unit.
     """
     if not scene.ring.joints[k].is_rotational:
         return _polynomial(scene, k, [form[0], form[1], form[2]], unit)
@@ -239,13 +240,13 @@ def root_of_form(scene: PieperLoop, k: int, form: SX, unit: SX) -> SequenceStep 
 
 
 def root_of_square(scene: PieperLoop, k: int, A: SX, unit: SX) -> SequenceStep | None:
-    """Joint k from b^T A b = 0; None where it does not depend on the joint.
+    """Return the step of joint k from b^T A b = 0; None if it does not depend on the joint.
 
     Args:
-        scene: whose joint it is.
-        k: its number in the ring.
-        A: (3, 3) symmetric, factors of the products, see `forms`.
-        unit: of the size of what it is a sum of, in its unit.
+        scene: loop with the joint.
+        k: index of the joint in the loop chain.
+        A: (3, 3) symmetric coefficients of products of the functions `basis`.
+        unit: typical size of the terms of the sum, in its unit.
     """
     if not scene.ring.joints[k].is_rotational:
         powers = [A[0, 0], 2 * A[0, 1], A[1, 1] + 2 * A[0, 2], 2 * A[1, 2], A[2, 2]]
@@ -268,14 +269,14 @@ def root_of_square(scene: PieperLoop, k: int, A: SX, unit: SX) -> SequenceStep |
 def linear(
     scene: PieperLoop, k: int, factor: SX, value: SX, scale: SX | float = 1.0
 ) -> SequenceStep:
-    """A prismatic joint, from factor x = value.
+    """Return the step of a prismatic joint from factor x = value.
 
     Args:
-        scene: whose joint it is.
-        k: its number in the ring.
-        factor: of the position.
-        value: the right side [m], times the unit of the factor.
-        scale: of the size of the factor, in its unit.
+        scene: loop with the joint.
+        k: index of the joint in the loop chain.
+        factor: coefficient of the position.
+        value: right side [m], times the unit of the factor.
+        scale: typical size of the factor, in its unit.
     """
     joint = scene.ring.joints[k]
     r, n, size = joint.name, scene.suffix(k), factor / scale
@@ -286,7 +287,7 @@ def linear(
 
 
 def _polynomial(scene: PieperLoop, k: int, factors: list[SX], unit: SX) -> SequenceStep | None:
-    """A prismatic joint, from a polynomial; factors from the highest power."""
+    """Return the step of a prismatic joint from a polynomial, highest power first, or None."""
     degree = len(factors) - 1
     while degree and scene.zero(factors[0] * scene.length**degree / unit):
         factors, degree = factors[1:], degree - 1
@@ -311,7 +312,7 @@ def _polynomial(scene: PieperLoop, k: int, factors: list[SX], unit: SX) -> Seque
 
 
 def _polynomial_text(names: list[str], r: str) -> str:
-    """The equation, such as "A3 r3^2 + B3 r3 + C3 = 0"."""
+    """Return the text of the equation, such as "A3 r3^2 + B3 r3 + C3 = 0"."""
     powers = [f" {r}^{k}" if k > 1 else f" {r}" for k in range(len(names) - 1, 0, -1)]
     return (
         " + ".join(f"{name}{power}" for name, power in zip(names, [*powers, ""], strict=True))
@@ -320,7 +321,7 @@ def _polynomial_text(names: list[str], r: str) -> str:
 
 
 def _quadratic_root(factors: list[SX], sign: SX, length: SX, unit: SX) -> Root:
-    """The root of a r^2 + b r + c on one side of the middle, finite for every a."""
+    """Return the root of a r^2 + b r + c on one side of the mean of the roots, finite for any a."""
     a, b, c = factors[0] * length**2 / unit, factors[1] * length / unit, factors[2] / unit
     inverse = a / (a * a + _SMALL)
     middle = -b * inverse / 2
@@ -329,25 +330,25 @@ def _quadratic_root(factors: list[SX], sign: SX, length: SX, unit: SX) -> Root:
     return Root(SX((middle + root.value) * length), SX(root.real / size), SX(a * a))
 
 
-# Three joints that carry a point to where it has to be.
+# Three joints that move a point to a target position.
 #
-# J1 [R1 t1] J2 f = p, where f(q3) is the point seen after joint 2. What joint 1 leaves unchanged
-# gives two equations in which joint 2 stands linearly, and joint 2 is eliminated from them; what
-# remains holds joint 3 alone.
+# J1 [R1 t1] J2 f = p, where f(q3) is the point in the frame after joint 2. Invariants of joint 1
+# give two equations that are linear in the functions of joint 2. Joint 2 is eliminated, and the
+# remaining equation depends on joint 3 only.
 #
 # Source: Pieper 1968; Khalil & Creusot 1997, section 3.3 for the types of equations.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reach:
-    """The target position of a point.
+    """Target position of a point that the first three joints move.
 
     Attributes:
-        scene: whose first three joints carry it.
-        way: (R1, t1) from joint 1 to joint 2.
-        f: (3, 3) forms in joint 3 of the point seen after joint 2.
+        scene: loop with the joints.
+        way: transform (R1, t1) from joint 1 to joint 2.
+        f: (3, 3) forms in joint 3 of the point in the frame after joint 2.
         square: (3, 1) form of |f|^2.
-        p: (3, 1) the target position [m].
+        p: (3, 1) target position in the frame before joint 1 [m].
     """
 
     scene: PieperLoop
@@ -358,12 +359,12 @@ class Reach:
 
 
 def three_joints(scene: PieperLoop, point: SX, p: SX) -> list[SequenceStep] | None:
-    """The steps of joints 3, 2 and 1; None where these three cannot be found so.
+    """Return the steps of joints 3, 2 and 1; None if these equations do not determine them.
 
     Args:
-        scene: whose first three joints they are.
-        point: (3, 1) seen after joint 3 [m].
-        p: (3, 1) where it has to be, seen before joint 1 [m].
+        scene: loop whose first three joints are solved.
+        point: (3, 1) point in the frame after joint 3 [m].
+        p: (3, 1) target position in the frame before joint 1 [m].
     """
     joint, way = scene.ring.joints[2], scene.after(1).pose
     f = casadi.mtimes(way.R, moved_point(joint, point))
@@ -377,19 +378,19 @@ def three_joints(scene: PieperLoop, point: SX, p: SX) -> list[SequenceStep] | No
 
 
 def _square(f: SX, t: SX, point: SX) -> SX:
-    """The form of |f|^2, of a point that rotates."""
+    """Return the form of |f|^2 for a revolute joint 3."""
     middle = 2 * casadi.mtimes(f.T, t)
     return SX(middle + constant(casadi.sumsqr(point) - casadi.sumsqr(t)))
 
 
 def _slid_square(f: SX) -> SX:
-    """The form of |f|^2, of a point that translates."""
+    """Return the form of |f|^2 for a prismatic joint 3."""
     u, v = f[:, 1], f[:, 2]
     return casadi.vertcat(casadi.sumsqr(u), 2 * casadi.dot(u, v), casadi.sumsqr(v))
 
 
 def _rows(reach: Reach) -> tuple[list[SX], list[SX], list[SX]]:
-    """Two equations a . (J2 f) = h: vectors a, forms h, and the units of h."""
+    """Return two equations a . (J2 f) = h: vectors a, forms h, and the units of h."""
     scene, R, t = reach.scene, reach.way.R, reach.way.p
     if not scene.ring.joints[0].is_rotational:
         rows = [R[k, :].T for k in (0, 1)]
@@ -401,7 +402,7 @@ def _rows(reach: Reach) -> tuple[list[SX], list[SX], list[SX]]:
 
 
 def _second_revolute(reach: Reach) -> list[SequenceStep] | None:
-    """Joints 3 and 2 where joint 2 is revolute."""
+    """Return the steps of joints 3 and 2 for a revolute joint 2."""
     scene = reach.scene
     (a, b), (h, k), (unit_h, unit_k) = _rows(reach)
     Z1, Z2 = h - a[2] * reach.f[2, :].T, k - b[2] * reach.f[2, :].T
@@ -425,7 +426,7 @@ def _second_revolute(reach: Reach) -> list[SequenceStep] | None:
 def _parallel(
     reach: Reach, first: tuple[SX, SX, SX], second: tuple[SX, SX, SX]
 ) -> list[SequenceStep] | None:
-    """Joints 3 and 2 where joint 2 stands in both equations in the same way, or in one alone."""
+    """Return steps of joints 3 and 2 if both equations have proportional terms in joint 2."""
     scene, (a, Z1, unit), (b, Z2, unit_b) = reach.scene, first, second
     if scene.zero(b[:2] * scene.length / unit_b):
         if scene.zero(a[:2] * scene.length / unit):
@@ -448,7 +449,7 @@ def _parallel(
 
 
 def _second_prismatic(reach: Reach) -> list[SequenceStep] | None:
-    """Joints 3 and 2 where joint 2 is prismatic."""
+    """Return the steps of joints 3 and 2 for a prismatic joint 2."""
     rows, forms, _ = _rows(reach)
     left = [h - casadi.mtimes(reach.f.T, a) for a, h in zip(rows, forms, strict=True)]
     if reach.scene.ring.joints[0].is_rotational:
@@ -459,7 +460,7 @@ def _second_prismatic(reach: Reach) -> list[SequenceStep] | None:
 def _two_displacements(
     reach: Reach, along: tuple[SX, SX], left: tuple[SX, SX]
 ) -> list[SequenceStep] | None:
-    """Joints 3 and 2 from along[k] x2 = left[k], two equations in the plane across joint 1."""
+    """Return the steps of joints 3 and 2 from two equations along[k] x2 = left[k], k = 0, 1."""
     scene, sign = reach.scene, reach.scene.ring.joints[1].sign
     third = root_of_form(scene, 2, along[1] * left[0] - along[0] * left[1], scene.length)
     if third is None:
@@ -472,9 +473,9 @@ def _two_displacements(
 def _slide_in_turn(
     reach: Reach, a: SX, along: SX, left: tuple[SX, SX]
 ) -> list[SequenceStep] | None:
-    """Joints 3 and 2 where joint 1 turns and joint 2 slides.
+    """Return the steps of joints 3 and 2 for a revolute joint 1 and a prismatic joint 2.
 
-    With r the way of joint 2: r^2 / 2 + (f_z + a_z) r = left[0] and along r = left[1].
+    With the displacement r of joint 2: r^2 / 2 + (f_z + a_z) r = left[0] and along r = left[1].
     """
     scene, sign = reach.scene, reach.scene.ring.joints[1].sign
     height, b3 = reach.f[2, :].T + constant(a[2]), basis(scene, 2)
@@ -492,7 +493,7 @@ def _slide_in_turn(
 
 
 def _first(reach: Reach) -> SequenceStep:
-    """Joint 1, once the other two are known."""
+    """Return the step of joint 1, with the other two joints known."""
     scene = reach.scene
     f = Pose.translation(casadi.mtimes(reach.f, basis(scene, 2)))
     w = (reach.way @ scene.motion(1) @ f).p
@@ -502,17 +503,17 @@ def _first(reach: Reach) -> SequenceStep:
     return linear(scene, 0, SX(1), joint.sign * (reach.p[2] - w[2]))
 
 
-# Three prismatic joints, anywhere in the loop: the revolute joints first, then three
-# linear equations.
+# Three prismatic joints at any position in the loop: the revolute joints first, then three linear
+# equations.
 #
 # Source: Pieper 1968; Khalil & Creusot 1997, section 3.3 for the types of equations.
 
 
 def three_displacements(scene: PieperLoop) -> list[SequenceStep]:
-    """The steps of a loop of three revolute and three prismatic joints.
+    """Return the steps of a loop of three revolute and three prismatic joints.
 
     Raises:
-        NoClosedForm: two of the turning axes are always parallel, or the prismatic joints coplanar.
+        NoClosedForm: two revolute axes are always parallel, or the prismatic axes are coplanar.
     """
     revolute = scene.ring
     for k in reversed([k for k, joint in enumerate(revolute.joints) if not joint.is_rotational]):
@@ -530,7 +531,7 @@ def three_displacements(scene: PieperLoop) -> list[SequenceStep]:
 
 
 def _displacements(scene: PieperLoop) -> SequenceStep:
-    """The prismatic joints, from the sum of all translations around the loop."""
+    """Return the step of the prismatic joints from the sum of translations around the loop."""
     path, indices, columns = Pose.identity(), list[int](), list[SX]()
     for k, (joint, gap) in enumerate(zip(scene.ring.joints, scene.ring.gaps, strict=True)):
         path = path @ gap.pose
@@ -558,7 +559,7 @@ def _displacements(scene: PieperLoop) -> SequenceStep:
 
 
 def _cross(M: SX, k: int) -> SX:
-    """(3, 1) the vector product of the two columns after column k."""
+    """Return the vector product (3, 1) of the two columns after column k, cyclically."""
     return SX(casadi.cross(M[:, (k + 1) % 3], M[:, (k + 2) % 3]))
 
 
@@ -576,7 +577,7 @@ def _text(scene: PieperLoop, indices: list[int], ends: list[str]) -> str:
     return ", ".join(f"{row} + {axis}0 = 0" for row, axis in zip(rows, "XYZ", strict=True))
 
 
-# The arrangement of the loop that Pieper's method takes, and its steps.
+# Arrangement of the loop for Pieper's method, and its steps.
 #
 # Source: Pieper 1968; Khalil & Creusot 1997, section 3.3 for the types of equations.
 
@@ -585,17 +586,18 @@ _JOINTS = 6
 
 
 def pieper(problem: Problem) -> StepSequence:
-    """The steps of a loop of six joints by Pieper's method.
+    """Return the steps of a loop of six joints by Pieper's method.
 
-    Wherever in the loop three neighbouring axes meet in a point, the loop is begun and walked so
-    that they come last; the first three joints carry the point, then the last three turn.
+    For three neighbouring axes that intersect in a point, the start and direction of the loop are
+    chosen so that these joints come last. The first three joints move the point to its target; the
+    last three joints set the orientation.
 
     Args:
-        problem: of six joints.
+        problem: problem with six joints.
 
     Raises:
-        NoClosedForm: no three neighbouring axes meet and no three joints slide, or the arm is
-            singular in every configuration.
+        NoClosedForm: no three neighbouring axes intersect and no three joints are prismatic, or
+            the arm is singular in all configurations.
     """
     names = [joint.name for joint in problem.ring.joints]
     if problem.size != _JOINTS:
@@ -618,12 +620,12 @@ def pieper(problem: Problem) -> StepSequence:
 
 
 def _cost(sequence: StepSequence) -> tuple[int, int]:
-    """The number of branches, then of quartics."""
+    """Return the number of branches and the number of quartics, as a sort key."""
     return sequence.branches, sum(step.kind == "quartic" for step in sequence.steps)
 
 
 def _steps(scene: PieperLoop) -> list[SequenceStep] | None:
-    """The steps where the axes of the last three joints meet; None where the first three differ."""
+    """Return steps for a loop whose last three axes intersect; None if there is no solution."""
     ring = scene.ring
     first, last = _height(scene.after(3).pose)[0], _height(scene.after(4).pose.inverse())[0]
     point = (scene.after(2).pose @ Pose.translation(vector([0, 0, first]))).p
@@ -640,13 +642,13 @@ def _steps(scene: PieperLoop) -> list[SequenceStep] | None:
 
 
 def _length(problem: Problem) -> SX:
-    """Of the size of the arm and of the pose [m]."""
+    """Return a typical length of the arm and of the pose [m]."""
     squares = [casadi.sumsqr(gap.pose.p) for gap in problem.ring.gaps]
     return SX(casadi.sqrt(sum(squares, SX(TINY_SQUARE))))
 
 
 def _arrangements(problem: Problem) -> list[PieperLoop]:
-    """The loop begun and walked so that three axes that meet come last."""
+    """Return the loop in all arrangements whose last three axes intersect."""
     length = _length(problem)
     found = list[PieperLoop]()
     for k in _concurrent(problem, length):
@@ -657,13 +659,13 @@ def _arrangements(problem: Problem) -> list[PieperLoop]:
 
 
 def _pose_comes_first(scene: PieperLoop) -> bool:
-    """Whether the way with the most symbols, that of the pose, lies after the first joint."""
+    """Whether the transform with the most symbols, which contains the pose, follows joint 1."""
     counts = [len(casadi.symvar(gap.pose.matrix)) for gap in scene.ring.gaps]
     return counts[1] == max(counts)
 
 
 def _regular(problem: Problem, steps: list[SequenceStep]) -> bool:
-    """Whether the steps determine every joint of a generic configuration."""
+    """Whether the steps determine all joints of a generic configuration."""
     x, given = problem.x, problem.given
     return not any(
         problem.always_zero(quantity)
@@ -673,7 +675,7 @@ def _regular(problem: Problem, steps: list[SequenceStep]) -> bool:
 
 
 def _concurrent(problem: Problem, length: SX) -> list[int]:
-    """The numbers k such that joints k, k + 1 and k + 2 rotate about axes through one point."""
+    """Return the indices k for which the axes of joints k, k + 1 and k + 2 meet in one point."""
     gaps, joints = problem.ring.gaps, problem.ring.joints
     after = [gaps[(k + 1) % _JOINTS].pose for k in range(_JOINTS)]
     ahead, behind = [_height(way) for way in after], [_height(way.inverse()) for way in after]
@@ -691,14 +693,14 @@ def _concurrent(problem: Problem, length: SX) -> list[int]:
 
 
 def _height(way: Pose) -> tuple[SX, SX, SX, SX]:
-    """Where an axis comes next to the z axis, and how.
+    """Return the common normal of the z axis and another axis, as coordinates.
 
     Args:
-        way: pose of a frame whose z axis is that axis.
+        way: pose of a frame, whose z axis is the other axis.
 
     Returns:
-        The height on the z axis, that on the axis itself, the miss, and the bend between them,
-        which vanishes where they are parallel.
+        Coordinate of the normal on the z axis, coordinate on the other axis, a measure of the
+        distance (zero if the axes intersect), and the squared sine between the axes.
     """
     p, a = way.p, way.R[:, 2]
     bend = a[0] * a[0] + a[1] * a[1]
@@ -714,7 +716,7 @@ def _refusal(names: list[str]) -> str:
 
 
 def _degenerate(scenes: list[PieperLoop]) -> str:
-    """Which joints do not determine where the axes meet."""
+    """Return the error text on joints that the target does not determine."""
     joints = scenes[0].ring.joints
     first, last = (", ".join(joint.name for joint in part) for part in (joints[:3], joints[3:]))
     return (

@@ -1,4 +1,4 @@
-"""Plane loops of three unknown joints: revolute and prismatic joints, parallelograms."""
+"""Closed forms of plane loops of three unknown joints: revolute, prismatic, parallelograms."""
 
 from __future__ import annotations
 
@@ -22,20 +22,21 @@ from mbs.closed_forms.roots import (
 from mbs.components.joints import Motion
 from mbs.recursions.chain import Ring, frames_at_zero
 
-# A planar loop with three unknown revolute joints: the law of cosines at the one in the middle.
+# A planar loop with three unknown revolute joints: the law of cosines at the joint in the middle.
 #
-# With g the path from the first axis to the third, d2 and d3 the links between, seen in the plane:
-# |d2 + R d3| = |g| is X cos t + Y sin t = Z in the middle angle t. The sign says to which side of
-# the stretched position the middle joint is rotated.
+# g is the vector from the first axis to the third, d2 and d3 are the links between them, in the
+# plane: |d2 + R d3| = |g| is X cos t + Y sin t = Z in the middle angle t. The sign is the side of
+# the stretched position to which the middle joint is rotated.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 8.
 
 
 def three_revolute(ring: Ring) -> LoopBranches:
-    """The two branches of a planar loop of three unknown revolute joints.
+    """Return the two branches of a planar loop of three unknown revolute joints.
 
     Args:
-        ring: its joints a, b, c; b is the one in the middle, c may be spherical.
+        ring: loop chain with the joints a, b, c, where c may be spherical. The branch is the sign
+            of joint b.
     """
     return LoopBranches(
         {label: _three_revolute_root(ring, sign) for label, sign in signed(ring.joints[1])}
@@ -54,20 +55,20 @@ def _three_revolute_root(ring: Ring, sign: int) -> Positions:
     return positions(ring.joints, (a.value, b.value, last_angle(before)))
 
 
-# A planar loop with two unknown revolute joints and a prismatic one: a quadratic equation in the
+# A planar loop with two unknown revolute joints and a prismatic joint: a quadratic equation in the
 # displacement.
 #
-# Seen from the first axis, the third one moves along a line e + r u; its distance is that of the
-# known path g: r = -u.e +- sqrt(g^2 - (u x e)^2). The sign says which end of the stroke it is.
+# Relative to the first axis, the third axis moves on a line e + r u. Its distance is the length of
+# the known vector g: r = -u.e +- sqrt(g^2 - (u x e)^2). The sign is the end of the stroke.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equations of types 2 and 4.
 
 
 def one_prismatic(ring: Ring) -> LoopBranches:
-    """The two branches of a planar loop of a prismatic joint between two revolute ones.
+    """Return the two branches of a planar loop of a prismatic joint between two revolute joints.
 
     Args:
-        ring: its joints a, b, c; b is the prismatic one, c may be spherical.
+        ring: loop chain with the joints a, b, c, where b is prismatic and c may be spherical.
     """
     return LoopBranches(
         {label: _one_prismatic_root(ring, sign) for label, sign in signed(ring.joints[1])}
@@ -84,17 +85,17 @@ def _one_prismatic_root(ring: Ring, sign: int) -> Positions:
     return positions(ring.joints, (a.value, r, last_angle(before)))
 
 
-# A planar loop with one unknown revolute joint and two prismatic ones: the angle is what is
-# missing, then linear.
+# A planar loop with one unknown revolute joint and two prismatic joints: the angle is the remaining
+# rotation of the loop; the displacements are linear.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equations of types 1 and 3.
 
 
 def two_prismatic(ring: Ring) -> LoopBranches:
-    """The only branch of a planar loop of an unknown revolute joint and two prismatic ones.
+    """Return the only branch of a planar loop of a revolute and two prismatic unknown joints.
 
     Args:
-        ring: its joints a, b, c; a is the revolute one.
+        ring: loop chain with the joints a, b, c, where a is revolute.
     """
     X1, X2, X3 = (gap.pose for gap in ring.gaps)
     R = X2.R @ X3.R
@@ -104,20 +105,20 @@ def two_prismatic(ring: Ring) -> LoopBranches:
     return LoopBranches({"": positions(ring.joints, values)})
 
 
-# A planar loop of equal opposite sides: the parallelogram, and its mirror image that crosses.
+# A planar loop with equal opposite sides: the parallelogram, and its mirror image that crosses.
 #
-# The known path g from the first axis to the third one runs over an axis that splits it into P and
-# Q, as long as the two unknown links, B and A. One solution is A = Q, B = P, whatever the
-# position; the other one is its mirror image about g. Told apart by this and not by a side,
-# either keeps its label through the flat position, where they meet.
+# A known axis splits the vector g from the first axis to the third into P and Q, which are as long
+# as the two unknown links B and A. One solution is A = Q, B = P at all positions; the other
+# solution is its mirror image about g. This definition, in contrast to a side, keeps the label of a
+# branch when it passes through the flat position, where both meet.
 
 
 def parallelogram(ring: Ring, pivot: int) -> LoopBranches:
-    """The two branches of a loop that can be a parallelogram.
+    """Return the two branches of a loop that can be a parallelogram.
 
     Args:
-        ring: its joints a, b, c; b is opposite to the known axis.
-        pivot: which known axis of the path from c to a that is.
+        ring: loop chain with the joints a, b, c, where b is opposite to the known axis.
+        pivot: index of the known axis among the known revolute joints from c to a.
     """
     name = ring.joints[1].name
     X1 = ring.gaps[0].pose
@@ -134,7 +135,7 @@ def parallelogram(ring: Ring, pivot: int) -> LoopBranches:
 
 
 def _parallelogram_root(ring: Ring, A: SX, B: SX) -> Positions:
-    """Positions with the first link along A and the second along B, both seen before joint a."""
+    """Return positions with the links along A and B, both vectors in the frame before joint a."""
     X1, X2, X3 = (gap.pose for gap in ring.gaps)
     R1, R2, R3 = (in_plane(pose.R) for pose in (X1, X2, X3))
     a = angle_onto(in_plane(X2.p), A)
@@ -147,10 +148,10 @@ _SPHERICAL, _PRISMATIC = Motion.SPHERICAL, Motion.PRISMATIC
 
 
 def planar(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """The branches of a plane loop; None where it is none, or too much of it is unknown.
+    """Return the branches of a plane loop; None if it is not plane or has too many unknowns.
 
-    What a closing joint can do out of the plane is left out; a spherical joint, or three revolute
-    joints whose axes meet in one point, stand for a revolute joint.
+    Motions of a closing joint out of the plane are ignored. A spherical joint, or three revolute
+    joints that intersect in one point, count as a revolute joint.
     """
     ring = with_spherical(ring, q, p)
     spherical = sum(joint.motion is _SPHERICAL for joint in ring.joints)
@@ -191,7 +192,7 @@ def _planar_branches(ring: Ring, prismatic: list[int], q: SX, p: SX) -> LoopBran
 
 
 def _opposite(ring: Ring, q: SX, p: SX) -> int | None:
-    """The known axis that makes the loop a parallelogram, if there is one."""
+    """Return the index of the known axis that makes the loop a parallelogram, or None."""
     back = ring.gaps[0].pose.inverse()
     A, B = (square(in_plane(gap.pose.p)) for gap in ring.gaps[1:])
     for number, pivot in enumerate(ring.gaps[0].pivots):
@@ -202,17 +203,17 @@ def _opposite(ring: Ring, q: SX, p: SX) -> int | None:
     return None
 
 
-# A loop whose rotations have one direction: the one prismatic joint that has a part along it.
+# A loop with parallel rotations: the single prismatic joint with a component along their direction.
 #
-# Along the direction n of the revolute axes only that prismatic joint moves anything: n.e + (n.u)
-# s = 0, linear. What is left is a plane loop. A spherical joint may stand in the loop, which keeps
+# Along the direction n of the revolute axes only that prismatic joint moves: n.e + (n.u) s = 0,
+# which is linear. The remaining loop is plane. The loop may contain a spherical joint, which keeps
 # a point.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 1.
 
 
 def along_normal(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """The displacement along parallel revolute axes; None where more than one joint has a part."""
+    """Return the displacement along parallel revolute axes; None unless one joint has it."""
     ring = with_spherical(ring, q, p)
     kinds = [joint.motion for joint in ring.joints]
     if kinds.count(Motion.SPHERICAL) > 1 or Motion.REVOLUTE not in kinds:

@@ -1,9 +1,10 @@
-"""Plane loops that must be solved together, in numbers: every configuration that closes them.
+"""All configurations of plane loops that must be solved together, by numerical methods.
 
-With complex numbers for vectors of the plane, the rows are A theta + D (s theta_c) + b = 0: theta_k
-is a unit number, the direction of link k, and a prismatic joint displaces by s along a direction
-that its link c carries. Parts that can be solved by themselves are solved first; what is left of
-them is a dyad, a set of revolute joints (Dixon's determinant) or a triad with prismatic joints.
+Vectors of the plane are complex numbers. The rows are A theta + D (s theta_c) + b = 0. The unit
+number theta_k is the direction of link k. A prismatic joint moves by s along a direction that is
+fixed in its link c. Parts that can be solved alone are solved first. An irreducible part is a dyad,
+a set of revolute joints (Dixon's determinant) or a triad with prismatic joints. Other parts are
+solved by homotopy.
 
 Source: Wampler 2001.
 """
@@ -28,18 +29,18 @@ Real = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 
 KNOWN = -1
-"""In place of the number of a link: one whose direction is known."""
+"""Link index that represents a known direction."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanarLoops:
-    """Rows of plane loops, lengths as parts of their size.
+    """Closure rows of L plane loops, with lengths divided by the size of the loops.
 
     Attributes:
-        angles: (L, n) what the directions of the links are multiplied by.
-        slides: (L, m) the same of the displacements, where the links that carry them are at zero.
-        carriers: (m,) numbers of these links, or `KNOWN`.
-        constant: (L,) what is known.
+        angles: (L, n) factors of the unknown link directions (unit numbers).
+        slides: (L, m) factors of the displacements, with the links that carry them at angle zero.
+        carriers: (m,) index of the link that carries each displacement, or `KNOWN`.
+        constant: (L,) known terms.
     """
 
     angles: Complex
@@ -49,15 +50,15 @@ class PlanarLoops:
 
     @property
     def counts(self) -> tuple[int, int]:
-        """How many directions and how many displacements are unknown."""
+        """Number of unknown directions and number of unknown displacements."""
         return self.angles.shape[1], self.slides.shape[1]
 
     def rows(self, theta: Real, s: Real) -> tuple[Complex, Complex]:
-        """Rows (r, L) and their derivatives by angles and displacements (r, L, n + m).
+        """Return the rows (r, L) and their derivatives by all unknowns (r, L, n + m).
 
         Args:
-            theta: (r, n) angles [rad].
-            s: (r, m) displacements.
+            theta: (r, n) angles of the links [rad].
+            s: (r, m) displacements, divided by the size.
         """
         unit = np.exp(1j * theta)
         carried = self._carried(unit)
@@ -74,7 +75,7 @@ class PlanarLoops:
         return whole[:, self.carriers]
 
     def with_known(self, part: PlanarPart, theta: Real, s: Real) -> PlanarLoops:
-        """What is left where the unknowns of a part are known: their columns go to the constant."""
+        """Return the rows for known unknowns of a part: their columns are added to the constant."""
         n, m = self.counts
         every_theta, every_s = np.zeros((1, n)), np.zeros((1, m))
         every_theta[0, part.angles], every_s[0, part.slides] = theta, s
@@ -105,10 +106,10 @@ class PlanarRoots:
 
     Attributes:
         theta: (r, n) directions of the links [rad].
-        s: (r, m) displacements.
-        methods: what was solved, such as "Dixon's determinant of degree 6".
-        complete: whether these are all: not where some equation vanishes for every direction, so
-            that some links may move while all that is known stays, or where a path is lost.
+        s: (r, m) displacements, divided by the size.
+        methods: solution methods, such as "Dixon's determinant of degree 6".
+        complete: whether no configuration is missing. False if an equation vanishes for all
+            directions, so that links may move by themselves, or if a path is lost.
     """
 
     theta: Real
@@ -117,30 +118,30 @@ class PlanarRoots:
     complete: bool
 
 
-# Parts that can be solved by themselves: as many rows in which nothing else is left as they need.
+# Parts that can be solved alone: unknowns with enough rows that contain no other unknown.
 
 
 _SMALL = 1e-10
-"""Singular values below this part of the largest count as zero: columns of rank one leave 1e-15,
-links of a millionth of the mechanism 1e-6."""
+"""Relative singular value that counts as zero: columns of rank one leave 1e-15, links of a
+millionth of the mechanism 1e-6."""
 _OPEN = 1e-9
-"""Rows that are closed, lengths in parts of the size: Newton's method leaves 1e-15 at single roots,
-1e-14 at double ones, and what is no root stays above 1e-4 as a rule."""
+"""Largest row of a closed configuration, in sizes: Newton's method leaves 1e-15 at single roots and
+1e-14 at double roots; without a root it is usually above 1e-4."""
 
 
 _DEPENDENT = 1e-5
-"""Rows that depend on others, at roots of these: a root at a fold is known to 1e-7 until all rows
-are refined together."""
+"""Largest value of redundant rows at the roots of other rows: a root at a fold is accurate to 1e-7
+until all rows are refined together."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanarPart:
-    """Unknowns that follow from some rows alone.
+    """Unknowns that some rows determine without other unknowns.
 
     Attributes:
-        angles: their numbers among the directions.
-        slides: their numbers among the displacements.
-        rows: (d, L) the combinations of rows in which nothing else is left.
+        angles: indices of its directions.
+        slides: indices of its displacements.
+        rows: (d, L) combinations of the rows that contain no other unknown.
     """
 
     angles: list[int]
@@ -149,13 +150,13 @@ class PlanarPart:
 
     @property
     def size(self) -> int:
-        """How many unknowns they are."""
+        """Number of unknowns."""
         return len(self.angles) + len(self.slides)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found:
-    """Roots of a part: as `PlanarRoots`."""
+    """Roots of a part, with the meaning of `PlanarRoots`."""
 
     theta: Real
     s: Real
@@ -164,13 +165,14 @@ class _Found:
 
 
 def planar_roots(loops: PlanarLoops) -> PlanarRoots:
-    """Every configuration that closes the loops.
+    """Return all configurations that close the loops.
 
     Args:
-        loops: as many independent rows as make half of the unknowns, dependent rows beside them.
+        loops: closure rows. The number of independent rows is half the number of unknowns. Further
+            dependent rows are allowed.
 
     Raises:
-        NoClosedForm: more than eight unknowns do not follow from fewer.
+        NoClosedForm: a part needs more than eight unknowns.
         LoopError: a part can move by itself.
     """
     theta, s, parts = _solve(loops)
@@ -203,7 +205,8 @@ def _solve(loops: PlanarLoops) -> tuple[Real, Real, list[_Found]]:
 
 
 _LARGEST = 8
-"""Unknowns of a part: of four loops the determinant has seventy rows, of five 252."""
+"""Largest number of unknowns of a part: the determinant of four loops has seventy rows, of five
+loops 252."""
 
 
 def _smallest_part(loops: PlanarLoops) -> PlanarPart:
@@ -224,7 +227,7 @@ def _smallest_part(loops: PlanarLoops) -> PlanarPart:
 
 
 def _left_null(columns: Complex) -> Complex:
-    """(d, L) rows whose products with the columns vanish."""
+    """Return rows (d, L) whose products with the columns vanish."""
     if not columns.shape[1]:
         return np.eye(len(columns), dtype=complex)
     U, values, _ = np.linalg.svd(columns)
@@ -236,16 +239,16 @@ def _rank(matrix: Complex) -> int:
     if not matrix.size:
         return 0
     values = np.linalg.svd(matrix, compute_uv=False)
-    # entries are parts of the size of the mechanism: what is below counts as no row
+    # entries are relative to the size of the mechanism, so that small values count as no row
     return int(np.sum(values > _SMALL))
 
 
 def _of_part(loops: PlanarLoops, part: PlanarPart) -> PlanarLoops:
-    """The rows of a part alone, as few as it needs."""
+    """Return the rows of a part alone, with no more rows than it needs."""
     rows = part.rows
     columns = np.concatenate([loops.angles[:, part.angles], loops.slides[:, part.slides]], axis=1)
     needed = (part.size + 1) // 2
-    if len(rows) > needed:  # rows that depend on each other: the combinations that say most
+    if len(rows) > needed:  # of dependent rows, the strongest combinations
         U = np.linalg.svd(rows @ columns)[0]
         rows = U[:, :needed].conj().T @ rows
     number = {k: place for place, k in enumerate(part.angles)}
@@ -259,7 +262,7 @@ def _of_part(loops: PlanarLoops, part: PlanarPart) -> PlanarLoops:
 
 
 def _irreducible(loops: PlanarLoops) -> _Found:
-    """The roots of a part that has no smaller ones, and how they were found."""
+    """Return the roots of a part that contains no smaller part, and the solution method."""
     n, m = loops.counts
     if n + m == 1:
         found = _one_unknown(loops)
@@ -280,7 +283,7 @@ def _irreducible(loops: PlanarLoops) -> _Found:
 
 
 def _one_unknown(loops: PlanarLoops) -> _Found:
-    """One direction or displacement from a row that is enough for two."""
+    """Return the only direction or displacement of a row that is sufficient for two unknowns."""
     n, _ = loops.counts
     a = (loops.angles if n else loops.slides)[:, 0]
     value = -np.vdot(a, loops.constant) / np.vdot(a, a)
@@ -290,13 +293,13 @@ def _one_unknown(loops: PlanarLoops) -> _Found:
 
 
 _AT_ZERO = 1e-6
-"""Angle [rad] below which the added direction is at zero: at a fold it is known to 1e-7."""
+"""Largest angle [rad] of the added direction in a valid root: at a fold it is accurate to 1e-7."""
 
 
 def _one_row_more(loops: PlanarLoops) -> _Found:
-    """The roots of loops that bind one unknown too often, as equal parallel cranks do.
+    """Return the roots of loops with one real equation too many, such as equal parallel cranks.
 
-    A direction with random factors is added, at zero of which the loops are what they were.
+    A direction with random factors is added. At angle zero it does not change the loops.
     """
     n, _ = loops.counts
     added = _random(np.random.default_rng(_MONODROMY_SEED), len(loops.constant), 1)
@@ -307,12 +310,13 @@ def _one_row_more(loops: PlanarLoops) -> _Found:
     return _Found(found.theta[kept, :n], found.s[kept], found.method, found.complete)
 
 
-# A dyad: one loop of two unknowns, by the law of cosines and its kin.
+# A dyad: one loop of two unknowns, by the law of cosines and similar quadratic equations.
 
 
 _FOLD = 1e-12
-"""By how much a cosine may pass one, or the square of a displacement be below zero, where a dyad is
-stretched: rounding of lengths in parts of the size."""
+"""Largest excess of a cosine above one, or of the square of a displacement below zero, at a
+stretched
+dyad: rounding of lengths relative to the size."""
 
 
 def _dyad(loops: PlanarLoops) -> _Found:
@@ -342,7 +346,7 @@ def _dyad(loops: PlanarLoops) -> _Found:
 
 
 def _angles_of(w: complex, value: float) -> list[float]:
-    """The angles t with Re(w e^(i t)) = value."""
+    """Return the angles t with Re(w e^(i t)) = value."""
     if abs(w) < _SMALL:
         if abs(value) < _SMALL:
             raise LoopError("a dyad of equal links can turn about its own end")
@@ -354,32 +358,31 @@ def _angles_of(w: complex, value: float) -> list[float]:
     return [float(t - np.angle(w)), float(-t - np.angle(w))]
 
 
-# Newton's method on all unknowns, many starts at once.
+# Newton's method on all unknowns, for many starts at once.
 
 
 _STEPS = 60
-"""At most: regular roots take two or three, folds halve the distance each."""
+"""Maximum number of steps: regular roots need two or three; a step halves the distance at folds."""
 _CLOSED = 1e-15
-"""Rows that are exact but for rounding, lengths in parts of the size."""
+"""Largest row that is exact up to rounding, in sizes."""
 _NEARLY, _HALF, _LEAST = 1e-13, 0.3, 1e-4
-"""Rows below which a second halving of the step is not tried, as rounding is all that is left, and
-the least part of a step that is tried elsewhere."""
+"""Row below which the step is halved at most once, because only rounding remains; smallest fraction
+of a step there; smallest fraction of a step for larger rows."""
 _LOOSE = 1e-13
-"""Relative singular value below which a root is not moved along: those of folds."""
+"""Relative singular value of directions along which a root is not moved, as at folds."""
 _SAME = 1e-4
-"""Distance of two roots [rad, or parts of the size] below which they are one where the middle
-between them closes as well as they do: at a fold Newton's method ends about the root of 1e-9, to
-which rows are judged, on both sides of it."""
+"""Distance [rad, or sizes] below which two roots are the same if their mean closes as well as the
+roots: at a fold Newton's method ends on both sides, at a distance of about the root of 1e-9."""
 _BETWEEN = 1e-13
-"""Rows in that middle: of two roots of their own they are an eighth of the square of the distance,
-so that those 1e-6 apart are two."""
+"""Largest row at the mean of two equal roots: between different roots it is an eighth of the
+squared distance, so that roots 1e-6 apart are distinguished."""
 
 
 def refine(loops: PlanarLoops, theta: Real, s: Real) -> tuple[Real, Real, Real]:
-    """Roots made exact, as far as rounding allows.
+    """Refine roots to rounding by Newton's method.
 
     Returns:
-        (r, n) angles within half a turn of zero, (r, m) displacements, (r,) largest rows.
+        (r, n) angles within half a rotation of zero, (r, m) displacements, (r,) largest rows.
     """
     n = theta.shape[1]
     x = np.concatenate([theta, s], axis=1)
@@ -401,14 +404,14 @@ def refine(loops: PlanarLoops, theta: Real, s: Real) -> tuple[Real, Real, Real]:
         value = np.where(better[:, None], other, value)
         slope = np.where(better[:, None, None], other_slope, slope)
         worst = np.where(better, error, worst)
-        # at a fold steps have no bounds: those that bring nothing are halved
+        # steps at a fold have no bound: a step without improvement is halved
         share = np.where(better, np.minimum(2 * share, 1), share / 2)
     x[:, :n] = pi - np.mod(pi - x[:, :n], 2 * pi)
     return x[:, :n], x[:, n:], worst
 
 
 def _distinct(loops: PlanarLoops, theta: Real, s: Real, residual: Real) -> tuple[Real, Real]:
-    """The roots, each once: the best of those that are one."""
+    """Return the different roots, each with the smallest residual of its copies."""
     kept = list[int]()
     for k in np.argsort(residual, kind="stable"):
         if not any(
@@ -419,7 +422,7 @@ def _distinct(loops: PlanarLoops, theta: Real, s: Real, residual: Real) -> tuple
 
 
 def _is_same(loops: PlanarLoops, theta: Real, s: Real, residual: float) -> bool:
-    """Whether two roots are one, (2, n) angles and (2, m) displacements; the first is the worse."""
+    """Whether two roots (2, n), (2, m) are the same; the first one has the larger residual."""
     turn = pi - np.mod(pi - (theta[0] - theta[1]), 2 * pi)
     slide = s[0] - s[1]
     if max(np.max(np.abs(turn), initial=0.0), np.max(np.abs(slide), initial=0.0)) > _SAME:
@@ -430,40 +433,40 @@ def _is_same(loops: PlanarLoops, theta: Real, s: Real, residual: float) -> bool:
 
 # Revolute joints alone: L rows in 2 L directions, by Dixon's determinant.
 #
-# With x one of the directions, hidden, the determinant of W(x) vanishes where the others follow;
-# products of their inverses are its null vector. After the lower rows are multiplied by x, W is a
-# linear pencil.
+# One direction x is hidden. The determinant of W(x) vanishes at the roots. The null vector of W
+# consists of products of inverses of the other directions. With the lower rows multiplied by x, W
+# is a linear pencil.
 #
 # Source: Wampler 2001.
 
 
 _NEAR_CIRCLE = 0.5
-"""Of |log |x||: roots of real mechanisms are unit numbers; at a fold two of them leave the circle
-by the root of rounding, 1e-7, and at a fourfold root by 1e-3."""
+"""Largest |log |x|| of a candidate for a real root: real roots are unit numbers; at a fold two
+roots leave the circle by the root of rounding, 1e-7, and at a fourfold root by 1e-3."""
 _SINGULAR = 1e-13
-"""Reciprocal condition of the pencil at the best of some places, below which it is singular
-everywhere: regular ones of a thousand mechanisms have 1e-7 at least."""
+"""Reciprocal condition number, at the best of some values of x, below which the pencil is singular
+for all x: regular pencils of a thousand mechanisms have 1e-7 at least."""
 _ZERO = 1e-12
-"""Elements of W that vanish, as parts of the largest: products of zeros of the loops are exact."""
+"""Relative size of elements of W that count as zero: products of zeros of the loops are exact."""
 _FAR = 1e6
-"""Absolute values of x between whose inverse and which roots are counted; others are rounding of
-zero and infinity."""
+"""Largest absolute value of x, or of its inverse, of a counted root: others are rounding of zero
+and infinity."""
 _APART = 1e-6
-"""Relative distance above which two roots x are counted as two."""
+"""Relative distance above which two roots x count as different."""
 
 
 def dixon_roots(angles: Complex, constant: Complex) -> _Found:
-    """Candidates for the directions that close loops of revolute joints alone.
+    """Return candidates for the directions that close loops of revolute joints.
 
     Args:
-        angles: (L, 2 L) what the directions are multiplied by.
-        constant: (L,) what is known.
+        angles: (L, 2 L) factors of the directions.
+        constant: (L,) known terms.
 
     Returns:
-        Angles (r, 2 L) [rad], to be refined and judged.
+        Angles (r, 2 L) [rad], which have to be refined and tested.
 
     Raises:
-        LoopError: the determinant vanishes everywhere, whatever is hidden.
+        LoopError: the determinant vanishes for all x, for each hidden direction.
     """
     n = angles.shape[1]
     pencils = [_pencil(angles, constant, hidden) for hidden in range(n)]
@@ -487,12 +490,14 @@ def dixon_roots(angles: Complex, constant: Complex) -> _Found:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pencil:
-    """W = P + x Q with one direction hidden; rows and columns of zeros are left out.
+    """Pencil W = P + x Q with one hidden direction, without zero rows and columns.
 
     Attributes:
-        hidden: number of the direction x.
-        others: numbers of the others.
-        products: for each column the set of directions, of which it is the product of inverses.
+        hidden: index of the hidden direction x.
+        others: indices of the other directions.
+        products: set of directions of each column: the null vector has the product of their
+            inverses there.
+        P, Q: square matrices of the pencil.
     """
 
     hidden: int
@@ -502,7 +507,7 @@ class _Pencil:
     Q: Complex
 
     def angles(self, x: complex, t: Complex) -> Real:
-        """All directions at a root x with null vector t, as angles."""
+        """Return the angles of all directions at a root x with null vector t."""
         theta = np.zeros(len(self.others) + 1)
         theta[self.hidden] = np.angle(x)
         place = {product: k for k, product in enumerate(self.products)}
@@ -537,7 +542,7 @@ def _pencil(angles: Complex, constant: Complex, hidden: int) -> _Pencil | None:
     def rest(product: tuple[int, ...]) -> tuple[int, ...]:
         return tuple(k for k in others if k not in product)
 
-    # in signs the hidden direction stands for zero, before all others
+    # in the signs of permutations, the hidden direction has index zero, before all others
     for k, J in enumerate(upper):
         left = rest(J)
         factor = _sign((-1, *left, *J)) * det(*(-a[:, j].conj() for j in J))
@@ -569,11 +574,12 @@ def _pencil(angles: Complex, constant: Complex, hidden: int) -> _Pencil | None:
 
 
 _PLACES = np.exp(1j * np.array([0.7, 2.1, 3.3, 4.9, 5.8])) * np.array([1.0, 0.8, 1.25, 0.9, 1.1])
-"""Where the pencil is inverted, at the best of them: any that are no roots."""
+"""Values of x at which the pencil may be inverted; the best conditioned is used. Any values that
+are no roots are possible."""
 
 
 def _eigenvectors(pencil: _Pencil) -> Iterator[tuple[Complex, Complex]]:
-    """The roots x and null vectors as columns; nothing where the pencil is singular everywhere."""
+    """Yield the roots x and null vectors (columns); nothing if the pencil is singular for all x."""
     scale = 1 / np.maximum(np.abs(pencil.P), np.abs(pencil.Q)).max(axis=1)
     P, Q = scale[:, None] * pencil.P, scale[:, None] * pencil.Q
     shifted = [P + x * Q for x in _PLACES]
@@ -597,33 +603,33 @@ def _count_distinct(x: Complex) -> int:
     return len(kept)
 
 
-# A triad with prismatic joints: two loops in one direction x and three more unknowns.
+# A triad with prismatic joints: two loops in one direction x and three further unknowns.
 #
-# With x given, the three are y = y0(x) + t alpha, t any complex number: a unit y is a circle of t,
-# a real one (after its carrier is turned back) a line. Where three circles or lines meet in one
-# point is a trigonometric polynomial in x of degree three at most.
+# For a given x, the three unknowns are y = y0(x) + t alpha with a complex number t. A unit number y
+# is a circle of t. A real y (after rotation by its link) is a line. The condition that three
+# circles or lines have a common point is a trigonometric polynomial in x of degree three at most.
 
 
 _SAMPLES = 16
 _TAIL = 1e-8
-"""Coefficients above degree three, as parts of the largest: rounding of products of six lengths."""
+"""Relative size of coefficients above degree three: rounding of products of six lengths."""
 
 
 def triad_roots(loops: PlanarLoops) -> _Found:
-    """Candidates for the unknowns of two loops with prismatic joints.
+    """Return candidates for the unknowns of two loops with prismatic joints.
 
     Raises:
-        LoopError: the polynomial vanishes everywhere.
+        LoopError: the polynomial vanishes for all directions.
     """
     triad = _hidden(loops)
-    assert triad is not None  # asked before
+    assert triad is not None  # tested by the caller
     angle, degree = triad.angles()
     theta, s = triad.unknowns(angle)
     return _Found(theta, s, f"the polynomial of a triad, of degree {degree}")
 
 
 def _hidden(loops: PlanarLoops) -> _Triad | None:
-    """The triad with a direction hidden that leaves three circles and lines; None without one."""
+    """Return the triad with a hidden direction that leaves three circles or lines; None without."""
     for hidden in range(loops.counts[0]):
         if all(k in (KNOWN, hidden) for k in loops.carriers):
             triad = _Triad.of(loops, hidden)
@@ -634,13 +640,13 @@ def _hidden(loops: PlanarLoops) -> _Triad | None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Triad:
-    """Two loops with one direction hidden.
+    """Two loops with one hidden direction.
 
     Attributes:
-        loops: whose.
-        hidden: number of the direction x.
-        columns: (2, 3) of the three other unknowns: directions, then displacements.
-        alpha: (3,) the combination of these columns that vanishes.
+        loops: closure rows of the loops.
+        hidden: index of the hidden direction x.
+        columns: (2, 3) factors of the three other unknowns: directions, then displacements.
+        alpha: (3,) null vector of these columns.
     """
 
     loops: PlanarLoops
@@ -650,7 +656,7 @@ class _Triad:
 
     @staticmethod
     def of(loops: PlanarLoops, hidden: int) -> _Triad | None:
-        """None where two of the three columns are parallel."""
+        """Return the triad; None if two of the three columns are parallel."""
         others = [k for k in range(loops.counts[0]) if k != hidden]
         columns = np.concatenate([loops.angles[:, others], loops.slides], axis=1)
         alpha = np.linalg.svd(columns)[2][-1].conj()
@@ -659,7 +665,7 @@ class _Triad:
         return _Triad(loops, hidden, columns, alpha)
 
     def _curves(self, x: Complex) -> tuple[Real, Complex, Real, Complex]:
-        """K |t|^2 + 2 Re(u* t) + w = 0 of the three unknowns, at (r,) directions x; y at t = 0."""
+        """Return K, u, w of the curves K |t|^2 + 2 Re(u* t) + w = 0 at x (r,), and y at t = 0."""
         fixed = x[:, None] * self.loops.angles[:, self.hidden] + self.loops.constant
         y = -fixed @ np.linalg.pinv(self.columns).T
         turned = self.loops.counts[0] - 1
@@ -677,7 +683,7 @@ class _Triad:
         return k, u, w, y
 
     def _meeting(self, x: Complex) -> tuple[Complex, Real, Real]:
-        """N and D of the point t = N / D on two of the curves, and the polynomial."""
+        """Return N and D of the point t = N / D on two of the curves, and the polynomial at x."""
         k, u, w, _ = self._curves(x)
         first = 0
         lines_u, lines_w = u - (k != 0) * u[:, :1], w - (k != 0) * w[:, :1]
@@ -691,7 +697,7 @@ class _Triad:
         return N, D, value
 
     def angles(self) -> tuple[Real, int]:
-        """The angles of the hidden direction near which the polynomial vanishes; its degree."""
+        """Return angles of the hidden direction near roots of the polynomial, and its degree."""
         x = np.exp(2j * pi * np.arange(_SAMPLES) / _SAMPLES)
         spectrum = np.fft.fft(self._meeting(x)[2]) / _SAMPLES
         coefficients = spectrum[np.arange(-3, 4)]  # of x^-3 .. x^3
@@ -710,7 +716,7 @@ class _Triad:
         return np.angle(roots[near]), 2 * degree
 
     def unknowns(self, angle: Real) -> tuple[Real, Real]:
-        """All unknowns at angles (r,) of the hidden direction."""
+        """Return all unknowns at angles (r,) of the hidden direction."""
         x = np.exp(1j * angle)
         N, D, _ = self._meeting(x)
         y = self._curves(x)[3] + (N / np.where(D == 0, NONZERO, D))[:, None] * self.alpha
@@ -722,40 +728,40 @@ class _Triad:
         return theta, np.real(y[:, n - 1 :] * back)
 
 
-# Any other loops, such as three with prismatic joints: all complex roots of random loops with links
-# in the same places are found once, by monodromy, and followed to those that are asked for.
+# Any other loops, such as three with prismatic joints: all complex roots of random loops with the
+# same nonzero factors are found once, by monodromy, and then followed to the given loops.
 #
-# The conjugate of a row is a row of its own, P+ w+ = 0 and P- w- = 0, with w+ = (e^(i theta),
-# s e^(i theta_c), 1) and w- = (e^(-i theta), s e^(-i theta_c), 1): the unknowns may be complex.
+# The conjugate of a row is a separate row: P+ w+ = 0 and P- w- = 0, with w+ = (e^(i theta),
+# s e^(i theta_c), 1) and w- = (e^(-i theta), s e^(-i theta_c), 1). The unknowns may be complex.
 
 
 _MONODROMY_SEED = 20260415
 _IDLE, _MOST_WAYS = 4, 60
-"""Ways around other loops without new roots after which all are taken to be known; and at most."""
+"""Number of monodromy loops without new roots after which the roots count as complete, and largest
+number of monodromy loops."""
 _CERTAIN = 0.03
-"""Of Newton's step times the bend of the rows: below one half one root is near; room for
-rounding."""
+"""Largest product of Newton's step and the curvature of the rows at a certified root: below one
+half one root is near; the margin is for rounding."""
 _NEAR = 0.1
-"""Distance of a root [rad, or parts of the size] within which the bend is what it is in the middle,
-but for a tenth."""
+"""Distance from a root [rad, or sizes] within which the curvature changes by a tenth at most."""
 _ROUNDING = 1e-14
-"""Of the rows, lengths in parts of the size: what Newton's step cannot fall below."""
+"""Rounding of the rows, in sizes: lower limit of Newton's step."""
 _NEARLY_REAL = 0.1
-"""Imaginary part of the end of a path before t = 1, at a root where two meet, which may be real: t
-misses 1 by some hundredths at most there, and the root by as much as the root of that."""
+"""Largest imaginary part of a candidate for a real double root, at the end of a path before t = 1:
+t misses 1 by some hundredths there, and the root by about the square root of that."""
 _END = 1e-2
-"""By how much t may miss 1 there."""
+"""Largest distance of t from 1 at such an end."""
 _SAME_ROOT = 1e-6
-"""Distance between a certified root and the real one that it is."""
+"""Largest distance between a certified root and the same root after refinement."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rows:
-    """Rows and their conjugates, in numbers of which nothing need be conjugate.
+    """Rows and their conjugates, as independent analytic equations in complex unknowns.
 
     Attributes:
-        P: (2, L, n + m + 1) of both kinds.
-        carriers: (m,) as of the loops.
+        P: (2, L, n + m + 1) factors of the rows and of their conjugates.
+        carriers: (m,) link of each displacement, as in `PlanarLoops`.
     """
 
     P: Complex
@@ -767,13 +773,13 @@ class _Rows:
         return _Rows(np.array([P, P.conj()]), loops.carriers)
 
     def with_constants(self, rng: np.random.Generator) -> _Rows:
-        """With random ones."""
+        """Return the rows with random constants."""
         P = self.P.copy()
         P[:, :, -1] = _random(rng, *P.shape[:2])
         return _Rows(P, self.carriers)
 
     def terms(self, x: Complex) -> tuple[Complex, Complex]:
-        """(r, 2, n + m + 1) what P multiplies, and its derivatives by x (r, n + m)."""
+        """Return the terms (r, 2, n + m + 1) that P multiplies, and their derivatives by x."""
         m = len(self.carriers)
         n, r = x.shape[1] - m, len(x)
         w = np.ones((r, 2, n + m + 1), dtype=np.complex128)
@@ -790,14 +796,14 @@ class _Rows:
         return w, dw
 
     def values(self, x: Complex) -> tuple[Complex, Complex]:
-        """The rows (r, 2 L) and their derivatives (r, 2 L, n + m)."""
+        """Return the rows (r, 2 L) and their derivatives (r, 2 L, n + m)."""
         w, dw = self.terms(x)
         size = self.P.shape[0] * self.P.shape[1]
         rows = np.einsum("klc,rkc->rkl", self.P, w).reshape(len(x), size)
         return rows, np.einsum("klc,rkcj->rklj", self.P, dw).reshape(len(x), size, x.shape[1])
 
     def followed(self, other: _Rows, x: Complex) -> tuple[Complex, Real]:
-        """Its roots x while it becomes other rows, and how far each came."""
+        """Follow roots x along a path to other rows; return the ends and the reached t (r,)."""
         change = other.P - self.P
 
         def newton(x: Complex, t: Real, _: Complex) -> tuple[Complex, Complex]:
@@ -814,7 +820,7 @@ class _Rows:
         return follow(newton, x, lambda x, slope: (x, slope))
 
     def certified(self, x: Complex) -> tuple[Complex, Real]:
-        """The roots near x, each once, and distances beyond which they are not.
+        """Return the certified roots near x, each once, and their error bounds (radius).
 
         Source: Ortega & Rheinboldt 1970, section 12.6; in floating point, with room for rounding.
         """
@@ -827,7 +833,7 @@ class _Rows:
             rows, J = self.values(x)
             W = np.abs(solved(J, np.broadcast_to(np.eye(x.shape[1], dtype=complex), J.shape)))
             w = np.abs(self.terms(x)[0])
-            # second derivatives of s e^(i theta) by both, beside those by theta alone
+            # second derivatives of s e^(i theta) by s and theta, in addition to those by theta only
             w[:, :, n:-1] *= 1 + 2 / np.maximum(np.abs(x[:, None, n:]), NONZERO)
             bend = np.einsum("klc,rkc->rkl", np.abs(self.P[:, :, :-1]), w[:, :, :-1])
             gain = np.max(np.einsum("rij,rj->ri", W, bend.reshape(rows.shape)), axis=1)
@@ -849,12 +855,12 @@ def _random(rng: np.random.Generator, *shape: int) -> Complex:
 
 @functools.lru_cache(maxsize=16)
 def _start(links: bytes, count: int, carriers: tuple[int, ...]) -> tuple[_Rows, Complex]:
-    """Random rows and all their roots.
+    """Return random rows and all their roots.
 
     Args:
-        links: (L, n + m) bytes, one where a number is not zero.
-        count: L.
-        carriers: as of the loops.
+        links: bytes of (L, n + m): one for a nonzero factor.
+        count: number L of rows.
+        carriers: link of each displacement, as in `PlanarLoops`.
     """
     rng = np.random.default_rng(_MONODROMY_SEED)
     there = np.frombuffer(links, dtype=bool).reshape(count, -1)
@@ -864,7 +870,7 @@ def _start(links: bytes, count: int, carriers: tuple[int, ...]) -> tuple[_Rows, 
         return _Rows(P, np.array(carriers, dtype=int))
 
     rows, x = drawn(), 0.5 * _random(rng, 1, there.shape[1])
-    # the constants that make this a root
+    # constants for which x is a root
     rows.P[:, :, -1] -= rows.values(x)[0].reshape(2, count)
     idle = 0
     for _ in range(_MOST_WAYS):
@@ -881,10 +887,10 @@ def _start(links: bytes, count: int, carriers: tuple[int, ...]) -> tuple[_Rows, 
 
 
 def path_roots(loops: PlanarLoops) -> _Found:
-    """The unknowns of any loops, by paths from random ones.
+    """Return the unknowns of any loops, by path tracking from random loops.
 
-    They are followed to random constants first: what arrives regular is as many roots as these
-    links have at almost every place, and nowhere are there more.
+    The paths first lead to random constants. The number of regular ends is the number of roots for
+    generic constants with these links, which is the maximum for all constants.
     """
     n, _ = loops.counts
     links = np.abs(np.concatenate([loops.angles, loops.slides], axis=1)) > _SMALL

@@ -1,6 +1,6 @@
-"""The ring of a loop: its unknown joints in cyclic order, its geometry, samples of it.
+"""Loop chain of a system: its unknown joints in cyclic order, its geometry, closed samples.
 
-A ring is a chain whose ends coincide, see `mbs.recursions.chain`; here it is read off a system.
+A loop chain (`Ring`) is a chain whose ends coincide, see `mbs.recursions.chain`.
 
 Source: Khalil & Creusot 1997, eq. 2.
 """
@@ -35,22 +35,22 @@ from mbs.solvers.least_squares import gauss_newton
 from mbs.solvers.rank import rank
 from mbs.spatial import Pose, align_z, vector
 
-# Where positions stand: those of q, then those of cut joints, then the spins of rods.
+# Indices of positions: those in q, then positions of cut joints, then spins of rods.
 #
-# A rod between two spherical joints may spin about its own line, which no closure row sees: one
-# velocity of a quaternion is independent then, and no element of q belongs to it. Its position here
-# is the angle by which the rod is rotated about its line [rad], from where the shortest rotation
-# leads from its orientation in the assembled configuration.
+# A rod between two spherical joints may spin about its own line, which no closure row detects. Then
+# one velocity of a quaternion is independent, and no element of q belongs to it. Its position is
+# the angle [rad] by which the rod is rotated about its line. At zero, the shortest rotation moves
+# the rod from its orientation in the assembled configuration.
 
 
 def cut_indices(system: System) -> tuple[int, ...]:
-    """Where the positions of each cut joint begin, and the end of all."""
+    """Return the first position index of each cut joint, and the end of the last one."""
     counts = [max(1, len(cut.edge.joint.freedoms)) for cut in system.cuts]
     return tuple(system.nq + sum(counts[:k]) for k in range(len(counts) + 1))
 
 
 def spin_indices(system: System) -> dict[int, int]:
-    """The index of each spin, by the one in q at which the quaternion of its joint begins."""
+    """Return the position index of each rod spin, by the first index in q of its quaternion."""
     spherical = [
         link.q.start
         for link in system.tree.links
@@ -62,15 +62,15 @@ def spin_indices(system: System) -> dict[int, int]:
 
 
 def extent(system: System) -> int:
-    """How many positions there are, those of cut joints and spins included."""
+    """Return the number of all positions: q, cut joints and rod spins."""
     return cut_indices(system)[-1] + len(spin_indices(system))
 
 
 def independent_indices(system: System) -> list[int]:
-    """The indices of the independent joints, in the order of `system.free`.
+    """Return the position indices of the independent joints, in the order of `system.free`.
 
     Raises:
-        NoClosedForm: a body is free, or a spherical joint rotates freely in more than one way.
+        NoClosedForm: a body is free, or a spherical joint has more than one independent rotation.
     """
     spins, indices = spin_indices(system), list[int]()
     for k in system.free:
@@ -90,18 +90,18 @@ def _unplaced(system: System, link: Link) -> str:
 
 
 def loop_links(system: System, cut: Cut) -> tuple[list[int], list[int]]:
-    """The links from frame_a of a cut joint back to the common link, and from there to frame_b."""
+    """Return link indices from frame_a of a cut joint to the common link, and on to frame_b."""
     return links_between(system.tree, cut.link_a, cut.link_b)
 
 
 def ring_of(system: System, number: int, known: Container[int], q: SX) -> Ring:
-    """The loop that a cut joint closes, from its frame_a through the tree and the joint itself.
+    """Return the loop chain of a cut joint, from its frame_a through the tree and the cut joint.
 
     Args:
-        system: whose loop it is.
-        number: of the cut joint.
-        known: indices in q of the positions that are known.
-        q: (nq, 1) symbols followed by those of cut joints, of which the known ones are used.
+        system: mechanism with the loop.
+        number: index of the cut joint.
+        known: indices of the known positions.
+        q: symbols of q (nq, 1) and of the positions of cut joints. Only known ones are used.
     """
     builder, cut = ChainBuilder(known, q), system.cuts[number]
     a, b = (cut.link_a, cut.pose_a), (cut.link_b, cut.pose_b)
@@ -112,13 +112,13 @@ def ring_of(system: System, number: int, known: Container[int], q: SX) -> Ring:
 
 
 def _spins(system: System) -> dict[int, Spin]:
-    """Of the spherical joints of rods, by the index in q at which their quaternions begin."""
+    """Return the spins of spherical joints of rods, by the first index in q of the quaternion."""
     rest = {link.q.start: system.configuration[link.q] for link in system.tree.links}
     return {start: Spin(index, rest[start]) for start, index in spin_indices(system).items()}
 
 
 def _pass_cut(builder: ChainBuilder, system: System, number: int) -> None:
-    """Back through the freedoms of the cut joint, from its frame_b to its frame_a."""
+    """Append the freedoms of the cut joint to the chain, from its frame_b to its frame_a."""
     joint = system.cuts[number].edge.joint
     spherical = ChainJoint(joint.name, Motion.SPHERICAL, None, -1, cut=True)
     freedoms = joint.freedoms
@@ -142,10 +142,10 @@ def _pass_cut(builder: ChainBuilder, system: System, number: int) -> None:
         builder.over(aligned.inverse())
 
 
-# The geometry of a loop, read from its gaps at random positions and parameters.
+# Geometry of a loop from its known transforms at random positions and parameters.
 #
-# What holds at every one of them holds by structure: lengths and angles given as numbers, or by
-# the same symbol, not by accident of one configuration.
+# A property that holds at all samples is structural: it follows from numeric or equal symbolic
+# lengths and angles, and not from one special configuration.
 
 
 Matrix = NDArray[np.float64]
@@ -153,18 +153,17 @@ Matrix = NDArray[np.float64]
 _SURVEYED = 3
 _SURVEY_SEED = 20260103
 _CLOSE = 1e-9
-"""Lengths [m] and cosines that count as zero or equal: products of a few transforms leave 1e-15 of
-rounding, and those that do not vanish everywhere are of about one at random positions."""
+"""Largest length [m] or cosine that counts as zero, and difference that counts as equal: products
+of a few transforms have rounding of 1e-15, and other values are about one at random positions."""
 PARAMETERS = (0.4, 1.6)
-"""Between which symbols get random values: of the size of one, positive, and not near zero, so that
-they may be lengths."""
+"""Range of random values of parameters: of size one, positive and not near zero, as lengths are."""
 _POSITIONS = (-1.5, 1.5)
-"""The same of positions [rad or m]: of both signs, and angles within a quarter turn."""
+"""Range of random positions [rad or m]: both signs, and angles within a quarter rotation."""
 _Z = np.array([0.0, 0.0, 1.0])
 
 
 def gap_samples(ring: Ring, q: SX, p: SX) -> list[list[Matrix]]:
-    """At some random positions and parameters the (4, 4) pose of every gap."""
+    """Return the (4, 4) pose of each known transform at three random positions and parameters."""
     return [[np.array(DM(T)) for T in values] for values in _evaluate(_matrices(ring.gaps), q, p)]
 
 
@@ -184,9 +183,12 @@ def _evaluate(values: list[SX], q: SX, p: SX) -> list[list[DM]]:
 
 
 def meeting_point(pose: Pose) -> tuple[SX, SX]:
-    """Where the z axes of two frames meet, along each of them; the second is seen from the first.
+    """Return the intersection of the z axes of two frames, as a coordinate along each axis.
 
-    The axes are taken to meet and not to be parallel.
+    The axes must intersect and must not be parallel.
+
+    Args:
+        pose: pose of the second frame relative to the first.
     """
     slope, offset = pose.R[0:2, 2], pose.p[0:2]
     second = -(slope.T @ offset) / (slope.T @ slope)
@@ -194,7 +196,7 @@ def meeting_point(pose: Pose) -> tuple[SX, SX]:
 
 
 def axes_meet(pose: Pose, q: SX, p: SX) -> bool:
-    """Whether the z axes of two frames meet in one point, whatever is known."""
+    """Whether the z axes of two frames intersect in one point, for all positions and parameters."""
     slope, offset = pose.R[0:2, 2], pose.p[0:2]
     return not parallel(pose, q, p) and always_zero(
         slope[0] * offset[1] - slope[1] * offset[0], q, p
@@ -202,27 +204,27 @@ def axes_meet(pose: Pose, q: SX, p: SX) -> bool:
 
 
 def parallel(pose: Pose, q: SX, p: SX) -> bool:
-    """Whether the z axes of two frames are parallel, whatever is known."""
+    """Whether the z axes of two frames are parallel, for all positions and parameters."""
     return always_zero(pose.R[0:2, 2], q, p)
 
 
 def always_zero(values: SX, q: SX, p: SX) -> bool:
-    """Whether every element is zero whatever the positions and parameters."""
+    """Whether each element is zero for all positions and parameters."""
     samples = [np.array(value).ravel() for (value,) in _evaluate([values], q, p)]
     return all(bool(np.all(np.abs(sample) < _CLOSE)) for sample in samples)
 
 
 def constants(values: SX, q: SX, p: SX) -> list[float | None]:
-    """Each element that is the same whatever the positions and parameters; None for the others."""
+    """Return each element that does not depend on positions and parameters, else None."""
     samples = np.array([np.array(value).ravel() for (value,) in _evaluate([values], q, p)])
     same = np.all(np.abs(samples - samples[0]) < _CLOSE, axis=0)
     return [float(x) if fixed else None for x, fixed in zip(samples[0], same, strict=True)]
 
 
 def without_idle(ring: Ring, samples: list[list[Matrix]]) -> Ring:
-    """The loop less the freedoms of its cut joint that a plane loop never uses.
+    """Return the loop without one freedom of its cut joint that a plane loop never uses.
 
-    These translate along the common normal of a loop, or rotate about an axis across it.
+    Such a freedom is a translation along the normal, or a rotation about an axis in the plane.
     """
     start = _first_revolute(ring)
     if start is None:
@@ -238,7 +240,7 @@ def without_idle(ring: Ring, samples: list[list[Matrix]]) -> Ring:
 
 
 def with_elbow(ring: Ring, q: SX) -> Ring:
-    """The loop begun so that the joint in the middle has rigid links on both sides, if one has."""
+    """Return the loop of three joints with a middle joint between two rigid links, if possible."""
     for k in range(3):
         begun = ring.rotated(k)
         sides = casadi.vertcat(*(casadi.vec(gap.pose.matrix) for gap in begun.gaps[1:]))
@@ -248,9 +250,9 @@ def with_elbow(ring: Ring, q: SX) -> Ring:
 
 
 def is_planar(ring: Ring, samples: list[list[Matrix]]) -> bool:
-    """Whether all rotations are about one direction, and all translations across it.
+    """Whether all rotations are about one direction, and all translations perpendicular to it.
 
-    A spherical joint, the last one of the loop, may stand for a revolute one.
+    A spherical joint at the end of the loop may act as a revolute joint.
     """
     start = _first_revolute(ring)
     if start is None:
@@ -269,7 +271,7 @@ def _first_revolute(ring: Ring) -> int | None:
 
 
 def _normal(gaps: list[Matrix], start: int, end: int) -> Matrix:
-    """The axis of joint `start` seen from the frame of joint `end`, all between at zero."""
+    """Return the axis of joint `start` in the frame of joint `end`, with zero joints between."""
     normal, n = _Z, len(gaps)
     for k in range(start + 1, end + 1 if end > start else end + n + 1):
         normal = gaps[k % n][:3, :3].T @ normal
@@ -283,10 +285,10 @@ def _fits(motion: Motion, normal: Matrix) -> bool:
     return cosine < _CLOSE if motion is Motion.PRISMATIC else cosine > 1 - _CLOSE
 
 
-# Numbers at which a loop closes, from random starts: known positions move with the unknown ones.
+# Numeric configurations that close a loop, from random starts, in which known positions may change.
 #
-# What holds at all of them holds by structure, as in `survey`; here of loops that do not close
-# for every value of what is known.
+# A property of all of them is structural, as above, for loops that do not close for all values of
+# the known positions.
 
 
 Vector = NDArray[np.float64]
@@ -295,18 +297,19 @@ _SAMPLES, _TRIES, _SEED = 4, 24, 20260107
 _ITERATIONS = 40
 _MOVABLE = 2
 _LOOSE = 1e-6
-"""Relative singular value below which a joint moves while the given stay: it is the
-root of 1e-12, to which loops are closed, and so what a double root leaves of a zero."""
+"""Relative singular value below which a joint can move while known positions are fixed: it is the
+root of 1e-12, to which loops are closed, and so the error of a zero at a double root."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sample:
-    """A configuration that closes a loop.
+    """Configuration that closes a loop.
 
     Attributes:
-        x: (n,) positions of its joints, in their order.
-        given: (m,) values of the symbols in its gaps.
-        rank: of the derivative of the closure by x; below n, joints move while the given stay.
+        x: (n,) positions of the joints, in their order.
+        given: (m,) values of the symbols in the known transforms.
+        rank: rank of the derivative of the closure by x. Below n, joints can move for fixed
+            `given`.
     """
 
     x: Vector
@@ -315,20 +318,21 @@ class Sample:
 
 
 def closure_of(ring: Ring, x: SX) -> SX:
-    """(12, 1) what is missing in X_1 J_1 .. X_n J_n = 1 at positions x (n, 1) [m or 1]."""
+    """Return the error (12, 1) [1 or m] of X_1 J_1 .. X_n J_n = 1 at positions x (n, 1)."""
     T = transforms(ring, x)[-1]
     return SX(casadi.densify(casadi.vertcat(casadi.vec(T.R - SX.eye(3)), T.p)))
 
 
 def closed_samples(ring: Ring, given: SX, p: SX) -> list[Sample]:
-    """Some closed configurations: four, or fewer where random starts lead to no more.
+    """Return up to four closed configurations from random starts.
 
-    It ends early where joints move at two of them while the given stay.
+    The search ends early after two configurations at which joints can move for fixed `given`.
 
     Args:
-        ring: a loop of revolute and prismatic joints.
-        given: (m, 1) the symbols of its gaps.
-        p: those of them that are parameters keep their random values, the others may move.
+        ring: loop chain of revolute and prismatic joints.
+        given: (m, 1) symbols of its known transforms.
+        p: symbols of parameters, which keep their random values. Other symbols of `given` may
+            change.
     """
     n, rng = len(ring.joints), np.random.default_rng(_SEED)
     parameters = {symbol.name() for symbol in casadi.symvar(p)}

@@ -1,4 +1,4 @@
-"""What a kernel finds: every branch of a loop, as expressions of what is known."""
+"""Result of a closed form: each branch of a loop, as expressions of known quantities."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Positions = Mapping[int, SX]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RodSpin:
-    """The spin of a rod at a configuration whose quaternion is known.
+    """Spin of a rod about its line in a configuration with a known quaternion.
 
     Attributes:
-        index: number of the spin among the positions.
-        angle: expression of all positions [rad].
+        index: index of the spin among the positions.
+        angle: spin [rad] as an expression of all positions.
     """
 
     index: int
@@ -30,11 +30,11 @@ class RodSpin:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoopBranches:
-    """The branches of a loop.
+    """Branches of a loop.
 
     Attributes:
-        branches: positions by label, such as "j3:+"; the label is empty where there is one alone.
-        spin: the spin on which they depend, if they do.
+        branches: positions by label, such as "j3:+". The label of a single branch is empty.
+        spin: rod spin on which the branches depend; None if they depend on no spin.
     """
 
     branches: Mapping[str, Positions]
@@ -42,7 +42,7 @@ class LoopBranches:
 
 
 def positions(joints: Sequence[ChainJoint], values: Sequence[SX]) -> Positions:
-    """Positions in q from those along the path around the loop; spherical joints are left out."""
+    """Return positions by index in q from positions along the loop, without spherical joints."""
     return {
         joint.index: joint.sign * value
         for joint, value in zip(joints, values, strict=True)
@@ -51,23 +51,23 @@ def positions(joints: Sequence[ChainJoint], values: Sequence[SX]) -> Positions:
 
 
 def signed(joint: ChainJoint) -> tuple[tuple[str, int], ...]:
-    """The labels of a joint with two roots, each with the sign of the root along the loop."""
+    """Return the two labels of a joint with two roots, each with its sign along the loop."""
     return tuple((f"{joint.name}:{label}", sign * joint.sign) for label, sign in _SIGNS)
 
 
 _SIGNS = (("+", 1), ("-", -1))
 
 
-# Angles by their sine and cosine: the two roots of X cos t + Y sin t = Z, and turns of vectors.
+# Angles by their sine and cosine: the two roots of X cos t + Y sin t = Z, and rotations of vectors.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Angle:
-    """An angle t by its cosine and sine, both of which may carry one common positive factor.
+    """Angle t by its cosine and sine, up to a common positive factor.
 
     Attributes:
-        c, s: size times cosine and sine.
-        size: the factor.
+        c, s: cosine and sine, times the factor.
+        size: factor.
     """
 
     c: SX
@@ -76,18 +76,18 @@ class Angle:
 
     @property
     def value(self) -> SX:
-        """The angle in (-pi, pi] [rad]."""
+        """Angle in (-pi, pi] [rad]."""
         return SX(casadi.atan2(self.s, self.c))
 
     @property
     def matrix(self) -> SX:
-        """(2, 2) turn of the plane."""
+        """Rotation matrix (2, 2) of the plane."""
         c, s = self.c / self.size, self.s / self.size
         return casadi.vertcat(casadi.horzcat(c, -s), casadi.horzcat(s, c))
 
 
 def root_angle(X: SX, Y: SX, Z: SX, sign: int) -> Angle:
-    """The root of X cos t + Y sin t = Z that lies on one side of the direction (X, Y).
+    """Return the root of X cos t + Y sin t = Z on one side (sign) of the direction (X, Y).
 
     Source: Khalil & Creusot 1997, section 3.3, equation of type 2.
     """
@@ -97,26 +97,26 @@ def root_angle(X: SX, Y: SX, Z: SX, sign: int) -> Angle:
 
 
 def angle_onto(a: SX, b: SX) -> Angle:
-    """The turn that brings a, (2, 1), onto b, (2, 1), which is as long."""
+    """Return the rotation of vector a (2, 1) onto vector b (2, 1) of the same length."""
     fixed = a if a.is_constant() else b
     return Angle(a[0] * b[0] + a[1] * b[1], across(a, b), fixed[0] * fixed[0] + fixed[1] * fixed[1])
 
 
 def across(a: SX, b: SX) -> SX:
-    """The vector product of two vectors of the plane."""
+    """Return the vector product (scalar) of two vectors of the plane."""
     return a[0] * b[1] - a[1] * b[0]
 
 
 def square(a: SX) -> SX:
-    """The square of the length of a vector."""
+    """Return the square of the length of a vector."""
     return SX(casadi.sumsqr(a))
 
 
 def in_plane(matrix: SX) -> SX:
-    """The part of a rotation or of a vector in its plane x, y."""
+    """Return the x, y part of a rotation matrix or of a vector."""
     return matrix[0:2, 0:2] if matrix.shape[1] > 1 else matrix[0:2]
 
 
 def last_angle(before: SX) -> SX:
-    """The rotation about z that undoes the turn `before`, of which the first row is used [rad]."""
+    """Return the rotation about z [rad] that is inverse to `before`, of which row 1 is used."""
     return SX(casadi.atan2(before[0, 1], before[0, 0]))

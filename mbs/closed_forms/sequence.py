@@ -1,4 +1,4 @@
-"""A loop solved joint by joint: each step one equation, its roots told apart by signs."""
+"""Solution of a loop in steps: each step is one equation, and signs distinguish its roots."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from numpy.typing import NDArray
 from mbs.numbers import NONZERO
 from mbs.recursions.chain import Ring
 
-# What is to be solved: a loop, the symbols in it, and numbers at which it closes.
+# Problem: a loop, the symbols in it, and numeric samples at which it closes.
 
 
 Matrix = NDArray[np.float64]
 
 ZERO = 1e-9
-"""Values at the samples of a problem, lengths [m] and numbers free of units, that count as zero:
-the samples close to 1e-12 or so, and what does not vanish everywhere is of about one at one of
-them."""
+"""Largest absolute value that counts as zero at the samples of a problem, for lengths [m] and
+dimensionless numbers: samples are closed to about 1e-12, and an expression that does not vanish has
+a value of about one at a sample."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
-    """A loop whose joints are looked for.
+    """Loop whose joint positions are unknown.
 
     Attributes:
-        ring: the loop; the place of each joint is its number in x.
-        x: (2 n, 1) symbols of the positions of its n joints [rad or m], then of as many further
-            angles that a solution may use, such as sums of joint angles.
-        given: (m, 1) symbols of everything that is known: parameters, and the pose to be reached.
-        samples: values of x[:n] and given, (n,) and (m,), at which the loop closes; the positions
-            are generic, and so are symbolic lengths.
+        ring: loop chain. The index of each joint is its index in x.
+        x: (2 n, 1) symbols of the positions of its n joints [rad or m], then of n further angles
+            that a solution may use, such as sums of joint angles.
+        given: (m, 1) symbols of all known quantities: parameters, and the target pose.
+        samples: values (n,) of x[:n] and (m,) of given at which the loop closes. Positions and
+            symbolic lengths are generic.
     """
 
     ring: Ring
@@ -46,11 +46,11 @@ class Problem:
 
     @property
     def size(self) -> int:
-        """The number of joints."""
+        """Number of joints."""
         return len(self.ring.joints)
 
     def at_samples(self, values: SX) -> list[Matrix]:
-        """The values of an expression of x and given at every sample; further angles are zero."""
+        """Return an expression of x and given at every sample, with further angles zero."""
         function = Function("values", [self.x, self.given], [values])
         rest = np.zeros(self.x.numel() - self.size)
         return [
@@ -58,29 +58,29 @@ class Problem:
         ]
 
     def always_zero(self, values: SX) -> bool:
-        """Whether an expression of x and given vanishes wherever the loop closes."""
+        """Whether an expression of x and given is zero at all closed configurations (samples)."""
         return all(bool(np.all(np.abs(sample) < ZERO)) for sample in self.at_samples(values))
 
 
-# One step of a solution: an equation that gives some joints, and the signs of its roots.
+# Step of a solution: an equation that gives some joints, and the signs of its roots.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SequenceStep:
-    """Some joints of a loop, from the given and from the joints found before.
+    """Step that solves some joints of a loop from known quantities and earlier joints.
 
     Attributes:
-        indices: indices in x of what it gives; beyond the joints those of further angles.
-        names: of these, as they stand in the equation.
-        kind: of the equation, such as "type 2" or "quartic".
-        equation: as one reads it, in terms of the coefficients, such as
+        indices: indices in x of the solved positions. Indices from n on are further angles.
+        names: names of these positions in the equation.
+        kind: type of the equation, such as "type 2" or "quartic".
+        equation: readable equation in terms of the coefficients, such as
             "X3 cos(q3) + Y3 sin(q3) = Z3".
-        signs: what tells its roots apart, each +1 or -1; empty where there is one root.
+        signs: names of the signs, +1 or -1, that distinguish its roots; empty for a single root.
         coefficients: names of the coefficients in the equation.
-        function: (x, given, s) -> (values, real, regular, coefficients). `values` has a row a
-            place and is finite for every argument; `real` has a row a radicand, made free of
-            units, and the root is real where none is negative; `regular` has a row a quantity
-            free of units that vanishes where the step leaves a joint undetermined.
+        function: (x, given, s) -> (values, real, regular, coefficients). `values` has one row per
+            index and is finite for all arguments. `real` has one row per dimensionless radicand;
+            the root is real if no radicand is negative. `regular` has one row per dimensionless
+            quantity that vanishes if the step does not determine a joint.
     """
 
     indices: tuple[int, ...]
@@ -94,13 +94,13 @@ class SequenceStep:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
-    """Expressions of x, given and signs that make up a step.
+    """Expressions of x, given and signs that define a step.
 
     Attributes:
-        values: by place.
-        real: radicands, free of units; negative where the root is not real.
-        regular: free of units, zero where a joint is left undetermined.
-        coefficients: by name.
+        values: expression by index in x.
+        real: dimensionless radicands; negative if the root is not real.
+        regular: dimensionless quantities; zero if a joint is undetermined.
+        coefficients: expression by name.
     """
 
     values: Mapping[int, SX]
@@ -112,14 +112,14 @@ class Found:
 def step(
     problem: Problem, kind: str, equation: str, signs: Mapping[str, SX], found: Found
 ) -> SequenceStep:
-    """A step from the expressions that make it up.
+    """Return a step that is defined by expressions.
 
     Args:
-        problem: of which it solves a part.
-        kind: of the equation.
-        equation: as one reads it.
-        signs: the symbol of each sign by its name.
-        found: the expressions.
+        problem: problem that the step solves in part.
+        kind: type of the equation.
+        equation: readable equation.
+        signs: symbol of each sign, by name.
+        found: expressions of the step.
     """
     s = casadi.vertcat(*signs.values())
     coefficients = dict(found.coefficients or {})
@@ -136,18 +136,18 @@ def _name(problem: Problem, index: int) -> str:
     return names.get(index, str(problem.x[index]))
 
 
-# Steps one after the other: a configuration for every choice of their signs.
+# Sequence of steps: one configuration for each combination of signs.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leaf:
-    """A configuration for one choice of all signs.
+    """Configuration for one combination of all signs.
 
     Attributes:
         x: (n, 1) positions of the joints.
-        real: (r, 1) every radicand on the path.
-        regular: (e, 1) every quantity that must not vanish.
-        coefficients: by name, those of every step.
+        real: (r, 1) radicands of all steps.
+        regular: (e, 1) quantities of all steps that must not vanish.
+        coefficients: coefficients of all steps by name.
     """
 
     x: SX
@@ -158,14 +158,14 @@ class Leaf:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepSequence:
-    """A solution of a loop in steps.
+    """Solution of a loop in steps.
 
-    Branch number b chooses the signs: sign number k, in the order of `signs`, is +1 where bit
-    number k of b, counted from the highest, is zero.
+    The branch index b defines the signs: sign k, in the order of `signs`, is +1 if bit k of b,
+    counted from the highest, is zero.
 
     Attributes:
         size: number of joints.
-        steps: in their order; together they give every joint.
+        steps: steps in their order. Together they solve every joint.
     """
 
     size: int
@@ -173,26 +173,26 @@ class StepSequence:
 
     @property
     def signs(self) -> tuple[str, ...]:
-        """The names of all signs, in the order of the steps."""
+        """Names of all signs, in the order of the steps."""
         return tuple(name for step in self.steps for name in step.signs)
 
     @property
     def branches(self) -> int:
-        """How many choices of signs there are."""
+        """Number of branches: combinations of signs."""
         return int(2 ** len(self.signs))
 
     def choice(self, branch: int) -> tuple[int, ...]:
-        """The signs, +1 or -1, of a branch."""
+        """Return the signs, +1 or -1, of a branch."""
         count = len(self.signs)
         return tuple(-1 if branch >> (count - 1 - k) & 1 else 1 for k in range(count))
 
     def label(self, branch: int) -> str:
-        """The signs of a branch by their names, such as "q3:+ q2:- q5:+"."""
+        """Return the label of a branch from its signs, such as "q3:+ q2:- q5:+"."""
         signs = zip(self.signs, self.choice(branch), strict=True)
         return " ".join(f"{name}:{'+' if sign > 0 else '-'}" for name, sign in signs)
 
     def leaf(self, given: SX, s: SX) -> Leaf:
-        """The configuration of one branch whose signs, (number of signs, 1), are expressions."""
+        """Return the configuration for signs s (number of signs, 1), given as expressions."""
         leaf, first = self._start(), 0
         for step in self.steps:
             chosen = s[first : first + len(step.signs)]
@@ -200,7 +200,7 @@ class StepSequence:
         return self._crop(leaf)
 
     def leaves(self, given: SX) -> list[Leaf]:
-        """The configurations of all branches in order; what they share is computed once."""
+        """Return the configurations of all branches in order, with common steps computed once."""
         leaves = [self._start()]
         for step in self.steps:
             choices = list(itertools.product((1, -1), repeat=len(step.signs)))
@@ -219,7 +219,7 @@ class StepSequence:
 
 
 def _take(leaf: Leaf, step: SequenceStep, given: SX, s: SX) -> Leaf:
-    """The configuration with one more step."""
+    """Return the configuration after a further step."""
     values, real, regular, coefficients = step.function(leaf.x, given, s)
     x = SX(leaf.x)
     x[list(step.indices)] = values
@@ -232,21 +232,20 @@ def _take(leaf: Leaf, step: SequenceStep, given: SX, s: SX) -> Leaf:
     )
 
 
-# Equations with two roots, by the sign of one of them: X cos t + Y sin t = Z, a r^2 + b r + c =
-# 0.
+# Equations with two roots that one sign distinguishes: X cos t + Y sin t = Z, a r^2 + b r + c = 0.
 #
-# Both give a finite number for every argument: where the roots are not real, the point of the
-# fold between them.
+# Both return a finite number for all arguments. If the roots are not real, it is the double root of
+# the nearest fold.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Root:
-    """A root and what tells whether it may be used.
+    """Root of an equation, and measures of its validity.
 
     Attributes:
-        value: the angle in (-pi, pi] [rad], or the number.
-        real: radicand, free of units; the root is real where it is not negative.
-        regular: free of units; zero where every number is a root, or none.
+        value: angle in (-pi, pi] [rad], or number.
+        real: dimensionless radicand; the root is real if it is not negative.
+        regular: dimensionless; zero if every number is a root, or none.
     """
 
     value: SX
@@ -255,16 +254,16 @@ class Root:
 
 
 def cosine_root(X: SX, Y: SX, Z: SX, sign: SX, scale: SX | float = 1.0) -> Root:
-    """The root of X cos t + Y sin t = Z on one side of the direction (X, Y).
+    """Return the root of X cos t + Y sin t = Z on one side of the direction (X, Y).
 
     Source: Khalil & Creusot 1997, section 3.3, equation of type 2.
 
     Args:
         X: factor of cos t.
         Y: factor of sin t.
-        Z: the right side.
-        sign: +1 for the root at a positive angle from that direction, -1 for the other.
-        scale: of the size of what the coefficients are sums of, in their unit.
+        Z: right side.
+        sign: +1 for the root at a positive angle from that direction, else -1.
+        scale: typical size of the terms of the coefficients, in their unit.
     """
     size = X * X + Y * Y
     radicand = size - Z * Z
@@ -274,46 +273,47 @@ def cosine_root(X: SX, Y: SX, Z: SX, sign: SX, scale: SX | float = 1.0) -> Root:
 
 
 def angle_of(s: SX, c: SX, scale: SX | float = 1.0) -> Root:
-    """The angle whose sine and cosine are s and c times one positive factor."""
+    """Return the angle whose sine and cosine are s and c, up to one positive factor."""
     return Root(SX(casadi.atan2(s, c)), SX(1), SX((s * s + c * c) / (scale * scale)))
 
 
 def square_root(square: SX, sign: SX, scale: SX | float = 1.0) -> Root:
-    """The root of r^2 = square of the given sign; scale is of the size of r, in its unit."""
+    """Return the root of r^2 = square with a given sign; scale is the typical size of r."""
     value = sign * casadi.sqrt(casadi.fmax(square, NONZERO))
     return Root(SX(value), SX(square / (scale * scale)), SX(1))
 
 
-# Equations with four roots, told apart by two signs: quartics, as two conics that meet.
+# Equations with four roots that two signs distinguish: quartics, as intersections of two conics.
 #
-# A trigonometric polynomial of degree 2 is a conic in the plane of (cos t, sin t), and its roots
-# are the points where it meets the unit circle; the roots of a quartic in r are where a conic in
-# the plane of (r^2, r) meets the parabola. Some conic of the pencil of the two is a pair of real
-# lines, through all four points; a cubic finds it. The first sign chooses the line, the second
-# the point of it: the one where the polynomial rises, or the one where it falls. A few Newton
-# steps on the polynomial itself end the search.
+# A trigonometric polynomial of degree 2 is a conic in the plane of (cos t, sin t); its roots are
+# the intersections with the unit circle. The roots of a quartic in r are the intersections of a
+# conic in the plane of (r^2, r) with the parabola. The pencil of the two conics contains a pair of
+# real lines through all four points, which a cubic equation finds. The first sign selects the line,
+# the second its intersection: the root at which the polynomial rises, or falls. A few Newton steps
+# on the polynomial complete the solution.
 #
-# Everything is finite for every argument; where the roots are not real the radicands say so.
+# All results are finite for all arguments. If the roots are not real, the radicands are negative.
 #
 # Source: Richter-Gebert 2011, chapter 11, for the pencil and its lines.
 
 
 TINY_SQUARE, _TINY_NUMBER = 1e-280, 1e-140
-"""Added to squares, and to numbers, so that nothing divides by zero: the root of the first is the
-second, and the square of that is no zero yet."""
-_NOISE = 1e-11  # of a trace that decides whether the lines are real
-_FAR = 1e8  # largest root, in its scale
-_STEPS = 3  # of Newton
-_MOST_STEP = 0.1  # twice the longest [rad, or of the scale]: near a fold the slope is small
+"""Values added to squares, and to numbers, to prevent division by zero: the second is the root of
+the first, and its square is still a nonzero double."""
+_NOISE = 1e-11  # rounding of a dimensionless trace that decides whether the lines are real
+_FAR = 1e8  # largest root, relative to its scale
+_STEPS = 3  # number of Newton steps
+_MOST_STEP = 0.1  # twice the longest step [rad, or of the scale]: slopes are small near a fold
 
 
 @dataclass(frozen=True, slots=True)
 class _Curve:
-    """The conic that carries the roots.
+    """Conic that contains all points of the unknown, and so the roots.
 
     Attributes:
-        C: (3, 3) its symmetric matrix, of determinant `determinant`.
-        side: a vector that tells a pair of lines l, m from m, l by the sign of side . (l x m).
+        C: (3, 3) symmetric matrix of the conic, with determinant `determinant`.
+        side: vector that distinguishes the pair of lines (l, m) from (m, l), by the sign of
+            side . (l x m).
     """
 
     C: DM
@@ -321,23 +321,23 @@ class _Curve:
     side: tuple[float, float, float]
 
 
-# not along an axis: where the equation is in cos t, or sin t, alone, the lines meet on one of them
+# not along an axis: for equations in cos t or sin t only, the lines intersect on an axis
 _CIRCLE = _Curve(DM([[1, 0, 0], [0, 1, 0], [0, 0, -1]]), -1.0, (1.0, 0.6, 0.0))
 _PARABOLA = _Curve(DM([[0, 0, -0.5], [0, 1, 0], [-0.5, 0, 0]]), -0.25, (0.0, 0.0, 1.0))
 
 
 def trigonometric_quartic(a: SX, signs: SX, scale: SX | float = 1.0) -> Root:
-    """The root of a0 cos 2t + a1 sin 2t + a2 cos t + a3 sin t + a4 = 0 that two signs choose.
+    """Return a root of a0 cos 2t + a1 sin 2t + a2 cos t + a3 sin t + a4 = 0, selected by two signs.
 
-    Where the second sign is +1 the polynomial rises with t there.
+    If the second sign is +1, the polynomial rises with t at the root.
 
     Args:
         a: (5, 1) coefficients.
-        signs: (2, 1) each +1 or -1.
-        scale: of the size of what the coefficients are sums of, in their unit.
+        signs: (2, 1) signs, +1 or -1.
+        scale: typical size of the terms of the coefficients, in their unit.
 
     Returns:
-        The angle in (-pi, pi] [rad]; `real` has two rows.
+        Angle in (-pi, pi] [rad]; `real` has two rows.
     """
     size = casadi.sumsqr(a[:4])
     b = a / casadi.sqrt(casadi.sumsqr(a) + TINY_SQUARE)
@@ -359,21 +359,21 @@ def trigonometric_quartic(a: SX, signs: SX, scale: SX | float = 1.0) -> Root:
 def real_quartic(
     coefficients: SX, signs: SX, scale: SX | float = 1.0, unit: SX | float = 1.0
 ) -> Root:
-    """The root of a0 r^4 + a1 r^3 + a2 r^2 + a3 r + a4 = 0 that two signs choose.
+    """Return a root of a0 r^4 + a1 r^3 + a2 r^2 + a3 r + a4 = 0, selected by two signs.
 
-    Where the second sign is +1 the polynomial rises with r there. Of four real roots, where the
-    first coefficient is positive, the first sign +1 chooses the larger two, and the second the
-    larger of these. The first coefficient may vanish; a root that is infinite stays at a large
-    number, and is not regular.
+    If the second sign is +1, the polynomial rises with r at the root. With four real roots and a
+    positive first coefficient, the first sign +1 selects the larger two, and the second the larger
+    of these. The first coefficient may vanish. An infinite root is replaced by a large number and
+    is not regular.
 
     Args:
-        coefficients: (5, 1) from the highest power.
-        signs: (2, 1) each +1 or -1.
-        scale: of the size of r, in its unit.
-        unit: of the size of what the coefficients are sums of, in the unit of the polynomial.
+        coefficients: (5, 1) coefficients from the highest power.
+        signs: (2, 1) signs, +1 or -1.
+        scale: typical size of r, in its unit.
+        unit: typical size of the terms of the coefficients, in the unit of the polynomial.
 
     Returns:
-        The number, in the unit of scale; `real` has two rows.
+        Number in the unit of scale; `real` has two rows.
     """
     powers = casadi.vertcat(*(scale**k for k in (4, 3, 2, 1, 0)))
     scaled = coefficients * powers
@@ -404,13 +404,13 @@ def _symmetric(row: tuple[SX, SX, SX], second: tuple[SX, SX], last: SX) -> SX:
 
 
 def _line(A: SX, curve: _Curve, sign: SX) -> tuple[SX, SX, SX]:
-    """One line of the pencil of A and the curve, the other one, and the radicand of the split.
+    """Return one line of the degenerate conic of A and `curve`, the other line, and the radicand.
 
     Args:
-        A: (3, 3) symmetric, of norm 1 or so, and without a part along the curve: the trace of
+        A: (3, 3) symmetric matrix with a norm of about 1 and no part along the curve: the trace of
             adj(C) A is zero.
-        curve: the other conic.
-        sign: which line.
+        curve: conic of the unknown.
+        sign: sign that selects the line.
     """
     M = _degenerate(A, curve)
     adjugate = _adjugate(M)
@@ -430,7 +430,7 @@ def _line(A: SX, curve: _Curve, sign: SX) -> tuple[SX, SX, SX]:
 
 
 def _degenerate(A: SX, curve: _Curve) -> SX:
-    """A plus the multiple of the curve that makes it a pair of lines, real where there is one."""
+    """Return A plus the multiple of the curve that makes a pair of lines, real if possible."""
     adjugate = _adjugate(A)
     linear = casadi.sum1(casadi.sum2(adjugate * SX(curve.C))) / curve.determinant
     constant = casadi.dot(A[:, 0], adjugate[:, 0]) / curve.determinant
@@ -441,7 +441,7 @@ def _degenerate(A: SX, curve: _Curve) -> SX:
 
 
 def _outer_roots(c: SX, d: SX) -> list[SX]:
-    """The smallest and the largest real root of x^3 + c x + d = 0."""
+    """Return the smallest and the largest real root of x^3 + c x + d = 0."""
     Q, R = -c / 3, d / 2
     D = R * R - Q * Q * Q
     angle = casadi.atan2(casadi.sqrt(casadi.fmax(-D, TINY_SQUARE)), R)
@@ -459,33 +459,33 @@ def _outer_roots(c: SX, d: SX) -> list[SX]:
 
 
 def _adjugate(M: SX) -> SX:
-    """(3, 3) adjugate of a symmetric matrix."""
+    """Return the adjugate (3, 3) of a symmetric matrix."""
     a, b, c, d, e, f = M[0, 0], M[0, 1], M[0, 2], M[1, 1], M[1, 2], M[2, 2]
     off = (c * e - b * f, b * e - c * d, b * c - a * e)
     return _symmetric((d * f - e * e, off[0], off[1]), (a * f - c * c, off[2]), a * d - b * b)
 
 
 def _largest(sizes: list[SX], values: list[SX]) -> SX:
-    """The value of the largest size of three."""
+    """Return the value that belongs to the largest of three sizes."""
     late = casadi.if_else(sizes[2] > sizes[1], values[2], values[1])
     first = casadi.logic_and(sizes[0] >= sizes[1], sizes[0] >= sizes[2])
     return SX(casadi.if_else(first, values[0], late))
 
 
 def _minus_sign(value: SX) -> SX:
-    """-1 where the value is positive or zero, else 1."""
+    """Return -1 if the value is positive or zero, else 1."""
     return SX(casadi.if_else(value >= 0, -1.0, 1.0))
 
 
 def _newton(value: SX, slope: SX, most: SX | float) -> SX:
-    """A Newton step that is never larger than half of `most`."""
-    # where the slope is rounding, below 1e-15, the step goes to zero and not to infinity
+    """Return a Newton step that is not larger than half of `most`."""
+    # for slopes below 1e-15, which are rounding, the step tends to zero instead of infinity
     step = -value * slope / (slope * slope + 1e-30)
     return SX(step / (1 + (step / most) ** 2))
 
 
 def _trigonometric(b: SX, t: SX) -> tuple[SX, SX]:
-    """The polynomial and its slope."""
+    """Return the trigonometric polynomial and its slope."""
     c, s = casadi.cos(t), casadi.sin(t)
     c2, s2 = c * c - s * s, 2 * s * c
     value = b[0] * c2 + b[1] * s2 + b[2] * c + b[3] * s + b[4]
@@ -493,7 +493,7 @@ def _trigonometric(b: SX, t: SX) -> tuple[SX, SX]:
 
 
 def _quartic(b: SX, r: SX) -> tuple[SX, SX]:
-    """The polynomial and its slope, both divided by (1 + r^2)^2."""
+    """Return the polynomial and its slope, both divided by (1 + r^2)^2."""
     value = (((b[0] * r + b[1]) * r + b[2]) * r + b[3]) * r + b[4]
     slope = ((4 * b[0] * r + 3 * b[1]) * r + 2 * b[2]) * r + b[3]
     size = (1 + r * r) ** 2
@@ -501,7 +501,7 @@ def _quartic(b: SX, r: SX) -> tuple[SX, SX]:
 
 
 def _quadratic(line: SX, root: SX) -> SX:
-    """(-b + root) / (2 a) of a r^2 + b r + c, without loss of digits and bounded."""
+    """Return (-b + root) / (2 a) for a r^2 + b r + c, without cancellation and bounded."""
     a, b, c = line[0], line[1], line[2]
     up, down = root - b, -b - root
     steady = b * root <= 0

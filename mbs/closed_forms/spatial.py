@@ -1,6 +1,6 @@
-"""Loops in space: joints from centres, distances, orientations and translations.
+"""Closed forms of loops in space, from centres, distances, orientations and translations.
 
-What lies beyond such a centre only sees a point, whatever the joints in it do.
+The joints of a centre keep one point fixed. The other joints of the loop depend on that point only.
 """
 
 from __future__ import annotations
@@ -37,20 +37,21 @@ from mbs.components.joints import Motion
 from mbs.recursions.chain import Chain, ChainJoint, Ring, frames_at_zero
 from mbs.spatial import Pose, cross, quaternion_rotation, vector
 
-# Two revolute joints whose axes meet, as in a universal joint, that aim a known point at a known
-# point.
+# Two revolute joints with intersecting axes, as in a universal joint, that move a point of a link
+# to a known point.
 #
-# What the second revolute joint can change along the axis of the first gives X cos t + Y sin t = Z.
-# The sign says to which side of the plane of the two axes the second joint is rotated.
+# The component along the axis of the first joint depends on the angle t of the second joint only: X
+# cos t + Y sin t = Z. The sign is the side of the plane of the two axes to which the second joint
+# is rotated.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 2.
 
 
 def aim(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """The branches that aim a link at its other end; None unless two centres are all unknown.
+    """Return two branches that aim a link between two centres; None unless they contain all joints.
 
     Args:
-        ring: the loop, of which one centre is made of two revolute joints.
+        ring: loop chain with a centre of two revolute joints.
         q: symbols of positions.
         p: symbols of parameters.
     """
@@ -81,16 +82,16 @@ def _aim_root(ring: Ring, one: Centre, other: Centre, sign: int) -> Positions:
     return positions(ring.joints[:2], (a.value, b.value))
 
 
-# A spherical joint as the only unknown joint: the quaternion of a known orientation.
+# A spherical joint as the only unknown joint: quaternion of a known rotation matrix.
 #
-# Of the four formulas the one with the largest denominator is taken, so that nothing is lost at
-# half rotations; the quaternion is the one whose first element is not negative.
+# The formula with the largest of four denominators is used, which is accurate at half rotations
+# too. The first element of the quaternion is not negative.
 #
 # Source: Shepperd 1978.
 
 
 def spherical(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """The orientation of a spherical joint of the tree; None unless it alone is unknown."""
+    """Return the quaternion of a spherical joint of the tree; None unless it alone is unknown."""
     joint = ring.joints[0]
     if len(ring.joints) != 1 or joint.motion is not Motion.SPHERICAL or joint.index is None:
         return None
@@ -100,7 +101,7 @@ def spherical(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def unit_quaternion(R: SX) -> SX:
-    """(4, 1) unit quaternion w, x, y, z of an orientation, w not negative."""
+    """Return the unit quaternion w, x, y, z (4, 1) of a rotation matrix, with w >= 0."""
     a, b, c = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
     d, e, f = R[1, 2] + R[2, 1], R[0, 2] + R[2, 0], R[0, 1] + R[1, 0]
     trace = casadi.trace(R)
@@ -119,11 +120,11 @@ def unit_quaternion(R: SX) -> SX:
     return SX(signed / casadi.norm_2(signed))
 
 
-# A spherical joint that two joints confine to a plane: a rotation brings it there.
+# A spherical joint whose centre two joints confine to a plane.
 #
-# Two parallel revolute joints, a revolute and a prismatic joint across it, or two prismatic joints
-# leave a point in a plane with the normal n. A rotation beyond them brings the spherical joint into
-# that plane: X cos t + Y sin t = Z. Then the loop is plane.
+# Two parallel revolute joints, a revolute and a prismatic joint perpendicular to it, or two
+# prismatic joints keep a point in a plane with the normal n. The rotation t of a third joint moves
+# the spherical centre into that plane: X cos t + Y sin t = Z. The remaining loop is plane.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 2.
 
@@ -132,10 +133,10 @@ _Z = (0.0, 0.0, 1.0)
 
 
 def confine(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """The rotation that brings a spherical joint into the plane of two others, or None.
+    """Return the rotation that moves a spherical centre into the plane of two joints, or None.
 
     Args:
-        ring: the loop, of which a spherical joint and three joints are unknown.
+        ring: loop chain with one spherical joint and three other unknown joints.
         q: symbols of positions.
         p: symbols of parameters.
     """
@@ -153,7 +154,7 @@ def confine(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def _normal(ring: Ring, q: SX, p: SX) -> SX | None:
-    """The normal of the plane that the second and third joint keep, seen before the second."""
+    """Return the normal of the plane of motion of joints 2 and 3, in the frame before joint 2."""
     second, third = (joint.motion is Motion.PRISMATIC for joint in ring.joints[1:3])
     between = ring.gaps[2].pose
     axis = between.R[:, 2]
@@ -166,12 +167,12 @@ def _normal(ring: Ring, q: SX, p: SX) -> SX | None:
 
 
 def _is_across(ring: Ring, normal: SX, q: SX, p: SX) -> bool:
-    """Whether the first revolute joint moves nothing along the normal either."""
+    """Whether the axis of joint 1 is parallel to the normal, so that it cannot reach the plane."""
     return always_zero(in_plane(ring.gaps[1].pose.R @ normal), q, p)
 
 
 def _confine_branches(ring: Ring, normal: SX) -> LoopBranches:
-    """The first joint, from the spherical one before it and its height on the normal behind it."""
+    """Return both angles of joint 1 that move the spherical centre into the other joints' plane."""
     X1, X2, X3, X4 = (gap.pose for gap in ring.gaps)
     joint, target = ring.joints[0], X1.inverse().p
     m = X2.R @ normal
@@ -185,16 +186,16 @@ def _confine_branches(ring: Ring, normal: SX) -> LoopBranches:
     )
 
 
-# Two coupled coordinates: the driven one by its polynomial, the driver where that is a line.
+# Coupled coordinates: the driven coordinate by the polynomial, others if they are linear in it.
 
 
 def coupled_position(
     coupling: CoordinateCoupling, known: Container[int], q: SX
 ) -> LoopBranches | str:
-    """The unknown one of coupled coordinates, or why it does not follow.
+    """Return the unknown coordinate of a coupling, or text on why it cannot be solved.
 
     Args:
-        coupling: one of whose coordinates is known.
+        coupling: coupling with all coordinates but one known.
         known: indices in q of known positions.
         q: (nq, 1) symbols of positions.
     """
@@ -207,32 +208,31 @@ def coupled_position(
         return LoopBranches({"": {number: coupling.value(q)}})
     if number == coupling.driver and len(terms) != 2:
         return "its driver follows from a polynomial that is not of degree one"
-    # linear in the unknown one, whose factor is its slope
+    # linear in the unknown coordinate, with the factor `slope`
     slope = terms[1] if number == coupling.driver else dict(coupling.others)[number]
     rest = casadi.substitute(coupling.value(q), q[number], SX(0))
     return LoopBranches({"": {number: (q[coupling.driven] - rest) / slope}})
 
 
-# One joint that brings two centres of a loop to the distance that a rigid link between them
-# tells.
+# One joint that sets the distance of two centres of a loop to the length of a rigid link.
 #
-# The centres are spherical joints, or revolute joints whose axes meet. Seen from the joint, one of
-# them is at m, the other one at d beyond the joint. A revolute joint gives X cos t + Y sin t = Z, a
-# prismatic joint a quadratic equation. These are the revolute and the prismatic joint "with length
-# constraint" of Modelica's assemblies.
+# A centre is a spherical joint, or revolute joints with intersecting axes. The first centre is at m
+# relative to the joint, the second centre at d in the frame after the joint. A revolute joint gives
+# X cos t + Y sin t = Z, a prismatic joint a quadratic equation. These are the revolute and the
+# prismatic joint "with length constraint" of Modelica's assemblies.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 2; Otter et al. 2003.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Span:
-    """A rigid link between two centres, and the path around the loop from its end to its start.
+    """Rigid link between two centres, and the loop chain from the end of the link to its start.
 
     Attributes:
-        chain: on that path.
-        target: (3, 1) the end of the link, before the first gap.
-        start: (3, 1) the start of the link, after the last gap.
-        squared: the square of its length.
+        chain: joints and transforms of the loop outside the link.
+        target: (3, 1) end of the link, in the frame before the first transform of `chain`.
+        start: (3, 1) start of the link, in the frame after the last transform of `chain`.
+        squared: square of the length of the link.
     """
 
     chain: Chain
@@ -242,7 +242,7 @@ class Span:
 
 
 def spans(ring: Ring, q: SX, p: SX) -> Iterator[Span]:
-    """Every rigid link of a loop between two centres."""
+    """Yield each rigid link of a loop between two centres."""
     n = len(ring.joints)
     found = centres(ring, q, p)
     for one in found:
@@ -253,7 +253,7 @@ def spans(ring: Ring, q: SX, p: SX) -> Iterator[Span]:
 
 
 def _span(begun: Ring, one: Centre, other: Centre) -> Span:
-    """The span between the first centre of a loop and the second one, next to it."""
+    """Return the span from the centre `one`, at which the loop begins, to the next one, `other`."""
     link = begun.gaps[one.count].pose
     after = one.count + other.count
     return Span(
@@ -265,7 +265,7 @@ def _span(begun: Ring, one: Centre, other: Centre) -> Span:
 
 
 def at_distance(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """The two branches of a joint where a rigid link fits; None where no link asks for it."""
+    """Return the branches of a single joint outside a link between two centres, or None."""
     for span in spans(ring, q, p):
         if len(span.chain.joints) == 1:
             m, d = _ends(span)
@@ -276,7 +276,7 @@ def at_distance(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def _ends(span: Span) -> tuple[SX, SX]:
-    """What the joint moves, and the rest of the link, seen from it."""
+    """Return the link's end in the frame before the joint, negated, and its start after it."""
     before, after = (gap.pose for gap in span.chain.gaps)
     back = before.inverse()
     return -(back.p + back.R @ span.target), after.p + after.R @ span.start
@@ -295,11 +295,11 @@ def _at_distance(joint: ChainJoint, m: SX, d: SX, squared: SX) -> LoopBranches:
     )
 
 
-# A free body as the only unknown joint: its position and quaternion follow from its pose.
+# A free body as the only unknown joint: its position and quaternion from its pose.
 
 
 def free_body(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """The pose of a free body; None unless it alone is unknown."""
+    """Return the pose of a free body; None unless it is the only unknown joint."""
     joint = ring.joints[0]
     if len(ring.joints) != 1 or joint.motion is not Motion.FREE or joint.index is None:
         return None
@@ -311,18 +311,17 @@ def free_body(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 # Three unknown revolute joints from orientations alone.
 #
-# R_a X_2 R_b X_3 R_c = X_1': the element on the third row and column holds the middle angle
-# alone, X cos t + Y sin t = Z. The sign says to which side of the plane of the two other axes the
-# middle joint is rotated.
+# R_a X_2 R_b X_3 R_c = X_1': element (3, 3) depends on the middle angle only, X cos t + Y sin t =
+# Z. The sign is the side of the plane of the two outer axes to which the middle joint is rotated.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 2.
 
 
 def orientations(ring: Ring) -> LoopBranches:
-    """The two branches of a loop of three unknown revolute joints, as far as orientations go.
+    """Return the two branches of three unknown revolute joints from orientations only.
 
     Args:
-        ring: its joints a, b, c; b is the one in the middle.
+        ring: loop chain with the joints a, b, c, where b is the joint in the middle.
     """
     return LoopBranches(
         {label: _orientations_root(ring, sign) for label, sign in signed(ring.joints[1])}
@@ -341,18 +340,18 @@ def _orientations_root(ring: Ring, sign: int) -> Positions:
     return positions(ring.joints, (a.value, b.value, c.value))
 
 
-# Turns from the orientations around a loop, before anything is known of its prismatic joints.
+# Rotations from the orientations around a loop, before its prismatic joints are known.
 #
-# Rotations about one direction are one: the loop is made of up to three directions. One angle is
-# what is missing; of two directions each rotation brings the other axis to where it belongs, those
-# that share their direction with others staying unknown; three revolute joints are solved as a
-# spherical loop.
+# Parallel revolute joints are one rotation, so that the loop has up to three directions. One
+# unknown angle is the remaining rotation. With two directions, each rotation aligns the other axis;
+# joints that share a direction with other joints remain unknown. Three revolute joints are solved
+# as a spherical loop.
 #
 # Source: Khalil & Creusot 1997, section 3.3; for RCCC loops Duffy 1980.
 
 
 def orientation(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """The revolute joints that orientations alone determine; None where there is none."""
+    """Return the revolute joints that orientations alone determine; None if there are none."""
     if any(joint.motion not in (Motion.REVOLUTE, Motion.PRISMATIC) for joint in ring.joints):
         return None
     revolute = _revolute_alone(ring)
@@ -371,7 +370,7 @@ def orientation(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def _revolute_alone(ring: Ring) -> Ring:
-    """The loop with its prismatic joints locked at zero."""
+    """Return the loop with its prismatic joints locked at zero."""
     for k, joint in enumerate(ring.joints):
         if joint.motion is Motion.PRISMATIC:
             return _revolute_alone(ring.without(k))
@@ -379,7 +378,7 @@ def _revolute_alone(ring: Ring) -> Ring:
 
 
 def _directions(ring: Ring, q: SX, p: SX) -> tuple[Ring, frozenset[str]]:
-    """One joint for each direction, and the names of those that stand for several."""
+    """Return the loop with one joint per direction, and names of joints that represent several."""
     shared, k = set[str](), 0
     while k < len(ring.joints) > 1:
         if parallel(ring.gaps[k].pose, q, p):
@@ -392,7 +391,7 @@ def _directions(ring: Ring, q: SX, p: SX) -> tuple[Ring, frozenset[str]]:
 
 
 def _is_oriented(ring: Ring, revolute: Ring, q: SX, p: SX) -> bool:
-    """Whether positions do not hinder three rotations: translations are free, or the axes meet."""
+    """Whether three rotations follow from orientations: free translations, or intersecting axes."""
     if len(ring.joints) == len(revolute.joints):
         return any(centre.count == 3 for centre in centres(ring, q, p))
     return len(ring.joints) == len(revolute.joints) + 3
@@ -410,16 +409,16 @@ def _two_orientations(ring: Ring, shared: frozenset[str]) -> LoopBranches:
 
 # Prismatic joints alone, or with all rotations about one point: linear equations.
 #
-# X_1 .. X_n with the prismatic joints at zero leaves a gap e; the prismatic joints move along u_1
-# .. u_m, m <= 3, and e + u_1 s_1 + .. + u_m s_m = 0. With fewer than three the normal equations are
-# solved, which lose nothing where the loop closes.
+# The product X_1 .. X_n with the prismatic joints at zero has the offset e. The m <= 3 prismatic
+# joints move along u_1 .. u_m: e + u_1 s_1 + .. + u_m s_m = 0. For m < 3 the normal equations are
+# solved, which are exact if the loop closes.
 
 
 _MOST = 3
 
 
 def prismatic(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """The only displacements that close a loop; None where a rotation has a say in them."""
+    """Return the unique displacements that close a loop; None if they depend on a rotation."""
     number = sum(joint.motion is Motion.PRISMATIC for joint in ring.joints)
     if not 1 <= number <= _MOST:
         return None
@@ -433,7 +432,7 @@ def prismatic(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def _prismatic_branches(ring: Ring, centre: Centre) -> LoopBranches:
-    """The prismatic joints that lead from the centre, the first one of the loop, back to it."""
+    """Return the prismatic joints of a loop that starts at a centre and ends at it."""
     joints = ring.joints[centre.count :]
     poses = frames_at_zero(ring.gaps[centre.count :], Pose.translation(-centre.after))
     axes, pose = [pose.R[:, 2] for pose in poses], poses[-1]
@@ -444,7 +443,7 @@ def _prismatic_branches(ring: Ring, centre: Centre) -> LoopBranches:
 
 
 def _combination(u: Sequence[SX], e: SX) -> list[SX]:
-    """The combination of one to three vectors that gives e."""
+    """Return the coefficients of one to three vectors u whose combination is e."""
     if len(u) == 1:
         return [casadi.dot(u[0], e) / casadi.sumsqr(u[0])]
     if len(u) == 2:
@@ -456,20 +455,19 @@ def _combination(u: Sequence[SX], e: SX) -> list[SX]:
     return [casadi.dot(e, normal) / volume for normal in across]
 
 
-# A rod between two spherical joints as all that is unknown: aimed by the shortest rotation, and
-# rotated about itself.
+# A rod between two spherical joints as the only unknowns: shortest rotation, then spin.
 #
-# The spherical joint rotates the vector u of the rod onto the known vector w. From the orientation
-# R_0 of the assembled configuration the shortest rotation M takes R_0 u onto w; before both the rod
-# may spin about u.
+# The spherical joint rotates the vector u of the rod onto the known vector w. Starting from the
+# orientation R_0 of the assembled configuration, the shortest rotation M takes R_0 u onto w. Before
+# both rotations, the rod may spin about u.
 
 
 def spin(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """The orientation of a rod that spins; None where more than its two joints is unknown.
+    """Return the quaternion of a rod from its spin; None if more than its two joints is unknown.
 
     Args:
-        ring: the loop.
-        q: symbols of positions, that of the spin included.
+        ring: loop chain.
+        q: symbols of positions, with the spin of the rod.
         p: symbols of parameters.
     """
     ring = with_spherical(ring, q, p)
@@ -499,36 +497,36 @@ def _rod_branches(ring: Ring, joint: ChainJoint, q: SX) -> LoopBranches:
 
 
 def _shortest_rotation(a: SX, b: SX) -> SX:
-    """The quaternion that rotates the unit vector a onto b about their common normal."""
+    """Return the quaternion that rotates the unit vector a onto b about their common normal."""
     whole = casadi.vertcat(1 + casadi.dot(a, b), cross(a, b))
     return SX(whole / casadi.norm_2(whole))
 
 
 def _product(a: SX, b: SX) -> SX:
-    """The product of two quaternions w, x, y, z."""
+    """Return the product of two quaternions w, x, y, z."""
     vector = a[0] * b[1:4] + b[0] * a[1:4] + cross(a[1:4], b[1:4])
     return casadi.vertcat(a[0] * b[0] - casadi.dot(a[1:4], b[1:4]), vector)
 
 
-# A point that two or three prismatic joints move and as many rigid links hold: spheres that meet.
+# Intersection of spheres: two or three prismatic joints, and as many rigid links to a point.
 #
-# Each link tells the distance of a point on what these joints move from a known centre: s'M s + 2
-# c_i's + k_i = 0 in the displacements s. Their differences are linear; the line that they leave
-# is cut with the first sphere. The sign says on which side of the plane of the centres the point
-# is, the first three of which are counted counterclockwise about its normal (of two centres: to
-# the left of the line from the first to the second).
+# Each link fixes the distance of a moved point from a known centre: s'M s + 2 c_i's + k_i = 0 in
+# the displacements s. The differences of these equations are linear. Their common line intersects
+# the first sphere in two points. The sign is the side of the plane of the centres on which the
+# point is; the first three centres are counterclockwise about the normal of that plane (for two
+# centres: the left of the line from the first to the second).
 #
 # Source: Clavel 1988.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sphere:
-    """s'M s + 2 c's + k = 0.
+    """Sphere equation s'M s + 2 c's + k = 0 of prismatic displacements s (n, 1).
 
     Attributes:
-        M: (n, n) of the axes of the prismatic joints.
-        c: (n, 1).
-        k: what is left.
+        M: (n, n) Gram matrix of the axes of the prismatic joints.
+        c: (n, 1) linear coefficients, halved.
+        k: constant term.
     """
 
     M: SX
@@ -537,7 +535,7 @@ class _Sphere:
 
 
 def prismatic_indices(span: Span) -> frozenset[int] | None:
-    """Indices in q of the joints between the ends of a link, where two or three are prismatic."""
+    """Return indices in q of the two or three prismatic joints of a span; None for other joints."""
     if any(joint.motion is not Motion.PRISMATIC for joint in span.chain.joints):
         return None
     indices = frozenset(joint.index for joint in span.chain.joints if joint.index is not None)
@@ -545,10 +543,10 @@ def prismatic_indices(span: Span) -> frozenset[int] | None:
 
 
 def independent_links(spans: Mapping[int, Span], q: SX, p: SX) -> list[int] | None:
-    """Which links hold the point, the others holding it likewise; None where they are too few.
+    """Return the loops whose links determine the point; None if there are too few of them.
 
     Args:
-        spans: with the same prismatic joints between their ends, by number of the loop.
+        spans: links whose loops have the same prismatic joints, by loop index.
         q: symbols of positions.
         p: symbols of parameters.
     """
@@ -566,16 +564,16 @@ def independent_links(spans: Mapping[int, Span], q: SX, p: SX) -> list[int] | No
 
 
 def _span_normal(a: Sequence[SX]) -> SX:
-    """What vanishes where vectors do not differ in direction."""
+    """Return an expression that is zero if one vector is zero or two vectors are parallel."""
     return a[0] if len(a) == 1 else cross(a[0], a[1])
 
 
 def point_on_links(name: str, spans: Sequence[Span]) -> LoopBranches:
-    """The two positions of a point that rigid links hold.
+    """Return the two positions of prismatic joints at which rigid links hold a point.
 
     Args:
-        name: for the labels.
-        spans: as many as there are prismatic joints between the ends of each of them.
+        name: prefix of the labels of both branches.
+        spans: links, as many as prismatic joints in each loop.
     """
     indices = sorted(prismatic_indices(spans[0]) or ())
     spheres = [_sphere(span, indices) for span in spans]
@@ -603,7 +601,7 @@ def _sphere(span: Span, indices: Sequence[int]) -> _Sphere:
 
 
 def _line(spheres: Sequence[_Sphere]) -> tuple[SX, SX]:
-    """A point and the direction of the line on which the spheres meet."""
+    """Return a point and the direction of the line that contains the common points of spheres."""
     first, *others = spheres
     a = [other.c - first.c for other in others]
     h = [(first.k - other.k) / 2 for other in others]
@@ -615,19 +613,18 @@ def _line(spheres: Sequence[_Sphere]) -> tuple[SX, SX]:
     return base / casadi.sumsqr(along), along
 
 
-# Bennett's loop: four revolute joints of skew axes, which moves nevertheless.
+# Bennett's loop: four revolute joints with skew axes, which is movable by its special dimensions.
 #
-# Opposite links are alike, so that a half rotation about a line takes the loop onto itself: it
-# swaps the axes next to the known one, and takes the known axis to the one opposite. The line lies
-# along the sum or the difference of the swapped axes; only one of them closes the loop, all the
-# way round.
+# Opposite links are equal, so that a half rotation about a line maps the loop onto itself: it swaps
+# the two axes next to the known axis, and maps the known axis to the opposite axis. The line is
+# along the sum or the difference of the swapped axes. Only one of the two closes the loop.
 #
 # Source: Bennett 1903.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Axes:
-    """Directions of the axes before, at and after the known one, seen after the last joint."""
+    """Directions of the axes before, at and after the known joint, in the frame after joint 3."""
 
     before: SX
     known: SX
@@ -635,7 +632,7 @@ class _Axes:
 
 
 def bennett(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """The only branch of a loop of three unknown revolute joints and a known one, or None."""
+    """Return the unique branch of Bennett's loop with one known joint; None for other loops."""
     revolute = all(joint.motion is Motion.REVOLUTE for joint in ring.joints)
     if len(ring.joints) != 3 or not revolute:
         return None
@@ -652,7 +649,7 @@ def bennett(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def _closing(ring: Ring, known: Pose, q: SX, p: SX) -> list[list[Angle]]:
-    """The angles by the half rotations that close the loop at every position of the known joint."""
+    """Return the angles of each half rotation that closes the loop at all known positions."""
     axes = _Axes(vector(_Z), known.R[:, 2], ring.gaps[0].pose.R[:, 2])
     found = list[list[Angle]]()
     for side in (1, -1):
@@ -666,7 +663,7 @@ def _closing(ring: Ring, known: Pose, q: SX, p: SX) -> list[list[Angle]]:
 
 
 def _has_equal_twists(ring: Ring, axes: _Axes, side: int, q: SX, p: SX) -> bool:
-    """Whether the twists of the unknown links are those of the known ones opposite."""
+    """Whether the twists of the unknown links are equal to the twists of the opposite links."""
     _, R2, R3 = (gap.pose.R for gap in ring.gaps)
     first = R2[2, 2] - side * casadi.dot(axes.before, axes.known)
     second = R3[2, 2] - side * casadi.dot(axes.after, axes.known)
@@ -674,7 +671,7 @@ def _has_equal_twists(ring: Ring, axes: _Axes, side: int, q: SX, p: SX) -> bool:
 
 
 def _angles(ring: Ring, axes: _Axes, swap: int, sense: int) -> list[Angle]:
-    """The angles when the half rotation takes the axis after the known one to swap x before."""
+    """Return the angles for the half rotation that maps axis `after` to swap times `before`."""
     R1, R2, R3 = (gap.pose.R for gap in ring.gaps)
     line = axes.after + swap * axes.before
     across = 2 * casadi.dot(line, axes.known) / casadi.sumsqr(line)
@@ -687,7 +684,7 @@ def _angles(ring: Ring, axes: _Axes, swap: int, sense: int) -> list[Angle]:
 
 
 def _closure_gap(ring: Ring, angles: list[Angle]) -> SX:
-    """What stays open of the loop, positions and directions."""
+    """Return the closure error of the loop (16, 1): pose around the loop minus the identity."""
     pose = Pose.identity()
     for gap, angle in zip(ring.gaps, angles, strict=True):
         pose = pose @ gap.pose @ _rotation(angle)

@@ -1,4 +1,4 @@
-"""Any loop of revolute and prismatic joints, by Paul's method: the simplest equations first.
+"""Closed form of any loop of revolute and prismatic joints, by Paul's method.
 
 Source: Paul 1981, section 3.7; Khalil & Dombre 2002, section 4.4.
 """
@@ -26,14 +26,14 @@ _AXES = Pose.rotation(SX(DM([[1, 0, 0], [0, 0, -1], [0, 1, 0]])))
 
 
 def split(ring: Ring, q: SX, p: SX) -> LoopBranches | str:
-    """The ways to find the revolute and prismatic joints of a loop, or why there is none.
+    """Return the branches of the revolute and prismatic joints of a loop, or text on the failure.
 
-    A spherical joint counts as three revolute joints, of which nothing is asked. The label of a way
-    has the signs of all steps with several roots, each named after its joint.
+    A spherical joint is replaced by three revolute joints, whose positions are not returned. The
+    label of a branch has the signs of all steps with several roots, each named after its joint.
 
     Args:
-        ring: the loop.
-        q: symbols of positions, those of cut joints included.
+        ring: loop chain.
+        q: symbols of positions, cut joints included.
         p: symbols of parameters.
     """
     simple = _without_spherical(ring)
@@ -52,7 +52,7 @@ def split(ring: Ring, q: SX, p: SX) -> LoopBranches | str:
 
 
 def _without_spherical(ring: Ring) -> Ring:
-    """The loop with three revolute joints about crossed axes in the place of each ball."""
+    """Return the loop with each spherical joint replaced by three revolute joints."""
     joints, gaps = list[ChainJoint](), list[Gap]()
     for joint, gap in zip(ring.joints, ring.gaps, strict=True):
         gaps.append(gap)
@@ -66,7 +66,7 @@ def _without_spherical(ring: Ring) -> Ring:
 
 
 def _problem(ring: Ring, q: SX, p: SX) -> Problem | str:
-    """The loop with its joints numbered from zero, or why it leaves them undetermined."""
+    """Return the loop with joint indices from zero, or why it does not determine its joints."""
     gaps = SX(casadi.vertcat(*(casadi.vec(gap.pose.matrix) for gap in ring.gaps)))
     symbols = {symbol.name() for symbol in casadi.symvar(gaps)}
     every = [*casadi.vertsplit(q), *casadi.vertsplit(p)]
@@ -94,7 +94,7 @@ def _root(ring: Ring, problem: Problem, sequence: StepSequence) -> LoopBranches:
 
 
 def _up_to(sequence: StepSequence, target: set[int]) -> StepSequence:
-    """The first steps, until they have given what is asked for."""
+    """Return the first steps that are needed to solve the joints of the indices `target`."""
     steps = list[SequenceStep]()
     for step in sequence.steps:
         if target:
@@ -104,7 +104,7 @@ def _up_to(sequence: StepSequence, target: set[int]) -> StepSequence:
 
 
 def _where_real(leaf: Leaf) -> SX:
-    """The positions; NaN where a radicand is negative."""
+    """Return the positions, or NaN if a radicand is negative."""
     real = leaf.real
     if real.numel() == 0:
         return leaf.x

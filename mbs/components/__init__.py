@@ -1,4 +1,4 @@
-"""What a user composes: bodies, joints, the world, and the mechanism that connects them."""
+"""Components of mechanisms: bodies, joints, forces, and the mechanism that connects them."""
 
 from mbs.components.blocks import (
     PI,

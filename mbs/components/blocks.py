@@ -1,8 +1,8 @@
-"""Signal blocks: controllers, filters, limits and sums between sensors and what they drive.
+"""Signal blocks: controllers, filters, limits and sums between sensors and actuators.
 
-A block has inputs and outputs, which `Mechanism.wire` connects, and no place in the mechanism. Most
-of them are continuous in time; sampled ones have events. Signals of blocks have the unit 1: a block
-does not know what it carries.
+A block has inputs and outputs, which `Mechanism.wire` connects, and no position in the mechanism.
+Most blocks are continuous in time; sampled blocks have events. Signals of blocks have the unit 1:
+a block is independent of the unit of its signals.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from mbs.text import quoted
 
 @dataclass(frozen=True, slots=True)
 class SignalBlock(Custom):
-    """A component of signals alone."""
+    """Base of components with signals only."""
 
     def _require_order(self) -> None:
-        """Refuse limits that are numbers and out of order."""
+        """Raise DescriptionError if both limits are numbers and not in order."""
         below, above = (self._number(name) for name in ("low", "high"))
         if below is not None and above is not None and below >= above:
             raise DescriptionError(
@@ -35,19 +35,19 @@ class SignalBlock(Custom):
             )
 
     def _number(self, name: str) -> float | None:
-        """The value of a parameter that is a number."""
+        """Return the value of a parameter; None if it is no number."""
         given = getattr(self, name)
         return None if given is None else to_float(given)
 
 
 def saturate(x: SX, low: SX | None, high: SX | None, width: SX) -> SX:
-    """A value between limits, each of which may be missing.
+    """Return a value limited to the range from low to high, with rounded corners.
 
     Args:
-        x: (1, 1).
-        low: (1, 1).
-        high: (1, 1).
-        width: (1, 1) over which the corners are rounded, zero for sharp ones.
+        x: (1, 1) value.
+        low: (1, 1) lower limit. None for no limit.
+        high: (1, 1) upper limit. None for no limit.
+        width: (1, 1) width over which the corners are rounded, zero for sharp corners.
     """
     if width.is_zero():
         x = x if low is None else casadi.fmax(x, low)
@@ -57,27 +57,27 @@ def saturate(x: SX, low: SX | None, high: SX | None, width: SX) -> SX:
 
 
 def _ramp(x: SX, width: SX) -> SX:
-    """Width log(1 + exp(x / width)), without overflow; fmax(x, 0) where the width is zero."""
+    """Return width log(1 + exp(x / width)), without overflow; fmax(x, 0) if the width is zero."""
     return casadi.fmax(x, 0) + width * casadi.log1p(
         casadi.exp(-casadi.fabs(x) / (width + (width == 0)))
     )
 
 
-# Without memory.
+# Blocks without states.
 
 
 class Constant(SignalBlock):
     """y = value.
 
     Attributes:
-        value: of the output.
+        value: value of the output.
     """
 
     value = custom.parameter()
     y = custom.output()
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The value."""
+        """Return the value."""
         return {"y": at.value}
 
 
@@ -93,7 +93,7 @@ class Gain(SignalBlock):
     y = custom.output()
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The factor times the input."""
+        """Return the factor times the input."""
         return {"y": at.k * at.u}
 
 
@@ -102,7 +102,7 @@ class Sum(SignalBlock):
     """y = weights[0] u1 + weights[1] u2 + ..., of up to four inputs.
 
     Attributes:
-        weights: one for each input; two inputs, one less the other, when left out.
+        weights: factor of each input, one to four. The default is (1, -1): u1 - u2.
     """
 
     weights: Any = (1.0, -1.0)
@@ -130,11 +130,11 @@ class Sum(SignalBlock):
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        """As many as there are weights."""
+        """Names of the inputs, as many as weights."""
         return ("u1", "u2", "u3", "u4")[: len(self.weights)]
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The sum."""
+        """Return the weighted sum."""
         pairs = zip(self.weights, self.input_names, strict=True)
         return {"y": sum((to_sx(w, at.symbols) * getattr(at, u) for w, u in pairs), SX(0))}
 
@@ -142,12 +142,13 @@ class Sum(SignalBlock):
 class Limiter(SignalBlock):
     """y = u between two limits, and the nearer limit beyond them.
 
-    With a width w the corners are rounded: fmax(x, 0) becomes w log(1 + exp(x / w)), which is more
+    With a width w the corners are rounded: fmax(x, 0) becomes w log(1 + exp(x / w)), which is
+        larger
     by w log 2 at the corner and by w exp(-10) at a distance of 10 w. y stays between the limits.
 
     Attributes:
-        low, high: the limits; one of them may be left out.
-        width: over which corners are rounded.
+        low, high: limits, one of which may be left out.
+        width: width over which corners are rounded.
     """
 
     low = custom.parameter("1", None)
@@ -165,11 +166,11 @@ class Limiter(SignalBlock):
         self._require_order()
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The input between the limits."""
+        """Return the limited input."""
         return {"y": saturate(at.u, at.low, at.high, at.width)}
 
 
-# With states, but no limits.
+# Blocks with states, without limits.
 
 
 class Integrator(SignalBlock):
@@ -185,11 +186,11 @@ class Integrator(SignalBlock):
     y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """The factor times the input."""
+        """Return the factor times the input."""
         return {"x": at.k * at.u}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The state."""
+        """Return the state."""
         return {"y": at.x}
 
 
@@ -198,7 +199,7 @@ class FirstOrder(SignalBlock):
 
     Attributes:
         time: time constant [s].
-        k: gain at rest.
+        k: static gain.
     """
 
     time = custom.parameter("s", positive=True)
@@ -208,11 +209,11 @@ class FirstOrder(SignalBlock):
     y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Towards the input."""
+        """Return the rate towards the input."""
         return {"x": (at.k * at.u - at.x) / at.time}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The state."""
+        """Return the state."""
         return {"y": at.x}
 
 
@@ -221,8 +222,8 @@ class SecondOrder(SignalBlock):
 
     Attributes:
         w: natural angular frequency [rad/s].
-        damping: ratio to critical damping.
-        k: gain at rest.
+        damping: damping ratio.
+        k: static gain.
     """
 
     w = custom.parameter("rad/s", positive=True)
@@ -234,25 +235,25 @@ class SecondOrder(SignalBlock):
     y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Of the output and of its rate."""
+        """Return the rates of the output and of its rate."""
         pull = at.w**2 * (at.k * at.u - at.x)
         return {"x": at.v, "v": pull - 2 * at.damping * at.w * at.v}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The state."""
+        """Return the state."""
         return {"y": at.x}
 
 
 class RateLimiter(SignalBlock):
-    """A signal that follows another one no faster than a rate: y = x, dx/dt = (u - x) / time.
+    """A signal that follows the input with a limited rate: y = x, dx/dt = (u - x) / time.
 
-    The rate is cut off at `rising` and at `-falling`. Where it is not cut off, y is late by `time`.
+    The rate is limited to the range from `-falling` to `rising`. Below the limits y lags by `time`.
 
     Attributes:
         rising: largest rate [1/s].
-        falling: largest rate downwards [1/s], as `rising` when left out.
+        falling: largest downward rate [1/s]. The default is `rising`.
         time: time constant [s].
-        width: over which the corners of the rate are rounded [1/s], see `Limiter`.
+        width: width over which the corners of the rate are rounded [1/s], see `Limiter`.
     """
 
     rising = custom.parameter("1/s", positive=True)
@@ -264,12 +265,12 @@ class RateLimiter(SignalBlock):
     y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Towards the input, between the largest rates."""
+        """Return the limited rate towards the input."""
         down = at.rising if at.falling is None else at.falling
         return {"x": saturate((at.u - at.x) / at.time, -down, at.rising, at.width)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The state."""
+        """Return the state."""
         return {"y": at.x}
 
 
@@ -277,10 +278,10 @@ class RateLimiter(SignalBlock):
 
 
 class ErrorController(SignalBlock):
-    """What controllers have: the error e = target - measured, its integral, limits of the output.
+    """Base of controllers: error e = target - measured, its integral, and limits of the output.
 
-    The integral part is the state x, dx/dt = ki e + (u - u0) / tracking, where u0 is the output
-    before the limits: at a limit the integral part runs after the output instead of winding up
+    The integral part is the state x, dx/dt = ki e + (u - u0) / tracking, with the output u0 before
+    the limits. At a limit the integral part tracks the output instead of winding up
     (back-calculation).
 
     Source: Astrom & Hagglund 2006 for the form with tracking.
@@ -304,7 +305,7 @@ class ErrorController(SignalBlock):
             self._require_ratio()
 
     def _require_ratio(self) -> None:
-        """Refuse gains whose ratio is no time constant, where it is used as one."""
+        """Raise DescriptionError if kp / ki is needed as a time constant and is not positive."""
         found = {name: self._number(name) for name in ("kp", "ki")}
         known = {name: gain for name, gain in found.items() if gain is not None}
         if 0 in known.values() or (len(known) == 2 and known["kp"] * known["ki"] < 0):
@@ -315,7 +316,7 @@ class ErrorController(SignalBlock):
             )
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Of the integral part."""
+        """Return the rate of the integral part."""
         rate = at.ki * (at.target - at.measured)
         if at.low is not None or at.high is not None:
             tracking = at.kp / at.ki if at.tracking is None else at.tracking
@@ -323,7 +324,7 @@ class ErrorController(SignalBlock):
         return {"x": rate}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The sum of the parts, between the limits."""
+        """Return the limited sum of the parts."""
         return {"u": self._saturate(at)}
 
     def _saturate(self, at: Any) -> SX:
@@ -339,8 +340,8 @@ class PI(ErrorController):
     Attributes:
         kp: gain.
         ki: gain of the integral part [1/s].
-        low, high: limits of the output; none when left out.
-        tracking: time constant of the integral part at a limit [s], kp / ki when left out.
+        low, high: limits of the output. The default is no limit.
+        tracking: time constant of the integral part at a limit [s]. The default is kp / ki.
     """
 
     kp = custom.parameter()
@@ -364,8 +365,8 @@ class PID(ErrorController):
         ki: gain of the integral part [1/s].
         kd: gain of the rate [s].
         filter: time constant of the rate's filter [s].
-        low, high: limits of the output; none when left out.
-        tracking: time constant of the integral part at a limit [s], kp / ki when left out.
+        low, high: limits of the output. The default is no limit.
+        tracking: time constant of the integral part at a limit [s]. The default is kp / ki.
     """
 
     kp = custom.parameter()
@@ -379,7 +380,7 @@ class PID(ErrorController):
     f = custom.state()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Of the integral part and of the filtered error."""
+        """Return the rates of the integral part and of the filtered error."""
         error = at.target - at.measured
         return {**ErrorController.rates(self, at), "f": (error - at.f) / at.filter}
 
@@ -388,32 +389,32 @@ class PID(ErrorController):
         return SX(at.kp * error + at.x + at.kd * (error - at.f) / at.filter)
 
 
-# Sampled blocks: what they give is constant between the instants at which they look.
+# Sampled blocks: their outputs are constant between sampling instants.
 
 
 class SampledBlock(SignalBlock):
-    """What sampled blocks have: the time that is left until they look again, from the start on."""
+    """Base of sampled blocks: the state `left` is the time to the next sample [s]."""
 
     left = custom.state("s")
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """The time that is left runs out."""
+        """Return the rate of the time to the next sample: -1."""
         return {"left": SX(-1)}
 
     def events(self, at: Any) -> Mapping[str, Event]:
-        """It looks again."""
+        """Return the sampling event."""
         return {"samples": Event(at.left, {"left": at.period, **self._sample(at)})}
 
     def _sample(self, at: Any) -> Mapping[str, SX]:
-        """What its modes become."""
+        """Return the new values of the modes at a sample."""
         raise NotImplementedError
 
 
 class SampleHold(SampledBlock):
-    """Sample and hold: y is what u was at the last multiple of the period.
+    """Sample and hold: y is the value of u at the last multiple of the period.
 
     Attributes:
-        period: between two looks [s].
+        period: sampling period [s].
     """
 
     period = custom.parameter("s", positive=True)
@@ -425,7 +426,7 @@ class SampleHold(SampledBlock):
         return {"sample": at.u}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """What it holds."""
+        """Return the sampled value."""
         return {"y": at.sample}
 
 
@@ -433,16 +434,16 @@ class SampledPID(SampledBlock):
     """A sampled PID controller: u = kp e + x + kd (e - e0) / T, x += ki e T, e = target - measured.
 
     T is the period, e0 the error one period before, zero at the start. At a limit of the output
-    the integral part x stays as it is unless it leads away from the limit.
+    the integral part x changes only away from the limit.
 
     Source: Astrom & Hagglund 2006 for the sampled form and conditional integration.
 
     Attributes:
-        period: between two looks [s].
+        period: sampling period [s].
         kp: gain.
         ki: gain of the integral part [1/s].
         kd: gain of the rate [s].
-        low, high: limits of the output; none when left out.
+        low, high: limits of the output. The default is no limit.
     """
 
     period = custom.parameter("s", positive=True)
@@ -468,11 +469,11 @@ class SampledPID(SampledBlock):
         given = at.kp * error + at.kd * (error - at.error) / at.period
         whole = given + more
         inside = saturate(whole, at.low, at.high, SX(0))
-        # the integral part grows only where the output is not at a limit already
+        # the integral part grows only if the output is not at a limit
         outwards = (whole - inside) * (more - at.x) > 0
         x = casadi.if_else(outwards, at.x, more)
         return {"sample": saturate(given + x, at.low, at.high, SX(0)), "x": x, "error": error}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """What it holds."""
+        """Return the sampled output."""
         return {"u": at.sample}

@@ -1,4 +1,4 @@
-"""Bodies: by their numbers, as homogeneous solids, the world; which inertias they may have."""
+"""Bodies with given inertia, homogeneous solids, the world, and checks of inertias."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from mbs.spatial import Inertia, vector
 from mbs.spatial.inertia import TEN_PARAMETERS
 from mbs.text import quoted
 
-# What masses and inertias a body may have, and the forms in which a user may write them.
+# Checks of masses and inertias, and conversion of the forms in which they may be given.
 
 
 _TOLERANCE = 1e-6
-"""Part of the largest moment of inertia by which one may be negative, and relative difference of
-elements of a tensor that are equal: files give them with six or seven digits."""
+"""Tolerance of negative moments of inertia relative to the largest moment, and relative tolerance
+of equal elements of a tensor: files have six or seven digits."""
 _LARGEST = 1e30
-"""Of masses, lengths and moments in SI units: products of four of them stay finite."""
+"""Largest mass, length or moment in SI units: a product of four of them is still finite."""
 _ZERO = 1e-12
-"""Element of a tensor [kg m^2] that is the rounding of zero, as where a file of a symmetric tensor
-was rotated: bodies that small are not described in kg and m."""
+"""Element of a tensor [kg m^2] that counts as rounding of zero, as in a rotated symmetric tensor:
+bodies that small are not described in kg and m."""
 
 
 GROUPED = (
     "or grouped=True for base parameters, which are sums over several bodies (grouped = true in"
     " TOML, the comment (* grouped 3 = 1 *) for frame 3 in a .par file)"
 )
-"""Remedy for base parameters in the place of inertial parameters."""
+"""Remedy in error messages about inertias: declare the values as base parameters."""
 
 
 def check_mass(name: str, mass: Scalar) -> None:
-    """Refuse a mass that is a negative number."""
+    """Raise DescriptionError if a mass is a negative number."""
     value = to_float(mass)
     if value is not None and value < 0:
         raise DescriptionError(f"{name}: mass is {value:g} kg; give zero or more")
@@ -56,12 +56,13 @@ def _require_mass(name: str, kind: str, given: Scalar | None, other: str = "") -
 def check_tensor(
     name: str, six: Iterable[Scalar], scale: float = 0.0, remedy: str = "give a positive tensor"
 ) -> None:
-    """Raise DescriptionError if a moment of inertia about the centre of mass is negative.
+    """Raise DescriptionError if a principal moment of inertia about the centre of mass is negative.
 
     Args:
-        name: the body, for the message.
+        name: name of the body, for the message.
         six: Ixx Ixy Ixz Iyy Iyz Izz.
-        scale: size of the numbers that were subtracted to get these, which rounding comes from.
+        scale: magnitude of the terms from which `six` was subtracted, which sets the rounding
+            error.
         remedy: end of the message.
     """
     low, _, high = _principal_moments(six)
@@ -73,11 +74,12 @@ def check_tensor(
 
 
 def tensor_fault(six: Iterable[Scalar], scale: float = 0.0) -> str:
-    """Return why no body has these moments about its centre of mass; empty if one may have them.
+    """Return the reason why no body has these moments of inertia; empty if they are possible.
 
     Args:
-        six: Ixx Ixy Ixz Iyy Iyz Izz, without negative principal moments.
-        scale: size of the numbers that were subtracted to get these, which rounding comes from.
+        six: Ixx Ixy Ixz Iyy Iyz Izz about the centre of mass, without negative principal moments.
+        scale: magnitude of the terms from which `six` was subtracted, which sets the rounding
+            error.
     """
     low, middle, high = _principal_moments(six)
     if low + middle >= high - _TOLERANCE * max(abs(high), scale):
@@ -88,7 +90,7 @@ def tensor_fault(six: Iterable[Scalar], scale: float = 0.0) -> str:
 
 
 def _principal_moments(six: Iterable[Scalar]) -> tuple[float, float, float]:
-    """Principal moments in ascending order; zeros if an element has no value."""
+    """Return the principal moments in ascending order; zeros if an element has no value."""
     numbers = [value for value in map(to_float, six) if value is not None]
     if len(numbers) < 6:
         return 0.0, 0.0, 0.0
@@ -97,13 +99,13 @@ def _principal_moments(six: Iterable[Scalar]) -> tuple[float, float, float]:
 
 
 def tensor_matrix(six: list[float]) -> Any:
-    """The (3, 3) symmetric matrix of Ixx Ixy Ixz Iyy Iyz Izz."""
+    """Return the symmetric (3, 3) matrix of Ixx Ixy Ixz Iyy Iyz Izz."""
     XX, XY, XZ, YY, YZ, ZZ = six
     return np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
 
 
 def three(values: Any, where: str) -> tuple[Expression, ...]:
-    """The three scalars (x, y, z) that a user wrote."""
+    """Return the three scalars (x, y, z) of a vector; raise if there are not three."""
     try:
         x, y, z = [] if isinstance(values, str) else list(values)
     except (TypeError, ValueError):
@@ -114,7 +116,7 @@ def three(values: Any, where: str) -> tuple[Expression, ...]:
 
 
 def six_of(values: Any, where: str) -> tuple[Expression, ...]:
-    """Ixx Ixy Ixz Iyy Iyz Izz of an inertia that a user wrote in any of the accepted forms."""
+    """Return Ixx Ixy Ixz Iyy Iyz Izz of an inertia in any of the accepted forms."""
     flat: list[Any] = []
     for value in values if hasattr(values, "__len__") and not isinstance(values, str) else [values]:
         nested = hasattr(value, "__len__") and not isinstance(value, str)
@@ -137,18 +139,18 @@ _TWINS = ((1, 3), (2, 6), (5, 7))
 
 
 def _equal(a: Expression, b: Expression) -> bool:
-    """Whether two elements of a tensor are the same, up to the rounding of numbers."""
+    """Return whether two elements of a tensor are equal, up to rounding."""
     if isinstance(a, Number) and isinstance(b, Number):
         return math.isclose(a.value, b.value, rel_tol=_TOLERANCE, abs_tol=_ZERO)
     return a == b
 
 
-# What every rigid body has, and the two bodies without inertia: the world and a mount.
+# Base class of bodies, and the two bodies without inertia: the world and a mount.
 
 
 @dataclass(frozen=True, slots=True)
 class RigidBody(Component):
-    """A component with a reference frame on which other frames are placed."""
+    """A component with a reference frame, relative to which other frames are placed."""
 
     @property
     def frame(self) -> Point:
@@ -158,29 +160,30 @@ class RigidBody(Component):
     def at(
         self, x: Scalar = 0, y: Scalar = 0, z: Scalar = 0, *, rotation: Rotation | None = None
     ) -> Point:
-        """The point (x, y, z) [m] of the reference frame, its axes rotated by `rotation`."""
+        """Return the point (x, y, z) [m] in the reference frame, its axes rotated by `rotation`."""
         return self.frame.at(x, y, z, rotation=rotation)
 
     def at_khalil(self, **parameters: Scalar) -> Point:
-        """The frame with these Khalil parameters gamma, b, alpha, d, theta, r."""
+        """Return the frame at Khalil parameters gamma, b, alpha, d, theta, r."""
         return self.frame.at_khalil(**parameters)
 
     @property
     def inertia_fault(self) -> str:
-        """Why no body has this inertia; empty if one may have it.
+        """Reason why no body has this inertia; empty if it is possible.
 
-        It matters only to bodies that rotate about several axes, so that assembling looks at it.
+        Only bodies that rotate about several axes require a possible inertia, which assembling
+        checks.
         """
         return ""
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Inertia about the origin of the reference frame, on CasADi symbols."""
+        """Return the inertia about the origin of the reference frame, in CasADi symbols."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True, slots=True)
 class World(RigidBody):
-    """The ground, the frame in which gravity is given.
+    """The ground, in whose frame gravity is given.
 
     Attributes:
         gravity: gravity acceleration in the world frame [m/s^2].
@@ -194,36 +197,36 @@ class World(RigidBody):
         object.__setattr__(self, "gravity", three(self.gravity, f"{self.name}, gravity"))
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """The ground does not move: no inertia."""
+        """Return zero inertia: the ground does not move."""
         return Inertia.zero()
 
 
 @dataclass(frozen=True, slots=True)
 class Mount(RigidBody):
-    """A frame without mass: the ground of a nested mechanism, to be connected to something."""
+    """A massless frame: the ground of a nested mechanism, to be connected to a body."""
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """No inertia."""
+        """Return zero inertia."""
         return Inertia.zero()
 
 
 @dataclass(frozen=True, slots=True)
 class Body(RigidBody):
-    """A body of given mass, centre of mass and inertia.
+    """A body with mass, centre of mass and inertia.
 
     Attributes:
-        mass: [kg]; `mass=0` for a frame without mass.
+        mass: mass [kg]; `mass=0` for a massless frame.
         com: centre of mass in the reference frame [m].
-        inertia: about the centre of mass, in the axes of the reference frame [kg m^2]: three
-            principal values, or Ixx Ixy Ixz Iyy Iyz Izz, or a (3, 3) symmetric matrix.
-        checked: False takes a mass and an inertia that no body has, as the files of others hold
-            them: inverse dynamics and the inertia matrix are defined all the same. Readers set it
-            on such a body, and note it; nothing else should.
+        inertia: inertia about the centre of mass, in the axes of the reference frame [kg m^2]:
+            three principal values, or Ixx Ixy Ixz Iyy Iyz Izz, or a (3, 3) symmetric matrix.
+        checked: Whether mass and inertia are checked. False accepts physically impossible values,
+            with which inverse dynamics and the inertia matrix are still defined. Only readers of
+            files set it, together with a note.
 
     Raises:
-        DescriptionError: no mass is given, it is negative, or a principal moment is. Principal
-            moments that break the triangle inequality raise an error at assembly, and are a note
-            for a body that rotates about one axis only.
+        DescriptionError: mass is missing or negative, or a principal moment is negative. Principal
+            moments that violate the triangle inequality raise an error at assembly, or give a note
+            if the body rotates about one axis only.
     """
 
     mass: Scalar | None = None
@@ -243,11 +246,11 @@ class Body(RigidBody):
 
     @property
     def inertia_fault(self) -> str:
-        """Why no body has this inertia; empty if one may have it, or if it is not checked."""
+        """Reason why no body has this inertia; empty if it is possible or not checked."""
         return tensor_fault(self.inertia) if self.checked else ""
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Inertia about the origin of the reference frame."""
+        """Return the inertia about the origin of the reference frame."""
         com = vector(to_sx(value, symbols) for value in self.com)
         tensor = Inertia.from_parameters(
             vector([*(to_sx(value, symbols) for value in self.inertia), 0, 0, 0, 0])
@@ -257,14 +260,14 @@ class Body(RigidBody):
 
 @dataclass(frozen=True, slots=True)
 class KhalilBody(RigidBody):
-    """A body by the ten inertial parameters about the origin of its frame, and in its axes.
+    """A body with ten inertial parameters about the origin of its frame, in its axes.
 
     Attributes:
         XX, XY, XZ, YY, YZ, ZZ: inertia about the origin of the frame [kg m^2].
         MX, MY, MZ: first moments, mass times centre of mass [kg m].
         M: mass [kg].
-        grouped: the values are base parameters (sums over several bodies), which need not
-            belong to any single body, so that nothing is checked.
+        grouped: Whether the values are base parameters (sums over several bodies). They are not
+            checked, since no single body needs to have them.
     """
 
     XX: Scalar = 0.0
@@ -294,11 +297,11 @@ class KhalilBody(RigidBody):
 
     @property
     def inertia_fault(self) -> str:
-        """Why no body has this inertia; empty if one may have it, or if it is grouped."""
+        """Reason why no body has this inertia; empty if it is possible or grouped."""
         return "" if self.grouped else tensor_fault(*self._about_com())
 
     def _about_com(self) -> tuple[list[Scalar], float]:
-        """Inertia about the centre of mass, and the size of the numbers that it is made of.
+        """Return the inertia about the centre of mass, and the magnitude of its terms.
 
         The inertia is empty if a parameter has no value or the mass is zero.
         """
@@ -320,7 +323,7 @@ class KhalilBody(RigidBody):
         return [float(J[at]) for at in upper], float(max(abs(np.array(numbers[:6]))))
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Inertia about the origin of the reference frame."""
+        """Return the inertia about the origin of the reference frame."""
         return Inertia.from_parameters(
             vector(to_sx(getattr(self, name), symbols) for name in TEN_PARAMETERS)
         )
@@ -328,10 +331,10 @@ class KhalilBody(RigidBody):
 
 @dataclass(frozen=True, slots=True)
 class PointMass(RigidBody):
-    """A mass without extent at its reference frame.
+    """A point mass at the origin of its reference frame.
 
     Attributes:
-        mass: [kg].
+        mass: mass [kg].
     """
 
     mass: Scalar | None = None
@@ -343,7 +346,7 @@ class PointMass(RigidBody):
         check_mass(self.name, mass)
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Inertia about the reference frame: only a mass."""
+        """Return the inertia about the origin of the reference frame: a mass only."""
         zero = Inertia.zero()
         return Inertia(zero.J, zero.ms, to_sx(self.mass or 0, symbols))
 
@@ -353,21 +356,21 @@ class PointMass(RigidBody):
 
 @dataclass(frozen=True, slots=True)
 class _Bar(RigidBody):
-    """A solid that runs along x from its left to its right end; the reference frame is at the left.
+    """Base of solids along x from a left to a right end; the reference frame is at the left end.
 
-    Either a density or a mass is given; `mass=0` makes a solid without mass.
+    Either density or mass is given; `mass=0` makes a massless solid.
     """
 
     length: Scalar = 1.0
 
     @property
     def left(self) -> Point:
-        """The end where the solid starts: its reference frame."""
+        """Left end of the solid: its reference frame."""
         return self.frame
 
     @property
     def right(self) -> Point:
-        """The end at x = length."""
+        """Right end of the solid, at x = length."""
         return self.at(self.length)
 
     @property
@@ -407,9 +410,9 @@ class Box(_Bar):
     """A homogeneous cuboid along x.
 
     Attributes:
-        length, width, height: along x, y and z [m]; the height is the width if not given.
-        density: [kg/m^3].
-        mass: [kg], instead of the density.
+        length, width, height: sides along x, y and z [m]. The default of the height is the width.
+        density: density [kg/m^3].
+        mass: mass [kg], instead of the density.
     """
 
     width: Scalar = 0.1
@@ -432,7 +435,7 @@ class Box(_Bar):
         return self._mass(self.mass, self.density, volume)
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Inertia about the left end."""
+        """Return the inertia about the left end."""
         l2, w2, h2 = (expression(side or 0) ** 2 for side in (self.length, self.width, self.height))
         radii = [(w2 + h2) / 12, (l2 + h2) / 12, (l2 + w2) / 12]
         return self._solid_inertia(symbols, self.solid_mass, radii)
@@ -443,11 +446,11 @@ class Cylinder(_Bar):
     """A homogeneous round bar or tube along x.
 
     Attributes:
-        length: along x [m].
+        length: length along x [m].
         radius: outer radius [m].
-        inner_radius: of the bore [m].
-        density: [kg/m^3].
-        mass: [kg], instead of the density.
+        inner_radius: radius of the bore [m].
+        density: density [kg/m^3].
+        mass: mass [kg], instead of the density.
     """
 
     radius: Scalar = 0.05
@@ -473,7 +476,7 @@ class Cylinder(_Bar):
         return self._mass(self.mass, self.density, area * self.length)
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Inertia about the left end."""
+        """Return the inertia about the left end."""
         squares = expression(self.radius) ** 2 + expression(self.inner_radius) ** 2
         across = squares / 4 + expression(self.length) ** 2 / 12
         return self._solid_inertia(symbols, self.solid_mass, [squares / 2, across, across])

@@ -1,4 +1,4 @@
-"""What all components have in common: a name, points to connect, placements, axes."""
+"""Base of all components: names, points to connect, placements and axes."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ from mbs.expressions import (
 from mbs.spatial import Khalil, Pose, align_z, nearest_rotation, unit_vector, vector
 from mbs.text import did_you_mean, listed, quoted, seen
 
-# Where a point of a component is: a chain of displacements, kept as data.
+# Placements of points on a component: chains of displacements, stored as data.
 #
-# A placement is read from left to right: each step starts where the one before it ended.
+# A placement is read from left to right: each step starts at the frame of the step before.
 
 
 SymbolTable = Mapping[str, SX]
-"""The CasADi symbol of every parameter, by name."""
+"""CasADi symbol of every parameter, by name."""
 
 _DIGITS = 11
-"""Significant digits from which on a number may be a multiple of pi/2 that was written down."""
+"""Significant digits from which a number is recognised as a rounded multiple of pi/2."""
 
 _WRITTEN = 6e-12
-"""How far the usual texts 1.5707963268 and 1.57079632679 are from pi/2, at most [rad]."""
+"""Largest deviation of the usual texts 1.5707963268 and 1.57079632679 from pi/2 [rad]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class Translation:
     z: Expression
 
     def pose(self, symbols: SymbolTable) -> Pose:
-        """The displaced frame seen from the one before."""
+        """Return the pose of the displaced frame relative to the previous frame."""
         return Pose.translation(vector(to_sx(value, symbols) for value in (self.x, self.y, self.z)))
 
 
@@ -68,24 +68,24 @@ class ElementaryRotation:
     angle: Expression
 
     def pose(self, symbols: SymbolTable) -> Pose:
-        """The rotated frame seen from the one before."""
+        """Return the pose of the rotated frame relative to the previous frame."""
         return Pose.about(self.axis, to_sx(self.angle, symbols))
 
 
 @dataclass(frozen=True, slots=True)
 class FixedRotation:
-    """A rotation given by its matrix, row by row."""
+    """A rotation given by the rows of its matrix."""
 
     rows: tuple[tuple[float, float, float], ...]
 
     def pose(self, symbols: SymbolTable) -> Pose:
-        """The rotated frame seen from the one before."""
+        """Return the pose of the rotated frame relative to the previous frame."""
         return Pose.rotation(SX(DM(self.rows)))
 
 
 @dataclass(frozen=True, slots=True)
 class KhalilStep:
-    """The six parameters of a frame j with respect to its antecedent, kept as they were written."""
+    """Khalil parameters of a frame j relative to its antecedent, as expressions."""
 
     gamma: Expression
     b: Expression
@@ -95,11 +95,11 @@ class KhalilStep:
     r: Expression
 
     def khalil(self, symbols: SymbolTable) -> Khalil:
-        """The parameters on CasADi symbols."""
+        """Return the parameters in CasADi symbols."""
         return Khalil(*(to_sx(getattr(self, f.name), symbols) for f in fields(self)))
 
     def pose(self, symbols: SymbolTable) -> Pose:
-        """Frame j seen from its antecedent."""
+        """Return the pose of frame j relative to its antecedent."""
         return self.khalil(symbols).pose()
 
 
@@ -108,30 +108,30 @@ Step = Translation | ElementaryRotation | FixedRotation | KhalilStep
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """A chain of displacements; empty means "here"."""
+    """A chain of displacements; empty for no displacement."""
 
     steps: tuple[Step, ...] = ()
 
     def pose(self, symbols: SymbolTable) -> Pose:
-        """The placed frame seen from where the chain starts."""
+        """Return the pose of the placed frame relative to the start of the chain."""
         pose = Pose.identity()
         for step in self.steps:
             pose = pose @ step.pose(symbols)
         return pose
 
     def then(self, *steps: Step) -> Placement:
-        """The placement with further steps at its end."""
+        """Return the placement with further steps at its end."""
         return Placement(self.steps + steps)
 
     def inverse(self) -> Placement:
-        """The placement of where the chain starts, seen from where it ends.
+        """Return the inverse placement: the start of the chain relative to its end.
 
-        The steps are translations and rotations.
+        The steps must be translations and rotations.
         """
         return Placement(tuple(_inverse(step) for step in reversed(self.steps)))
 
     def expressions(self) -> Iterator[Expression]:
-        """Every scalar in the placement."""
+        """Yield every scalar in the placement."""
         for step in self.steps:
             for f in fields(step):
                 value = getattr(step, f.name)
@@ -139,12 +139,12 @@ class Placement:
                     yield value
 
     def scoped(self, prefix: str) -> Placement:
-        """The placement with its parameters put in the scope of a nested mechanism."""
+        """Return the placement with prefixed parameter names, for a nested mechanism."""
         return Placement(tuple(_scoped(step, prefix) for step in self.steps))
 
 
 def _inverse(step: Step) -> Step:
-    """Inverse of a translation or a rotation."""
+    """Return the inverse of a translation or a rotation."""
     if isinstance(step, Translation):
         return Translation(*(operation("negate", value) for value in (step.x, step.y, step.z)))
     if isinstance(step, ElementaryRotation):
@@ -164,13 +164,13 @@ def _scoped(step: Step, prefix: str) -> Step:
 
 
 Rotation = tuple[str, Scalar] | Sequence[tuple[str, Scalar]] | Sequence[Sequence[float]]
-"""("z", "pi/2 + A"), a sequence of such rotations, or a (3, 3) matrix."""
+"""Rotation ("z", "pi/2 + A"), a sequence of such rotations, or a (3, 3) matrix."""
 
 
 def displacement(
     where: str, x: Scalar, y: Scalar, z: Scalar, rotation: Rotation | None
 ) -> tuple[Step, ...]:
-    """The steps of "at (x, y, z), then rotated by `rotation`"."""
+    """Return the steps of a translation by (x, y, z) and a rotation by `rotation`."""
     values = [
         expression(value, f"{where}, {name}") for name, value in zip("xyz", (x, y, z), strict=True)
     ]
@@ -185,15 +185,15 @@ def displacement(
 def in_rotated_axes(
     vector: Sequence[Expression], rotation: Rotation, where: str
 ) -> tuple[Expression, ...]:
-    """Return the components of a vector (3,) in axes that are rotated.
+    """Return the components of a vector (3,) in rotated axes.
 
     Args:
         vector: components in the axes before the rotation.
-        rotation: of the new axes relative to the old ones.
-        where: names the rotation in messages.
+        rotation: rotation of the new axes relative to the old axes.
+        where: name of the rotation in error messages.
 
     Raises:
-        DescriptionError: the rotation is none.
+        DescriptionError: the value is no rotation.
     """
     for step in _rotation_steps(where, rotation):
         if isinstance(step, FixedRotation):
@@ -211,7 +211,7 @@ def in_rotated_axes(
 
 
 def _sum(products: Iterable[tuple[Scalar, Expression]]) -> Expression:
-    """Sum of products, without the products with zero."""
+    """Return the sum of products, without products with zero."""
     total: Expression = Number(0.0)
     for factor, value in products:
         if 0 in (to_float(factor), to_float(value)):
@@ -230,7 +230,7 @@ def _rotation_steps(where: str, rotation: Any) -> Iterable[Step]:
         R = np.asarray(rotation, dtype=float)
     except (TypeError, ValueError):
         R = np.zeros(0)
-    # cosines as files give them, with six digits; what is kept is the nearest rotation
+    # tolerance for cosines with six digits in files; the nearest rotation is stored
     if R.shape != (3, 3) or not np.allclose(R @ R.T, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0:
         raise DescriptionError(
             f"{where}: rotation {quoted(rotation)} is not a rotation; give ('z', angle), a sequence"
@@ -250,10 +250,11 @@ def _elementary_rotation(where: str, axis: str, angle: Scalar) -> ElementaryRota
 
 
 def angle_expression(angle: Scalar, where: str) -> Expression:
-    """An angle [rad]; a multiple of pi/2 that was written with 11 digits or more is exactly that.
+    """Return an angle [rad] as an expression; pi/2 with 11 or more digits becomes exact.
 
-    1.57079632679 in a file means pi/2. Five units of 1e-12 would be a tilt that nobody meant, for
-    which every model pays in operations. A text with fewer digits is taken at its word.
+    A file with 1.57079632679 means pi/2. A deviation of 5e-12 would be an unintended tilt, which
+    adds operations to every model. Multiples of pi/2 are treated in the same way. Numbers with
+    fewer digits stay unchanged.
     """
     value = expression(angle, where)
     if not isinstance(value, Number):
@@ -274,13 +275,13 @@ _NAME = re.compile(r"[^\s.'\"]+(?:\.[^\s.'\"]+)*")
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A frame fixed on a component, where another component can be connected.
+    """A frame fixed on a component, to which another component can be connected.
 
     Attributes:
-        owner: the component that carries the frame.
-        port: which frame of the owner the placement starts at ("" for the reference frame of a
+        owner: component that carries the frame.
+        port: frame of the owner at which the placement starts ("" for the reference frame of a
             body; "a" or "b" for a joint).
-        placement: the frame seen from that port.
+        placement: placement of the frame relative to the port.
     """
 
     owner: Component
@@ -290,7 +291,7 @@ class Point:
     def at(
         self, x: Scalar = 0, y: Scalar = 0, z: Scalar = 0, *, rotation: Rotation | None = None
     ) -> Point:
-        """A point displaced by (x, y, z) [m] in this frame, then rotated by `rotation`."""
+        """Return a point displaced by (x, y, z) [m] in this frame, then rotated by `rotation`."""
         steps = displacement(f"{self.owner.name}.at", x, y, z, rotation)
         return replace(self, placement=self.placement.then(*steps))
 
@@ -303,7 +304,7 @@ class Point:
         theta: Scalar = 0,
         r: Scalar = 0,
     ) -> Point:
-        """A point placed by the parameters of Khalil & Kleinfinger 1986, angles in rad."""
+        """Return a point placed by the parameters of Khalil & Kleinfinger 1986, angles in rad."""
         where = f"{self.owner.name}.at_khalil"
         values = (gamma, b, alpha, d, theta, r)
         names = ("gamma", "b", "alpha", "d", "theta", "r")
@@ -317,16 +318,16 @@ class Point:
 C = TypeVar("C", bound="Component")
 
 
-# Arguments of constructors.
+# Checks of constructor arguments.
 
 
 def check_arguments(cls: type) -> None:
-    """Make the constructor of a class raise an ArgumentError for names and numbers of arguments.
+    """Make the constructor of a class raise an ArgumentError for wrong arguments.
 
-    The error names unknown, missing, surplus and repeated arguments.
+    The error lists unknown, missing, surplus and repeated arguments.
 
     Args:
-        cls: the class; only an `__init__` of its own is replaced.
+        cls: class; only an `__init__` of its own is replaced.
     """
     own = vars(cls).get("__init__")
     if own is None or hasattr(own, "__wrapped__"):
@@ -335,7 +336,7 @@ def check_arguments(cls: type) -> None:
 
 
 def _checking(init: Callable[..., None]) -> Callable[..., None]:
-    """The same constructor; wrong arguments raise an ArgumentError."""
+    """Return the constructor with an ArgumentError for wrong arguments."""
 
     @wraps(init)
     def checked(self: Any, *args: Any, **kwargs: Any) -> None:
@@ -357,7 +358,7 @@ def _checking(init: Callable[..., None]) -> Callable[..., None]:
 def _wrong_arguments(
     init: Callable[..., None], args: Sequence[Any], kwargs: Mapping[str, Any]
 ) -> str:
-    """The fault of the arguments of a constructor; empty if they fit."""
+    """Return the fault of the arguments of a constructor; empty if they are right."""
     known = list(signature(init).parameters.values())[1:]
     if any(one.kind in (one.VAR_POSITIONAL, one.VAR_KEYWORD) for one in known):
         return ""
@@ -384,10 +385,10 @@ def _wrong_arguments(
 
 @dataclass(frozen=True, slots=True)
 class Component:
-    """A named part of a mechanism.
+    """Base of all components: a named part of a mechanism.
 
     Attributes:
-        name: unique in its mechanism; a dot separates the names of nested mechanisms.
+        name: unique name in the mechanism. Dots separate the names of nested mechanisms.
     """
 
     name: str
@@ -408,33 +409,33 @@ class Component:
             )
 
     def expressions(self) -> Iterator[Expression]:
-        """Every scalar of the component that may hold parameters."""
+        """Yield every scalar of the component that may contain parameters."""
         for f in fields(self):
             yield from _expressions(getattr(self, f.name))
 
     def parameters(self) -> frozenset[str]:
-        """The names of the symbols that it holds."""
+        """Return the names of the symbols in the component."""
         return frozenset(p.name for value in self.expressions() for p in parameters_of(value))
 
     def _normalise(self, *names: str) -> None:
-        """Convert fields that a user wrote as numbers or texts to expressions, checking each."""
+        """Convert fields with numbers or texts to expressions, with checks."""
         for name in names:
             value = expression(getattr(self, name), f"{self.name}, {name}")
             object.__setattr__(self, name, value)
 
     def scoped(self: C, prefix: str) -> C:
-        """The same component inside a mechanism that is placed in another one."""
+        """Return the component with prefixed names, for a nested mechanism."""
         return self._change(lambda value: renamed(value, prefix), f"{prefix}.{self.name}")
 
     def without_defaults(self: C) -> C:
-        """The same component, which knows no values of its parameters."""
+        """Return the component without values of its parameters."""
         return self._change(without_defaults, self.name)
 
     def check_values(self: C, values: Mapping[str, float]) -> C:
         """Return the component with values of its parameters, checked as in the constructor.
 
         Raises:
-            DescriptionError: as in the constructor.
+            DescriptionError: the constructor raises it for these values.
         """
         return self._change(lambda value: with_values(value, values), self.name)
 
@@ -469,7 +470,7 @@ def _map(value: Any, change: Callable[[Expression], Expression]) -> Any:
 
 
 def with_points(component: C, change: Callable[[Point], Point]) -> C:
-    """The component with each of its points changed, those in tuples too."""
+    """Return the component with `change` applied to each of its points, also in tuples."""
 
     def change_points(value: Any) -> Any:
         if isinstance(value, Point):
@@ -484,11 +485,11 @@ def with_points(component: C, change: Callable[[Point], Point]) -> C:
     return replace(component, **other) if other else component
 
 
-# Coordinates with a number each, as users write them.
+# Pairs of coordinate name and number.
 
 
 def named_scalars(given: Any) -> list[tuple[str, Any]] | None:
-    """The pairs of a name and a scalar that a user wrote; None where they are something else."""
+    """Return the pairs of a name and a scalar in an argument; None if it has another form."""
     if isinstance(given, str) or not isinstance(given, Iterable):
         return None
     pairs = list(given)
@@ -498,14 +499,14 @@ def named_scalars(given: Any) -> list[tuple[str, Any]] | None:
     return [(name, value) for name, value in pairs]
 
 
-# Axes as users write them.
+# Axes.
 
 
 _NAMED_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def unit_axis(name: str, axis: Any) -> tuple[float, float, float]:
-    """The unit vector of an axis that a user wrote as a letter or as three numbers."""
+    """Return the unit vector of an axis, given as a letter or as three numbers."""
     if isinstance(axis, str):
         sign, letter = (-1.0, axis[1:]) if axis.startswith("-") else (1.0, axis)
         if letter not in _NAMED_AXES:
@@ -522,7 +523,7 @@ def unit_axis(name: str, axis: Any) -> tuple[float, float, float]:
         raise DescriptionError(
             f"{name}: axis {quoted(axis)} is not a direction; give three numbers"
         )
-    if math.hypot(*values) < 1e-9:  # rounding of zero: nobody gives directions that short
+    if math.hypot(*values) < 1e-9:  # rounding of zero: axes are longer
         raise DescriptionError(f"{name}: axis {quoted(axis)} has zero length; give a direction")
     return unit_vector(values.tolist())
 
@@ -530,7 +531,7 @@ def unit_axis(name: str, axis: Any) -> tuple[float, float, float]:
 def in_plane(
     axis: tuple[float, float, float],
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Two unit vectors u, v with u x v = axis; x and y for the axis z."""
+    """Return two unit vectors u, v with u x v = axis; they are x and y for the axis z."""
     R = align_z(axis)
     u, v = ([float(R[k, column]) for k in range(3)] for column in (0, 1))
     return (u[0], u[1], u[2]), (v[0], v[1], v[2])

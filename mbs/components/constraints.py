@@ -1,7 +1,7 @@
-"""Constraints: what keeps a distance, a line, a plane or an orientation between two frames.
+"""Constraints on a distance, a line, a plane or an orientation between two frames.
 
-They connect as joints do but place nothing: no coordinate describes how one frame moves in the
-other, so the assembly always cuts them and only their rows remain (`mbs.loops.closure`).
+They are connected as joints are, but have no coordinates. Joints must determine the pose of both
+frames. The assembly always cuts constraints and adds their rows (`mbs.loops.closure`).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from mbs.spatial import Pose, align_z
 
 @dataclass(frozen=True, slots=True)
 class Constraint(Joint):
-    """Rows between two frames that joints elsewhere place; it has no coordinate itself."""
+    """Base of constraint rows between two frames whose poses are determined by joints."""
 
     def __post_init__(self) -> None:
         Joint.__post_init__(self)
@@ -42,21 +42,21 @@ class Constraint(Joint):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        """None that coordinates describe."""
+        """No coordinates."""
         return ()
 
     @property
     def places(self) -> bool:
-        """Never: what it connects is placed by other joints."""
+        """False: other joints determine the poses of the frames."""
         return False
 
 
 @dataclass(frozen=True, slots=True)
 class Rod(Constraint):
-    """A massless rod between spherical joints: the two origins keep their distance; 1 row.
+    """A massless rod between spherical joints: constant distance of the two origins; 1 row.
 
     Attributes:
-        length: between the two centres [m].
+        length: distance of the two centres [m].
     """
 
     length: Scalar = field(kw_only=True)
@@ -72,14 +72,14 @@ class Rod(Constraint):
         Constraint.__post_init__(self)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Its effort is the force that pushes the ends apart; near zero it is the lengthening."""
+        """Return the lengthening, to first order; its effort is the force that pushes the ends."""
         length = to_sx(self.length, symbols)
         return [("force along", (casadi.sumsqr(pose.p) - length**2) / (2 * length))]
 
 
 @dataclass(frozen=True, slots=True)
 class _AxisConstraint(Constraint):
-    """A constraint with an axis: "x", "y", "z", "-x" .. or three numbers, in frame_a."""
+    """A constraint with an axis in frame_a: "x", "y", "z", "-x" .. or three numbers."""
 
     axis: Any = "z"
 
@@ -93,7 +93,7 @@ class PointOnLine(_AxisConstraint):
     """The origin of frame_b stays on the axis, a line through the origin of frame_a; 2 rows."""
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Nothing across the line."""
+        """Return rows of the two components across the line."""
         return position_rows(along_z(pose, self.axis), "xy")
 
 
@@ -105,47 +105,47 @@ class PointOnPlane(_AxisConstraint):
     """
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Nothing along the normal."""
+        """Return the row of the component along the normal."""
         return position_rows(along_z(pose, self.axis), "z")
 
 
 @dataclass(frozen=True, slots=True)
 class ConstantVelocity(_AxisConstraint):
-    """A homokinetic joint: two shafts that meet at any angle rotate by the same angle; 4 rows.
+    """A homokinetic joint: two shafts at any angle, with the same rotation; 4 rows.
 
-    Its centre is the origin of both frames, and the axis is that of the shaft in each of them.
+    Its centre is the origin of both frames, and the axis is the shaft axis in each frame.
     """
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """The origins agree, and frame_b is rotated about an axis in the plane x, y alone."""
+        """Return rows for coincident origins and no rotation of frame_b about the z axis."""
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "xyz"), orientation_rows(pose)[2]]
 
     def facing(self, pose: Pose) -> list[SX]:
-        """The shafts are not folded back onto each other."""
+        """Return a value that is negative if the shafts are folded back onto each other."""
         return [0.5 * (casadi.trace(pose.R) - cosine(pose, self.axis))]
 
 
-# Rolling without slip: a constraint on velocities that no constraint on positions implies.
+# Rolling without slip: a nonholonomic constraint on velocities.
 #
-# With n the normal of the plane, u the axis of the disc and s = |n x u|, the point that touches
-# the plane is at c = -r (n - (n.u) u) / s from the centre; the centre is r s above the plane, and
-# the velocity V + w x c of the point has no part in the plane.
+# With the normal n of the plane, the axis u of the disc and s = |n x u|, the contact point is at
+# c = -r (n - (n.u) u) / s from the centre, and the centre is r s above the plane. The velocity
+# V + w x c of the contact point has no component in the plane.
 #
 # Source: Neimark and Fufaev 1972, chapter 1.
 
 
 SLIPS = ("slip x", "slip y")
-"""Labels of the rows of velocities, in axes whose z is the normal of the plane."""
+"""Labels of the velocity rows, in axes whose z is the normal of the plane."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RimContact:
-    """A disc on a plane, in axes whose z is the normal of the plane.
+    """Contact of a disc with a plane, in axes whose z is the normal of the plane.
 
     Attributes:
-        height: of the rim above the plane [m].
-        point: (3, 1) from the centre to where the rim touches the plane [m].
+        height: height of the lowest rim point above the plane [m].
+        point: (3, 1) vector from the centre to the contact point of the rim [m].
         upright: sine of the angle between the disc and the plane.
     """
 
@@ -156,16 +156,16 @@ class RimContact:
 
 @dataclass(frozen=True, slots=True)
 class RollingDisc(Constraint):
-    """A thin disc that touches a plane with its rim and rolls on it without slipping.
+    """A thin disc that rolls with its rim on a plane without slipping.
 
-    One row of positions, the rim stays on the plane, and two of velocities: the point of the disc
-    that touches the plane does not move in it. Frame_a lies in the plane; the origin of frame_b
-    is the centre of the disc. The wheel itself, its mass and its axle are bodies and joints.
+    One row on positions keeps the rim on the plane. Two rows on velocities keep the contact point
+    of the disc at rest in the plane. Frame_a is in the plane; the origin of frame_b is the centre
+    of the disc. The wheel itself, its mass and its axle are bodies and joints.
 
     Attributes:
-        radius: of the rim [m].
-        normal: of the plane, on the side where the disc is, in frame_a.
-        axis: about which the disc spins, in frame_b.
+        radius: radius of the rim [m].
+        normal: normal of the plane, on the side of the disc, in frame_a.
+        axis: spin axis of the disc, in frame_b.
     """
 
     radius: Scalar = field(kw_only=True)
@@ -182,14 +182,14 @@ class RollingDisc(Constraint):
         Constraint.__post_init__(self)
 
     def on_plane(self, pose: Pose) -> Pose:
-        """Frame_b in axes at frame_a whose z is the normal of the plane."""
+        """Return the pose of frame_b in axes at frame_a whose z is the normal of the plane."""
         return Pose.rotation(align_z(self.normal)).inverse() @ pose
 
     def contact(self, pose: Pose, symbols: SymbolTable) -> RimContact:
-        """Where it touches the plane.
+        """Return the contact of the disc with the plane.
 
         Args:
-            pose: of frame_b, the centre of the disc, in axes whose z is the normal.
+            pose: pose of frame_b, at the centre of the disc, in axes whose z is the normal.
             symbols: CasADi symbol of every parameter.
         """
         radius = to_sx(self.radius, symbols)
@@ -199,5 +199,5 @@ class RollingDisc(Constraint):
         return RimContact(pose.p[2] - radius * s, point, s)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """The rim stays on the plane."""
+        """Return the row of the height of the rim above the plane."""
         return [("force normal", self.contact(self.on_plane(pose), symbols).height)]

@@ -1,8 +1,8 @@
-"""Contact in motion: shapes on planes, on height fields and on each other, with friction.
+"""Compliant contact: shapes on planes, on height fields and on each other, with friction.
 
-The laws are smooth, without events: a force that grows with the depth by which two shapes overlap,
-and friction that follows the velocity with which they slide. A shape says where it touches, as
-`Spot`s; what happens there is written once, in `Contact`.
+The laws are smooth, without events: a normal force that grows with the penetration depth, and
+friction that depends on the slip velocity. A shape returns its contact points as `Spot`s; `Contact`
+computes the forces at them.
 """
 
 from __future__ import annotations
@@ -29,39 +29,41 @@ from mbs.text import did_you_mean, error_text, quoted
 _LAWS = ("regularised", "bristle")
 _OUTPUTS = {"normal_force": "N", "friction_force": "N", "depth": "m", "slip": "m/s"}
 _NOMINAL = 1e-4
-"""Size of the bristle states [m] by which solvers measure their errors: the default `bristle`."""
+"""Nominal size of the bristle states [m] for the error of solvers: the default of `bristle`."""
 _STILL = 1e-6
-"""Speed [m/s] over which |v| is rounded at zero in the rate of bristles: far below what slides, and
-quadratic there, so that what stands does not creep."""
+"""Speed [m/s] over which |v| is rounded at zero in the rate of bristles: far below sliding speeds,
+and quadratic there, so that a body at rest does not creep."""
 _ELASTIC = 0.25
-"""Square of the part of the friction limit up to which bristles bend without slipping at all."""
+"""Square of the fraction of the friction limit up to which bristles bend without any slip."""
 _TOUCHING = 1e-9
-"""Gap [m] from which on shapes count as touching where steps end: a body that is placed exactly on
-a plane is inside, whatever rounding does."""
+"""Distance [m] below which shapes count as touching at the end of a step: a body that is placed
+exactly on a plane is in contact in spite of rounding."""
 _THIN = 0.03
-"""Half the width of a wheel without a round rim in pictures, part of its radius: a disc that is
-seen from its edge, too."""
+"""Half the width of a wheel without a round rim in pictures, as a fraction of its radius: a disc
+stays visible from its edge."""
 _PARALLEL = 1e-6
-"""Weight of the distances from the middles of capsules in the square of their distance. It adds
-1e-5 of a radius to the distance at the ends of capsules of ten radii, a tenth of usual depths. Its
-square root is the angle over which a capsule comes to rest on another one."""
+"""Weight, in the squared distance of two capsules, of the squared distances of the contact points
+from the capsule centres. It adds 1e-5 of a radius to the distance at the ends of capsules of ten
+radii, a tenth of usual depths. Its square root is the angle [rad] within which the contact of
+nearly parallel capsules moves from one end to the other."""
 _SPACING = 0.01
-"""Size [m] of the narrowest bump or body that a point is sure to meet where no size is given: that
-of the ground of feet and wheels."""
+"""Size [m] of the narrowest bump or body that a contact point is sure to detect if no size is
+given: size of the ground features that matter to feet and wheels."""
 _INSIDE = 1e-9
-"""Distance [m] of a centre from a box from which on its direction tells the normal; nearer, and
-inside, the nearest face does."""
+"""Distance [m] between a centre and a box above which its direction gives the normal. Below it and
+inside, the nearest face gives the normal."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spot:
-    """Where two shapes touch, or are nearest, seen from the ground and in its axes.
+    """Contact point, or nearest points, of two shapes, in the ground frame.
 
     Attributes:
-        depth: by how much they overlap [m]; below zero for a gap.
-        normal: (3, 1) unit vector, out of the ground.
-        lever: (3, 1) from the origin of the body's frame to where the force acts [m].
-        slope: how fast the depth falls along the normal; one but on height fields.
+        depth: penetration depth [m], negative for a gap.
+        normal: (3, 1) unit vector out of the ground.
+        lever: (3, 1) vector from the origin of the body's frame to the contact point [m].
+        slope: derivative of the depth along the inward normal; 1 except on height fields and for
+            nearly parallel capsules.
     """
 
     depth: SX
@@ -72,17 +74,17 @@ class Spot:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Touch:
-    """What happens at a spot.
+    """Forces and velocities at a contact point.
 
     Attributes:
-        normal: normal force [N], never below zero.
-        elastic: the part of it along the depth that the energy k d^(n + 1) / (n + 1) gives [N].
-        along: the whole along the depth [N].
-        rate: of the depth [m/s].
-        slip: (3, 1) velocity of the body along the ground [m/s].
-        friction: (3, 1) force on the body [N].
+        normal: normal force [N], never negative.
+        elastic: force along the depth from the energy k d^(n + 1) / (n + 1) [N].
+        along: elastic and damping force along the depth [N].
+        rate: rate of the depth [m/s].
+        slip: (3, 1) velocity of the body tangential to the ground [m/s].
+        friction: (3, 1) friction force on the body [N].
         bend: (3, 1) rates of the bristles [m/s].
-        spot: where.
+        spot: contact point.
     """
 
     normal: SX
@@ -97,39 +99,41 @@ class _Touch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact(ForceElement):
-    """A body against a ground, at one spot or several: Hunt and Crossley's force, and friction.
+    """Contact of a body and a ground at contact points: Hunt-Crossley normal force and friction.
 
-    The normal force is k d^n max(0, 1 + c d') at the depth d > 0, zero elsewhere. A shape derives
-    from this class, names its two frames in `ports` and its spots in `labels`, and gives `spots`.
+    The normal force is k d^n max(0, 1 + c d') at the depth d > 0, else zero. A shape derives from
+    this class: `ports` has the names of its two frames, `labels` those of its contact points, and
+    `spots` returns the contact points.
 
     Source: Hunt and Crossley 1975 for the normal force; Canudas de Wit et al. 1995 and Dupont et
     al. 2002 for the bristles.
 
     Attributes:
         stiffness: k [N/m^n].
-        exponent: n, at least 1; 1.5 is that of spheres after Hertz.
-        damping: c [s/m]; zero when it and `restitution` are left out.
-        restitution: instead of it, speed after an impact / speed before, above 0, at most 1; it
+        exponent: n, at least 1. 1.5 holds for spheres after Hertz.
+        damping: c [s/m]. Zero if it and `restitution` are left out.
+        restitution: coefficient of restitution, above 0 and at most 1, instead of the damping. It
             is exact at `impact_speed`, for any stiffness, exponent and mass.
-        impact_speed: [m/s].
+        impact_speed: impact speed at which `restitution` holds [m/s].
         friction: coefficient mu.
-        friction_law: "regularised", mu N v / sqrt(v^2 + width^2), which creeps where it should
-            stand; or "bristle", with states that make it stand.
-        width: velocity over which regularised friction changes sign [m/s].
-        bristle: how far bristles bend at the limit mu N [m].
-        bristle_time: of their damping, and in which they relax without contact [s].
+        friction_law: "regularised": mu N v / sqrt(v^2 + width^2), which creeps instead of sticking;
+            or "bristle": bristle states that make it stick.
+        width: slip velocity over which regularised friction changes sign [m/s].
+        bristle: deflection of the bristles at the friction limit mu N [m].
+        bristle_time: time constant of the bristle damping, and of the relaxation of bristles
+            without contact [s].
     """
 
     shape = ""
 
     ports: ClassVar[tuple[str, str]] = ("body", "ground")
-    """The frame of what touches, and that in whose axes spots are given."""
+    """Names of two frames: of the body, and of the ground, whose axes contact points refer to."""
 
     labels: ClassVar[tuple[str, ...]] = ("",)
-    """What the names of the outputs and states of each spot end with."""
+    """Suffix of the output and state names of each contact point."""
 
     axes: ClassVar[str] = "xyz"
-    """Along which axes of the ground bristles bend: x and y alone where the normal is z."""
+    """Axes of the ground along which bristles bend: only x and y if the normal is z."""
 
     stiffness: Scalar
     exponent: Scalar = 1.5
@@ -168,7 +172,7 @@ class Contact(ForceElement):
         self._settle_restitution()
 
     def _settle_restitution(self) -> None:
-        """Check what an impact leaves, which is given by two numbers or by the damping."""
+        """Check the restitution: given with an impact speed, without damping, and in its range."""
         given = [
             name for name in ("restitution", "impact_speed") if getattr(self, name) is not None
         ]
@@ -189,43 +193,43 @@ class Contact(ForceElement):
                 )
             object.__setattr__(self, name, value)
 
-    # What it has.
+    # Properties.
 
     @property
     def damping_factor(self) -> Expression:
-        """The damping c [s/m], as it is given or from the restitution."""
+        """Damping c [s/m], as given or computed from the restitution."""
         if self.restitution is not None and self.impact_speed is not None:
             return Number(damping_for(self.restitution, self.impact_speed))
         return expression(0.0 if self.damping is None else self.damping)
 
     @property
     def has_bristles(self) -> bool:
-        """Whether friction has states."""
+        """Whether friction has bristle states."""
         return self.friction_law == "bristle" and self.friction != Number(0.0)
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """The bristles, where there are any."""
+        """Names of the bristle states; empty without bristles."""
         return self.names_of("state") if self.has_bristles else ()
 
     def has(self, *methods: str) -> bool:
-        """Whether it says something; bristles keep some work for a while, which is no heat."""
+        """Return whether a method is defined; dissipation counts as undefined with bristles."""
         asked = [name for name in methods if not (name == "dissipation" and self.has_bristles)]
         return custom.Custom.has(self, *asked)
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
-        """Where it touches, one spot for each label.
+        """Return the contact points, one for each label.
 
         Args:
-            motion: how the frame of the body moves, seen from that of the ground.
-            at: the parameters.
+            motion: motion of the body's frame relative to the ground's frame.
+            at: values of the parameters.
         """
         raise NotImplementedError
 
-    # What it does.
+    # Equations.
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Normal and friction forces on the body at every spot, and the opposite on the ground."""
+        """Return normal and friction forces on the body at all points, opposite on the ground."""
         body, ground = (getattr(at, port) for port in self.ports)
         motion = self._motion(at)
         force, on_body, on_ground = zeros(), zeros(), zeros()
@@ -237,13 +241,13 @@ class Contact(ForceElement):
         return custom.between(ground, body, custom.FrameLoad(-force, on_ground), on_body)
 
     def energy(self, at: Any) -> SX:
-        """The sum of k d^(n + 1) / (n + 1)."""
+        """Return the sum of k d^(n + 1) / (n + 1) over the contact points [J]."""
         k, n = (to_sx(getattr(self, name), at.symbols) for name in ("stiffness", "exponent"))
         spots = self.spots(self._motion(at), at)
         return sum((k * _power(spot.depth, n + 1) / (n + 1) for spot in spots), SX(0))
 
     def dissipation(self, at: Any) -> SX:
-        """What damping and regularised friction take."""
+        """Return the power dissipated by damping and regularised friction [W]."""
         return sum(
             (
                 (touch.along - touch.elastic) * touch.rate - casadi.dot(touch.friction, touch.slip)
@@ -253,7 +257,7 @@ class Contact(ForceElement):
         )
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """How fast the bristles bend."""
+        """Return the rates of the bristle states."""
         if not self.has_bristles:
             return {}
         return {
@@ -263,7 +267,7 @@ class Contact(ForceElement):
         }
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Sizes of the forces, the depth, and how fast it slides, at every spot."""
+        """Return magnitudes of normal and friction force, depth and slip speed at every point."""
         found: dict[str, SX] = {}
         for label, touch in zip(self.labels, self._touches(at), strict=True):
             values = (
@@ -276,7 +280,7 @@ class Contact(ForceElement):
         return found
 
     def crossings(self, at: Any) -> Mapping[str, SX | Approach]:
-        """The depths: a spot begins and ends to touch where one is zero."""
+        """Return the depths as event indicators: contact begins and ends at their zeros."""
         motion = self._motion(at)
         return {
             f"depth{label}": Approach(spot.depth + _TOUCHING, *self.approach(motion, spot, at))
@@ -284,21 +288,21 @@ class Contact(ForceElement):
         }
 
     def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
-        """Speed [m/s] and pace [1/s] of the depth of a spot, as `custom.Approach` has them.
+        """Return speed [m/s] and pace [1/s] of the depth of a contact point, see `custom.Approach`.
 
-        The speed is that of the whole body, and the size is the distance of the spot from its
-        frame, at least 1 cm.
+        The speed bounds the speed of all points of the body. The obstacle size is the distance of
+        the contact point from the body's frame, at least 1 cm.
 
         Args:
-            motion: of the frame of the body, seen from that of the ground.
-            spot: one of its spots.
-            at: the parameters.
+            motion: motion of the body's frame relative to the ground's frame.
+            spot: one of the contact points.
+            at: values of the parameters.
         """
         reach = custom.regular_length(spot.lever)
         speed = custom.regular_length(motion.V) + reach * custom.regular_length(motion.w)
         return speed, speed / casadi.fmax(reach, _SPACING)
 
-    # How it is computed.
+    # Helpers.
 
     def _motion(self, at: Any) -> RelativeMotion:
         body, ground = (getattr(at, port) for port in self.ports)
@@ -318,7 +322,7 @@ class Contact(ForceElement):
         velocity = motion.V + cross(motion.w, spot.lever)
         speed = casadi.dot(spot.normal, velocity)
         slip = velocity - spot.normal * speed
-        # the normal force does the work of the depth, whose rate is exact
+        # the normal force does the work along the depth, whose rate is exact
         rate = -spot.slope * speed
         elastic = k * _power(spot.depth, n)
         along = elastic * casadi.fmax(1 + c * rate, 0)
@@ -332,11 +336,12 @@ class Contact(ForceElement):
         return _Touch(normal, elastic, along, rate, slip, friction, bend, spot)
 
     def _bristles(self, at: Any, label: str, spot: Spot, slip: SX, limit: SX) -> tuple[SX, SX]:
-        """(3, 1) friction on the body, and (3, 1) rates of the bristles.
+        """Return (3, 1) friction on the body, and (3, 1) rates of the bristles.
 
-        With w the bend over that at the limit, w' = (v - s(w) |v| w) / bristle, s growing from 0
-        where w is half the limit to 1 at the limit: w stays within it. The force is
-        -limit (w + bristle_time w'), cut to the limit.
+        With w the deflection as a fraction of its limit, w' = (v - s(w) |v| w) / bristle. s grows
+        from
+        0 at |w| = 1/2 to 1 at |w| = 1, so that |w| stays below 1. The force is
+        -limit (w + bristle_time w'), clamped to the limit.
         """
         longest, time = (to_sx(x, at.symbols) for x in (self.bristle, self.bristle_time))
         bend = vector(
@@ -345,29 +350,29 @@ class Contact(ForceElement):
         w = (bend - spot.normal * casadi.dot(spot.normal, bend)) / longest
         speed = casadi.sqrt(casadi.dot(slip, slip) + _STILL**2) - _STILL
         slips = _smooth_step((casadi.dot(w, w) - _ELASTIC) / (1 - _ELASTIC))
-        # bristles are as long as they bend: above that gap nothing bends them
+        # bristles are as long as their deflection limit: above that gap no bristle bends
         reached = _smooth_step(1 + spot.depth / longest)
         own = reached * (slip - slips * speed * w)
         asked = w + time * own / longest
         friction = -limit * asked / casadi.sqrt(casadi.fmax(casadi.dot(asked, asked), 1))
-        # without contact they relax, and so does what is left along a normal that turns
+        # bristles relax without contact, and so does a component along a rotating normal
         return friction, own - ((1 - reached) * bend + reached * (bend - longest * w)) / time
 
 
 def damping_for(restitution: float, impact_speed: float) -> float:
-    """The damping c [s/m] of Hunt and Crossley's force that leaves a part of the impact speed.
+    """Return the damping c [s/m] of the Hunt-Crossley force for a coefficient of restitution.
 
     m u du/dd = -k d^n (1 + c u) integrated over an impact from speed v to -e v gives
-    c v (1 + e) = ln((1 + c v) / (1 - c v e)), whatever k, n and m are.
+    c v (1 + e) = ln((1 + c v) / (1 - c v e)), independent of k, n and m.
 
-    Source: Hunt and Crossley 1975, whose 3 (1 - e) / (2 v) is its limit where e is near one.
+    Source: Hunt and Crossley 1975, whose 3 (1 - e) / (2 v) is the limit for e near 1.
 
     Args:
         restitution: e, above 0 and at most 1.
         impact_speed: v [m/s].
     """
     e = restitution
-    # positive below the root, negative above; the root is within these bounds
+    # the function is positive below the root and negative above, and the root is within the bounds
     low, high = 0.75 * (1 - e**2) / (1 + e**3), 1 / e
     while low < (middle := 0.5 * (low + high)) < high:
         value = _bend(middle) - _bend(-e * middle) if e * middle < 1 else -math.inf
@@ -376,29 +381,29 @@ def damping_for(restitution: float, impact_speed: float) -> float:
 
 
 def _bend(x: float) -> float:
-    """X - ln(1 + x), to rounding where x is small."""
-    if abs(x) > 0.1:  # the difference loses two digits there, the series needs 18 terms
+    """Return x - ln(1 + x), accurate to rounding for small x."""
+    if abs(x) > 0.1:  # x - log loses at most two digits; the series needs 18 terms
         return x - math.log1p(x)
     return sum((-x) ** k / k for k in range(2, 20))  # 0.1^20 is below rounding
 
 
 def _power(depth: SX, exponent: SX) -> SX:
-    """The depth to a power where it is positive, else zero, with finite derivatives everywhere."""
+    """Return depth^exponent for a positive depth, else zero, with finite derivatives everywhere."""
     touches = depth > 0
     return casadi.if_else(touches, casadi.if_else(touches, depth, 1) ** exponent, 0)
 
 
 def _smooth_step(u: SX) -> SX:
-    """0 up to zero, 1 from one on, with a continuous slope."""
+    """Return a step from 0 at u <= 0 to 1 at u >= 1 with a continuous slope."""
     u = casadi.fmin(casadi.fmax(u, 0), 1)
     return u**2 * (3 - 2 * u)
 
 
-# Shapes on a plane: that of x and y of a frame, whose z points out of the ground.
+# Shapes on a plane: the x-y plane of a frame whose z axis points out of the ground.
 
 
 class PlaneContact(Contact):
-    """A shape made of spheres, on the ground z < 0 of a frame."""
+    """Contact of a shape made of spheres with the ground z < 0 of a frame."""
 
     ports = ("body", "plane")
     labels: ClassVar[tuple[str, ...]] = ()
@@ -408,26 +413,26 @@ class PlaneContact(Contact):
     plane = custom.frame()
 
     def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
-        """(3, 1) centres of the spheres, in the frame of the body [m].
+        """Return the (3, 1) centres of the spheres, in the frame of the body [m].
 
         Args:
-            motion: of that frame, seen from the plane.
-            at: the parameters.
+            motion: motion of the body's frame relative to the plane.
+            at: values of the parameters.
         """
         return [zeros()]
 
     def reach(self, at: Any) -> SX:
-        """Radius of the spheres [m]."""
+        """Return the radius of the spheres [m]."""
         return SX(0)
 
     def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
-        """The whole speed; a plane has no size, so that only a turn shortens an approach."""
+        """Return the full speed; the pace is the angular speed, since a plane has no size."""
         reach = custom.regular_length(spot.lever)
         turn = custom.regular_length(motion.w)
         return custom.regular_length(motion.V) + reach * turn, turn
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
-        """The lowest point of every sphere."""
+        """Return the lowest point of every sphere."""
         found, up = [], vector([SX(0), SX(0), SX(1)])
         for centre in self.centres(motion, at):
             arm = casadi.mtimes(motion.R, centre)
@@ -437,12 +442,12 @@ class PlaneContact(Contact):
 
 
 class SpherePlaneContact(PlaneContact):
-    """A sphere on a plane; a point where its radius is zero.
+    """Contact of a sphere with a plane, or of a point if its radius is zero.
 
     Attributes:
         body: frame at the centre of the sphere.
-        plane: frame whose plane z = 0 is the ground, and its z the way out of it.
-        radius: [m].
+        plane: frame whose plane z = 0 is the ground, with z out of the ground.
+        radius: radius of the sphere [m].
     """
 
     labels = ("",)
@@ -450,22 +455,22 @@ class SpherePlaneContact(PlaneContact):
     radius = custom.parameter("m", 0.0, min=0)
 
     def reach(self, at: Any) -> SX:
-        """The radius."""
+        """Return the radius."""
         return SX(at.radius)
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """The sphere."""
+        """Return the sphere."""
         return _ball("body", at.radius)
 
 
 class CapsulePlaneContact(PlaneContact):
-    """A capsule on a plane, by its two end spheres, which share the load as it asks.
+    """Contact of a capsule with a plane at its two end spheres.
 
     Attributes:
         body: frame in the middle of the capsule, whose z is its axis.
-        plane: frame whose plane z = 0 is the ground, and its z the way out of it.
-        radius: [m].
-        length: between the centres of the end spheres [m].
+        plane: frame whose plane z = 0 is the ground, with z out of the ground.
+        radius: radius of the capsule [m].
+        length: distance of the centres of the end spheres [m].
     """
 
     labels = ("_a", "_b")
@@ -474,28 +479,28 @@ class CapsulePlaneContact(PlaneContact):
     length = custom.parameter("m", positive=True)
 
     def reach(self, at: Any) -> SX:
-        """The radius."""
+        """Return the radius."""
         return SX(at.radius)
 
     def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
-        """The ends a, at z < 0, and b."""
+        """Return the centres of the ends a, at z < 0, and b."""
         return [vector([SX(0), SX(0), side * at.length / 2]) for side in (-1, 1)]
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """The capsule."""
+        """Return the capsule."""
         return {"body": Shape("capsule", (at.radius, at.length))}
 
 
 class WheelPlaneContact(PlaneContact):
-    """A wheel on a plane, by the lowest point of its rim, which may be round.
+    """Contact of a wheel with a plane at the lowest point of its rim, which may be round.
 
-    Flat on the plane it has no single lowest point; it then stands on one of its rim.
+    A wheel that lies flat has no single lowest point; the contact is then at one point of its rim.
 
     Attributes:
         body: frame at the centre of the wheel, whose y is its axle.
-        plane: frame whose plane z = 0 is the ground, and its z the way out of it.
-        radius: of the circle in the middle of the rim [m].
-        rim: radius of the round of the rim [m]; a thin disc where it is zero.
+        plane: frame whose plane z = 0 is the ground, with z out of the ground.
+        radius: radius of the centre circle of the rim [m].
+        rim: radius of the rounding of the rim [m]; zero for a thin disc.
     """
 
     labels = ("",)
@@ -504,27 +509,27 @@ class WheelPlaneContact(PlaneContact):
     rim = custom.parameter("m", 0.0, min=0)
 
     def reach(self, at: Any) -> SX:
-        """That of the round of the rim."""
+        """Return the radius of the rounding of the rim."""
         return SX(at.rim)
 
     def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
-        """The lowest point of the circle: it is not one of the body, but its height moves alike."""
+        """Return the lowest point of the circle, which is not fixed on the body."""
         up = motion.R[2, :].T
         across = vector([up[0], SX(0), up[2]])
         return [-at.radius * across / custom.regular_length(across)]
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """A disc that bulges, as wide as its rim."""
+        """Return a rounded disc as wide as the rim."""
         outer = at.radius + at.rim
         return {"body": Shape("ellipsoid", (outer, max(at.rim, _THIN * outer), outer))}
 
 
 class BoxPlaneContact(PlaneContact):
-    """A box on a plane, by its eight corners.
+    """Contact of a box with a plane at its eight corners.
 
     Attributes:
         body: frame in the middle of the box, along its sides.
-        plane: frame whose plane z = 0 is the ground, and its z the way out of it.
+        plane: frame whose plane z = 0 is the ground, with z out of the ground.
         size: sides along x, y, z [m].
     """
 
@@ -537,17 +542,17 @@ class BoxPlaneContact(PlaneContact):
         Contact.__post_init__(self)
 
     def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
-        """The corners 1 to 8: x changes its sign first, then y, then z, all negative at first."""
+        """Return corners 1 to 8: x changes sign first, then y, then z; corner 1 is all negative."""
         half = _half_size(self, at)
         return [half * vector(map(SX, signs[::-1])) for signs in product((-1, 1), repeat=3)]
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """The box."""
+        """Return the box."""
         return _cuboid("body", self.size, at)
 
 
 def _take_size(box: Any) -> None:
-    """Turn the three sides that a user gave into expressions."""
+    """Convert the field `size` to expressions; raise DescriptionError if a side is not positive."""
     sides = three(box.size, f"{box.name}, size")
     for side in sides:
         value = to_float(side)
@@ -559,19 +564,19 @@ def _take_size(box: Any) -> None:
 
 
 def _ball(port: str, radius: float) -> Mapping[str, Shape]:
-    """A sphere, none for a point."""
+    """Return a sphere to draw; none for a point."""
     return {port: Shape("sphere", (radius,))} if radius > 0 else {}
 
 
 def _cuboid(port: str, size: Any, at: Any) -> Mapping[str, Shape]:
-    """A box, none where a side has no value."""
+    """Return a box to draw; none if a side has no value."""
     sides = [to_float(side, at.symbols) for side in size]
     known = tuple(side for side in sides if side is not None)
     return {port: Shape("box", known)} if len(known) == len(sides) else {}
 
 
 def _within(value: SX, half: SX) -> SX:
-    """A distance from the middle of a segment, at most half its length."""
+    """Clamp a distance from the middle of a segment to half its length."""
     return casadi.fmin(casadi.fmax(value, -half), half)
 
 
@@ -579,15 +584,15 @@ def _half_size(box: Any, at: Any) -> SX:
     return vector(to_sx(side, at.symbols) for side in box.size) / 2
 
 
-# A sphere on other shapes.
+# Spheres and capsules on other shapes.
 
 
 class SphereSphereContact(Contact):
-    """Two spheres.
+    """Contact of two spheres.
 
     Attributes:
         a, b: frames at their centres.
-        radius_a, radius_b: [m].
+        radius_a, radius_b: radii of the spheres [m].
     """
 
     ports = ("b", "a")
@@ -598,29 +603,29 @@ class SphereSphereContact(Contact):
     radius_b = custom.parameter("m", positive=True)
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
-        """On the line between the centres, in the middle of the overlap."""
+        """Return the point on the line between the centres, in the middle of the overlap."""
         depth = at.radius_a + at.radius_b - motion.length
         return [Spot(depth, motion.along, -(at.radius_b - depth / 2) * motion.along)]
 
     def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
-        """The relative speed of the centres; the size is the sum of the radii."""
+        """Return the relative speed of the centres; the obstacle size is the sum of the radii."""
         speed = custom.regular_length(at.b.v - at.a.v)
         return speed, speed / (at.radius_a + at.radius_b)
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Both spheres."""
+        """Return both spheres."""
         return {**_ball("a", at.radius_a), **_ball("b", at.radius_b)}
 
 
 class SphereCapsuleContact(Contact):
-    """A sphere and a capsule, at the point of its axis that is nearest.
+    """Contact of a sphere with a capsule, at the nearest point of the capsule's axis.
 
     Attributes:
-        sphere: frame at its centre.
+        sphere: frame at the centre of the sphere.
         capsule: frame in the middle of the capsule, whose z is its axis.
-        radius: of the sphere [m].
-        capsule_radius: of the capsule [m].
-        length: between the centres of its end spheres [m].
+        radius: radius of the sphere [m].
+        capsule_radius: radius of the capsule [m].
+        length: distance of the centres of the end spheres of the capsule [m].
     """
 
     ports = ("sphere", "capsule")
@@ -632,7 +637,7 @@ class SphereCapsuleContact(Contact):
     length = custom.parameter("m", positive=True)
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
-        """From the nearest point of the axis to the centre."""
+        """Return the point between the nearest point of the axis and the centre of the sphere."""
         along = _within(motion.p[2], at.length / 2)
         off = motion.p - vector([SX(0), SX(0), along])
         distance = custom.regular_length(off)
@@ -640,29 +645,30 @@ class SphereCapsuleContact(Contact):
         return [Spot(depth, off / distance, -(at.radius - depth / 2) * off / distance)]
 
     def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
-        """The speed of the centre, seen from the capsule; the size is the sum of the radii."""
+        """Return the speed of the centre relative to the capsule; the size is the sum of radii."""
         speed = custom.regular_length(motion.V)
         return speed, speed / (at.radius + at.capsule_radius)
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """The sphere and the capsule."""
+        """Return the sphere and the capsule."""
         capsule = Shape("capsule", (at.capsule_radius, at.length))
         return {**_ball("sphere", at.radius), "capsule": capsule}
 
 
 class CapsuleCapsuleContact(Contact):
-    """Two capsules, at the points of their axes that are nearest.
+    """Contact of two capsules, at the nearest points of their axes.
 
-    Of axes that are parallel no points are nearest. The square of the distance therefore has the
-    term e (s^2 + t^2) of the distances s and t of the points from the middles, e = 1e-6: the points
-    move smoothly from one end to the other while the angle of the axes changes by some 1e-3 rad.
+    The nearest points of parallel axes are not unique. The square of the distance therefore has the
+    additional term e (s^2 + t^2), with the distances s and t of the points from the capsule centres
+    and e = 1e-6. The points then move smoothly from one end to the other while the angle between
+    the axes changes by about 1e-3 rad.
 
     Source: Ericson 2005, section 5.1.9, for the nearest points of two segments.
 
     Attributes:
         a, b: frames in the middle of the capsules, whose z is the axis.
-        radius_a, radius_b: [m].
-        length_a, length_b: between the centres of the end spheres [m].
+        radius_a, radius_b: radii of the capsules [m].
+        length_a, length_b: distances of the centres of the end spheres [m].
     """
 
     ports = ("b", "a")
@@ -675,12 +681,12 @@ class CapsuleCapsuleContact(Contact):
     length_b = custom.parameter("m", positive=True)
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
-        """Between the nearest points, in the middle of the overlap."""
+        """Return the point between the nearest points, in the middle of the overlap."""
         axis = motion.R[:, 2]
         cosine, weight = axis[2], 1 + _PARALLEL
         own, other = motion.p[2], casadi.dot(motion.p, axis)
         half_a, half_b = at.length_a / 2, at.length_b / 2
-        # the minimum of a convex function of s and t within the lengths
+        # minimum of a convex function of s and t within the lengths
         s = _within((weight * own - cosine * other) / (weight**2 - cosine**2), half_a)
         t = _within((cosine * s - other) / weight, half_b)
         s = _within((own + cosine * t) / weight, half_a)
@@ -692,13 +698,13 @@ class CapsuleCapsuleContact(Contact):
         return [Spot(depth, normal, lever, length / distance)]
 
     def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
-        """The speed of the ends of b, seen from a; the size is the sum of the radii."""
+        """Return the speed of the ends of b relative to a; the size is the sum of the radii."""
         turn = at.length_b / 2 * custom.regular_length(motion.w)
         speed = custom.regular_length(motion.V) + turn
         return speed, speed / (at.radius_a + at.radius_b)
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Both capsules."""
+        """Return both capsules."""
         return {
             "a": Shape("capsule", (at.radius_a, at.length_a)),
             "b": Shape("capsule", (at.radius_b, at.length_b)),
@@ -706,14 +712,14 @@ class CapsuleCapsuleContact(Contact):
 
 
 class SphereBoxContact(Contact):
-    """A sphere and a box: its nearest point, on a face, an edge or a corner.
+    """Contact of a sphere with a box, at the nearest point of the box: face, edge or corner.
 
     A centre inside the box is pushed out through the nearest face.
 
     Attributes:
-        sphere: frame at its centre.
+        sphere: frame at the centre of the sphere.
         box: frame in the middle of the box, along its sides.
-        radius: of the sphere [m].
+        radius: radius of the sphere [m].
         size: sides of the box along x, y, z [m].
     """
 
@@ -729,13 +735,13 @@ class SphereBoxContact(Contact):
         Contact.__post_init__(self)
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
-        """From the nearest point of the box to the centre."""
+        """Return the point between the nearest point of the box and the centre of the sphere."""
         beyond = casadi.fabs(motion.p) - _half_size(self, at)
         outside = casadi.fmax(beyond, 0)
         square = casadi.dot(outside, outside)
         is_outside = square > _INSIDE**2
         distance = casadi.sqrt(casadi.if_else(is_outside, square, 1))
-        # inside, the face whose plane is nearest, the first of several
+        # inside, the nearest face gives the normal; of several, the first in the order x, y, z
         nearest = casadi.mmax(beyond)
         x, y = (beyond[k] == nearest for k in (0, 1))
         face = vector([x, (1 - x) * y, (1 - x) * (1 - y)])
@@ -745,29 +751,29 @@ class SphereBoxContact(Contact):
         return [Spot(depth, normal, -(at.radius - depth / 2) * normal)]
 
     def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
-        """The speed of the centre, seen from the box; the size is that of its shortest side."""
+        """Return the speed of the centre relative to the box; the size is its least half side."""
         speed = custom.regular_length(motion.V)
         return speed, speed / (at.radius + casadi.mmin(_half_size(self, at)))
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """The sphere and the box."""
+        """Return the sphere and the box."""
         return {**_ball("sphere", at.radius), **_cuboid("box", self.size, at)}
 
 
 class HeightFieldContact(Contact):
-    """A sphere on a ground z = h(x, y) of a frame; a point where its radius is zero.
+    """Contact of a sphere, or a point if its radius is zero, with a ground z = h(x, y) of a frame.
 
-    The depth is that below the tangent plane under the centre,
-    radius - (z - h) / sqrt(1 + |grad h|^2): exact on slopes, and else where the field bends little
-    over the radius. The force is along its gradient, so that its energy is exact.
+    The depth is measured below the tangent plane under the centre,
+    radius - (z - h) / sqrt(1 + |grad h|^2). It is exact on slopes, and accurate if the field bends
+    little over the radius. The force is along its gradient, so that its energy is exact.
 
     Attributes:
         body: frame at the centre of the sphere.
         ground: frame of x, y and z.
-        height: h, a function of (x, y) made of CasADi operations, or a casadi.Function [m].
-        radius: [m].
-        spacing: width of the narrowest bump [m], which no step passes over; the radius when left
-            out, 1 cm for a point.
+        height: h [m], a function of (x, y) made of CasADi operations, or a casadi.Function.
+        radius: radius of the sphere [m].
+        spacing: width of the narrowest bump [m], which steps do not miss. The default is the
+            radius, or 1 cm for a point.
     """
 
     body = custom.frame()
@@ -812,18 +818,18 @@ class HeightFieldContact(Contact):
             )
 
     def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
-        """The speed over the ground has no bound for the depth, which a bump may change at once."""
+        """Return None for the speed, which bumps leave unbounded, and the pace over the ground."""
         size = casadi.if_else(at.radius > 0, at.radius, _SPACING)
         if self.spacing is not None:
             size = to_sx(self.spacing, at.symbols)
         return None, custom.regular_length(motion.V) / size
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """The sphere; the ground is not drawn."""
+        """Return the sphere; the ground is not drawn."""
         return _ball("body", at.radius)
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
-        """Under the centre, along the gradient of the depth."""
+        """Return the point under the centre, along the gradient of the depth."""
         c = SX.sym("c", 3)
         h = SX(self.height(c[0], c[1]))
         steep = casadi.gradient(h, c)

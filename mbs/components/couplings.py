@@ -15,16 +15,16 @@ from mbs.text import quoted
 
 @dataclass(frozen=True, slots=True)
 class Coupling(Component):
-    """A relation between positions of joints: driven = sum of c_k driver^k.
+    """A relation between joint positions: driven = sum of c_k driver^k.
 
-    Gears, mimic joints and joint equalities; one row on the coordinates. Others may be added, each
-    times a factor, as in a planetary gear.
+    It represents gears, mimic joints and joint equalities by one constraint row. Further
+    coordinates may be added, each times a factor, as in a planetary gear.
 
     Attributes:
-        driven: name of the coordinate that follows.
-        driver: name of the coordinate that leads.
+        driven: name of the driven coordinate.
+        driver: name of the driving coordinate.
         coefficients: c_0, c_1, ... of the polynomial.
-        others: name and factor of each further coordinate that is added to it.
+        others: name and factor of each further coordinate that is added to the polynomial.
     """
 
     driven: str = ""
@@ -54,11 +54,11 @@ class Coupling(Component):
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """The names of all that it relates, the driven one first."""
+        """Names of all coordinates of the relation, the driven coordinate first."""
         return (self.driven, self.driver, *(name for name, _ in self.others))
 
     def _checked_others(self) -> tuple[tuple[str, Expression], ...]:
-        """Name and factor of the other coordinates, factors as expressions."""
+        """Return name and factor, as an expression, of each further coordinate."""
         pairs = named_scalars(self.others)
         if pairs is None:
             raise DescriptionError(
@@ -68,7 +68,7 @@ class Coupling(Component):
         return tuple((n, expression(c, f"{self.name}, factor of {n}")) for n, c in pairs)
 
     def scoped(self, prefix: str) -> Coupling:
-        """The same relation inside a mechanism that is placed in another one."""
+        """Return the coupling with prefixed names, for a nested mechanism."""
         inner = Component.scoped(self, prefix)
         return replace(
             inner,
@@ -78,25 +78,25 @@ class Coupling(Component):
         )
 
 
-# Gears, racks and screws: couplings of coordinates, with the ratio that their names suggest.
+# Gears, racks and screws: couplings with one ratio.
 
 
 @dataclass(frozen=True, slots=True)
 class Transmission(Coupling):
-    """driven = offset + k driver, between coordinates of the kinds that it is made for.
+    """driven = offset + k driver, between coordinates of required kinds.
 
     Attributes:
-        offset: position of driven where the driver is at zero [rad or m].
+        offset: position of driven at the zero position of the driver [rad or m].
     """
 
     kinds: ClassVar[tuple[Motion, Motion]]
-    """What driven and driver have to be."""
+    """Required motions of driven and driver."""
 
     coefficients: tuple[Scalar, ...] = field(init=False, default=(0.0, 1.0))
     offset: Scalar = field(kw_only=True, default=0.0)
 
     def _set_factor(self, given: str, factor: Expression) -> None:
-        """Couple by `factor`, which comes from the attribute `given` and may not be zero."""
+        """Set the factor k, computed from the attribute `given`; raise if it is zero."""
         if to_float(factor) == 0:
             raise DescriptionError(
                 f"{self.name}: {given} is 0, which ties nothing; give another number, less than"
@@ -108,11 +108,11 @@ class Transmission(Coupling):
 
 @dataclass(frozen=True, slots=True)
 class Gear(Transmission):
-    """A pair of gears: the driven angle is `ratio` times the driving one.
+    """A pair of gears: the driven angle is `ratio` times the driving angle.
 
     Attributes:
-        ratio: revolutions of driven per revolution of the driver; less than zero for wheels that
-            mesh from outside about parallel axes.
+        ratio: revolutions of driven per revolution of the driver; negative for external gears with
+            parallel axes.
     """
 
     kinds = (Motion.REVOLUTE, Motion.REVOLUTE)
@@ -127,11 +127,10 @@ class Gear(Transmission):
 class RackAndPinion(Transmission):
     """A rack, the driven displacement, that a pinion moves by `radius` times its angle.
 
-    A wheel that rolls along a straight line is the same relation.
+    A wheel that rolls along a straight line has the same relation.
 
     Attributes:
-        radius: of the pitch circle of the pinion [m]; less than zero where the rack moves the
-            other way.
+        radius: radius of the pitch circle of the pinion [m]; negative for the opposite direction.
     """
 
     kinds = (Motion.PRISMATIC, Motion.REVOLUTE)
@@ -149,7 +148,7 @@ class Screw(Transmission):
     On the coordinates `.s` and `.phi` of one Cylindrical joint it makes a screw joint.
 
     Attributes:
-        pitch: advance per revolution [m]; less than zero for a left-hand thread.
+        pitch: advance per revolution [m]; negative for a left-hand thread.
     """
 
     kinds = (Motion.PRISMATIC, Motion.REVOLUTE)
@@ -162,12 +161,12 @@ class Screw(Transmission):
 
 @dataclass(frozen=True, slots=True)
 class Helical(Cylindrical):
-    """A screw joint: a rotation `phi` about the axis, with which `s` along it advances.
+    """A screw joint: rotation `phi` about the axis with a proportional advance `s` along it.
 
     Connecting it adds the `Screw` NAME.thread between its two coordinates.
 
     Attributes:
-        pitch: advance per revolution [m]; less than zero for a left-hand thread.
+        pitch: advance per revolution [m]; negative for a left-hand thread.
     """
 
     pitch: Scalar = field(kw_only=True)
@@ -183,6 +182,6 @@ class Helical(Cylindrical):
 
     @property
     def companions(self) -> tuple[Component, ...]:
-        """The thread."""
+        """The `Screw` between its coordinates."""
         name = self.name
         return (Screw(f"{name}.thread", f"{name}.s", f"{name}.phi", pitch=self.pitch),)

@@ -1,4 +1,4 @@
-"""Curves through given points: a point that moves along one, and cams."""
+"""Point on a curve, and cams, with splines through given points."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from mbs.errors import DescriptionError
 from mbs.text import quoted
 
 _APART = 1e-9
-"""Least distance of neighbours, in parts of the largest one: points that are nearer are the same
-one with other roundings, through which a spline would have any direction."""
+"""Least distance of neighbouring points relative to the largest distance. Nearer points are equal
+points with different rounding, through which a spline would have an arbitrary direction."""
 
 Rows = tuple[tuple[float, ...], ...]
 
 
 def _rows_of(name: str, what: str, given: Any, columns: int, least: int, example: str) -> Rows:
-    """The rows of numbers that a user gave for a curve."""
+    """Return the rows of numbers of a curve; raise DescriptionError if they are invalid."""
     try:
         values: NDArray[np.float64] = np.array(given, dtype=float)
     except (TypeError, ValueError):
@@ -47,19 +47,20 @@ def _rows_of(name: str, what: str, given: Any, columns: int, least: int, example
 class PointOnCurve(Custom):
     """A point that stays on a curve: a bead on a wire, a pin in a slot, a car on rails.
 
-    The curve is the cubic spline through given points, over the sums of their distances, with two
-    continuous derivatives; it is fixed in the frame `ground`. Where it is open it goes on straight
-    beyond its ends. The three rows are the elements of p - c(s), p being the origin of `pin` in
-    `ground`; s, near the length along the curve, is an unknown, the coordinate NAME.s, so that two
-    rows bind the bodies. There is no friction.
+    The curve is the cubic spline through given points, parameterised by the cumulative distance of
+    the points, with two continuous derivatives. It is fixed in the frame `ground`. An open curve
+    continues along straight lines beyond its ends. The three constraint rows are the elements of
+    p - c(s), with the position p of the origin of `pin` in `ground`. The parameter s, close to the
+    arc length, is an unknown with the coordinate NAME.s, so that two of the rows constrain the
+    bodies. There is no friction.
 
     Source: Haug 1989 for point followers; Boor 1978 for splines.
 
     Attributes:
-        ground: the frame in which the curve is.
-        pin: the point that stays on it.
-        curve: its points, rows of x, y and z [m].
-        closed: whether it leads from the last point to the first.
+        ground: frame of the curve.
+        pin: point that stays on the curve.
+        curve: points of the curve, rows of x, y and z [m].
+        closed: Whether the curve returns from the last point to the first.
     """
 
     ground = custom.frame()
@@ -85,21 +86,21 @@ class PointOnCurve(Custom):
             )
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """How far the point is from that of the curve, in axes of the ground."""
+        """Return the vector from the curve point c(s) to the pin, in axes of the ground."""
         off = at.ground.to(at.pin).p - self.spline.at(at.s)
         return dict(zip("xyz", casadi.vertsplit(off), strict=True))
 
     def crossings(self, at: Any) -> Mapping[str, SX]:
-        """The knots of the curve."""
+        """Return the event indicator of the knots of the curve."""
         return {"knots": self.spline.bend(at.s)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The force of the curve on the point, in axes of the ground."""
+        """Return the force of the curve on the point, in axes of the ground."""
         return {f"force_{axis}": at.lam[axis] for axis in "xyz"}
 
     @property
     def spline(self) -> Spline:
-        """The curve, over the sums of the distances of its points."""
+        """The curve, parameterised by the cumulative distance of its points."""
         d, points = self._distances(), np.array(self.curve)
         t = np.concatenate([[0.0], np.cumsum(d)])
         return periodic_spline(t[:-1], points, t[-1]) if self.closed else natural_spline(t, points)
@@ -113,20 +114,21 @@ class PointOnCurve(Custom):
 class Cam(Custom):
     """A cam: driven = lift(driver), a curve through given points with two continuous derivatives.
 
-    The lift is the cubic spline through the points; it repeats itself after `period`, or goes on
-    straight beyond its ends where there is none. It is one row on two coordinates, which may be
-    angles or displacements; it holds in both directions, as that of a grooved cam does: a follower
-    that is only pressed on leaves the cam where `effort`, on the driven coordinate, is below zero.
+    The lift is the cubic spline through the points. It is periodic with `period`, or continues
+    along straight lines beyond its ends without a period. It is one constraint row on two
+    coordinates, which may be angles or displacements. The row holds in both directions, as for a
+    grooved cam. A follower that is only pressed on would leave the cam while `effort`, on the
+    driven coordinate, is negative.
 
     Source: Boor 1978 for splines.
 
     Attributes:
         driven: name of the coordinate of the follower.
         driver: name of the coordinate of the cam.
-        profile: rows of a position of the driver and one of the driven coordinate, in order
-            [rad or m]; with a period they span less than one.
-        period: of the driver [rad or m], a whole revolution if not given; None for a curve with
-            ends.
+        profile: rows of the positions of driver and driven coordinate, in increasing order of the
+            driver [rad or m]. With a period they span less than the period.
+        period: period of the driver [rad or m], by default a whole revolution. None for a curve
+            with ends.
     """
 
     driven = custom.coordinate()
@@ -137,7 +139,7 @@ class Cam(Custom):
 
     @property
     def needs_position(self) -> bool:
-        """A lift is one of positions."""
+        """True: the lift needs positions."""
         return True
 
     def __post_init__(self) -> None:
@@ -166,21 +168,21 @@ class Cam(Custom):
             )
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """What the driven coordinate is off the lift."""
+        """Return the deviation of the driven coordinate from the lift."""
         lift = self.spline.at(at.driver.q)
         return {"lift": Row(at.driven.q - lift, "m" if at.driven.unit == "m" else "1")}
 
     def crossings(self, at: Any) -> Mapping[str, SX]:
-        """The knots of the lift."""
+        """Return the event indicator of the knots of the lift."""
         return {"knots": self.spline.bend(at.driver.q)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """What the cam does to the driven coordinate."""
+        """Return the effort of the cam on the driven coordinate."""
         return {"effort": at.lam["lift"]}
 
     @property
     def spline(self) -> Spline:
-        """The lift over the position of the driver."""
+        """The lift as a function of the position of the driver."""
         t, lift = np.array(self.profile).T
         if self.period is None:
             return natural_spline(t, lift[:, None])

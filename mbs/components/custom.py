@@ -1,6 +1,6 @@
-"""Components by their equations: ports, parameters, states, inputs, outputs, and what they do.
+"""User-defined components: ports, parameters, states, inputs, outputs, and equations.
 
-A class that derives from `Custom` declares what it has, and says by methods what it does:
+A class that derives from `Custom` declares its ports and quantities. Its methods return equations:
 
     class Drag(Custom):
         \"\"\"Air drag on a point: force -c |v| v.\"\"\"
@@ -16,9 +16,9 @@ A class that derives from `Custom` declares what it has, and says by methods wha
             v = at.point.v
             return at.c * custom.regular_length(v) * casadi.dot(v, v)
 
-Every method gets `at`, which has all that was declared under its name as CasADi expressions.
-Assembling a mechanism checks what they return and brings it into every model. Force elements,
-drives and frictions of this package are written in the same way.
+Each method gets an argument `at`. Each declared name is an attribute of `at`: a CasADi expression,
+or the motion of a port. Assembling a mechanism checks the returned expressions and includes them in
+all models. Force elements, drives and frictions of this package are written in the same way.
 """
 
 from __future__ import annotations
@@ -52,24 +52,24 @@ from mbs.spatial import vector, zeros
 from mbs.text import did_you_mean, quoted
 from mbs.units import UNITS
 
-# What a component declares.
+# Declarations of ports and quantities in a component class.
 
 
 EFFORT = "effort"
-"""The unit of an effort along a coordinate: N m or N."""
+"""Unit of an effort along a coordinate: N m for a rotation, N for a displacement."""
 
 REQUIRED: Any = object()
-"""Stands where there is no default."""
+"""Default of a declaration that has no default: a value must be given."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Declared:
-    """One thing that a component has.
+    """Declaration of a port or a quantity of a component class.
 
     Attributes:
         kind: frame, flange, coordinate, parameter, state, mode, unknown, input or output.
-        unit: of its value.
-        default: of a parameter or an input; the start of a state, the guess of an unknown.
+        unit: unit of the value.
+        default: default of a parameter or an input, start of a state or guess of an unknown.
         low, high: least and greatest value of a parameter.
         nominal: typical size of a state.
     """
@@ -90,22 +90,22 @@ class Declared:
 
 
 def frame() -> Any:
-    """A port on a point of a body: the component is made with a body or `body.at(...)` for it."""
+    """Declare a port on a point of a body. The constructor gets a body or `body.at(...)` for it."""
     return Declared("frame")
 
 
 def flange(*, slides: bool | None = False) -> Any:
-    """A port on a shaft: `m.connect(component.name_of_it, joint.flange)` connects it.
+    """Declare a port on a shaft, connected by `m.connect(component.name_of_it, joint.flange)`.
 
     Args:
-        slides: it is a place on a slide, whose position is in m, and is connected to flanges of
-            prismatic joints; None where it may be either.
+        slides: Whether the flange is on a prismatic joint, so that its position is in m. None if
+            it may be on either kind of joint.
     """
     return Declared("flange", "1" if slides is None else "m" if slides else "rad")
 
 
 def coordinate() -> Any:
-    """A port on a coordinate of a joint: the component is made with its name, such as "j1"."""
+    """Declare a port on a joint coordinate. The constructor gets its name, such as "j1"."""
     return Declared("coordinate")
 
 
@@ -117,50 +117,50 @@ def parameter(
     max: float | None = None,
     positive: bool = False,
 ) -> Any:
-    """A number, a text or an `mbs.Parameter`; it stays a symbol where one is in it.
+    """Declare a parameter: a number, a text or an `mbs.Parameter`, symbolic if it has symbols.
 
     Args:
-        unit: of its value.
-        default: where the component is made without it, and it must be given when left out; with
-            None it may stay away, and at.of_it is None.
-        min: the least value that is taken.
-        max: the greatest.
-        positive: take what is more than zero only.
+        unit: unit of the value.
+        default: value if the constructor gets none. A parameter without default must be given. The
+            default None makes the parameter optional: at.of_it is then None.
+        min: least allowed value.
+        max: greatest allowed value.
+        positive: Whether only values above zero are allowed.
     """
     low = MORE_THAN_ZERO if positive and min is None else min
     return Declared("parameter", unit, default, low, max)
 
 
 def state(unit: str = "1", *, start: float = 0.0, nominal: float = 1.0) -> Any:
-    """A quantity with a rate of its own, which `rates` gives; `start` may be given by its name.
+    """Declare a state, whose rate the method `rates` returns. The constructor may get its start.
 
     Args:
-        unit: of its value.
-        start: where a motion begins when nothing else is said.
-        nominal: typical size, by which solvers measure errors.
+        unit: unit of the value.
+        start: initial value of a simulation, unless another is given.
+        nominal: typical size, relative to which solvers measure errors.
     """
     return Declared("state", unit, start, nominal=nominal)
 
 
 def mode(start: float = 0.0) -> Any:
-    """A number that is constant between events, such as 1 where something is locked.
+    """Declare a discrete state: constant between events, such as 1 while a brake is locked.
 
-    It is a state whose rate is zero, and which `events` sets.
+    It is a state with rate zero, which `events` changes.
 
     Args:
-        start: at the start of a motion; it may be given by its name.
+        start: initial value of a simulation. The constructor may get another by the state's name.
     """
     return Declared("mode", "1", start)
 
 
 def unknown(unit: str = "m", *, guess: float = 0.0) -> Any:
-    """A quantity that the rows of the component determine together with the configuration.
+    """Declare a quantity that the constraint equations determine together with the configuration.
 
-    It is a coordinate of the system, without mass, named NAME.of_it; its rate is an element of v.
+    It is a massless coordinate of the system, named NAME.of_it. Its rate is an element of v.
 
     Args:
         unit: "m" or "rad".
-        guess: near which assembling looks for it.
+        guess: initial guess of its value when loops are closed.
     """
     if unit not in ("m", "rad"):
         raise DescriptionError(
@@ -170,27 +170,27 @@ def unknown(unit: str = "m", *, guess: float = 0.0) -> Any:
 
 
 def input(unit: str = "1", *, default: float = 0.0) -> Any:
-    """A signal from outside: of `run`, an FMU, an optimal control problem, or `m.wire`.
+    """Declare an input signal, set by `run`, an FMU, an optimal control problem or `m.wire`.
 
     Args:
-        unit: of its value.
-        default: where nothing gives it.
+        unit: unit of the value.
+        default: value if the input is not connected and not set.
     """
     return Declared("input", unit, default)
 
 
 def output(unit: str = "1") -> Any:
-    """A signal that `outputs` gives: a column of results, an output of FMUs, a source of wires."""
+    """Declare an output signal, returned by `outputs`: for results, FMUs and wires."""
     return Declared("output", unit)
 
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """An input or output of a component, which `Mechanism.wire` takes.
+    """An input or output of a component, as an argument of `Mechanism.wire`.
 
     Attributes:
-        owner: the component.
-        name: of the signal in it.
+        owner: component that has the signal.
+        name: name of the signal in the component.
         kind: "input" or "output".
     """
 
@@ -204,11 +204,11 @@ class Signal:
 
 @dataclass(frozen=True, slots=True)
 class Flange:
-    """An end of a shaft that another one can be connected to.
+    """An end of a shaft, which can be connected to other flanges.
 
     Attributes:
-        owner: the component that it belongs to: a part of a drive line, or a joint.
-        port: which flange of it, "a" or "b"; nothing where there is only one.
+        owner: component that has the flange: a part of a drive line, or a joint.
+        port: name of the flange in its owner, such as "a" or "b". Empty for a single flange.
     """
 
     owner: Component
@@ -216,7 +216,7 @@ class Flange:
 
     @property
     def key(self) -> tuple[str, str]:
-        """The name of its component, and which flange of it."""
+        """Names of the component and of its flange."""
         return self.owner.name, self.port
 
     def __str__(self) -> str:
@@ -226,7 +226,7 @@ class Flange:
 
 
 class _Handle:
-    """What stands in a class for a flange, an input or an output: `motor.voltage` is a Signal."""
+    """Class attribute of a flange, an input or an output: `motor.voltage` returns a Signal."""
 
     def __init__(self, kind: str, name: str) -> None:
         self.kind, self.name = kind, name
@@ -243,28 +243,28 @@ class _Handle:
 
 
 def port_of_flange(name: str) -> str:
-    """The port of the flange that a component declares under a name: "a" for flange_a."""
+    """Return the port of the flange declared under a name: "a" for flange_a."""
     return name.removeprefix("flange").removeprefix("_") if name.startswith("flange") else name
 
 
-# What the methods of a component see: its ports where they are, its numbers as expressions.
+# Arguments of the component methods: motion of the ports, and values as expressions.
 
 
 SHORTEST = 1e-12
-"""Length that is added to every norm as the root of a sum of squares."""
+"""Length [m] under the root of every norm, so that norms are differentiable at zero."""
 
 
 def regular_length(x: SX) -> SX:
-    """Length of a vector, sqrt(x'x + 1e-24): unlike `casadi.norm_2` it has slopes where x is 0."""
+    """Return the length of a vector, sqrt(x'x + 1e-24), which is differentiable at x = 0."""
     return casadi.sqrt(casadi.dot(x, x) + SHORTEST**2)
 
 
 @dataclass(frozen=True, eq=False)
 class RelativeMotion:
-    """How a frame b moves, seen from a frame a and in its axes.
+    """Motion of a frame b relative to a frame a, in the axes of a.
 
     Attributes:
-        p: (3, 1) origin of b [m].
+        p: (3, 1) position of the origin of b [m].
         R: (3, 3) orientation of b.
         V: (3, 1) rate of p [m/s].
         w: (3, 1) angular velocity of b relative to a [rad/s].
@@ -277,12 +277,12 @@ class RelativeMotion:
 
     @cached_property
     def length(self) -> SX:
-        """Distance of the origins [m], regular where it is zero."""
+        """Distance of the origins [m], differentiable at zero."""
         return regular_length(self.p)
 
     @cached_property
     def along(self) -> SX:
-        """(3, 1) unit vector from a to b."""
+        """(3, 1) unit vector from the origin of a to the origin of b."""
         return self.p / self.length
 
     @cached_property
@@ -292,13 +292,13 @@ class RelativeMotion:
 
 
 class FrameAt:
-    """A frame of a component in a configuration, in motion.
+    """Pose and velocity of a frame of a component.
 
     Attributes:
-        port: the name that the component gave it.
-        p: (3, 1) its origin in the world [m].
-        R: (3, 3) its orientation in the world.
-        v: (3, 1) velocity of its origin, in axes of the world [m/s].
+        port: name of the frame in the component.
+        p: (3, 1) position of the origin in the world [m].
+        R: (3, 3) orientation in the world.
+        v: (3, 1) velocity of the origin, in axes of the world [m/s].
         w: (3, 1) angular velocity, in axes of the world [rad/s].
     """
 
@@ -312,17 +312,17 @@ class FrameAt:
 
     @property
     def p(self) -> SX:
-        """(3, 1) its origin in the world [m]."""
+        """(3, 1) position of the origin in the world [m]."""
         return self._in_world.p
 
     @property
     def R(self) -> SX:
-        """(3, 3) its orientation in the world."""
+        """(3, 3) orientation in the world."""
         return self._in_world.R
 
     @property
     def v(self) -> SX:
-        """(3, 1) velocity of its origin, in axes of the world [m/s]."""
+        """(3, 1) velocity of the origin, in axes of the world [m/s]."""
         return self._in_world.V
 
     @property
@@ -331,18 +331,18 @@ class FrameAt:
         return self._in_world.w
 
     def to(self, other: FrameAt) -> RelativeMotion:
-        """How another frame moves, seen from this one and in its axes."""
+        """Return the motion of another frame relative to this frame, in the axes of this frame."""
         return other._seen_from(self)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoordinateAt:
-    """A coordinate, or a sum of several, each times a factor.
+    """Position and rate of a coordinate, or of a weighted sum of coordinates.
 
     Attributes:
-        q: its position [rad or m]; None where it is none, as the rates of a spherical joint.
-        v: its rate.
-        unit: of its position, that of the first one where it is a sum.
+        q: position [rad or m]. None for rates without a position, as of a spherical joint.
+        v: rate [rad/s or m/s].
+        unit: unit of the position. For a sum, the unit of its first coordinate.
     """
 
     q: SX | None
@@ -352,11 +352,11 @@ class CoordinateAt:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FlangeAt:
-    """A flange.
+    """Position and rate of a flange.
 
     Attributes:
-        angle: of its shaft [rad]; of a flange that slides its position [m].
-        speed: its rate [rad/s or m/s].
+        angle: angle of the shaft [rad], or position of a sliding flange [m].
+        speed: rate of `angle` [rad/s or m/s].
     """
 
     angle: SX
@@ -364,16 +364,16 @@ class FlangeAt:
 
     @property
     def position(self) -> SX:
-        """Of a flange that slides [m]."""
+        """Position of a sliding flange [m]."""
         return self.angle
 
 
 class At:
-    """What a component has, at a state: every declared name is an attribute.
+    """Values of a component in the current state: each declared name is an attribute.
 
-    Frames are `FrameAt`, flanges `FlangeAt`, coordinates `CoordinateAt`; parameters, states,
-    inputs and unknowns are (1, 1) expressions. `outputs` has `lam` besides, the efforts of the
-    rows by their labels. `symbols` are those of all parameters of the mechanism, by name.
+    Frames are `FrameAt`, flanges `FlangeAt`, coordinates `CoordinateAt`. Parameters, states, inputs
+    and unknowns are (1, 1) expressions. In `outputs`, `lam` has the efforts of the constraint rows
+    by label. `symbols` has the symbol of each parameter of the mechanism by name.
     """
 
     def __init__(
@@ -395,17 +395,17 @@ class At:
         return value
 
 
-# What the methods of a component return.
+# Results of the component methods.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameLoad:
-    """What a component does to a frame.
+    """Wrench that a component exerts on a frame.
 
     Attributes:
         force: (3, 1) [N].
         moment: (3, 1) about the origin of the frame [N m].
-        own_axes: both are in the axes of the frame, not of the world.
+        own_axes: Whether both are in the axes of the frame. Otherwise they are in world axes.
     """
 
     force: SX
@@ -414,35 +414,35 @@ class FrameLoad:
 
 
 def force(value: Any, *, own_axes: bool = False) -> FrameLoad:
-    """A force (3, 1) [N] at the origin of a frame, in axes of the world or of the frame.
+    """Return the load of a force on the origin of a frame, in axes of the world or of the frame.
 
     Args:
-        value: (3, 1), or a list of three numbers and expressions.
-        own_axes: in the axes of the frame.
+        value: (3, 1) force [N], or a list of three numbers and expressions.
+        own_axes: Whether the force is in the axes of the frame.
     """
     return FrameLoad(_column(value), zeros(), own_axes)
 
 
 def torque(value: Any, *, own_axes: bool = False) -> FrameLoad:
-    """A torque (3, 1) [N m] on a frame, in axes of the world or of the frame, as `force`."""
+    """Return the load of a torque (3, 1) [N m] on a frame. Arguments are as for `force`."""
     return FrameLoad(zeros(), _column(value), own_axes)
 
 
 def _column(value: Any) -> SX:
-    """What a user gave: an expression, or a list of numbers and expressions."""
+    """Convert an expression, or a list of numbers and expressions, to a column."""
     return vector(value) if isinstance(value, (list, tuple)) else SX(value)
 
 
 def between(
     a: FrameAt, b: FrameAt, on_a: FrameLoad, moment_b: SX | None = None
 ) -> dict[str, FrameLoad]:
-    """A wrench on frame a in its axes, and the opposite force on frame b.
+    """Return the loads of a wrench on frame a and of the opposite force on frame b, by port.
 
     Args:
-        a: a frame of the component.
-        b: another one.
-        on_a: force and moment on a, in its own axes.
-        moment_b: (3, 1) moment on b about its origin, in the axes of a; none when left out.
+        a: frame of the component.
+        b: second frame of the component.
+        on_a: force and moment on a, in the axes of a.
+        moment_b: (3, 1) moment on b about its origin, in the axes of a. Zero if left out.
     """
     R = a.to(b).R
     turned = zeros() if moment_b is None else moment_b
@@ -451,17 +451,17 @@ def between(
 
 
 def pull(a: FrameAt, b: FrameAt, tension: SX) -> dict[str, FrameLoad]:
-    """A tension [N] that draws the origins of two frames together."""
+    """Return the loads of a tension [N] that pulls the origins of two frames together."""
     return between(a, b, FrameLoad(a.to(b).along * tension, zeros()))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Row:
-    """Something that must be zero.
+    """Constraint equation: a value that must be zero.
 
     Attributes:
         value: (1, 1).
-        unit: "m" for a length, "1" for what has no size, such as a cosine or an angle.
+        unit: "m" for a length, "1" for a dimensionless value such as a cosine or an angle.
     """
 
     value: SX
@@ -470,17 +470,17 @@ class Row:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Approach:
-    """A crossing whose rate has a known bound, such as the distance of two bodies.
+    """Event indicator with a known bound of its rate, such as the distance of two bodies.
 
-    Simulations look at it so often within a step that it does not fall to zero and rise again
-    between two looks. They need no looks while it is larger than the bound lets it fall.
+    Simulations evaluate it often enough within a step that it cannot fall to zero and rise again
+    between two evaluations. They skip evaluations while the bound keeps it above zero.
 
     Source: Mirtich 1996 for the bound of the time until two bodies touch.
 
     Attributes:
-        value: (1, 1) what passes through zero.
-        speed: (1, 1) bound of its rate for motion at the present speed in any direction; None
-            where no bound is known.
+        value: (1, 1) event indicator, whose zeros are located.
+        speed: (1, 1) bound of its rate for motion at the present speed in any direction. None
+            if no bound is known.
         pace: (1, 1) reciprocal of the shortest time in which it falls to zero and rises again
             [1/s], such as the speed over the size of an obstacle.
     """
@@ -492,12 +492,12 @@ class Approach:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Event:
-    """Something that happens at once.
+    """Event that changes states and modes of a component instantly.
 
     Attributes:
-        when: (1, 1) positive before; it happens where this is not positive any more. After it,
-            `when` must be positive again, or leave zero upwards.
-        then: what states and modes of the component become, by name.
+        when: (1, 1) event indicator, positive before the event. The event occurs when it stops
+            being positive. Afterwards `when` must be positive again, or rise from zero.
+        then: new values of states and modes of the component, by name.
     """
 
     when: SX
@@ -506,22 +506,22 @@ class Event:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Friction:
-    """Dry friction: it sticks up to an effort, and is braked beyond.
+    """Dry friction: it sticks up to a largest effort and slides beyond it.
 
-    The velocity of slip is linear in velocities, with factors of positions and parameters; what it
-    is at rest, such as the speed of a belt, is of parameters alone. The effort acts along it: what
-    the ports get is what does the same work.
+    The slip velocity is linear in velocities, with factors of positions and parameters. Its value
+    at rest, such as the speed of a belt, depends on parameters only. The efforts on the ports
+    follow from virtual work along the slip velocity.
 
     Source: Pfeiffer and Glocker 1996, chapter 5.
 
     Attributes:
-        slip: (1, 1) velocity of slip [rad/s or m/s].
-        limit: (1, 1) friction while it slides, never below zero [N m or N]; of positions,
-            velocities, states, inputs and parameters.
-        sticking: (1, 1) the largest effort at which it sticks, at least the limit, and as large
-            when left out.
-        unit: of the effort, "N" or "N.m"; when left out that of the coordinate or shaft of the
-            component, and "N" where it has frames.
+        slip: (1, 1) slip velocity [rad/s or m/s].
+        limit: (1, 1) friction effort during sliding, at least zero [N m or N]. A function of
+            positions, velocities, states, inputs and parameters.
+        sticking: (1, 1) largest effort during sticking, at least the limit, which is the default
+            [N m or N].
+        unit: unit of the effort, "N" or "N.m". The default is the unit of the coordinate or shaft
+            of the component, and "N" if it has frames.
     """
 
     slip: Any
@@ -532,17 +532,17 @@ class Friction:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stop:
-    """A rigid stop: a gap that stays between limits, with impacts and contact.
+    """Rigid stop: a distance or angle that stays between limits, with impacts and contact.
 
     Source: Pfeiffer and Glocker 1996, chapters 4 and 6.
 
     Attributes:
-        gap: (1, 1) of positions and parameters [rad or m].
-        lower: the least gap, of parameters; None for no stop on that side.
-        upper: the largest one, likewise.
-        restitution: Newton's, between 0 and 1, of parameters.
-        rest_speed: of the slowest rebound [rad/s or m/s], of parameters.
-        unit: of its effort, as that of `Friction`.
+        gap: (1, 1) distance or angle [rad or m], a function of positions and parameters.
+        lower: least gap, a function of parameters. None for no stop on that side.
+        upper: greatest gap, a function of parameters. None for no stop on that side.
+        restitution: Newton's coefficient, between 0 and 1, a function of parameters.
+        rest_speed: speed of the slowest rebound [rad/s or m/s], a function of parameters.
+        unit: unit of the effort, with the same default as in `Friction`.
     """
 
     gap: Any
@@ -555,11 +555,11 @@ class Stop:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OneWay:
-    """A velocity that never falls below zero: a freewheel.
+    """Freewheel: a velocity that never falls below zero.
 
     Attributes:
-        velocity: (1, 1) of velocities, as the slip of a `Friction` [rad/s or m/s].
-        unit: of its effort, as that of `Friction`.
+        velocity: (1, 1) linear in velocities, as the slip of a `Friction` [rad/s or m/s].
+        unit: unit of the effort, with the same default as in `Friction`.
     """
 
     velocity: Any
@@ -567,56 +567,59 @@ class OneWay:
 
 
 Load = FrameLoad | SX | float
-"""A wrench on a frame; a force [N] or torque [N m] along a coordinate or on a flange."""
+"""Load on a port: a wrench on a frame, or a force [N] or torque [N m] on a coordinate or flange."""
 
 C = TypeVar("C", bound="Custom")
 
 
 @dataclass(frozen=True, slots=True)
 class Custom(OnPoints):
-    """A component by its equations; derive from it, declare ports and numbers, write methods.
+    """Base of user-defined components: a subclass declares ports and quantities, with methods.
 
-    What a component does:
+    Methods that a subclass may define:
 
-    - `loads(at)`: what it does to its ports, by their names. Where it is left out and `energy` is
-      there, the loads are the slopes of the energy, with the opposite sign.
-    - `energy(at)`: what it stores [J]; of positions and states; inputs count as constants.
-    - `dissipation(at)`: what it turns into heat [W], never negative.
-    - `rates(at)`: the rate of every state, by name.
-    - `rows(at)`: what must be zero, by label: each a `Row`, of positions, unknowns and parameters.
-    - `positive(at)`: what must be positive where the rows are zero, by label: it tells which of the
-      configurations that the rows allow is meant.
-    - `velocity_rows(at)`: what must be zero, by label: linear in velocities.
-    - `outputs(at)`: the value of every output, by name.
-    - `events(at)`: by label, when something happens at once, and what states and modes become; in
+    - `loads(at)`: loads on its ports, by port. If it is left out and `energy` is there, the loads
+      are the negative derivatives of the energy.
+    - `energy(at)`: stored energy [J], a function of positions and states. Inputs count as
+      constants.
+    - `dissipation(at)`: dissipated power [W], never negative.
+    - `rates(at)`: rate of every state, by name.
+    - `rows(at)`: constraint equations on positions, unknowns and parameters, by label, each a
+      `Row`.
+    - `positive(at)`: expressions by label. Among the configurations at which the rows are zero, the
+      intended configurations are those with positive values.
+    - `velocity_rows(at)`: constraint equations linear in velocities, by label.
+    - `outputs(at)`: value of every output, by name.
+    - `events(at)`: instant changes of states and modes, an `Event` each, by label. They apply to
       simulations and FMUs.
-    - `frictions(at)`: dry frictions, a `Friction` each, by label; in simulations and FMUs.
-    - `stops(at)`: rigid stops and freewheels, a `Stop` or `OneWay` each, by label; likewise.
-    - `limits(at)`: between which values its coordinates stay, a pair each, by port.
-    - `figures(at)`: what it looks like at its frames, a `Shape` each, of numbers.
-    - `crossings(at)`: by label, what passes through zero where the law has a bend or is short:
-      simulations end a step there; an `Approach` for what is short while bodies move far.
+    - `frictions(at)`: dry frictions, a `Friction` each, by label, for simulations and FMUs.
+    - `stops(at)`: rigid stops and freewheels, a `Stop` or `OneWay` each, by label, for simulations
+      and FMUs.
+    - `limits(at)`: lower and upper limit of its coordinates, a pair each, by port.
+    - `figures(at)`: shapes that pictures show at its frames, a `Shape` of numbers each, by port.
+    - `crossings(at)`: event indicators at which simulations end a step, by label: zero at a kink of
+      the law. An `Approach` is for a law that acts only briefly, such as a contact.
 
     Source: Haug 1989 for forces, rows and the work that they do.
 
     Attributes:
-        name: unique in its mechanism.
+        name: unique name in the mechanism.
     """
 
     declared: ClassVar[Mapping[str, Declared]] = {}
-    """What the class and its bases declare, by name."""
+    """Declarations of the class and its bases, by name."""
 
     drives: ClassVar[bool] = False
-    """Whether it is a motor on its flange: models of efforts leave what it delivers to tau."""
+    """Whether it is a motor on its flange: its torque is part of the efforts tau of models."""
 
     fixed: ClassVar[bool] = False
-    """Whether its flanges do not move."""
+    """Whether its flanges are at rest."""
 
     shape: ClassVar[str] = "bar"
-    """How pictures show it between its points, one after the other: "bar", "coil" or ""."""
+    """Form of the line through its points in pictures: "bar", "coil", or "" for none."""
 
     lowered: ClassVar[bool] = False
-    """Whether the assembly turns it into joints and couplings, so that nothing is left of it."""
+    """Whether assembling replaces it completely by joints and couplings."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super(Custom, cls).__init_subclass__(**kwargs)
@@ -639,7 +642,7 @@ class Custom(OnPoints):
                 _CHECKS[what.kind](self, name, what)
 
     def require_made(self) -> None:
-        """Refuse a component whose class does not look at what it was made with."""
+        """Raise DescriptionError if the class skipped the check of the constructor arguments."""
         for name in self.names_of("frame", "parameter"):
             given = getattr(self, name)
             if given is not None and not isinstance(given, (Point, Expression)):
@@ -651,14 +654,14 @@ class Custom(OnPoints):
     # Ports.
 
     def names_of(self, *kinds: str) -> tuple[str, ...]:
-        """The names of what is declared of some kinds, in order."""
+        """Return the names of the declarations of some kinds, in order."""
         return tuple(name for name, what in self.declared.items() if what.kind in kinds)
 
     def drawn(self, values: Mapping[str, float]) -> Mapping[str, Shape]:
-        """Its figures at values of the symbols; none where one of its parameters has no value.
+        """Return the shapes by port at values of the symbols; none if a parameter has no value.
 
         Raises:
-            DescriptionError: a figure is no Shape, or its port is no frame.
+            DescriptionError: an entry of `figures` is no Shape, or its port is no frame.
         """
         numbers: dict[str, Any] = {}
         for name in self.names_of("parameter"):
@@ -679,48 +682,48 @@ class Custom(OnPoints):
 
     @property
     def frames(self) -> Mapping[str, Point]:
-        """Its points, by port."""
+        """Points of the component, by port."""
         return {name: getattr(self, name) for name in self.names_of("frame")}
 
     @property
     def points(self) -> tuple[Point, ...]:
-        """Its points."""
+        """Points of the component."""
         return tuple(self.frames.values())
 
     @property
     def coordinates(self) -> Mapping[str, tuple[tuple[str, Scalar], ...]]:
-        """By port, the coordinates whose sum it is, each with its factor."""
+        """Pairs of coordinate and factor by port: a port is a weighted sum of coordinates."""
         return {name: ((getattr(self, name), Number(1.0)),) for name in self.names_of("coordinate")}
 
     @property
     def shaft_ports(self) -> tuple[str, ...]:
-        """The flanges that its methods ask for, by name."""
+        """Names of the flanges that the methods use."""
         return self.names_of("flange")
 
     @property
     def flanges(self) -> tuple[Flange, ...]:
-        """All its flanges."""
+        """All flanges of the component."""
         return tuple(getattr(self, name) for name in self.names_of("flange"))
 
     def slides(self, flange: Flange) -> bool | None:
-        """Whether one of its flanges is a place on a slide; None where it may be either."""
+        """Return whether a flange belongs to prismatic joints; None if it may be on either kind."""
         declared = {port_of_flange(name): name for name in self.names_of("flange")}
         unit = self.declared[declared[flange.port]].unit
         return None if unit == "1" else unit == "m"
 
     @property
     def own_inertia(self) -> Expression:
-        """Inertia that it adds to its shaft [kg m^2], or mass to its slide [kg]."""
+        """Inertia that the component adds to its shaft [kg m^2], or mass of a sliding part [kg]."""
         return Number(0.0)
 
     @property
     def needs_position(self) -> bool:
-        """Whether its coordinates must be positions, which those of a spherical joint are not."""
+        """Whether its coordinates must have positions. Rates of a spherical joint have none."""
         return False
 
     @property
     def scope(self) -> str:
-        """Where it counts, in words; nothing for a component of all models."""
+        """End of a report sentence: models that contain the component. Empty if all models do."""
         if not self.switches:
             return ""
         if self.has(*(method for method in _METHODS if method not in _SWITCHES)):
@@ -728,121 +731,121 @@ class Custom(OnPoints):
         return ", in simulations; the other models leave it out"
 
     def scoped(self: C, prefix: str) -> C:
-        """The same component inside a mechanism that is placed in another one."""
+        """Return the component with prefixed names, for a nested mechanism."""
         inner = OnPoints.scoped(self, prefix)
         changed: dict[str, Any] = {
             name: f"{prefix}.{getattr(self, name)}" for name in self.names_of("coordinate")
         }
         return replace(inner, **changed) if changed else inner
 
-    # What it does.
+    # Equations of the component.
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """What it does to its ports, by their names: wrenches on frames, efforts on the others."""
+        """Return the loads on the ports, by port: wrenches on frames, efforts on other ports."""
         return {}
 
     def energy(self, at: Any) -> SX:
-        """What it stores [J]."""
+        """Return the stored energy [J]."""
         return SX(0)
 
     def dissipation(self, at: Any) -> SX:
-        """What it turns into heat [W]."""
+        """Return the dissipated power [W]."""
         return SX(0)
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """The rate of every state, by its name."""
+        """Return the rate of every state, by name."""
         return {}
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """What must be zero, by label, of positions, unknowns and parameters."""
+        """Return constraint equations on positions, unknowns and parameters, by label."""
         return {}
 
     def positive(self, at: Any) -> Mapping[str, SX]:
-        """What must be positive where the rows are zero, by label, such as a cosine."""
+        """Return expressions, by label, that are positive at the intended configurations."""
         return {}
 
     def velocity_rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """What must be zero, by label, linear in velocities."""
+        """Return constraint equations linear in velocities, by label."""
         return {}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The value of every output, by its name."""
+        """Return the value of every output, by name."""
         return {}
 
     def events(self, at: Any) -> Mapping[str, Event]:
-        """What happens at once, by label: of positions, velocities, states, modes and inputs."""
+        """Return events, by label, of positions, velocities, states, modes and inputs."""
         return {}
 
     def frictions(self, at: Any) -> Mapping[str, Friction]:
-        """Its dry frictions, by label."""
+        """Return the dry frictions, by label."""
         return {}
 
     def stops(self, at: Any) -> Mapping[str, Stop | OneWay]:
-        """Its rigid stops and freewheels, by label."""
+        """Return the rigid stops and freewheels, by label."""
         return {}
 
     def limits(self, at: Any) -> Mapping[str, tuple[SX | None, SX | None]]:
-        """Between which values its coordinates stay, by port; None for no limit on a side."""
+        """Return the limits of its coordinates, by port. None means no limit on that side."""
         return {}
 
     def crossings(self, at: Any) -> Mapping[str, SX | Approach]:
-        """What passes through zero where the law has a bend or is short, by label.
+        """Return event indicators, by label, for kinks of the law and for laws that act briefly.
 
-        It is of positions, velocities, states and parameters. A step of `mbs.simulate.run` ends
-        there. An `Approach` says how fast the value can change.
+        An indicator depends on positions, velocities, states and parameters. A step of
+        `mbs.simulate.run` ends at its zero. An `Approach` also has a bound of its rate.
         """
         return {}
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """What it looks like at its frames, by port; `at` has its parameters as numbers.
+        """Return the shapes that pictures show, by frame; `at` has the parameters as numbers.
 
-        Pictures show it. Values of parameters that nobody gave are NaN, and there is no picture.
+        The component is not drawn if a parameter has no value.
         """
         return {}
 
-    # What the assembly asks.
+    # Properties that the assembly uses.
 
     def has(self, *methods: str) -> bool:
-        """Whether the class says something by one of these methods."""
+        """Return whether the class defines one of these methods."""
         return any(getattr(type(self), name) is not getattr(Custom, name) for name in methods)
 
     @property
     def has_equations(self) -> bool:
-        """Whether anything is left of it in the models."""
+        """Whether the component adds equations to the models."""
         return not self.lowered and self.has(*_METHODS)
 
     @property
     def acts(self) -> bool:
-        """Whether it puts loads on its ports."""
+        """Whether the component exerts loads on its ports."""
         return self.has("loads", "energy")
 
     @property
     def binds(self) -> bool:
-        """Whether it has rows."""
+        """Whether the component has constraint equations."""
         return self.has("rows", "velocity_rows")
 
     @property
     def switches(self) -> bool:
-        """Whether it has frictions or stops, which hold at times and let go at others."""
+        """Whether the component has frictions or stops, which constrain the motion at times."""
         return self.has(*_SWITCHES)
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Its states, modes among them."""
+        """Names of its states, with the modes."""
         return self.names_of("state", "mode")
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        """Its inputs."""
+        """Names of its inputs."""
         return self.names_of("input")
 
     @property
     def output_names(self) -> tuple[str, ...]:
-        """Its outputs."""
+        """Names of its outputs."""
         return self.names_of("output")
 
     def _require_magnitudes(self, *names: str) -> None:
-        """Refuse numbers below zero in these fields."""
+        """Raise DescriptionError if a number in these fields is below zero."""
         for name in names:
             given = getattr(self, name)
             for scalar in given if isinstance(given, tuple) else (given,):
@@ -851,14 +854,14 @@ class Custom(OnPoints):
                     raise DescriptionError(f"{self.name}: {name} is {value:g}; give zero or more")
 
     def _require_positive(self, *names: str) -> None:
-        """Refuse zero and numbers below it in these fields."""
+        """Raise DescriptionError if a number in these fields is zero or less."""
         for name in names:
             value = to_float(getattr(self, name))
             if value is not None and value <= 0:
                 raise DescriptionError(f"{self.name}: {name} is {value:g}; give more than zero")
 
     def _require_effect(self, *names: str) -> None:
-        """Refuse an element all of whose strengths are zero."""
+        """Raise DescriptionError if all these fields are zero, so that the element does nothing."""
         values = [getattr(self, name) for name in names]
         flat = [v for value in values for v in (value if isinstance(value, tuple) else (value,))]
         if all(value == Number(0.0) for value in flat):
@@ -869,21 +872,21 @@ class Custom(OnPoints):
 
 
 _SWITCHES = ("frictions", "stops")
-"""What a component says of rows that come and go."""
+"""Methods that return constraints which are active only at times."""
 
 _METHODS = ("loads", "energy", "rates", "rows", "velocity_rows", "outputs", *_SWITCHES)
-"""What a component can say that models ask for."""
+"""Methods whose results become equations of the models."""
 
 _RESERVED = frozenset({"name", "declared", "symbols", "lam", *vars(Custom)})
-"""Names that a declaration must not take, since components or `at` have them already."""
+"""Names that a declaration must not have, since components or `at` use them."""
 
 
 def _make_fields(cls: type[Custom], own: Mapping[str, Declared]) -> None:
-    """Turn what a class declares into fields of a frozen dataclass, and into handles."""
+    """Turn the declarations of a class into fields of a frozen dataclass and into handles."""
     if "__slots__" in vars(cls):
         raise DescriptionError(f"{cls.__name__}: it has __slots__; leave them out")
     annotations: dict[str, Any] = dict(inspect.get_annotations(cls))
-    # fields with values, declared or not, in the order in which the class has them
+    # fields that have values, declared or not, in the order of the class body
     valued = {
         name: annotations.pop(name, Any) for name in vars(cls) if name in {*annotations, *own}
     }
@@ -939,7 +942,7 @@ def _check_parameter(component: Custom, name: str, what: Declared) -> None:
     component._normalise(name)
     given = getattr(component, name)
     if isinstance(given, Parameter) and given.default is None and given.unit == "1":
-        # a text says no unit: that of the declaration is meant
+        # a text specifies no unit: it has the unit of the declaration
         object.__setattr__(component, name, replace(given, unit=what.unit))
     value = to_float(given)
     fault = "" if value is None else out_of_bounds(value, what.low, what.high)
@@ -962,7 +965,7 @@ _CHECKS: Mapping[str, Callable[[Custom, str, Declared], None]] = {
     "mode": _check_number,
     "unknown": _check_number,
 }
-"""What is given to a component, by kind, and what refuses it."""
+"""Check of a constructor argument, by kind of its declaration."""
 
 __all__ = [
     "Approach",

@@ -1,4 +1,4 @@
-"""A mechanism under construction: components and how they are connected."""
+"""Description under construction: components and their connections."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ from mbs.errors import AssemblyError, DescriptionError
 from mbs.expressions import Parameter, Scalar, expression, parameters_of
 from mbs.text import did_you_mean, quoted
 
-# A mechanism that is placed inside another one, and the handle to it.
+# Nested mechanisms and handles to them.
 
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """A mechanism inside another one: `arm["forearm"]` is its component, `arm.base` its ground."""
+    """Handle to a nested mechanism: `arm["forearm"]` is its component, `arm.base` its ground."""
 
     outer: Description
     scope: str
@@ -49,7 +49,7 @@ class Placed:
         return self.outer.components[full]
 
     def body(self, name: str) -> RigidBody:
-        """The body of that name."""
+        """Return the body of a name in the nested mechanism."""
         component = self[name]
         if not isinstance(component, RigidBody):
             raise DescriptionError(
@@ -58,7 +58,7 @@ class Placed:
         return component
 
     def point(self, name: str) -> Point:
-        """The frame that the inner mechanism gave this name."""
+        """Return the frame of a name in the nested mechanism."""
         full = f"{self.scope}.{name}"
         if full not in self.outer.frames:
             inside = sorted(n for n in self.outer.frames if n.startswith(f"{self.scope}."))
@@ -67,7 +67,7 @@ class Placed:
 
     @property
     def base(self) -> RigidBody:
-        """The ground of the inner mechanism, to be connected to something."""
+        """Ground of the nested mechanism, to be connected to a body."""
         return self.body("world")
 
 
@@ -77,10 +77,10 @@ _SCOPE = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*", re.ASCII)
 
 
 def place(outer: Description, inner: Description, name: str) -> Placed:
-    """Copy the components of a mechanism into another one, their names scoped by its own.
+    """Copy the components of a mechanism into another mechanism, with names prefixed by `name`.
 
     Raises:
-        DescriptionError: the name is taken or cannot stand before those of parameters.
+        DescriptionError: the name is taken, or is no valid prefix of the names of parameters.
     """
     scope = Component(name).name
     if inner is outer:
@@ -118,13 +118,13 @@ def place(outer: Description, inner: Description, name: str) -> Placed:
     outer.guess.update({f"{scope}.{name}": value for name, value in inner.guess.items()})
     used = {parameter.name for parameter in outer.used_parameters()}
     for symbol, value in inner.given_values().items():
-        if (scoped := f"{scope}.{symbol}") in used:  # not what only its gravity used
+        if (scoped := f"{scope}.{symbol}") in used:  # drop symbols of its gravity only
             outer.values[scoped] = replace(value, name=scoped)
     return Placed(outer, scope)
 
 
 def _frames_of(inner: Description) -> dict[str, Point]:
-    """Return the named frames of a mechanism; a mount adds the frame of the outer world."""
+    """Return the named frames of a mechanism; a mount adds the frame "outer_world"."""
     if not inner.mount.steps:
         return inner.frames
     if OUTER_WORLD in inner.frames:
@@ -136,7 +136,7 @@ def _frames_of(inner: Description) -> dict[str, Point]:
 
 
 def on_placed(point: Point, placed: Mapping[str, Component], scope: str) -> Point:
-    """A point of the inner mechanism on the component that was placed for its owner."""
+    """Return the point of a nested mechanism on the copy of its owner."""
     owner = placed[point.owner.name]
     return replace(point, owner=owner, placement=point.placement.scoped(scope))
 
@@ -153,11 +153,11 @@ _ATTRIBUTES: Mapping[str, type] = MappingProxyType(
         "mount": Placement,
     }
 )
-"""Attributes of a mechanism, and what each of them is."""
+"""Attributes of a mechanism and their types."""
 _NO_UNIT = "1"
 """Unit of a parameter whose unit is not given."""
 _COMPENSATIONS = "_gravcomp", "_gravity"
-"""Ends of the names of forces that readers of files make against the weight of bodies."""
+"""Ends of the names of forces by which readers of files compensate the weight of bodies."""
 
 
 class Description:
@@ -189,7 +189,7 @@ class Description:
         self.world = World(gravity=gravity)
         self.components: dict[str, Component] = {self.world.name: self.world}
         self.connections: list[tuple[Point, Point]] = []
-        self._ports: set[tuple[str, str]] = set()  # of the first `_counted` connections
+        self._ports: set[tuple[str, str]] = set()  # ports in the first `_counted` connections
         self._counted = 0
         self.shafts: list[tuple[Flange, Flange]] = []
         self.wires: list[tuple[str, Signal]] = []
@@ -207,7 +207,7 @@ class Description:
         """Set an attribute. A class that derives from Description may have attributes of its own.
 
         Raises:
-            DescriptionError: a mechanism has no attribute of this name, or it is something else.
+            DescriptionError: the attribute does not exist, or the value has the wrong type.
         """
         is_fixed = vars(type(self)).get("has_fixed_attributes", False)
         if is_fixed and name not in _ATTRIBUTES and not hasattr(type(self), name):
@@ -236,17 +236,17 @@ class Description:
     def change_gravity(
         self, gravity: Sequence[Scalar] | None = None, mount: Mounting | None = None
     ) -> None:
-        """Change the gravity acceleration, or place the base in it.
+        """Change the gravity acceleration, or mount the base in it.
 
         Args:
-            gravity: in the axes of the outer world [m/s^2], where the base is not rotated but by
-                this mount; unchanged if left out.
+            gravity: gravity acceleration in the axes of the outer world [m/s^2]; unchanged if left
+                out. A new gravity discards an earlier mount.
             mount: rotation of the base relative to the axes of the outer world, or a dict with its
-                "position" and "rotation"; none if left out.
+                "position" and "rotation". No change if left out.
 
         Raises:
-            DescriptionError: these are no vector and no mount, or forces of the file compensate
-                its own gravity.
+            DescriptionError: an argument is no vector or no mount, or forces that were read from a
+                file compensate its gravity.
         """
         where = f"{self.name}, gravity"
         for component in self.components.values():
@@ -274,18 +274,19 @@ class Description:
     def add(self, component: Description, name: str | None = None) -> Placed: ...
 
     def add(self, component: C | Description, name: str | None = None) -> C | Placed:
-        """Add a body, a joint or a whole mechanism, whose names are then scoped by its own.
+        """Add a body, a joint, another component or a whole mechanism.
 
-        A mechanism that is placed in another one moves in the gravity of the outer one. Its base is
-        at the position at which it is connected. A mount gives it the frame "outer_world":
-        `connect(outer.world, placed.point("outer_world"))` puts the base at its mount.
+        The names of a nested mechanism are prefixed by its own name. It moves in the gravity of the
+        outer mechanism, and its base is at the connected position. If it has a mount, it gets the
+        frame "outer_world": `connect(outer.world, placed.point("outer_world"))` puts the base at
+        its mount.
 
         Args:
-            component: what to add.
-            name: for a mechanism, its name here; its own name when left out.
+            component: component or mechanism to add.
+            name: name of a nested mechanism in this one. The default is its own name.
 
         Returns:
-            The component; for a mechanism a handle to the components placed.
+            The component, or a handle to the copied components of a mechanism.
 
         Raises:
             DescriptionError: the name is taken.
@@ -322,10 +323,11 @@ class Description:
 
         `connect(a, joint, b)` puts the joint's frame_a on a and its frame_b on b;
         `connect(a, b)` makes the two frames coincide. A frame of a joint is a point as well.
-        Flanges that are connected rotate together; parts of drive lines need not be added first.
+        Connected flanges rotate together. Joints and parts of drive lines are added automatically.
 
         Raises:
-            DescriptionError: a component is unknown here, or the joint is connected already.
+            DescriptionError: a component is not in the mechanism, or the joint is connected
+                already.
         """
         if isinstance(a, Flange) or isinstance(joint_or_point, Flange):
             self._join(flange_pair(self.name, a, joint_or_point, b))
@@ -362,18 +364,18 @@ class Description:
         self._weld(self._point(a), self._point(joint_or_point))
 
     def wire(self, source: Signal | str, target: Signal | str) -> None:
-        """Feed an input of a component from an output or state of another one, or from a sensor.
+        """Connect an input of a component to an output, a state or a sensor reading.
 
         Components that are not in the mechanism yet are added.
 
         Args:
-            source: an output such as `controller.u`; or a state or what a sensor reads, by its name
-                in results, such as "motor.i" or "encoder.q".
-            target: an input such as `motor.voltage`, or its name, such as "arm.motor.voltage" in a
-                mechanism that was placed here.
+            source: output such as `controller.u`, or the name of a state or a sensor reading in
+                results, such as "motor.i" or "encoder.q".
+            target: input such as `motor.voltage`, or its name, such as "arm.motor.voltage" for a
+                nested mechanism.
 
         Raises:
-            DescriptionError: they are no output and no input, or a name of theirs is taken.
+            DescriptionError: the source is no output, the target is no input, or a name is taken.
         """
         is_output = isinstance(source, Signal) and source.kind == "output"
         if not (isinstance(source, str) or is_output):
@@ -407,7 +409,7 @@ class Description:
         self.wires.append((str(source), target))
 
     def add_frame(self, name: str, point: Point | RigidBody) -> Point:
-        """Name a point, so that models can be asked for it (a tool, a sensor)."""
+        """Name a point, such as a tool centre point, as a frame that models can refer to."""
         if name in self.frames or name in self.components or name == "base":
             raise DescriptionError(
                 f"{self.name}: the frame name {name!r} is taken; choose another name"
@@ -416,18 +418,18 @@ class Description:
         return self.frames[name]
 
     def add_shape(self, point: Point | RigidBody, shape: Shape) -> None:
-        """Say what a body looks like in pictures; nothing else changes.
+        """Add a shape that pictures show on a body. It has no effect on the equations.
 
         Args:
-            point: where the middle of the shape is, or the frame of its mesh.
-            shape: what is there.
+            point: centre of the shape, or the frame of its mesh.
+            shape: shape to show.
         """
         if not isinstance(shape, Shape):
             raise DescriptionError(f"{self.name}: {_what(shape)} is no shape; give a Shape")
         self.shapes.append((self._point(point), shape))
 
     def cut(self, joint: Joint) -> None:
-        """Open the loop that this joint closes here, not where the assembly would choose."""
+        """Choose the joint at which its loop is cut, instead of the automatic choice."""
         if not isinstance(joint, Joint):
             raise DescriptionError(
                 f"{self.name}: {_what(joint)} is not a joint; give the joint itself, not its name"
@@ -439,7 +441,7 @@ class Description:
         self.cuts.append(joint.name)
 
     def _require_use(self, component: Component) -> None:
-        """Refuse a component that no equation would know."""
+        """Raise DescriptionError if a component contributes to no equation."""
         if isinstance(component, MotionJoint) and component.frame_a is None:
             raise DescriptionError(
                 f"{self.name}: {type(component).__name__} {component.name!r} is added, but a joint"
@@ -471,21 +473,21 @@ class Description:
         return f"<Description {self.name}: {bodies} bodies, {joints} joints>"
 
     def joints(self) -> Iterator[Joint]:
-        """Every joint, in the order added."""
+        """Return all joints, in the order of their addition."""
         return (c for c in self.components.values() if isinstance(c, Joint))
 
     def bodies(self) -> Iterator[RigidBody]:
-        """Every body, in the order added, without the world."""
+        """Return all bodies without the world, in the order of their addition."""
         return (
             c for c in self.components.values() if isinstance(c, RigidBody) and c is not self.world
         )
 
     def couplings(self) -> Iterator[Coupling]:
-        """Every coupling of coordinates, in the order added."""
+        """Return all couplings of coordinates, in the order of their addition."""
         return (c for c in self.components.values() if isinstance(c, Coupling))
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Every symbol that the components use, in the order of their first use, with its value.
+        """Return the symbols that the components use, with values, in the order of their first use.
 
         Raises:
             AssemblyError: a value is given for a symbol that no component uses, or a symbol has
@@ -514,7 +516,7 @@ class Description:
         return tuple(found.values())
 
     def given_values(self) -> dict[str, Parameter]:
-        """Values of symbols that were given to the mechanism, with units, descriptions and bounds.
+        """Return the values set in this mechanism by symbol, with units, descriptions and bounds.
 
         Raises:
             DescriptionError: an entry of `values` is no number, or a Parameter of another name.
@@ -531,7 +533,7 @@ class Description:
         return found
 
     def _merge(self, known: Parameter, other: Parameter) -> Parameter:
-        """Two uses of one symbol: a value and bounds may stand at either, but not differ."""
+        """Merge two uses of one symbol; raise AssemblyError if their values or bounds differ."""
         for what in ("default", "min", "max"):
             one, two = getattr(known, what), getattr(other, what)
             if None not in (one, two) and one != two:
@@ -549,7 +551,7 @@ class Description:
         return replace(first, unit=unit, min=low, max=high)
 
     def used_parameters(self) -> Iterator[Parameter]:
-        """Every symbol of components and places, as often as it is used."""
+        """Yield every symbol of components and placements, as often as it is used."""
         for component in self.components.values():
             for value in component.expressions():
                 yield from parameters_of(value)
@@ -591,7 +593,7 @@ class Description:
         self.shafts.append(flanges)
 
     def _is_used(self, point: Point) -> bool:
-        """Whether a frame of a joint is connected; each connection is looked at once."""
+        """Return whether a frame of a joint is connected; new connections are registered first."""
         if self._counted > len(self.connections):
             self._ports.clear()
             self._counted = 0
@@ -605,7 +607,7 @@ check_arguments(Description)
 
 
 def _what(value: object) -> str:
-    """A value in a message: a component or a signal by its name."""
+    """Return the text of a value in a message: a component or a signal by its name."""
     if isinstance(value, Component):
         return f"{type(value).__name__} {value.name!r}"
     if isinstance(value, Signal):

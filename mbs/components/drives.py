@@ -1,7 +1,6 @@
-"""Drive lines: flanges, shafts and gears, what drives them, elastic parts between them.
+"""Drive lines: flanges, shafts, gears, motors, and elastic parts between them.
 
-A flange has an angle, which is the same for all flanges that are connected, and a torque, and the
-torques of connected flanges add up to zero.
+Connected flanges have the same angle, and their torques add up to zero.
 """
 
 from __future__ import annotations
@@ -23,24 +22,24 @@ from mbs.text import quoted
 
 @dataclass(frozen=True, slots=True)
 class OneFlange(Custom):
-    """A part at one point of a shaft."""
+    """Base of parts at one point of a shaft."""
 
     flange = custom.flange()
 
 
 @dataclass(frozen=True, slots=True)
 class TwoFlanges(Custom):
-    """A part between two shafts, or the ends of one; a gear has angle a = `ratio` * angle b."""
+    """Base of parts between two shafts, or of a part of one shaft with two ends."""
 
     flange_a = custom.flange()
     flange_b = custom.flange()
 
 
 def flange_pair(where: str, *given: Any) -> tuple[Flange, Flange]:
-    """The two flanges that a user connects.
+    """Return the two flanges in the arguments of a connection.
 
     Raises:
-        DescriptionError: one of them is no flange, or there are not two.
+        DescriptionError: an argument is no flange, or there are not exactly two.
     """
     flanges = [value for value in given if isinstance(value, Flange)]
     others = [value for value in given if value is not None and not isinstance(value, Flange)]
@@ -62,17 +61,17 @@ def flange_pair(where: str, *given: Any) -> tuple[Flange, Flange]:
 
 @dataclass(frozen=True, slots=True)
 class RigidPart(TwoFlanges):
-    """An inertia or a mass; its two flanges are the two ends of one rigid part."""
+    """Base of inertias and masses, whose two flanges are the two ends of one rigid part."""
 
     lowered = True
 
 
 @dataclass(frozen=True, slots=True)
 class ShaftInertia(RigidPart):
-    """A rotating inertia; its two flanges are the two ends of one rigid shaft.
+    """A rotating inertia, whose two flanges are the two ends of one rigid shaft.
 
     Attributes:
-        inertia: about the axis of the shaft [kg m^2].
+        inertia: moment of inertia about the axis of the shaft [kg m^2].
     """
 
     inertia: Scalar
@@ -84,7 +83,7 @@ class ShaftInertia(RigidPart):
 
     @property
     def own_inertia(self) -> Expression:
-        """All of it."""
+        """The inertia, all of which is on the shaft."""
         return expression(self.inertia)
 
 
@@ -93,8 +92,8 @@ class IdealGear(TwoFlanges):
     """A rigid gear without losses: angle_a = ratio * angle_b, and torque_b = -ratio * torque_a.
 
     Attributes:
-        ratio: revolutions of flange_a per revolution of flange_b, or rad for 1 m where flange_b is
-            on a prismatic joint; less than zero when they rotate in opposite directions.
+        ratio: revolutions of flange_a per revolution of flange_b, or rad per m if flange_b is on a
+            prismatic joint; negative for opposite directions.
     """
 
     lowered = True
@@ -110,9 +109,9 @@ class IdealGear(TwoFlanges):
 
 
 class FixedFlange(OneFlange):
-    """A flange that is fixed: the housing, for shafts and for parts that slide.
+    """A fixed flange: the housing, for shafts and for sliding parts.
 
-    It locks what is connected to it at zero: the end of a spring, the ring of a planetary gear.
+    It locks connected flanges at zero: the end of a spring, the ring of a planetary gear.
     """
 
     fixed = True
@@ -122,14 +121,14 @@ class FixedFlange(OneFlange):
 
 
 def check_inertia(name: str, inertia: Scalar) -> None:
-    """Refuse an inertia that is a negative number."""
+    """Raise DescriptionError if an inertia is a negative number."""
     value = to_float(inertia)
     if value is not None and value < 0:
         raise DescriptionError(f"{name}: inertia is {value:g} kg m^2; give zero or more")
 
 
 def check_ratio(name: str, ratio: Scalar) -> None:
-    """Refuse a gear that ties nothing."""
+    """Raise DescriptionError if a gear ratio is zero."""
     if to_float(ratio) == 0:
         raise DescriptionError(
             f"{name}: ratio is 0, which ties nothing; give the revolutions of flange_a per"
@@ -137,47 +136,45 @@ def check_ratio(name: str, ratio: Scalar) -> None:
         )
 
 
-# What drives a drive line: torques that follow from an input and from states of their own.
+# Drives: torques that follow from an input and from states of the drive.
 
 
 @dataclass(frozen=True, slots=True)
 class Device(OneFlange):
-    """A motor: it drives its shaft, and the efforts tau of models have what it delivers.
+    """Base of motors: the torque on the shaft is part of the efforts tau of models.
 
-    A class of a user's own drives a shaft where it derives from this one and its `loads` are
-    those of the port "flange".
+    A user-defined motor derives from this class, and its `loads` are those of the port "flange".
     """
 
     drives = True
 
 
 class TorqueSource(Device):
-    """A given torque on a shaft: the input `tau` [N m]."""
+    """An imposed torque on a shaft: the input `tau` [N m]."""
 
     tau = custom.input("N.m")
     w = custom.output("rad/s")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The input."""
+        """Return the input as the load on the flange."""
         return {"flange": at.tau}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The speed of the shaft."""
+        """Return the speed of the shaft."""
         return {"w": at.flange.speed}
 
 
 class DCMotor(Device):
-    """A motor with permanent magnets: the input is its voltage, its torque follows the current.
+    """A permanent-magnet DC motor with the voltage as input.
 
-    inductance * di/dt = voltage - resistance * i - constant * w, and torque = constant * i. With
-    no inductance the current follows the voltage at once, and there is no state.
+    inductance * di/dt = voltage - resistance * i - constant * w, and torque = constant * i. Without
+    inductance the current follows the voltage instantly and is no state.
 
     Attributes:
-        resistance: of the armature [ohm].
-        inductance: of the armature [H].
-        constant: torque for a unit of current [N m/A], which is the voltage for a unit of speed
-            [V s/rad] too.
-        inertia: of the rotor [kg m^2].
+        resistance: resistance of the armature [ohm].
+        inductance: inductance of the armature [H].
+        constant: torque per current [N m/A], equal to the voltage per speed [V s/rad].
+        inertia: moment of inertia of the rotor [kg m^2].
     """
 
     resistance = custom.parameter("ohm", positive=True)
@@ -190,7 +187,7 @@ class DCMotor(Device):
     w = custom.output("rad/s")
 
     def check_values(self, values: Mapping[str, float]) -> Self:
-        """Refuse values that the motor itself would refuse, and a symbol of no inductance."""
+        """Return the motor with values; raise DescriptionError for a symbolic inductance of 0."""
         checked = Component.check_values(self, values)
         if "i" in self.state_names and to_float(self.inductance, values) == 0:
             raise DescriptionError(
@@ -201,32 +198,32 @@ class DCMotor(Device):
 
     @property
     def own_inertia(self) -> Expression:
-        """That of the rotor."""
+        """Moment of inertia of the rotor."""
         return expression(self.inertia)
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """The current, unless there is no inductance, and those of a derived class."""
+        """Names of the states: the current unless the inductance is 0, and those of subclasses."""
         every = self.names_of("state", "mode")
         return tuple(name for name in every if name != "i" or self.inductance != Number(0.0))
 
     @property
     def output_names(self) -> tuple[str, ...]:
-        """Torque and speed, and the current where it is no state."""
+        """Names of torque and speed, and of the current if it is no state."""
         own = self.names_of("output")
         return own if "i" in self.state_names else ("i", *own)
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Of the current."""
+        """Return the rate of the current."""
         left = at.voltage - at.constant * at.flange.speed - at.resistance * at.i
         return {"i": left / at.inductance} if "i" in self.state_names else {}
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """In proportion to the current."""
+        """Return the torque, proportional to the current."""
         return {"flange": at.constant * self._current(at)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """What it delivers, and how fast it rotates."""
+        """Return torque and speed, and the current if it is no state."""
         i = self._current(at)
         values = {"tau": at.constant * i, "w": at.flange.speed}
         return values if "i" in self.state_names else {"i": i, **values}
@@ -246,7 +243,7 @@ class BLDCMotor(Device):
         L_q di_q/dt = v_q - R i_q - P w (L_d i_d + psi)
         torque = 3/2 P (psi i_q + (L_d - L_q) i_d i_q)
 
-    for voltages and currents as large as the amplitudes of the phases. The electrical power is
+    for voltages and currents equal to the amplitudes of the phases. The electrical power is
     3/2 (v_d i_d + v_q i_q): the copper loss 3/2 R (i_d^2 + i_q^2), the rate of the magnetic energy
     3/4 (L_d i_d^2 + L_q i_q^2), and the mechanical power torque w.
 
@@ -254,11 +251,11 @@ class BLDCMotor(Device):
 
     Attributes:
         pole_pairs: P, electrical revolutions per revolution of the shaft.
-        resistance: R of a phase [ohm].
-        inductance_d: L_d, along the magnets [H].
-        inductance_q: L_q, across them [H]; as much as L_d where left out.
+        resistance: R, resistance of a phase [ohm].
+        inductance_d: L_d, inductance along the magnets [H].
+        inductance_q: L_q, inductance across the magnets [H]. The default is L_d.
         flux: psi, flux linkage of the magnets [Wb].
-        inertia: of the rotor [kg m^2].
+        inertia: moment of inertia of the rotor [kg m^2].
     """
 
     pole_pairs = custom.parameter("1", positive=True)
@@ -277,11 +274,11 @@ class BLDCMotor(Device):
 
     @property
     def own_inertia(self) -> Expression:
-        """That of the rotor."""
+        """Moment of inertia of the rotor."""
         return expression(self.inertia)
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Of the currents."""
+        """Return the rates of the currents."""
         L_d, L_q = self._inductances(at)
         w = at.pole_pairs * at.flange.speed
         return {
@@ -290,11 +287,11 @@ class BLDCMotor(Device):
         }
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Of the magnets, and of the difference of the inductances."""
+        """Return the torque of the magnets and of the difference of the inductances."""
         return {"flange": self._torque(at)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """What it delivers, how fast it rotates, and the electrical power that it takes."""
+        """Return torque, speed and electrical input power."""
         power = 1.5 * (at.v_d * at.i_d + at.v_q * at.i_q)
         return {"tau": self._torque(at), "w": at.flange.speed, "power": power}
 
@@ -307,15 +304,15 @@ class BLDCMotor(Device):
         return at.inductance_d, at.inductance_d if at.inductance_q is None else at.inductance_q
 
 
-# Elastic and damping parts of a drive line: forces on the coordinates of its shafts.
+# Elastic and damping parts of a drive line: forces on coordinates of shafts.
 
 
 @dataclass(frozen=True, slots=True)
 class ShaftForce(CoordinateForce):
-    """A spring and a damper on x, the sum of the angles of its flanges, each times a share.
+    """Base of springs and dampers on x, a weighted sum of the angles of its flanges.
 
     Attributes:
-        levers: the coordinates that x is made of; the assembly knows them, leave them out.
+        levers: pairs of coordinate and weight in x, set by the assembly. Leave them out.
     """
 
     levers: tuple[tuple[str, Scalar], ...] = field(default=(), kw_only=True, repr=False)
@@ -324,21 +321,21 @@ class ShaftForce(CoordinateForce):
 
     @property
     def shares(self) -> Iterable[tuple[Flange, Expression]]:
-        """What every flange contributes to x for a unit of its angle."""
+        """Pairs of flange and weight of its angle in x."""
         raise NotImplementedError
 
     @property
     def shaft_ports(self) -> tuple[str, ...]:
-        """None beside x."""
+        """No flanges: the law uses x only."""
         return ()
 
     @property
     def needs_position(self) -> bool:
-        """A twist is one of positions."""
+        """True: the twist needs positions."""
         return True
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """What it needs to be twisted."""
+        """Return the torque that twists it."""
         return {"torque": self.resistance(at)}
 
 
@@ -349,8 +346,8 @@ class ElasticShaft(ShaftForce, TwoFlanges):
     The twist is the angle of flange_a less that of flange_b.
 
     Attributes:
-        stiffness: [N m/rad].
-        damping: [N m s/rad].
+        stiffness: torsional stiffness [N m/rad].
+        damping: torsional damping [N m s/rad].
     """
 
     stiffness: Scalar
@@ -368,26 +365,25 @@ class ElasticShaft(ShaftForce, TwoFlanges):
         return (self.flange_a, Number(1.0)), (self.flange_b, Number(-1.0))
 
     def resistance(self, at: Any) -> SX:
-        """The torque that twists it."""
+        """Return the torque that twists the shaft."""
         stiffness, damping = to_sx(self.stiffness, at.symbols), to_sx(self.damping, at.symbols)
         return SX(stiffness * at.x.q + damping * at.x.v)
 
     def energy(self, at: Any) -> SX:
-        """What its twist stores."""
+        """Return the energy stored in the twist."""
         return SX(0.5 * to_sx(self.stiffness, at.symbols) * at.x.q**2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ElasticGear(ElasticShaft):
-    """A gear with an elastic transmission, its twist and its stiffness taken at flange_b.
+    """A gear with an elastic transmission; its twist and stiffness refer to flange_b.
 
-    twist = angle_a / ratio - angle_b; flange_b gets the torque stiffness * twist + damping * rate
-    and flange_a the opposite of this divided by ratio.
+    twist = angle_a / ratio - angle_b. flange_b gets the torque stiffness * twist + damping * rate
+    and flange_a the opposite of this torque divided by ratio.
 
     Attributes:
-        ratio: revolutions of flange_a per revolution of flange_b, or rad for 1 m where flange_b is
-            on a prismatic joint, whose stiffness is then in N/m; less than zero when they rotate in
-            opposite directions.
+        ratio: revolutions of flange_a per revolution of flange_b, or rad per m if flange_b is on a
+            prismatic joint, with the stiffness then in N/m; negative for opposite directions.
     """
 
     flange_b = custom.flange(slides=None)
@@ -401,7 +397,7 @@ class ElasticGear(ElasticShaft):
 
     @property
     def shares(self) -> Iterable[tuple[Flange, Expression]]:
-        """What flange_a is at the other side of the gear, less the angle of flange_b."""
+        """The angle of flange_a divided by the ratio, minus the angle of flange_b."""
         return (self.flange_a, 1 / expression(self.ratio)), (self.flange_b, Number(-1.0))
 
 
@@ -410,7 +406,7 @@ class ShaftDamper(ShaftForce, OneFlange):
     """Viscous friction of a bearing between a shaft and the housing.
 
     Attributes:
-        damping: [N m s/rad].
+        damping: viscous friction [N m s/rad].
     """
 
     damping: Scalar
@@ -427,9 +423,9 @@ class ShaftDamper(ShaftForce, OneFlange):
         return ((self.flange, Number(1.0)),)
 
     def resistance(self, at: Any) -> SX:
-        """The torque that the bearing takes."""
+        """Return the friction torque of the bearing."""
         return SX(to_sx(self.damping, at.symbols) * at.x.v)
 
     def dissipation(self, at: Any) -> SX:
-        """All its power."""
+        """Return the friction power [W]."""
         return SX(self.resistance(at) * at.x.v)

@@ -1,7 +1,7 @@
-"""Force elements: they act on points or on a joint and constrain nothing.
+"""Force elements: components that exert forces on points or joints without constraining them.
 
-A force element is a component that knows where it acts: `m.add(Spring("s", a.right, b, ...))`. Its
-law is written once, on CasADi scalars; the recursions know where its points are.
+A force element is added with its points or joints: `m.add(Spring("s", a.right, b, ...))`. Its law
+is written in CasADi scalars; the recursions compute the motion of its points.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ J = TypeVar("J", bound="JointForce")
 
 @dataclass(frozen=True, slots=True)
 class ForceElement(Custom):
-    """A component that acts on others without constraining them."""
+    """Base of components that exert forces on others without constraining them."""
 
 
 @dataclass(frozen=True, slots=True)
 class PairForce(OnPair, ForceElement):
-    """An element between two points of two bodies.
+    """A force element between two points of two bodies.
 
     Attributes:
-        a, b: the points, or bodies for their reference frames.
+        a, b: two points. A body stands for its reference frame.
     """
 
     @property
@@ -47,33 +47,33 @@ class PairForce(OnPair, ForceElement):
 
 @dataclass(frozen=True, slots=True)
 class CoordinateForce(ForceElement):
-    """An element that acts on x, the sum of some joint coordinates, each times its lever."""
+    """A force element on x, a weighted sum of joint coordinates; the weights are moment arms."""
 
     @property
     def levers(self) -> tuple[tuple[str, Scalar], ...]:
-        """The joint coordinates that it acts on, and how much of each."""
+        """Pairs of joint coordinate and moment arm (weight in x)."""
         raise NotImplementedError
 
     @property
     def coordinates(self) -> Mapping[str, tuple[tuple[str, Scalar], ...]]:
-        """Those of `levers`, as the port x."""
+        """The coordinates of `levers`, as the port x."""
         return {"x": self.levers}
 
     def resistance(self, at: Any) -> SX:
-        """What at.x needs of effort to overcome it [N m or N]."""
+        """Return the resisting effort: the effort along x that would overcome it [N m or N]."""
         raise NotImplementedError
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The opposite of what x needs; every coordinate gets its lever times it."""
+        """Return the negative resistance on x; each joint gets it times its moment arm."""
         return {"x": -self.resistance(at)}
 
 
 @dataclass(frozen=True, slots=True)
 class JointForce(CoordinateForce):
-    """An element that acts along a coordinate of a joint.
+    """A force element along a joint coordinate.
 
     Attributes:
-        joint: name of the coordinate: the joint, with a suffix when it has several.
+        joint: name of the coordinate: the joint, with a suffix if the joint has several.
     """
 
     joint: str
@@ -88,11 +88,11 @@ class JointForce(CoordinateForce):
 
     @property
     def levers(self) -> tuple[tuple[str, Scalar], ...]:
-        """The coordinate itself."""
+        """The coordinate, with moment arm 1."""
         return ((self.joint, Number(1.0)),)
 
     def limits(self, at: Any) -> Mapping[str, tuple[SX | None, SX | None]]:
-        """The fields lower and upper of a stop."""
+        """Return the fields lower and upper of a stop as limits of x."""
         lower, upper = (getattr(self, side, None) for side in ("lower", "upper"))
         if lower is None and upper is None:
             return {}
@@ -100,7 +100,7 @@ class JointForce(CoordinateForce):
         return {"x": (next(both), next(both))}
 
     def _take_limits(self) -> None:
-        """Convert the fields lower and upper of a stop to expressions, checking them."""
+        """Convert the fields lower and upper of a stop to expressions, with checks."""
         sides = [name for name in ("lower", "upper") if getattr(self, name) is not None]
         if not sides:
             raise DescriptionError(
@@ -114,7 +114,7 @@ class JointForce(CoordinateForce):
             )
 
     def scoped(self: J, prefix: str) -> J:
-        """The same element inside a mechanism that is placed in another one."""
+        """Return the element with prefixed names, for a nested mechanism."""
         return replace(Component.scoped(self, prefix), joint=f"{prefix}.{self.joint}")
 
 
@@ -126,17 +126,17 @@ _AXES = ("world", "body")
 
 @dataclass(frozen=True, slots=True)
 class PointSource(ForceElement):
-    """Something constant that acts on one point.
+    """Base of constant forces and torques on one point.
 
     Attributes:
-        point: of a body, or a body for its reference frame.
+        point: point of a body. A body stands for its reference frame.
     """
 
     point: Any
 
     @property
     def frames(self) -> Mapping[str, Point]:
-        """The one point."""
+        """The point, by its port."""
         return {"point": self.point}
 
     @property
@@ -145,7 +145,7 @@ class PointSource(ForceElement):
         raise NotImplementedError
 
     def _settle(self, name: str) -> None:
-        """Check what every source has; `name` is the field of its three components."""
+        """Check the point, the axes and the vector; `name` is the field of the vector."""
         Component.__post_init__(self)
         self._take_point("point")
         object.__setattr__(self, name, three(getattr(self, name), f"{self.name}, {name}"))
@@ -160,11 +160,12 @@ class PointSource(ForceElement):
 
 @dataclass(frozen=True, slots=True)
 class Force(PointSource):
-    """A constant force.
+    """A constant force at a point.
 
     Attributes:
-        force: its three components [N].
-        axes: "world" for a direction fixed in space, "body" for one that rotates with the point.
+        force: three components [N].
+        axes: "world" for a direction fixed in space, "body" for a direction that rotates with the
+            point.
     """
 
     force: Any
@@ -179,17 +180,18 @@ class Force(PointSource):
         return self.axes == "body"
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The force, without a moment about its point."""
+        """Return the force on the point, without a moment about it."""
         return {"point": custom.force(_in_point_axes(self.force, self.follows, at), own_axes=True)}
 
 
 @dataclass(frozen=True, slots=True)
 class Torque(PointSource):
-    """A constant torque.
+    """A constant torque on a body.
 
     Attributes:
-        torque: its three components [N m].
-        axes: "world" for a direction fixed in space, "body" for one that rotates with the point.
+        torque: three components [N m].
+        axes: "world" for a direction fixed in space, "body" for a direction that rotates with the
+            point.
     """
 
     torque: Any
@@ -204,7 +206,7 @@ class Torque(PointSource):
         return self.axes == "body"
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The torque alone."""
+        """Return the torque on the point."""
         return {
             "point": custom.torque(_in_point_axes(self.torque, self.follows, at), own_axes=True)
         }
@@ -222,32 +224,32 @@ def _in_point_axes(components: tuple[Expression, ...], follows: bool, at: Any) -
 
 @dataclass(frozen=True, slots=True)
 class LineForce(PairForce):
-    """A tension along the line from a to b, a function of the distance L and of its rate.
+    """Base of tensions along the line from a to b, functions of the distance L and its rate.
 
-    L is sqrt(d'd + (1e-12 m)^2), d being the vector from a to b: where the points coincide the
-    direction is not defined, and the force is zero there instead of not a number.
+    L is sqrt(d'd + (1e-12 m)^2) with the vector d from a to b. If the points coincide, the
+    direction is undefined and the force is zero instead of NaN.
     """
 
     force = custom.output("N")
 
     def tension(self, length: SX, rate: SX, symbols: SymbolTable) -> SX:
-        """Force that draws the points together [N] at this distance [m] and rate [m/s]."""
+        """Return the force that pulls the points together [N] at a distance [m] and rate [m/s]."""
         raise NotImplementedError
 
     def potential(self, length: SX, symbols: SymbolTable) -> SX:
-        """Energy [J] whose slope in the distance is the tension at rest."""
+        """Return the energy [J] whose derivative in the distance is the tension at rest."""
         raise NotImplementedError
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The tension, each point towards the other."""
+        """Return the tension on each point, towards the other."""
         return custom.pull(at.a, at.b, self._tension(at))
 
     def energy(self, at: Any) -> SX:
-        """The potential of the distance."""
+        """Return the potential at the present distance."""
         return self.potential(at.a.to(at.b).length, at.symbols)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The tension."""
+        """Return the tension."""
         return {"force": self._tension(at)}
 
     def _tension(self, at: Any) -> SX:
@@ -257,7 +259,7 @@ class LineForce(PairForce):
 
 @dataclass(frozen=True, slots=True)
 class Spring(LineForce):
-    """A spring, with a damper beside it: tension k (L - L0) + c dL/dt.
+    """A spring with a parallel damper: tension k (L - L0) + c dL/dt.
 
     Attributes:
         stiffness: k [N/m].
@@ -278,19 +280,19 @@ class Spring(LineForce):
         self._require_effect("stiffness", "damping")
 
     def tension(self, length: SX, rate: SX, symbols: SymbolTable) -> SX:
-        """The stretch times the stiffness, and the damping times the rate."""
+        """Return stiffness times stretch plus damping times rate."""
         stretch = length - to_sx(self.length, symbols)
         return to_sx(self.stiffness, symbols) * stretch + to_sx(self.damping, symbols) * rate
 
     def potential(self, length: SX, symbols: SymbolTable) -> SX:
-        """Half the stiffness times the square of the stretch."""
+        """Return half the stiffness times the square of the stretch."""
         stretch = length - to_sx(self.length, symbols)
         return 0.5 * to_sx(self.stiffness, symbols) * stretch**2
 
 
 @dataclass(frozen=True, slots=True)
 class Damper(LineForce):
-    """A damper alone: tension c dL/dt.
+    """A damper: tension c dL/dt.
 
     Attributes:
         damping: c [N s/m].
@@ -305,22 +307,22 @@ class Damper(LineForce):
         self._require_effect("damping")
 
     def tension(self, length: SX, rate: SX, symbols: SymbolTable) -> SX:
-        """The damping times the rate of the distance."""
+        """Return the damping times the rate of the distance."""
         return to_sx(self.damping, symbols) * rate
 
     def potential(self, length: SX, symbols: SymbolTable) -> SX:
-        """A damper stores nothing."""
+        """Return zero: a damper stores no energy."""
         return SX(0)
 
 
 @dataclass(frozen=True, slots=True)
 class Attraction(LineForce):
-    """Attraction by the inverse square of the distance: tension mu / L^2.
+    """Inverse-square attraction between two points: tension mu / L^2.
 
-    Central gravity of a body of mass m: mu = G M m, its points the two centres of mass.
+    For the central gravity of a body of mass m: mu = G M m, between the two centres of mass.
 
     Attributes:
-        strength: mu [N m^2]; below zero the points repel each other, as equal charges do.
+        strength: mu [N m^2]. If it is negative, the points repel each other, as equal charges do.
     """
 
     strength: Scalar
@@ -331,11 +333,11 @@ class Attraction(LineForce):
         self._require_effect("strength")
 
     def tension(self, length: SX, rate: SX, symbols: SymbolTable) -> SX:
-        """The strength over the square of the distance."""
+        """Return the strength divided by the square of the distance."""
         return to_sx(self.strength, symbols) / length**2
 
     def potential(self, length: SX, symbols: SymbolTable) -> SX:
-        """-mu / L, zero at infinity."""
+        """Return -mu / L, which is zero at infinity."""
         return -to_sx(self.strength, symbols) / length
 
 
@@ -343,18 +345,18 @@ class SpringDamperSeries(ForceElement):
     """A spring in series with a damper between two points, a Maxwell element.
 
     With the distance L of the points and the state z, the elongation of the damper, the tension is
-    T = stiffness (L - length - z), and damping dz/dt = T - parallel z. A constant distance relaxes
-    within the time damping / (stiffness + parallel). With a spring parallel to the damper it is the
-    standard linear solid: the node between the springs has no mass.
+    T = stiffness (L - length - z), and damping dz/dt = T - parallel z. At a constant distance it
+    relaxes with the time constant damping / (stiffness + parallel). With a spring parallel to the
+    damper it is the standard linear solid: the node between the springs has no mass.
 
     Source: Haug 1989 for translational springs and dampers.
 
     Attributes:
-        a, b: the points, or bodies for their reference frames.
-        stiffness: of the spring [N/m].
-        damping: of the damper [N s/m].
-        length: free length of both together at z = 0 [m].
-        elongation: of the damper at the start [m].
+        a, b: two points. A body stands for its reference frame.
+        stiffness: stiffness of the spring in series [N/m].
+        damping: damping of the damper [N s/m].
+        length: free length of spring and damper together at z = 0 [m].
+        elongation: initial elongation of the damper [m].
         parallel: stiffness of a spring parallel to the damper [N/m].
     """
 
@@ -368,24 +370,24 @@ class SpringDamperSeries(ForceElement):
     parallel = custom.parameter("N/m", 0.0, min=0)
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Of the elongation of the damper."""
+        """Return the rate of the elongation of the damper."""
         return {"elongation": self._damper_force(at) / at.damping}
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Tension between the points. It is positive if it pulls them together."""
+        """Return the tension between the points, positive if it pulls them together."""
         return custom.pull(at.a, at.b, self._tension(at))
 
     def energy(self, at: Any) -> SX:
-        """Energy in the springs."""
+        """Return the energy in the springs."""
         stored = at.stiffness * self._stretch(at) ** 2 + at.parallel * at.elongation**2
         return SX(0.5 * stored)
 
     def dissipation(self, at: Any) -> SX:
-        """What the damper takes."""
+        """Return the power dissipated by the damper [W]."""
         return SX(self._damper_force(at) ** 2 / at.damping)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The tension."""
+        """Return the tension."""
         return {"force": self._tension(at)}
 
     def _stretch(self, at: Any) -> SX:
@@ -403,16 +405,16 @@ class SpringFrictionSeries(ForceElement):
     """A spring in series with dry friction between two points, a Jenkins element.
 
     With the distance L of the points and the elongation z of the friction, the tension is
-    T = stiffness (L - length - z). The friction sticks while |T - parallel z| is below `friction`,
-    and slides otherwise; then |T - parallel z| is `friction`. The element does not depend on the
-    rate: a cycle of the amplitude X, without a parallel spring, dissipates the energy
-    4 friction (X - friction / stiffness). In simulations and FMUs it changes between sticking and
-    sliding at events.
+    T = stiffness (L - length - z). The friction sticks while |T - parallel z| is below `friction`.
+    It slides otherwise, with |T - parallel z| = friction. The element is independent of the rate: a
+    cycle of amplitude X, without a parallel spring, dissipates the energy
+    4 friction (X - friction / stiffness). Simulations and FMUs change between sticking and sliding
+    at events.
 
     Source: Pfeiffer and Glocker 1996, chapter 5.
 
     Attributes:
-        a, b: the points, or bodies for their reference frames.
+        a, b: two points. A body stands for its reference frame.
         stiffness: stiffness of the spring in series [N/m].
         friction: force at which the friction slides [N].
         length: free length at z = 0 [m].
@@ -434,21 +436,21 @@ class SpringFrictionSeries(ForceElement):
     slip = custom.output("m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Tension between the points. It is positive if it pulls them together."""
+        """Return the tension between the points, positive if it pulls them together."""
         return custom.pull(at.a, at.b, self._tension(at))
 
     def energy(self, at: Any) -> SX:
-        """Energy in the springs."""
+        """Return the energy in the springs."""
         z = self._elongation(at)
         return SX(0.5 * (self._tension(at) ** 2 / at.stiffness + at.parallel * z**2))
 
     def dissipation(self, at: Any) -> SX:
-        """Power that the friction dissipates while it slides [W]."""
+        """Return the power that the friction dissipates while it slides [W]."""
         share = at.stiffness / (at.stiffness + at.parallel)
         return SX(at.friction * share * at.direction * at.a.to(at.b).rate)
 
     def events(self, at: Any) -> Mapping[str, custom.Event]:
-        """Sliding begins if the force reaches `friction`, and ends if the rate changes its sign."""
+        """Return the events: sliding begins at the force `friction` and ends if the rate turns."""
         sticks, rate = at.direction == 0, at.a.to(at.b).rate
         force = self._tension(at) - at.parallel * at.elongation
         found = {}
@@ -464,11 +466,11 @@ class SpringFrictionSeries(ForceElement):
         return {**found, "sticks": custom.Event(turned, stop)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The tension, and the elongation of the friction."""
+        """Return the tension, and the elongation of the friction."""
         return {"force": self._tension(at), "slip": self._elongation(at)}
 
     def _sliding(self, at: Any, direction: SX | int) -> SX:
-        """The elongation at which the force on the friction is that of sliding."""
+        """Return the elongation at which the friction has the sliding force in a direction."""
         pull = at.stiffness * (at.a.to(at.b).length - at.length) - direction * at.friction
         return SX(pull / (at.stiffness + at.parallel))
 
@@ -481,29 +483,29 @@ class SpringFrictionSeries(ForceElement):
 
 # Bushings: elastic mounts between two frames.
 #
-# Source: Haug 1989 for forces between bodies; the angles are those of the unit quaternion.
+# Source: Haug 1989 for forces between bodies. The angles are from the unit quaternion.
 
 
 _HALF_REVOLUTION = 1e-12
-"""What 2 cos(theta / 2) is at least: at half a revolution nothing is divided by zero, and off it
-the square, 1e-24, is rounding."""
+"""Lower bound of 2 cos(theta / 2), which avoids a division by zero at half a revolution. Its
+square, 1e-24, is below rounding at all other angles."""
 _STRENGTHS = ("stiffness", "damping", "angular_stiffness", "angular_damping")
 
 
 @dataclass(frozen=True, slots=True)
 class Bushing(PairForce):
-    """Springs and dampers along and about the three axes of frame a, at rest where a and b agree.
+    """Springs and dampers along and about the three axes of frame a, relaxed if a and b coincide.
 
-    The displacement is p, the origin of b in frame a; the angles are phi = 2 sin(theta / 2) u for
-    a rotation by theta about u, which is the vector of small rotations where theta is small. Forces
-    and moments are exact derivatives of the energy p' K p / 2 + phi' K_phi phi / 2 for any
-    rotation of less than half a revolution.
+    The displacement p is the position of the origin of b in frame a. The angles are
+    phi = 2 sin(theta / 2) u for a rotation by theta about u, which is the rotation vector for small
+    theta. Forces and moments are exact derivatives of the energy p' K p / 2 + phi' K_phi phi / 2
+    for rotations of less than half a revolution.
 
     Attributes:
-        stiffness: K along the axes of a [N/m], three numbers, or one for all.
-        damping: [N s/m], likewise.
-        angular_stiffness: K_phi about the axes of a [N m/rad], likewise.
-        angular_damping: [N m s/rad], likewise.
+        stiffness: K along the axes of a [N/m], three numbers or a common number.
+        damping: damping along the axes of a [N s/m], three numbers or a common number.
+        angular_stiffness: K_phi about the axes of a [N m/rad], three numbers or a common number.
+        angular_damping: damping about the axes of a [N m s/rad], three numbers or a common number.
     """
 
     shape = "coil"
@@ -531,13 +533,13 @@ class Bushing(PairForce):
         self._require_effect(*_STRENGTHS)
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Force and moment at the origin of b, transformed to the origin of a."""
+        """Return force and moment at the origin of b, and their transform to the origin of a."""
         motion, force, moment = self._at_b(at)
         on_a = custom.FrameLoad(force, moment + cross(motion.p, force))
         return custom.between(at.a, at.b, on_a, -moment)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The force on a at the origin of b, and the moment about it, in axes of a."""
+        """Return the force on a at the origin of b, and the moment about it, in axes of a."""
         _, force, moment = self._at_b(at)
         values = (*casadi.vertsplit(force), *casadi.vertsplit(moment))
         return dict(zip(self.output_names, values, strict=True))
@@ -553,7 +555,7 @@ class Bushing(PairForce):
         return motion, force, moment
 
     def energy(self, at: Any) -> SX:
-        """The energy p' K p / 2 + phi' K_phi phi / 2."""
+        """Return the energy p' K p / 2 + phi' K_phi phi / 2."""
         motion = at.a.to(at.b)
         half, _ = _half_turn(motion.R)
         total = SX(0)
@@ -569,22 +571,22 @@ class Bushing(PairForce):
 
 
 def _half_turn(R: SX) -> tuple[SX, SX]:
-    """sin(theta / 2) u and cos(theta / 2) of a rotation by theta about u."""
+    """Return sin(theta / 2) u and cos(theta / 2) of a rotation by theta about u."""
     cosine = 0.5 * casadi.sqrt(1 + casadi.trace(R) + _HALF_REVOLUTION**2)
     axis = vector([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     return axis / (4 * cosine), cosine
 
 
-# The sign of a velocity, smoothed: the one law of Coulomb friction without events.
+# Smoothed sign of a velocity, for all laws of Coulomb friction without events.
 
 
 def smooth_sign(v: SX, width: SX) -> SX:
-    """tanh(v / width), and sign(v) for a width of zero; element by element.
+    """Return tanh(v / width), or sign(v) for a width of zero, elementwise.
 
     Args:
         v: velocities [rad/s or m/s].
-        width: (1, 1) velocity over which the sign changes, a number or an expression; zero in its
-            values needs no care, derivatives stay finite.
+        width: (1, 1) velocity over which the sign changes, a number or an expression. Its value may
+            be zero: derivatives stay finite.
     """
     if width.is_zero():
         return casadi.sign(v)
@@ -599,20 +601,20 @@ def smooth_sign(v: SX, width: SX) -> SX:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointStop(JointForce):
-    """Elastic stops: nothing between the limits, springs and dampers beyond them.
+    """Elastic stops: no force between the limits, springs and dampers beyond them.
 
     Over the first `width` beyond a limit the stiffness grows from zero to its full value, so that
-    the force of the spring and two derivatives of it are continuous. The damper exerts at most as
-    much as the spring, so that a stop never pulls.
+    the force of the spring and its first two derivatives are continuous. The damping force is at
+    most as large as the spring force, so that a stop never pulls.
 
     Source: Modelica Association 2023, `ElastoGap`, for the limit of the damper.
 
     Attributes:
-        lower: limit [rad or m]; None for no stop on that side.
-        upper: likewise.
-        stiffness: [N m/rad or N/m].
-        damping: [N m s/rad or N s/m], which grows over the same width.
-        width: [rad or m].
+        lower: lower limit [rad or m]. None for no stop on that side.
+        upper: upper limit [rad or m]. None for no stop on that side.
+        stiffness: stiffness beyond the limits [N m/rad or N/m].
+        damping: damping beyond the limits [N m s/rad or N s/m], which grows over the same width.
+        width: depth over which the stiffness grows [rad or m].
     """
 
     lower: Scalar | None = None
@@ -632,15 +634,15 @@ class JointStop(JointForce):
 
     @property
     def needs_position(self) -> bool:
-        """A limit is one of a position."""
+        """True: a limit needs a position."""
         return True
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """What it does to the joint."""
+        """Return the effort on the joint."""
         return {"effort": -self.resistance(at)}
 
     def resistance(self, at: Any) -> SX:
-        """Stiffness times the depth, and damping where the stop is touched."""
+        """Return stiffness times depth, and damping while the stop is in contact."""
         stiffness, damping = to_sx(self.stiffness, at.symbols), to_sx(self.damping, at.symbols)
         total = SX(0)
         for sign, depth, width in self._sides(at.x.q, at.symbols):
@@ -650,7 +652,7 @@ class JointStop(JointForce):
         return total
 
     def energy(self, at: Any) -> SX:
-        """What the stops store."""
+        """Return the energy stored in the stops."""
         stiffness = to_sx(self.stiffness, at.symbols)
         areas = (
             smooth_ramp(depth, width)[2] for _, depth, width in self._sides(at.x.q, at.symbols)
@@ -658,7 +660,7 @@ class JointStop(JointForce):
         return stiffness * sum(areas, SX(0))
 
     def _sides(self, q: SX, symbols: SymbolTable) -> list[tuple[float, SX, SX]]:
-        """Direction, depth beyond the limit and width of every stop."""
+        """Return direction, depth beyond the limit and width of every stop."""
         width = to_sx(self.width, symbols)
         sides = []
         if self.upper is not None:
@@ -669,30 +671,30 @@ class JointStop(JointForce):
 
 
 def smooth_ramp(depth: SX, width: SX) -> tuple[SX, SX, SX]:
-    """A slope that grows smoothly from 0 to 1 over a width, its integral, and that one's.
+    """Return a slope rising smoothly from 0 to 1 over a width, and its first two integrals.
 
-    With u = depth / width between 0 and 1 the slope is 3 u^2 - 2 u^3; the integral is
-    depth - width / 2 from there on.
+    With u = depth / width between 0 and 1 the slope is 3 u^2 - 2 u^3. Beyond the width the first
+    integral is depth - width / 2.
     """
     u = casadi.fmin(casadi.fmax(depth / width, 0), 1)
     beyond = casadi.fmax(depth - width, 0)
     slope = u**2 * (3 - 2 * u)
     ramped = width * u**3 * (1 - u / 2) + beyond
-    # u^4 / 4 - u^5 / 10, the integral of the ramp u^3 - u^4 / 2
+    # u^4 / 4 - u^5 / 10 is the integral of the ramp u^3 - u^4 / 2
     area = width**2 * u**4 * (0.25 - 0.1 * u) + 0.5 * beyond * (beyond + width)
     return slope, ramped, area
 
 
 def one_sided_damping(damper: SX, spring: SX) -> SX:
-    """The effort of a damper, at most as large as that of the spring beside it.
+    """Return the effort of a damper, limited to the effort of the spring parallel to it.
 
-    Their sum is then between zero and twice that of the spring: what touches does not pull.
+    The sum of both is between zero and twice the spring effort: a contact never pulls.
 
     Source: Modelica Association 2023, `ElastoGap` and `ElastoBacklash`.
 
     Args:
-        damper: (1, 1) its effort without the limit.
-        spring: (1, 1) not negative.
+        damper: (1, 1) effort of the damper without the limit.
+        spring: (1, 1) effort of the spring, not negative.
     """
     if damper.is_zero():
         return damper
@@ -703,13 +705,13 @@ def one_sided_damping(damper: SX, spring: SX) -> SX:
 class JointFriction(JointForce):
     """Coulomb, Stribeck and viscous friction on a joint.
 
-    Effort (coulomb + stribeck exp(-(v / velocity)^2)) tanh(v / width) + viscous v.
+    The effort is (coulomb + stribeck exp(-(v / velocity)^2)) tanh(v / width) + viscous v.
 
     Attributes:
-        coulomb: Coulomb friction while it slides [N m or N].
-        stribeck: what Coulomb friction has more than that at rest [N m or N].
-        velocity: over which this falls to 1/e [rad/s or m/s].
-        viscous: [N m s/rad or N s/m].
+        coulomb: Coulomb friction during sliding [N m or N].
+        stribeck: additional Coulomb friction at rest [N m or N].
+        velocity: velocity at which the additional friction has fallen to 1/e [rad/s or m/s].
+        viscous: viscous friction [N m s/rad or N s/m].
         width: velocity over which Coulomb friction changes sign [rad/s or m/s].
     """
 
@@ -729,11 +731,11 @@ class JointFriction(JointForce):
         self._require_effect("coulomb", "stribeck", "viscous")
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """What it does to the joint."""
+        """Return the effort on the joint."""
         return {"effort": -self.resistance(at)}
 
     def resistance(self, at: Any) -> SX:
-        """Coulomb friction that falls from rest to sliding, and viscous friction."""
+        """Return Coulomb friction, which falls from rest to sliding, plus viscous friction."""
         v, symbols = at.x.v, at.symbols
         coulomb = to_sx(self.coulomb, symbols)
         if self.stribeck != Number(0.0):
@@ -743,25 +745,28 @@ class JointFriction(JointForce):
         return total + coulomb * smooth_sign(v, to_sx(self.width, symbols))
 
     def dissipation(self, at: Any) -> SX:
-        """All its power."""
+        """Return the friction power, all of which is dissipated [W]."""
         return SX(self.resistance(at) * at.x.v)
 
 
-# Tendons that are routed over joints without a path in space.
+# Tendons over joints, without a path in space.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FixedTendon(CoordinateForce):
-    """A tendon whose length is x, a sum of joint positions, each times its lever.
+    """A tendon whose length x is a weighted sum of joint positions; the weights are moment arms.
 
-    It pulls and pushes: stiffness (x - length) + damping dx/dt + friction tanh(dx/dt / width),
-    and every joint feels its lever times that. With two lengths the spring is slack between them.
+    It pulls and pushes with the tension
+    stiffness (x - length) + damping dx/dt + friction tanh(dx/dt / width).
+    The effort on every joint is the negative tension times its moment arm. With two lengths the
+    spring is slack between them.
 
     Attributes:
-        levers: name of each coordinate and its lever [m/rad or 1].
-        stiffness: [N/m].
-        length: at which the spring is at rest [m], or (lower, upper) where it is slack between.
-        damping: [N s/m].
+        levers: pairs of the name of a coordinate and its moment arm [m/rad or 1].
+        stiffness: stiffness [N/m].
+        length: length at which the spring is relaxed [m], or (lower, upper) between which it is
+            slack.
+        damping: damping [N s/m].
         friction: Coulomb friction [N].
         width: rate of the length over which Coulomb friction changes sign [m/s].
     """
@@ -799,16 +804,16 @@ class FixedTendon(CoordinateForce):
 
     @property
     def needs_position(self) -> bool:
-        """A length is one of positions."""
+        """True: the length needs positions."""
         return True
 
     def scoped(self, prefix: str) -> FixedTendon:
-        """The same tendon inside a mechanism that is placed in another one."""
+        """Return the tendon with prefixed names, for a nested mechanism."""
         inner = Component.scoped(self, prefix)
         return replace(inner, levers=tuple((f"{prefix}.{n}", c) for n, c in inner.levers))
 
     def resistance(self, at: Any) -> SX:
-        """The tension."""
+        """Return the tension."""
         x, rate, symbols = at.x.q, at.x.v, at.symbols
         total = to_sx(self.stiffness, symbols) * self._stretch(x, symbols)
         total += to_sx(self.damping, symbols) * rate
@@ -818,11 +823,11 @@ class FixedTendon(CoordinateForce):
         return total
 
     def energy(self, at: Any) -> SX:
-        """Half the stiffness times the square of the stretch."""
+        """Return half the stiffness times the square of the stretch."""
         return 0.5 * to_sx(self.stiffness, at.symbols) * self._stretch(at.x.q, at.symbols) ** 2
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The tension."""
+        """Return the tension."""
         return {"tension": self.resistance(at)}
 
     def _stretch(self, x: SX, symbols: SymbolTable) -> SX:
@@ -832,7 +837,7 @@ class FixedTendon(CoordinateForce):
         return casadi.fmax(x - high, 0) + casadi.fmin(x - low, 0)
 
     def _checked_levers(self) -> tuple[tuple[str, Expression], ...]:
-        """The levers as expressions, each coordinate once."""
+        """Return the moment arms as expressions; raise if a coordinate occurs twice."""
         pairs = named_scalars(self.levers) or []
         if not pairs or len({name for name, _ in pairs}) < len(pairs):
             raise DescriptionError(
@@ -842,31 +847,31 @@ class FixedTendon(CoordinateForce):
         return tuple((n, expression(c, f"{self.name}, lever of {n}")) for n, c in pairs)
 
 
-# Contacts along a coordinate of a joint: rigid stops and Coulomb friction that really sticks.
+# Contacts along a joint coordinate: rigid stops, and Coulomb friction with sticking.
 #
 # They lock the coordinate at times and release it at others. Simulations change between the two at
-# events; smooth models, such as the inverse dynamic one, leave contacts out.
+# events. Smooth models, such as inverse dynamics, do not contain these contacts.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointContact(JointForce):
-    """What may lock a coordinate of a joint, in simulations alone."""
+    """Base of elements that may lock a joint coordinate, in simulations only."""
 
-    loads = Custom.loads  # nothing in smooth models
+    loads = Custom.loads  # no loads in smooth models
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RigidStop(JointContact):
     """Rigid limits of a coordinate, with impacts and contact.
 
-    The velocity v of an impact becomes -restitution v. Where that is slower than `rest_speed` the
-    coordinate stays at the limit until something pulls it off.
+    An impact with velocity v rebounds with -restitution v. If the rebound is slower than
+    `rest_speed`, the coordinate stays at the limit until a force moves it away.
 
     Attributes:
-        lower: limit [rad or m]; None for no stop on that side.
-        upper: likewise.
-        restitution: Newton's, between 0 and 1.
-        rest_speed: of the slowest rebound [rad/s or m/s].
+        lower: lower limit [rad or m]. None for no stop on that side.
+        upper: upper limit [rad or m]. None for no stop on that side.
+        restitution: Newton's coefficient of restitution, between 0 and 1.
+        rest_speed: speed of the slowest rebound [rad/s or m/s].
     """
 
     lower: Scalar | None = None
@@ -889,11 +894,11 @@ class RigidStop(JointContact):
 
     @property
     def needs_position(self) -> bool:
-        """A limit is one of a position."""
+        """True: a limit needs a position."""
         return True
 
     def stops(self, at: Any) -> Mapping[str, Stop | OneWay]:
-        """That of its coordinate."""
+        """Return the stop of the coordinate."""
         lower, upper = self.limits(at)["x"]
         e, slowest = (to_sx(x, at.symbols) for x in (self.restitution, self.rest_speed))
         return {"": Stop(at.x.q, lower, upper, restitution=e, rest_speed=slowest)}
@@ -901,12 +906,12 @@ class RigidStop(JointContact):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CoulombFriction(JointContact):
-    """Coulomb friction: the coordinate sticks up to an effort, and is braked beyond.
+    """Coulomb friction with sticking: the coordinate sticks up to a largest effort, then slides.
 
     Attributes:
-        sliding: friction while it slides [N m or N].
-        sticking: the largest effort at which it sticks, at least `sliding`, and as large when
-            left out [N m or N].
+        sliding: friction during sliding [N m or N].
+        sticking: largest effort during sticking [N m or N], at least `sliding`, which is the
+            default.
     """
 
     sliding: Scalar
@@ -933,7 +938,7 @@ class CoulombFriction(JointContact):
             )
 
     def frictions(self, at: Any) -> Mapping[str, Friction]:
-        """That of its coordinate."""
+        """Return the friction of the coordinate."""
         assert self.sticking is not None
         sliding, sticking = (to_sx(x, at.symbols) for x in (self.sliding, self.sticking))
         return {"": Friction(at.x.v, sliding, sticking)}

@@ -1,4 +1,4 @@
-"""Forces, torques and efforts that come from outside: inputs of runs, FMUs, controllers, wires."""
+"""Forces, torques and efforts from inputs of simulations, FMUs, controllers and wires."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _AXES = ("world", "body")
 
 
 class _GivenOnPoint(Custom):
-    """Three inputs on a point, along the axes of the world or of the point."""
+    """Base of vectors with three inputs on a point, in axes of the world or of the point."""
 
     point = custom.frame()
     axes: str = field(default="world", kw_only=True)
@@ -34,12 +34,12 @@ class _GivenOnPoint(Custom):
 
 
 class ForceInput(_GivenOnPoint):
-    """A force on a point: the inputs x, y and z [N].
+    """A force on a point, with the inputs x, y and z [N].
 
     Attributes:
-        point: of a body, or a body for its reference frame.
-        axes: "world" for components along axes fixed in space, "body" for those of the point,
-            which rotate with it.
+        point: point of a body. A body stands for its reference frame.
+        axes: "world" for components along axes fixed in space, "body" for components along the axes
+            of the point, which rotate with it.
     """
 
     x = custom.input("N")
@@ -47,18 +47,18 @@ class ForceInput(_GivenOnPoint):
     z = custom.input("N")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The force, without a moment about its point."""
+        """Return the force on the point, without a moment about it."""
         F = casadi.vertcat(at.x, at.y, at.z)
         return {"point": custom.force(F, own_axes=self.axes == "body")}
 
 
 class TorqueInput(_GivenOnPoint):
-    """A torque on a body: the inputs x, y and z [N m].
+    """A torque on a body, with the inputs x, y and z [N m].
 
     Attributes:
-        point: of a body, or a body for its reference frame.
-        axes: "world" for components along axes fixed in space, "body" for those of the point,
-            which rotate with it.
+        point: point of a body. A body stands for its reference frame.
+        axes: "world" for components along axes fixed in space, "body" for components along the axes
+            of the point, which rotate with it.
     """
 
     x = custom.input("N.m")
@@ -66,7 +66,7 @@ class TorqueInput(_GivenOnPoint):
     z = custom.input("N.m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The torque alone."""
+        """Return the torque on the point."""
         T = casadi.vertcat(at.x, at.y, at.z)
         return {"point": custom.torque(T, own_axes=self.axes == "body")}
 
@@ -74,11 +74,11 @@ class TorqueInput(_GivenOnPoint):
 class PairForceInput(Custom):
     """A force on point b along the axes of frame a, and its reaction on the body of a.
 
-    The inputs are x, y and z [N]. The line of action goes through b, so that the reaction has the
-    moment p x F about the origin of a, p being the origin of b in frame a.
+    The inputs are x, y and z [N]. The line of action passes through b, so that the reaction has the
+    moment -p x F about the origin of a, with the position p of the origin of b in frame a.
 
     Attributes:
-        a, b: points of two bodies, or bodies for their reference frames.
+        a, b: points of two bodies. A body stands for its reference frame.
     """
 
     a = custom.frame()
@@ -88,7 +88,7 @@ class PairForceInput(Custom):
     z = custom.input("N")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The force on b, the opposite wrench on a."""
+        """Return the force on b and the opposite wrench on a."""
         F = casadi.vertcat(at.x, at.y, at.z)
         on_a = custom.FrameLoad(-F, -casadi.cross(at.a.to(at.b).p, F))
         return custom.between(at.a, at.b, on_a)
@@ -100,7 +100,7 @@ class PairTorqueInput(Custom):
     The inputs are x, y and z [N m].
 
     Attributes:
-        a, b: points of two bodies, or bodies for their reference frames.
+        a, b: points of two bodies. A body stands for its reference frame.
     """
 
     a = custom.frame()
@@ -110,18 +110,18 @@ class PairTorqueInput(Custom):
     z = custom.input("N.m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The torque on b, the opposite on a."""
+        """Return the torque on b and the opposite torque on a."""
         T = casadi.vertcat(at.x, at.y, at.z)
         return custom.between(at.a, at.b, custom.FrameLoad(SX.zeros(3), -T), T)
 
 
 class LineForceInput(Custom):
-    """A force along the line from a to b: the input `tension` [N] draws the points together.
+    """A force along the line from a to b: the input `tension` [N] pulls the points together.
 
-    A tension below zero pushes them apart, as a hydraulic cylinder does.
+    A negative tension pushes them apart, as a hydraulic cylinder does.
 
     Attributes:
-        a, b: points of two bodies, or bodies for their reference frames.
+        a, b: points of two bodies. A body stands for its reference frame.
     """
 
     a = custom.frame()
@@ -131,30 +131,30 @@ class LineForceInput(Custom):
     speed = custom.output("m/s")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The tension, each point towards the other."""
+        """Return the tension on each point, towards the other."""
         return custom.pull(at.a, at.b, at.tension)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The distance of the points and its rate."""
+        """Return the distance of the points and its rate."""
         motion = at.a.to(at.b)
         return {"length": motion.length, "speed": motion.rate}
 
 
 class JointEffort(Custom):
-    """An effort along a coordinate of a joint: the input `tau` [N m or N].
+    """An effort along a joint coordinate, with the input `tau` [N m or N].
 
-    It is added to what motors deliver and, other than these, is no part of the efforts tau of
-    models: `inverse_dynamics` takes it off what the motors need.
+    It acts in addition to the motors. It is not part of the efforts tau of models:
+    `inverse_dynamics` subtracts it from the required motor efforts.
 
     Attributes:
-        joint: name of the coordinate: the joint, with a suffix when it has several.
+        joint: name of the coordinate: the joint, with a suffix if the joint has several.
     """
 
     joint = custom.coordinate()
     tau = custom.input(custom.EFFORT)
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The input."""
+        """Return the input as the effort on the coordinate."""
         return {"joint": at.tau}
 
 
@@ -164,26 +164,26 @@ class ShaftTorqueInput(TwoFlanges):
     tau = custom.input("N.m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The input on flange_b, its reaction on flange_a."""
+        """Return the input on flange_b and its reaction on flange_a."""
         return {"flange_a": -at.tau, "flange_b": at.tau}
 
 
 class SlidingForceInput(TwoFlanges):
-    """A force between flanges that slide: the input `force` [N] on flange_b, its opposite on a."""
+    """A force between sliding flanges: the input `force` [N] on flange_b, its opposite on a."""
 
     flange_a = custom.flange(slides=True)
     flange_b = custom.flange(slides=True)
     force = custom.input("N")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The input on flange_b, its reaction on flange_a."""
+        """Return the input on flange_b and its reaction on flange_a."""
         return {"flange_a": -at.force, "flange_b": at.force}
 
 
 class ForceSource(Device):
-    """A given force on a flange that slides, as a motor: the input `force` [N].
+    """An imposed force on a sliding flange, as a motor: the input `force` [N].
 
-    What it delivers is in the efforts tau of models, as that of a TorqueSource on a shaft is.
+    Its force is part of the efforts tau of models, as the torque of a TorqueSource on a shaft.
     """
 
     flange = custom.flange(slides=True)
@@ -191,9 +191,9 @@ class ForceSource(Device):
     v = custom.output("m/s")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The input."""
+        """Return the input as the load on the flange."""
         return {"flange": at.force}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The velocity of the flange."""
+        """Return the velocity of the flange."""
         return {"v": at.flange.speed}

@@ -1,8 +1,8 @@
-"""Hydraulics: cylinders whose chambers hold compressible oil, and the valves that feed them.
+"""Hydraulics: cylinders with chambers of compressible oil, and valves that feed them.
 
-Pressures are gauge pressures, of 0 Pa outside. Wires carry flows from a valve to a cylinder and
-pressures back. Oil is taken to be of one density in flows, and without gas: pressures may become
-negative, which says that a real cylinder would cavitate.
+Pressures are gauge pressures, relative to the surroundings. Wires connect flows from a valve to a
+cylinder and pressures back. The oil has constant density in flows and contains no gas. A negative
+pressure means that a real cylinder would cavitate.
 """
 
 from __future__ import annotations
@@ -19,34 +19,34 @@ from mbs.components.forces import one_sided_damping, smooth_ramp
 
 
 class HydraulicCylinder(Custom):
-    """A double-acting cylinder between two points, with the pressures of its chambers as states.
+    """A double-acting cylinder between two points, with the chamber pressures as states.
 
     With the distance L of the points and the stroke s = L - closed,
 
         past = leakage (p_a - p_b)
         dp_a/dt = bulk / (dead_a + area_a s) (flow_a - area_a ds/dt - past)
         dp_b/dt = bulk / (dead_b + area_b (stroke - s)) (flow_b + area_b ds/dt + past)
-        force = p_a area_a - p_b area_b - friction ds/dt + what the end stops push
+        force = p_a area_a - p_b area_b - friction ds/dt + force of the end stops
 
-    which drives the points apart. End stops at s = 0 and s = stroke are springs and dampers, whose
+    which pushes the points apart. End stops at s = 0 and s = stroke are springs and dampers, whose
     stiffness grows from zero over `end_width` beyond them.
 
     Source: Merritt 1967 for the flows into compressed volumes.
 
     Attributes:
-        a, b: the points of the housing and of the rod.
-        area_a: of the piston on the side that extends the cylinder [m^2].
-        area_b: on the side of the rod [m^2].
-        closed: distance of the points where the rod is drawn in [m].
-        stroke: how far it comes out [m].
-        dead_a, dead_b: volumes that are left where the piston is at the end of a chamber, with
-            those of its pipes [m^3].
+        a, b: points of the housing and of the rod.
+        area_a: piston area on the side that extends the cylinder [m^2].
+        area_b: piston area on the rod side [m^2].
+        closed: distance of the points with the rod retracted [m].
+        stroke: range of the rod [m].
+        dead_a, dead_b: dead volumes: volumes of the chambers, with their pipes, with the piston at
+            the end of the chamber [m^3].
         bulk: bulk modulus of the oil [Pa].
-        leakage: flow past the piston for a unit of pressure [m^3/(s Pa)].
+        leakage: leakage flow past the piston per pressure [m^3/(s Pa)].
         friction: viscous friction [N s/m].
-        end_stiffness: of the end stops [N/m].
-        end_damping: of the end stops [N s/m].
-        end_width: over which they come into effect [m].
+        end_stiffness: stiffness of the end stops [N/m].
+        end_damping: damping of the end stops [N s/m].
+        end_width: depth over which the stiffness of the end stops grows [m].
     """
 
     a = custom.frame()
@@ -63,14 +63,14 @@ class HydraulicCylinder(Custom):
     end_stiffness = custom.parameter("N/m", 1e8, positive=True)
     end_damping = custom.parameter("N.s/m", 1e5, min=0)
     end_width = custom.parameter("m", 1e-4, positive=True)
-    p_a = custom.state("Pa", nominal=1e5)  # a bar: loads change pressures by as much
-    p_b = custom.state("Pa", nominal=1e5)  # likewise
+    p_a = custom.state("Pa", nominal=1e5)  # 1 bar, the order of pressure changes by loads
+    p_b = custom.state("Pa", nominal=1e5)  # 1 bar, as p_a
     flow_a = custom.input("m3/s")
     flow_b = custom.input("m3/s")
     force = custom.output("N")
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Of the pressures."""
+        """Return the rates of the pressures."""
         motion = at.a.to(at.b)
         s, rate = motion.length - at.closed, motion.rate
         past = at.leakage * (at.p_a - at.p_b)
@@ -81,15 +81,15 @@ class HydraulicCylinder(Custom):
         }
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The force drives the points apart."""
+        """Return the force, which pushes the points apart."""
         return custom.pull(at.a, at.b, -self._force(at))
 
     def energy(self, at: Any) -> SX:
-        """That of the end stops."""
+        """Return the energy in the end stops."""
         return SX(at.end_stiffness * sum((area for _, _, _, area in self._ends(at)), SX(0)))
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The force."""
+        """Return the force."""
         return {"force": self._force(at)}
 
     def _force(self, at: Any) -> SX:
@@ -102,7 +102,7 @@ class HydraulicCylinder(Custom):
 
     @staticmethod
     def _ends(at: Any) -> list[tuple[float, SX, SX, SX]]:
-        """Direction of the push, share of the stiffness, depth and its integral, of both stops."""
+        """Return sign of the force, slope of the ramp, ramp and its integral for both stops."""
         s = at.a.to(at.b).length - at.closed
         sides = ((1.0, -s), (-1.0, s - at.stroke))
         return [(sign, *smooth_ramp(depth, at.end_width)) for sign, depth in sides]
@@ -111,19 +111,20 @@ class HydraulicCylinder(Custom):
 class HydraulicValve(Custom):
     """A 4/3 spool valve between a supply, a tank and the two chambers of a cylinder.
 
-    The spool runs from -1 to 1. Above zero it opens the supply to a and b to the tank, below zero
-    the supply to b and a to the tank, as far as it is shifted; at zero all is closed. The flow
-    through an edge is rated_flow |spool| sqrt(dp / rated_drop), with its sign, where dp is the
-    difference of pressures; sqrt(dp) is dp / (dp^2 + transition^2)^(1/4), smooth at zero.
+    The spool position is between -1 and 1. Positive values connect the supply with a, and b with
+    the tank; negative values connect the supply with b, and a with the tank. The opening is
+    proportional to the spool position; at zero all edges are closed. The flow through an edge is
+    rated_flow |spool| sqrt(dp / rated_drop), with the sign of the pressure difference dp. sqrt(dp)
+    is dp / (dp^2 + transition^2)^(1/4), which is smooth at zero.
 
     Source: Merritt 1967 for orifices and spool valves.
 
     Attributes:
-        rated_flow: through one edge, open, at the rated difference of pressures [m^3/s].
-        rated_drop: that difference [Pa].
+        rated_flow: flow through one open edge at the rated pressure difference [m^3/s].
+        rated_drop: rated pressure difference [Pa].
         supply: pressure of the supply [Pa].
         tank: pressure of the tank [Pa].
-        transition: difference of pressures below which the root is smooth [Pa].
+        transition: pressure difference below which the square root is smoothed [Pa].
     """
 
     rated_flow = custom.parameter("m3/s", positive=True)
@@ -138,7 +139,7 @@ class HydraulicValve(Custom):
     flow_b = custom.output("m3/s")
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The flows into the chambers."""
+        """Return the flows into the chambers."""
         s = casadi.fmin(casadi.fmax(at.spool, -1), 1)
         ahead, back = casadi.fmax(s, 0), casadi.fmax(-s, 0)
         fill_a, drain_a = self._flow(at, at.supply - at.p_a), self._flow(at, at.p_a - at.tank)
@@ -150,6 +151,6 @@ class HydraulicValve(Custom):
 
     @staticmethod
     def _flow(at: Any, drop: SX) -> SX:
-        """Through an edge that is open, at a difference of pressures."""
+        """Return the flow through an open edge at a pressure difference."""
         root = drop / (drop**2 + at.transition**2) ** 0.25
         return SX(at.rated_flow * root / casadi.sqrt(at.rated_drop))

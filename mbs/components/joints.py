@@ -1,7 +1,7 @@
-"""Joints: how frame_b may move with respect to frame_a; their motions, rotors and limits.
+"""Joints: relative motion of frame_b and frame_a, with rotors, friction and limits.
 
-A joint is described by its freedoms, elementary motions one after the other from frame_a to
-frame_b. The rows that close a loop through a cut joint follow from the same description
+A joint is described by its freedoms, a sequence of elementary motions from frame_a to frame_b. The
+constraint rows of a cut joint, which close a loop, follow from the same description
 (`mbs.loops.closure`).
 """
 
@@ -25,11 +25,11 @@ from mbs.numbers import has_boolean
 from mbs.spatial import Pose, align_z
 from mbs.text import quoted
 
-# Elementary motions of a frame, of which every joint is made.
+# Elementary motions, of which every joint is made.
 
 
 class Motion(Enum):
-    """An elementary motion of a frame: about or along its z axis, or free."""
+    """Elementary motion of a frame: revolute about z, prismatic along z, spherical, or free."""
 
     REVOLUTE = "revolute"
     PRISMATIC = "prismatic"
@@ -52,10 +52,10 @@ class Freedom:
     """One elementary motion of a joint.
 
     Attributes:
-        motion: what moves.
-        axis: unit vector of the axis in frame_a at the zero configuration (z where none is
-            special).
-        suffix: what distinguishes its coordinates from the others of the same joint.
+        motion: type of the motion.
+        axis: unit vector of the axis in frame_a at the zero configuration; z for motions without
+            an axis.
+        suffix: suffix that distinguishes its coordinates from others of the same joint.
     """
 
     motion: Motion
@@ -63,33 +63,33 @@ class Freedom:
     suffix: str = ""
 
     def coordinate_of(self, joint: str) -> str:
-        """Name of its coordinate in a joint of this name, which has a suffix beside others."""
+        """Return the name of its coordinate in a joint: the joint's name and the suffix, if any."""
         return f"{joint}.{self.suffix}" if self.suffix else joint
 
 
-# The rows that close a loop through a joint that is cut, from the pose of frame_b in frame_a.
+# Constraint rows that close a loop at a cut joint, as functions of the pose of frame_b in frame_a.
 #
-# Lengths are in metres, directions are cosines, so that a row is zero when closed.
+# Lengths are in metres and directions are cosines. Each row is zero if the loop is closed.
 #
 # Source: Haug 1989, chapter 9, for the rows of each type of joint.
 
 
 Rows = list[tuple[str, SX]]
-"""Label and value of each row."""
+"""Pairs of label and value of constraint rows."""
 
 
 def position_rows(pose: Pose, axes: str) -> Rows:
-    """The origin of frame_b has no part along some axes of frame_a."""
+    """Return rows of the position of the origin of frame_b along axes of frame_a."""
     return [(f"force {axis}", pose.p["xyz".index(axis)]) for axis in axes]
 
 
 def tilt_rows(pose: Pose) -> Rows:
-    """The z axis of frame_b has no part along x and y of frame_a."""
+    """Return rows of the components of the z axis of frame_b along x and y of frame_a."""
     return [("moment y", pose.R[0, 2]), ("moment x", pose.R[1, 2])]
 
 
 def orientation_rows(pose: Pose) -> Rows:
-    """Frame_b is not rotated."""
+    """Return rows that are zero if frame_b is not rotated relative to frame_a."""
     R = pose.R
     return [
         ("moment x", 0.5 * (R[2, 1] - R[1, 2])),
@@ -99,42 +99,42 @@ def orientation_rows(pose: Pose) -> Rows:
 
 
 def weld_rows(pose: Pose) -> Rows:
-    """The frames agree."""
+    """Return rows that are zero if the frames coincide."""
     return [*position_rows(pose, "xyz"), *orientation_rows(pose)]
 
 
 def along_z(pose: Pose, axis: Sequence[float]) -> Pose:
-    """The pose in axes whose z is the axis."""
+    """Return the pose expressed in axes whose z is the given axis."""
     inside = Pose.rotation(align_z(axis))
     return inside.inverse() @ pose @ inside
 
 
 def cosine(pose: Pose, axis: Sequence[float]) -> SX:
-    """Cosine between an axis of frame_b and the same axis of frame_a."""
+    """Return the cosine between an axis of frame_b and the same axis of frame_a."""
     z = SX(DM(list(axis)))
     return casadi.dot(z, casadi.mtimes(pose.R, z))
 
 
 def diagonal(pose: Pose) -> list[SX]:
-    """Cosines between the axes of frame_b and those of frame_a."""
+    """Return the cosines between the axes of frame_b and the same axes of frame_a."""
     return [pose.R[k, k] for k in range(3)]
 
 
-# Rotors of motors that rotate with a joint, faster than it.
+# Rotors of motors, geared to a joint.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rotor:
-    """A balanced rotor on the link of a joint's frame_a, which a gear ties to the joint.
+    """A balanced rotor on the link of a joint's frame_a, geared to the joint.
 
-    Relative to that link it spins at `ratio` times the velocity of the joint. The mass of the
-    rotor and its whole inertia, locked, belong to the body that carries it.
+    Relative to that link it spins at `ratio` times the velocity of the joint. The mass and the
+    inertia of the locked rotor are part of the body that carries it.
 
     Attributes:
-        inertia: about its own axis [kg m^2].
-        ratio: revolutions of the rotor per revolution of the joint, or rad for 1 m of a prismatic
-            one; less than zero when it rotates in the opposite direction.
-        axis: of the rotor, in frame_a, as a letter or three numbers; that of the joint when None.
+        inertia: moment of inertia about its own axis [kg m^2].
+        ratio: revolutions of the rotor per revolution of the joint, or rad per m of a prismatic
+            joint; negative for opposite directions.
+        axis: axis of the rotor in frame_a, as a letter or three numbers. None for the joint axis.
     """
 
     inertia: Scalar
@@ -149,7 +149,7 @@ class Rotor:
             object.__setattr__(self, "axis", unit_axis("rotor", self.axis))
 
 
-# Limits of joints: ranges of positions, of the velocity and of the effort of the motor.
+# Limits of joints: ranges of the position, the velocity and the effort of the motor.
 
 
 Range = tuple[float, float]
@@ -158,15 +158,15 @@ Range = tuple[float, float]
 def limits_by_suffix(
     name: str, suffixes: Iterable[str], limits: Any
 ) -> tuple[tuple[str, Range], ...]:
-    """The ranges of positions of a joint by the suffix of the coordinate.
+    """Return the position ranges of a joint, as pairs of coordinate suffix and range.
 
     Args:
-        name: of the joint, for errors.
-        suffixes: of its coordinates of one number.
+        name: name of the joint, for error messages.
+        suffixes: suffixes of its coordinates of one number.
         limits: None, a pair for a joint with one coordinate, or a mapping from suffixes to pairs.
 
     Raises:
-        DescriptionError: a range names no coordinate, or is not (lower, upper).
+        DescriptionError: a range refers to no coordinate, or is not (lower, upper).
     """
     if limits is None:
         return ()
@@ -180,15 +180,15 @@ def limits_by_suffix(
 
 
 def motor_range(where: str, quantity: str, given: Any) -> Range | None:
-    """The range of a velocity or an effort: (-x, x) where one number x is given.
+    """Return the range of a velocity or an effort. A single number x means (-x, x).
 
     Args:
-        where: it is described, for errors.
+        where: name of the joint, for error messages.
         quantity: "velocity" or "effort".
         given: None, a number above zero, or (lower, upper) with zero between them.
 
     Raises:
-        DescriptionError: it is something else.
+        DescriptionError: the value has another form.
     """
     if given is None:
         return None
@@ -207,7 +207,7 @@ def _both(given: Any) -> Range:
 
 
 def _pair(pair: Any) -> Range:
-    """Two numbers, NaN where there are not two."""
+    """Return two numbers; NaN if the value is not a pair of numbers."""
     if has_boolean(pair):
         return math.nan, math.nan
     try:
@@ -237,26 +237,27 @@ def _is_named_interval(item: Any) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint(Component):
-    """What every joint has.
+    """Base of all joints.
 
     Attributes:
-        actuated: whether a motor drives it; None leaves the choice to the assembly: every joint
-            of an open chain is active, a joint of a loop and a Free joint are passive.
-        limits: (lower, upper) of its position, or a mapping from the suffix of a coordinate.
-        velocity: the largest velocity in both directions, or (lower, upper), of a joint of one
-            degree of freedom [rad/s or m/s]; kept as the pair.
-        effort: likewise of its motor [N m or N].
+        actuated: Whether a motor drives the joint. None lets the assembly choose: joints of an open
+            chain are actuated, joints of a loop and Free joints are passive.
+        limits: (lower, upper) of its position, or a mapping from coordinate suffix to such pairs.
+        velocity: largest velocity in both directions, or (lower, upper), of a joint of one
+            degree of freedom [rad/s or m/s]. It is stored as the pair.
+        effort: largest effort of its motor in both directions, or (lower, upper) [N m or N]. It is
+            stored as the pair.
         Fv: viscous friction [N m s/rad or N s/m].
-        Fs: Coulomb friction [N m or N], which acts as Fs tanh(v / Fs_width).
-        Fs_width: velocity over which Coulomb friction changes sign [rad/s or m/s]; zero for the
-            step Fs sign(v), which identification needs and integrators do not.
-        Ia: inertia of the rotor seen at the joint [kg m^2 or kg], for what its spin does to the
-            link that carries it see `rotor`.
-        stiffness: of a spring between its two frames [N m/rad or N/m], of a joint of one degree
-            of freedom.
-        rest: position at which the spring is at rest [rad or m].
-        rotor: a `Rotor` that spins with a joint of one degree of freedom, its gyroscopic effects
-            included; besides Ia.
+        Fs: Coulomb friction [N m or N], with the effort Fs tanh(v / Fs_width).
+        Fs_width: velocity over which Coulomb friction changes sign [rad/s or m/s]. Zero gives the
+            step Fs sign(v), which is for identification and unsuitable for integrators.
+        Ia: rotor inertia reflected to the joint [kg m^2 or kg]. `rotor` also models the gyroscopic
+            effect of the spin on the link that carries the rotor.
+        stiffness: stiffness of a spring between its two frames [N m/rad or N/m], for a joint of one
+            degree of freedom.
+        rest: position at which the spring is relaxed [rad or m].
+        rotor: `Rotor` that spins with a joint of one degree of freedom, with its gyroscopic
+            effects. It acts in addition to Ia.
     """
 
     actuated: bool | None = None
@@ -296,58 +297,59 @@ class Joint(Component):
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super(Joint, cls).__init_subclass__(**kwargs)
-        # rows say the same as freedoms: who writes other freedoms must not inherit old rows
+        # rows and freedoms describe the same motion: a class with new freedoms must not inherit old
+        # rows
         if "freedoms" in vars(cls) and "closing_rows" not in vars(cls):
             cls.closing_rows = Joint.closing_rows  # type: ignore[method-assign]
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        """The elementary motions from frame_a to frame_b."""
+        """Elementary motions from frame_a to frame_b, in order."""
         raise NotImplementedError
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows | None:
-        """Label and value of what must be zero where it is cut; None where it must not be cut.
+        """Return label and value of the constraint rows of the cut joint; None if it cannot be cut.
 
         A joint without rows stays in the tree, and its free end is welded.
 
         Args:
-            pose: of frame_b in frame_a.
+            pose: pose of frame_b in frame_a.
             symbols: CasADi symbol of every parameter.
         """
         return None
 
     def facing(self, pose: Pose) -> list[SX]:
-        """Cosines that must be positive where the rows are zero: axes that are not opposed."""
+        """Return cosines that must be positive at closed loops, so that no axes are opposed."""
         return []
 
     @property
     def closes(self) -> bool:
-        """Whether rows can stand for it where it is cut."""
+        """Whether the joint can be cut and replaced by constraint rows."""
         return type(self).closing_rows is not Joint.closing_rows
 
     @property
     def companions(self) -> tuple[Component, ...]:
-        """What is added to the mechanism together with it."""
+        """Components that are added to the mechanism together with the joint."""
         return ()
 
     @property
     def places(self) -> bool:
-        """Whether its coordinates can place one frame in the other, as in a tree they must."""
+        """Whether its coordinates determine the pose of frame_b, as a tree requires."""
         return True
 
     @property
     def frame_a(self) -> Point:
-        """The frame that the joint moves with respect to."""
+        """Frame relative to which frame_b moves."""
         return Point(self, "a")
 
     @property
     def frame_b(self) -> Point:
-        """The frame that the joint moves."""
+        """Frame that the joint moves relative to frame_a."""
         return Point(self, "b")
 
     @property
     def flange(self) -> Flange:
-        """Where a drive line exerts a torque, or a force where it is prismatic."""
+        """Flange of the joint, on which a drive line exerts a torque, or a force if prismatic."""
         if self.nv != 1 or len(self.freedoms) != 1:
             raise DescriptionError(
                 f"{self.name}: a {type(self).__name__} joint has no flange, since it has not one"
@@ -368,14 +370,14 @@ class Joint(Component):
         return bool(self.actuated) or acts
 
     def _magnitudes(self) -> Iterator[tuple[str, Scalar]]:
-        """What may not be less than zero, with its name."""
+        """Yield name and value of each quantity that must not be negative."""
         for name in ("Fv", "Fs", "Fs_width", "Ia", "stiffness"):
             yield name, getattr(self, name)
         if self.rotor is not None:
             yield "inertia of the rotor", self.rotor.inertia
 
     def _refuse_drive(self) -> None:
-        """Springs, rotors and limits of a motor belong to joints of one position."""
+        """Raise if a joint without a single position has a spring, a rotor or motor limits."""
         given = [name for name in ("stiffness", "rest") if getattr(self, name) != Number(0.0)]
         given += [n for n in ("rotor", "velocity", "effort") if getattr(self, n) is not None]
         for name in given:
@@ -387,7 +389,7 @@ class Joint(Component):
 
 @dataclass(frozen=True, slots=True)
 class _AxisJoint(Joint):
-    """A joint with one axis: "x", "y", "z", "-x" .. or three numbers, in frame_a."""
+    """A joint with an axis in frame_a: "x", "y", "z", "-x" .. or three numbers."""
 
     axis: Any = "z"
 
@@ -398,7 +400,7 @@ class _AxisJoint(Joint):
 
 @dataclass(frozen=True, slots=True)
 class Revolute(_AxisJoint):
-    """One rotation about the axis; closes a loop with 5 rows."""
+    """Revolute joint: a rotation about the axis. It closes a loop with 5 rows."""
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
@@ -406,18 +408,18 @@ class Revolute(_AxisJoint):
         return (Freedom(Motion.REVOLUTE, self.axis),)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """The origins agree, and the axes."""
+        """Return rows for coincident origins and parallel axes."""
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "xyz"), *tilt_rows(pose)]
 
     def facing(self, pose: Pose) -> list[SX]:
-        """The axes are not opposed."""
+        """Return the cosine of the axes, which must not be opposed."""
         return [cosine(pose, self.axis)]
 
 
 @dataclass(frozen=True, slots=True)
 class Prismatic(_AxisJoint):
-    """One translation along the axis; closes a loop with 5 rows."""
+    """Prismatic joint: a translation along the axis. It closes a loop with 5 rows."""
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
@@ -425,18 +427,18 @@ class Prismatic(_AxisJoint):
         return (Freedom(Motion.PRISMATIC, self.axis),)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """The origin moves along the axis alone, and nothing rotates."""
+        """Return rows for a displacement along the axis only, without rotation."""
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "xy"), *orientation_rows(pose)]
 
     def facing(self, pose: Pose) -> list[SX]:
-        """No axis is opposed."""
+        """Return the cosines of the axes, none of which may be opposed."""
         return diagonal(pose)
 
 
 @dataclass(frozen=True, slots=True)
 class Cylindrical(_AxisJoint):
-    """A translation `s` along and a rotation `phi` about the axis; 4 rows."""
+    """Cylindrical joint: displacement `s` along and rotation `phi` about the axis; 4 rows."""
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
@@ -447,20 +449,20 @@ class Cylindrical(_AxisJoint):
         )
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """The origin moves along the axis alone, and the axes agree."""
+        """Return rows for a displacement along the axis only, and parallel axes."""
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "xy"), *tilt_rows(pose)]
 
     def facing(self, pose: Pose) -> list[SX]:
-        """The axes are not opposed."""
+        """Return the cosine of the axes, which must not be opposed."""
         return [cosine(pose, self.axis)]
 
 
 @dataclass(frozen=True, slots=True)
 class Planar(_AxisJoint):
-    """Translations `s_x`, `s_y` in the plane normal to the axis, a rotation `phi` about it; 3 rows.
+    """Planar joint: displacements `s_x`, `s_y` normal to the axis, rotation `phi` about it; 3 rows.
 
-    For the axis z the translations are along x and y of frame_a.
+    For the axis z the displacements are along x and y of frame_a.
     """
 
     @property
@@ -474,20 +476,20 @@ class Planar(_AxisJoint):
         )
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """The origin stays in the plane, and the axes agree."""
+        """Return rows for an origin in the plane, and parallel axes."""
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "z"), *tilt_rows(pose)]
 
     def facing(self, pose: Pose) -> list[SX]:
-        """The axes are not opposed."""
+        """Return the cosine of the axes, which must not be opposed."""
         return [cosine(pose, self.axis)]
 
 
 @dataclass(frozen=True, slots=True)
 class Cartesian(Joint):
-    """Translations `x`, `y`, `z` along the axes of frame_a, without any rotation.
+    """Translations `x`, `y`, `z` along the axes of frame_a, without rotation.
 
-    It stays in the tree: a loop through it is closed by a weld behind it.
+    The joint stays in the tree: a loop through it is closed by a weld at its frame_b.
     """
 
     @property
@@ -499,13 +501,13 @@ class Cartesian(Joint):
 
 @dataclass(frozen=True, slots=True)
 class Gimbal(Joint):
-    """Three rotations, one after the other, `phi_1` about the first axis and so on.
+    """Three successive rotations, `phi_1` about the first axis, and so on.
 
-    It is singular where the first and the last axis are aligned; `Spherical` never is. It stays in
-    the tree: a loop through it is closed by a weld behind it.
+    It is singular if the first and the last axis are aligned; `Spherical` is never singular. The
+    joint stays in the tree: a loop through it is closed by a weld at its frame_b.
 
     Attributes:
-        axes: three axes in frame_a at the zero configuration, each orthogonal to the next one.
+        axes: three axes in frame_a at the zero configuration, each orthogonal to the next.
     """
 
     axes: tuple[Any, Any, Any] = ("z", "y", "x")
@@ -518,7 +520,7 @@ class Gimbal(Joint):
             )
         axes = tuple(unit_axis(self.name, axis) for axis in given)
         for first, second in ((axes[0], axes[1]), (axes[1], axes[2])):
-            if abs(np.dot(first, second)) > 1e-9:  # unit vectors: beyond the rounding of digits
+            if abs(np.dot(first, second)) > 1e-9:  # unit vectors: more than rounding of digits
                 raise DescriptionError(
                     f"{self.name}: axes {quoted(self.axes)} are not orthogonal one to the next;"
                     " give such as ('z', 'y', 'x')"
@@ -536,13 +538,13 @@ class Gimbal(Joint):
 
 @dataclass(frozen=True, slots=True)
 class PinSlot(_AxisJoint):
-    """A pin in a straight slot: a translation `s` along the slot, a rotation `phi` about the axis.
+    """A pin in a straight slot: displacement `s` along the slot, rotation `phi` about the axis.
 
-    It stays in the tree: a loop through it is closed by a weld behind it.
+    The joint stays in the tree: a loop through it is closed by a weld at its frame_b.
 
     Attributes:
-        axis: of the pin.
-        slot: direction of the slot, orthogonal to the axis; both in frame_a.
+        axis: axis of the pin in frame_a.
+        slot: direction of the slot in frame_a, orthogonal to the axis.
     """
 
     slot: Any = "x"
@@ -550,7 +552,7 @@ class PinSlot(_AxisJoint):
     def __post_init__(self) -> None:
         object.__setattr__(self, "slot", unit_axis(self.name, self.slot))
         _AxisJoint.__post_init__(self)
-        if abs(np.dot(self.axis, self.slot)) > 1e-9:  # unit vectors: beyond the rounding of digits
+        if abs(np.dot(self.axis, self.slot)) > 1e-9:  # unit vectors: above rounding
             raise DescriptionError(
                 f"{self.name}: slot {quoted(self.slot)} is not orthogonal to the axis"
                 f" {quoted(self.axis)}; give two orthogonal directions"
@@ -567,7 +569,7 @@ class PinSlot(_AxisJoint):
 
 @dataclass(frozen=True, slots=True)
 class Universal(Joint):
-    """Two rotations about orthogonal axes that meet, `phi_a` then `phi_b`; 4 rows.
+    """Universal joint: rotations `phi_a`, then `phi_b` about orthogonal axes that meet; 4 rows.
 
     Attributes:
         axes: the two axes in frame_a at the zero configuration.
@@ -583,7 +585,7 @@ class Universal(Joint):
                 f"{self.name}: axes {quoted(self.axes)} are not two; give two orthogonal axes"
             ) from None
         first, second = unit_axis(self.name, first), unit_axis(self.name, second)
-        if abs(np.dot(first, second)) > 1e-9:  # unit vectors: beyond the rounding of their digits
+        if abs(np.dot(first, second)) > 1e-9:  # unit vectors: tolerance above decimal rounding
             raise DescriptionError(
                 f"{self.name}: axes {quoted(self.axes)} are not orthogonal;"
                 " give two orthogonal axes"
@@ -601,7 +603,7 @@ class Universal(Joint):
         )
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """The origins agree, and the two axes stay orthogonal."""
+        """Return rows for coincident origins and orthogonal axes."""
         first, second = (SX(DM(list(axis))) for axis in self.axes)
         across = casadi.dot(first, casadi.mtimes(pose.R, second))
         return [*position_rows(along_z(pose, (0.0, 0.0, 1.0)), "xyz"), ("moment across", across)]
@@ -609,7 +611,7 @@ class Universal(Joint):
 
 @dataclass(frozen=True, slots=True)
 class Spherical(Joint):
-    """Any rotation: a unit quaternion, the orientation of frame_b in frame_a; 3 rows.
+    """Spherical joint: the orientation of frame_b in frame_a, a unit quaternion; 3 rows.
 
     The velocity is the angular velocity of frame_b relative to frame_a, in the axes of frame_b.
     """
@@ -620,13 +622,13 @@ class Spherical(Joint):
         return (Freedom(Motion.SPHERICAL),)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """The origins agree."""
+        """Return rows for coincident origins."""
         return position_rows(along_z(pose, (0.0, 0.0, 1.0)), "xyz")
 
 
 @dataclass(frozen=True, slots=True)
 class Free(Joint):
-    """No constraint at all: position and unit quaternion of frame_b in frame_a.
+    """Free joint without constraint: position and unit quaternion of frame_b in frame_a.
 
     The velocity is the [linear; angular] velocity of frame_b relative to frame_a, in the axes of
     frame_b.
@@ -638,23 +640,23 @@ class Free(Joint):
         return (Freedom(Motion.FREE),)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """None."""
+        """Return no rows."""
         return []
 
 
 @dataclass(frozen=True, slots=True)
 class Fixed(Joint):
-    """No motion: a weld; closes a loop with 6 rows."""
+    """Fixed joint (weld). It closes a loop with 6 rows."""
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        """None."""
+        """No motions."""
         return ()
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """The origins agree, and nothing rotates."""
+        """Return rows for coincident origins without rotation."""
         return weld_rows(pose)
 
     def facing(self, pose: Pose) -> list[SX]:
-        """No axis is opposed."""
+        """Return the cosines of the axes, none of which may be opposed."""
         return diagonal(pose)

@@ -1,4 +1,4 @@
-"""Joints that are locked, and roots that are freed of the world or welded to it."""
+"""Locking of joints, and change of a root between fixed and free."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ if TYPE_CHECKING:
     from mbs.components.description import Description
 
 _AGREE = 1e-9
-"""How far a coupling may be off between two locked joints [rad or m]; files have 10 digits."""
+"""Tolerance of a coupling between two locked joints [rad or m]: files have 10 digits."""
 
 
 @dataclass(slots=True)
 class _Locks:
-    """Positions of the joints that are locked, those included that couplings lock with them.
+    """Positions of the locked joints, with the joints that couplings lock with them.
 
     Attributes:
-        mechanism: whose joints they are.
-        positions: of each of them, one for each element of q.
-        values: of each coordinate.
-        gone: the couplings among locked coordinates alone.
-        changed: couplings of more than two coordinates, as they are among those that are left.
+        mechanism: mechanism that has the joints.
+        positions: one expression per element of q, by joint.
+        values: value of each locked coordinate.
+        gone: names of couplings whose coordinates are all locked.
+        changed: couplings of more than two coordinates, reduced to their unlocked coordinates.
     """
 
     mechanism: Description
@@ -59,7 +59,7 @@ class _Locks:
     changed: dict[str, Coupling] = field(default_factory=dict)
 
     def add(self, name: str, given: Any) -> None:
-        """Take the position of a joint."""
+        """Add the position of a joint to lock."""
         joint = self._joint(name)
         where = f"{self.mechanism.name}: lock of {name}"
         many = given if np.ndim(given) else (given,)
@@ -90,7 +90,7 @@ class _Locks:
         return joints[name]
 
     def follow_couplings(self) -> None:
-        """Lock what a locked joint drives, or is driven by."""
+        """Lock the joints that couplings tie to locked joints."""
         pending = list(self.mechanism.couplings())
         while True:
             touched = [c for c in pending if set(c.coordinates) & self.values.keys()]
@@ -102,12 +102,12 @@ class _Locks:
                 if set(left.coordinates) & self.values.keys():
                     self._follow(left)
                     self.gone.add(left.name)
-                else:  # it relates what is left, unless more of it will be locked
+                else:  # it couples only free joints, so far
                     self.changed[left.name] = left
                     pending.append(left)
 
     def _among_free(self, coupling: Coupling) -> Coupling:
-        """A coupling of many coordinates with the locked ones in its first coefficient."""
+        """Return a coupling whose locked coordinates are absorbed in its first coefficient."""
         if not coupling.others:
             return coupling
         offset = sum(
@@ -118,12 +118,12 @@ class _Locks:
         first, *rest = coupling.coefficients or (0.0,)
         left = replace(coupling, coefficients=(first + offset, *rest), others=tuple(free))
         locked = self.values.get(left.driver)
-        if free and locked is not None:  # the next one drives
+        if free and locked is not None:  # the next coordinate drives
             (driver, factor), *free = free
             terms = (_polynomial(left, locked), factor)
             left = replace(left, driver=driver, coefficients=terms, others=tuple(free))
         locked = self.values.get(left.driven)
-        if free and locked is not None:  # the driver becomes the driven one
+        if free and locked is not None:  # the driver becomes driven
             constant, factor = self._linear(left)
             shares = [(name, expression(value) * -1.0 / factor) for name, value in free]
             (driver, share), *shares = shares
@@ -134,7 +134,7 @@ class _Locks:
         return left
 
     def _linear(self, coupling: Coupling) -> tuple[Expression, Expression]:
-        """The two coefficients of a coupling that can be inverted."""
+        """Return offset and factor of a linear coupling; raise if it cannot be inverted."""
         terms = [expression(c) for c in coupling.coefficients]
         offset, factor = (*terms, Number(0.0), Number(0.0))[:2]
         if len(terms) > 2 or to_float(factor) == 0:
@@ -197,7 +197,7 @@ def lock(mechanism: Description, positions: Mapping[str, Any]) -> None:
         name = point.owner.name
         if name not in welds:
             return point
-        # Both frames of the weld are frame_a of the joint; frame_b is where the position puts it.
+        # Both frames of the weld are the joint's frame_a; its frame_b follows from the position.
         before = steps[name] if point.port == "b" else ()
         return replace(
             point, owner=welds[name], placement=Placement((*before, *point.placement.steps))
@@ -221,14 +221,14 @@ def lock(mechanism: Description, positions: Mapping[str, Any]) -> None:
 
 
 def _acts_on(component: Component, coordinates: Mapping[str, Expression]) -> bool:
-    """Whether it acts along locked coordinates alone, where it moves nothing."""
+    """Return whether a force acts along locked coordinates only, so that it has no effect."""
     return isinstance(component, CoordinateForce) and all(
         name in coordinates for name, _ in component.levers
     )
 
 
 def _require_free_of_others(mechanism: Description, locks: _Locks) -> None:
-    """Refuse to lock joints that sensors read, drive lines move, or tendons share with others."""
+    """Raise if sensors, drive lines, or tendons with other joints use the joints to lock."""
     driven = {flange.owner.name for pair in mechanism.shafts for flange in pair}
     for name in locks.positions:
         if name in driven:
@@ -260,12 +260,12 @@ def _require_free_of_others(mechanism: Description, locks: _Locks) -> None:
 
 
 def _with_points(component: Component, reattach: Any) -> Component:
-    """The component with its points where they are now."""
+    """Return the component with its points reattached."""
     return with_points(component, reattach) if isinstance(component, OnPoints) else component
 
 
 def _steps(mechanism: Description, name: str, values: Sequence[Expression]) -> tuple[Step, ...]:
-    """Frame_b seen from frame_a of a joint at a position."""
+    """Return the steps from frame_a to frame_b of a joint at a position."""
     joint = mechanism.components[name]
     assert isinstance(joint, Joint)
     steps: list[Step] = []
@@ -305,10 +305,10 @@ def _axis_rotation(axis: Sequence[float], angle: Expression) -> list[Step]:
 
 
 def _orientation(where: str, values: Sequence[Scalar]) -> FixedRotation:
-    """The rotation of a unit quaternion w, x, y, z."""
+    """Return the rotation of a unit quaternion w, x, y, z; raise if it is not of unit length."""
     numbers = [to_float(expression(value)) for value in values]
     length = math.nan if None in numbers else math.hypot(*(n or 0.0 for n in numbers))
-    if not abs(length - 1) < 1e-6:  # as far as files write quaternions out
+    if not abs(length - 1) < 1e-6:  # quaternions in files have about six digits
         raise DescriptionError(
             f"{where}: the quaternion {quoted([str(v) for v in values])} is not numbers of unit"
             " length; divide it by its length"
@@ -322,24 +322,24 @@ def _orientation(where: str, values: Sequence[Scalar]) -> FixedRotation:
     return FixedRotation(nearest_rotation(R))
 
 
-# The root: what is connected to the world, by a weld or by a Free joint.
+# Root: connection to the world, by a weld or by a Free joint.
 
 
 Base = Literal["fixed", "free"]
-"""What connects the root: a weld to the world, or nothing."""
+"""Connection of the root: a weld to the world, or a Free joint."""
 
 FREE_JOINT = "root_joint"
-"""Name of the joint of a free root, as pinocchio has it; it has coordinates root_joint.x, .qw .."""
+"""Name of the joint of a free root, as in pinocchio; coordinates root_joint.x, .qw and so on."""
 
 
 def free_root(mechanism: Description) -> None:
-    """Put a Free joint where one body is welded to the world; nothing where one is there already.
+    """Replace the single weld of a body to the world by a Free joint, unless a Free joint exists.
 
     Args:
-        mechanism: changed.
+        mechanism: mechanism, changed in place.
 
     Raises:
-        DescriptionError: there is not one weld that carries the whole mechanism.
+        DescriptionError: the mechanism is not connected to the world by exactly one weld of a body.
     """
     if _free_joints(mechanism):
         return
@@ -359,7 +359,7 @@ def free_root(mechanism: Description) -> None:
 
 
 def fix_root(mechanism: Description) -> None:
-    """Lock the Free joints on the world where the guess has them, or else at zero."""
+    """Lock Free joints on the world at the positions in the guess; the default is zero."""
     positions = {}
     for joint, forward in _free_joints(mechanism):
         names = ("x", "y", "z", "qw", "qx", "qy", "qz")
@@ -370,7 +370,7 @@ def fix_root(mechanism: Description) -> None:
 
 
 def _inverse(values: Sequence[float]) -> list[float]:
-    """Position and quaternion of the opposite displacement."""
+    """Return position and quaternion of the inverse displacement."""
     R = np.array(_orientation("", [Number(v) for v in values[3:]]).rows)
     p = -R.T @ np.array(values[:3])
     w, x, y, z = values[3:]
@@ -378,7 +378,7 @@ def _inverse(values: Sequence[float]) -> list[float]:
 
 
 def _free_joints(mechanism: Description) -> list[tuple[str, bool]]:
-    """The Free joints on the world or on what is welded to it, and whether by their frame_a."""
+    """Return Free joints on the ground, and whether their frame_a (not frame_b) is on it."""
     neighbours: dict[str, list[str]] = {}
     for a, b in mechanism.connections:
         if all(isinstance(p.owner, (RigidBody, Fixed)) for p in (a, b)):

@@ -1,4 +1,4 @@
-"""Joints by their motion: the pose of frame_b in frame_a as a function of coordinates."""
+"""Joints defined by the pose of frame_b in frame_a as a function of coordinates."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mbs.text import quoted
 
 
 class MotionJoint(Custom):
-    """A joint by its motion: derive from it, declare coordinates as unknowns, write `motion`.
+    """A joint defined by its motion: a subclass declares coordinates as unknowns and has `motion`.
 
         class Corkscrew(MotionJoint):
             lead = custom.parameter("m")
@@ -28,10 +28,9 @@ class MotionJoint(Custom):
             def motion(self, at):
                 return rotation("z", at.phi) @ translation(0, 0, at.lead * at.phi)
 
-    It is connected as any joint, `m.connect(point_a, joint, point_b)`. Rows keep frame_b where the
-    motion puts it, whether a loop closes there or not; the coordinates are named NAME.of_it.
-    Motions made of rotations and translations one after the other are cheaper as `freedoms` of a
-    `Joint`.
+    It is connected as any joint, `m.connect(point_a, joint, point_b)`. Constraint rows keep frame_b
+    at the pose that `motion` returns, in a loop or not. The coordinates are named NAME.of_it.
+    Sequences of rotations and translations are more efficient as `freedoms` of a `Joint`.
 
     Source: Haug 1989, chapter 9, for constraints between two frames.
     """
@@ -48,16 +47,16 @@ class MotionJoint(Custom):
             )
 
     def motion(self, at: Any) -> Pose:
-        """The pose of frame_b in frame_a."""
+        """Return the pose of frame_b in frame_a."""
         raise NotImplementedError
 
     def between(self, a: Point, b: Point) -> tuple[MotionJoint, Free]:
-        """The joint between two points, and what places one in the other."""
+        """Return the joint between two points, and the Free joint that connects its frames."""
         points: dict[str, Any] = {"frame_a": a, "frame_b": b}
         return replace(self, **points), Free(f"{self.name}.free")
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Frame_b is where the motion puts it: origins agree, and nothing is rotated."""
+        """Return rows for the pose of frame_b: coincident origins and no rotation from `motion`."""
         offset, R = self._displacement(at)
         p = casadi.vertsplit(casadi.densify(offset))
         x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
@@ -67,12 +66,12 @@ class MotionJoint(Custom):
         }
 
     def positive(self, at: Any) -> Mapping[str, SX]:
-        """No axis is opposed to where the motion puts it."""
+        """Return cosines of the axes of frame_b and of `motion`, which must not be opposed."""
         _, R = self._displacement(at)
         return {f"axis {axis}": R[k, k] for k, axis in enumerate("xyz")}
 
     def _displacement(self, at: Any) -> tuple[SX, SX]:
-        """(3, 1) and (3, 3) frame_b seen from where the motion puts it."""
+        """Return (3, 1) position and (3, 3) orientation of frame_b relative to `motion`."""
         seen, target = at.frame_a.to(at.frame_b), self.motion(at)
         if not isinstance(target, Pose):
             raise DescriptionError(
@@ -83,12 +82,12 @@ class MotionJoint(Custom):
 
 
 def rotation(axis: str, angle: Any) -> Pose:
-    """A rotation about "x", "y" or "z" by an angle [rad]."""
+    """Return the pose of a rotation about "x", "y" or "z" by an angle [rad]."""
     if axis not in ("x", "y", "z"):
         raise DescriptionError(f'a rotation is about {quoted(axis)}; give "x", "y" or "z"')
     return Pose.about(axis, SX(angle))
 
 
 def translation(x: Any = 0, y: Any = 0, z: Any = 0) -> Pose:
-    """A displacement [m]."""
+    """Return the pose of a displacement [m]."""
     return Pose.translation(vector([SX(x), SX(y), SX(z)]))

@@ -1,4 +1,4 @@
-"""Where the base of a mechanism is mounted in the world: its position and its rotation."""
+"""Mount of the base of a mechanism in the world: its position and its rotation."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Mounting = Rotation | Mapping[str, Any]
 
 
 def mount_of(mount: Any, where: str) -> tuple[tuple[Step, ...], Rotation | None]:
-    """Return the steps from the world to a mounted base, and the rotation among them.
+    """Return the displacement steps from the world to a mounted base, and its rotation.
 
     Args:
-        mount: rotation, or a dict with "position" and "rotation", of which one may be left out.
-        where: names the mount in messages.
+        mount: rotation, or a dict with "position" and "rotation", one of which may be left out.
+        where: name of the mount in error messages.
 
     Raises:
         DescriptionError: the dict has other entries, or values that are no position or rotation.
@@ -41,7 +41,7 @@ def mount_of(mount: Any, where: str) -> tuple[tuple[Step, ...], Rotation | None]
 
 
 _REVOLUTION = 2 * math.pi
-"""Angle [rad] beyond which the rotation of a mount looks like degrees: no base needs more."""
+"""Angle [rad] above which a mount angle is noted as possible degrees: a mount needs no more."""
 
 
 def notes_on_degrees(steps: Iterable[Step]) -> list[Note]:

@@ -1,4 +1,4 @@
-"""What a reader of a file did that its author may not expect."""
+"""Notes on the changes that a reader of a file made to its content."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ NoteKind = Literal["renamed", "ignored", "doubted", "completed"]
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """One element of a file that was not taken as it is written.
+    """A note on one element of a file that was changed, ignored, completed or kept with doubt.
 
     Attributes:
-        kind: "renamed", its name is another one here; "ignored", it has no meaning here;
-            "doubted", it was taken, and no real mechanism has it; "completed", something that the
-            format requires was missing.
-        element: such as "link 'base'".
-        text: the rest of the sentence: what is written there, and what was made of it.
-        line: of the file; None where the format's own reader does not report it.
+        kind: "renamed": the element has another name in the mechanism. "ignored": it has no meaning
+            in a mechanism. "doubted": it was kept, but is not physically plausible. "completed": a
+            part that the format requires was missing and has been added.
+        element: description of the element, such as "link 'base'".
+        text: rest of the message: the content in the file and its interpretation.
+        line: line in the file. None if the parser of the format reports none.
     """
 
     kind: NoteKind

@@ -1,4 +1,4 @@
-"""Components that know where they are: on points of bodies, or on a joint by its name."""
+"""Components that contain their attachment: points of bodies, or the name of a joint."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ P = TypeVar("P", bound="OnPoints")
 
 @dataclass(frozen=True, slots=True)
 class OnPoints(Component):
-    """A component that is added, not connected, and names the points that it belongs to."""
+    """Base of components that contain their points: added by `add` without `connect`."""
 
     @property
     def points(self) -> tuple[Point, ...]:
-        """Where it is."""
+        """Points that the component is attached to."""
         return ()
 
     def scoped(self: P, prefix: str) -> P:
-        """The same component inside a mechanism that is placed in another one."""
+        """Return the component with prefixed names, for a nested mechanism."""
         return with_points(
             Component.scoped(self, prefix),
             lambda point: replace(point, owner=Component(f"{prefix}.{point.owner.name}")),
         )
 
     def _take_point(self, name: str) -> None:
-        """Convert the body or point that a user gave to a point."""
+        """Convert the field `name`, a body or a point, to a point."""
         object.__setattr__(self, name, self._as_point(getattr(self, name), name))
 
     def _as_point(self, value: Any, name: str) -> Point:
@@ -49,7 +49,7 @@ class OnPair(OnPoints):
     """A component between two points.
 
     Attributes:
-        a, b: the points, or bodies for their reference frames.
+        a, b: two points. A body stands for its reference frame.
     """
 
     a: Any

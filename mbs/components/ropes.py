@@ -1,4 +1,4 @@
-"""Ropes over pulleys: through any number of points, with one tension in all of them."""
+"""Ropes over pulleys, through any number of points, with the same tension everywhere."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from mbs.errors import DescriptionError
 from mbs.text import quoted
 
 _TAUT = 1e-3
-"""Stretch over which a rope becomes stiff [m]: a millimetre, within which its strands settle."""
+"""Stretch over which a rope becomes stiff [m]: 1 mm, over which its strands settle."""
 
 
 class _Rope(Custom):
-    """A massless rope along a path of points; pulleys on the path have no size and no friction."""
+    """A massless rope along a path of points. Pulleys on the path have no size and no friction."""
 
     path: Any
     length = custom.parameter("m", positive=True)
@@ -39,11 +39,11 @@ class _Rope(Custom):
 
     @property
     def frames(self) -> Mapping[str, Point]:
-        """The points along it: p0, p1, ..."""
+        """Points along the rope: p0, p1, ..."""
         return {f"p{k}": point for k, point in enumerate(self.path)}
 
     def _segments(self, at: Any) -> list[tuple[Any, Any]]:
-        """The frames at both ends of every straight piece."""
+        """Return the pairs of frames at both ends of every straight segment."""
         ports = [getattr(at, port) for port in self.frames]
         return list(pairwise(ports))
 
@@ -52,47 +52,46 @@ class _Rope(Custom):
 
 
 class RopeOverPulleys(_Rope):
-    """A rope that does not stretch: the distances of its points, one after the other, have a sum.
+    """A rope that does not stretch: the distances of successive points have a constant sum.
 
-    It is one row, the sum of the distances less the length, and the effort of this row is the
-    tension. The row holds in both directions: where the tension is below zero, a rope would have
-    become slack; `ElasticRope` does.
+    It is one constraint row, whose effort is the tension. The row holds in both directions: with a
+    negative tension a real rope would be slack, like an `ElasticRope`.
 
     Source: Haug 1989 for rows on distances.
 
     Attributes:
-        path: its points, from one end to the other: bodies, `body.at(...)` or points of the world.
-            The inner ones are pulleys.
-        length: of the rope [m].
+        path: points from one end to the other: bodies, `body.at(...)` or points of the world. The
+            inner points are pulleys.
+        length: length of the rope [m].
     """
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """What the path is longer than the rope."""
+        """Return the length of the path minus the length of the rope."""
         return {"length": self._length(at) - at.length}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The tension."""
+        """Return the tension."""
         return {"tension": -at.lam["length"]}
 
 
 class ElasticRope(_Rope):
-    """A rope that stretches, and is slack where its path is shorter than it is.
+    """A rope that stretches, and is slack if its path is shorter than its length.
 
-    With the stretch x, the sum of the distances of its points less its length, the tension is
+    With the stretch x, the sum of the distances of its points minus its length, the tension is
     stiffness r(x) + damping s(x) dx/dt, with the ramp r and its slope s of a JointStop: over the
     first `width` of the stretch the stiffness grows from zero to its full value, so that the
-    tension of the spring and two derivatives of it are continuous. The damper exerts at most as
-    much as the spring, so that a rope that shortens fast does not push.
+    spring tension and its first two derivatives are continuous. The damper tension is at most as
+    large as the spring tension, so that a rope that shortens fast does not push.
 
     Source: Haug 1989 for forces along distances.
 
     Attributes:
-        path: its points, from one end to the other: bodies, `body.at(...)` or points of the world.
-            The inner ones are pulleys.
-        length: of the rope without tension [m].
-        stiffness: of the whole rope [N/m].
-        damping: likewise, while it is taut [N s/m].
-        width: over which the stiffness grows [m].
+        path: points from one end to the other: bodies, `body.at(...)` or points of the world. The
+            inner points are pulleys.
+        length: length of the rope without tension [m].
+        stiffness: stiffness of the whole rope [N/m].
+        damping: damping of the whole rope under tension [N s/m].
+        width: stretch over which the stiffness grows [m].
     """
 
     stiffness = custom.parameter("N/m", positive=True)
@@ -100,7 +99,7 @@ class ElasticRope(_Rope):
     width = custom.parameter("m", _TAUT, positive=True)
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The tension draws every point towards its neighbours."""
+        """Return the tension on every point, towards its neighbours."""
         T = self._tension(at)
         total: dict[str, FrameLoad] = {}
         for a, b in self._segments(at):
@@ -111,15 +110,15 @@ class ElasticRope(_Rope):
         return total
 
     def energy(self, at: Any) -> SX:
-        """What its stretch stores."""
+        """Return the energy stored in the stretch."""
         return SX(at.stiffness * self._stretch(at)[2])
 
     def dissipation(self, at: Any) -> SX:
-        """What the damper takes."""
+        """Return the power dissipated by the damper [W]."""
         return SX(self._tensions(at)[1] * self._rate(at))
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The tension."""
+        """Return the tension."""
         return {"tension": self._tension(at)}
 
     def _stretch(self, at: Any) -> tuple[SX, SX, SX]:
@@ -132,7 +131,7 @@ class ElasticRope(_Rope):
         return sum(self._tensions(at), SX(0))
 
     def _tensions(self, at: Any) -> tuple[SX, SX]:
-        """The tension of the spring, and that of the damper."""
+        """Return the tensions of the spring and of the damper."""
         slope, ramped, _ = self._stretch(at)
         spring = at.stiffness * ramped
         return spring, one_sided_damping(at.damping * slope * self._rate(at), spring)

@@ -1,7 +1,7 @@
-"""Sensors on points and on joints: motions, wrenches, power.
+"""Sensors on points and on joints: motion, wrench, power.
 
-A sensor is a component that knows where it is: `m.add(AbsoluteSensor("tip", arm.right))`. It takes
-no part in the motion; `mbs.models.measurements` says what it reads.
+A sensor is added with its point or joint: `m.add(AbsoluteSensor("tip", arm.right))`. It has no
+effect on the motion. `mbs.models.measurements` computes its readings.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from mbs.text import did_you_mean, quoted
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """Something that a sensor reads.
+    """Quantity that a sensor measures.
 
     Attributes:
-        name: short, as it ends the name of an output.
-        unit: of each element.
+        name: short name, which ends the names of outputs.
+        unit: unit of each element.
         shape: rows and columns.
     """
 
@@ -31,7 +31,7 @@ class Quantity:
 
     @property
     def elements(self) -> tuple[str, ...]:
-        """The ends of the names of its elements, column by column; empty for a scalar."""
+        """Suffixes of the element names, column by column; one empty suffix for a scalar."""
         rows, columns = self.shape
         if (rows, columns) == (1, 1):
             return ("",)
@@ -54,17 +54,17 @@ _DISTANCE = (Quantity("L", "m"), Quantity("Ld", "m/s"))
 
 @dataclass(frozen=True, slots=True)
 class Sensor(OnPoints):
-    """A component that reads something and changes nothing.
+    """Base of components that measure and have no effect on the motion.
 
-    What a sensor of a user's own reads are the outputs of a `Custom` component.
+    The readings of a user-defined sensor are the outputs of a `Custom` component.
     """
 
     reads: ClassVar[str] = ""
-    """What kind of reading it is: absolute, relative, distance, coordinate, wrench or power."""
+    """Kind of sensor: absolute, relative, distance, coordinate, wrench or power."""
 
     @property
     def measured(self) -> tuple[Quantity, ...]:
-        """What it reads; what depends on the joint that it is on, the assembly finds out."""
+        """Measured quantities, except those that depend on the joint, which assembly determines."""
         raise NotImplementedError
 
     def _check_axes(self, allowed: tuple[str, ...], meaning: str) -> None:
@@ -79,7 +79,7 @@ class MotionSensor(Sensor):
 
     @property
     def measured(self) -> tuple[Quantity, ...]:
-        """Those that were asked for."""
+        """Requested quantities."""
         names = getattr(self, "quantities", ())
         return tuple(quantity for quantity in _MOTION if quantity.name in names)
 
@@ -102,16 +102,16 @@ class MotionSensor(Sensor):
 
 @dataclass(frozen=True, slots=True)
 class AbsoluteSensor(MotionSensor):
-    """How a point moves in the world.
+    """Motion of a point in the world.
 
-    Position p, velocity v, angular velocity w, acceleration a, angular acceleration wd, as an
-    observer at rest sees them, and orientation R, whose columns are the axes of the point. Gravity
-    has no part in a.
+    Position p, velocity v, angular velocity w, acceleration a and angular acceleration wd relative
+    to the world, and orientation R, whose columns are the axes of the point. a does not include
+    gravity.
 
     Attributes:
-        point: of a body, or a body for its reference frame.
-        axes: in which vectors are: "world", or "body" for those of the point.
-        quantities: those to read, some of p, R, v, w, a, wd; all of them when left out.
+        point: point of a body. A body stands for its reference frame.
+        axes: axes of the vectors: "world", or "body" for the axes of the point.
+        quantities: quantities to measure, some of p, R, v, w, a, wd. The default is all of them.
     """
 
     reads = "absolute"
@@ -130,21 +130,21 @@ class AbsoluteSensor(MotionSensor):
 
     @property
     def points(self) -> tuple[Point, ...]:
-        """The one point."""
+        """The point of the sensor."""
         return (self.point,)
 
 
 @dataclass(frozen=True, slots=True)
 class RelativeSensor(OnPair, MotionSensor):
-    """How a frame b moves for an observer who moves and rotates with a frame a.
+    """Motion of a frame b relative to an observer who moves and rotates with a frame a.
 
-    Position p of b, velocity v and acceleration a as that observer sees them, angular velocity w
-    and its rate wd for him, and orientation R, whose columns are the axes of b in a.
+    Position p of b, its velocity v and acceleration a, its angular velocity w and the rate wd of w,
+    all relative to the observer, and orientation R, whose columns are the axes of b in a.
 
     Attributes:
-        a, b: points of bodies, or bodies for their reference frames.
-        axes: in which vectors are: "a", "b" or "world".
-        quantities: those to read, some of p, R, v, w, a, wd; all of them when left out.
+        a, b: points of bodies. A body stands for its reference frame.
+        axes: axes of the vectors: "a", "b" or "world".
+        quantities: quantities to measure, some of p, R, v, w, a, wd. The default is all of them.
     """
 
     reads = "relative"
@@ -160,17 +160,17 @@ class RelativeSensor(OnPair, MotionSensor):
 
 @dataclass(frozen=True, slots=True)
 class DistanceSensor(OnPair, Sensor):
-    """Distance L between two points and its rate Ld; where they coincide the rate is zero.
+    """Distance L between two points and its rate Ld, which is zero if they coincide.
 
     Attributes:
-        a, b: the points, or bodies for their reference frames.
+        a, b: two points. A body stands for its reference frame.
     """
 
     reads = "distance"
 
     @property
     def measured(self) -> tuple[Quantity, ...]:
-        """Distance and rate."""
+        """Distance and rate of the distance."""
         return _DISTANCE
 
 
@@ -182,10 +182,10 @@ S = TypeVar("S", bound="OnJoint")
 
 @dataclass(frozen=True, slots=True)
 class OnJoint(Sensor):
-    """A sensor on a joint.
+    """Base of sensors on a joint.
 
     Attributes:
-        joint: name of the joint, or of one of its coordinates for a sensor of coordinates.
+        joint: name of the joint, or of a coordinate for a coordinate sensor.
     """
 
     joint: str
@@ -198,15 +198,15 @@ class OnJoint(Sensor):
             )
 
     def scoped(self: S, prefix: str) -> S:
-        """The same sensor inside a mechanism that is placed in another one."""
+        """Return the sensor with prefixed names, for a nested mechanism."""
         return replace(Component.scoped(self, prefix), joint=f"{prefix}.{self.joint}")
 
 
 @dataclass(frozen=True, slots=True)
 class JointSensor(OnJoint):
-    """Position q, velocity v and acceleration a of a coordinate, of a cut joint too.
+    """Position q, velocity v and acceleration a of a coordinate, also of a cut joint.
 
-    A quaternion has elements q alone, an angular velocity v and a alone.
+    The elements of a quaternion have q only. The angular velocity of its joint has v and a only.
 
     Attributes:
         joint: name of the coordinate, such as "j1" or "slide.s".
@@ -216,19 +216,20 @@ class JointSensor(OnJoint):
 
     @property
     def measured(self) -> tuple[Quantity, ...]:
-        """Depends on the coordinate."""
+        """Empty: the quantities depend on the coordinate."""
         return ()
 
 
 @dataclass(frozen=True, slots=True)
 class WrenchSensor(OnJoint):
-    """Force f and moment m that a joint or constraint transmits, the cut force.
+    """Constraint wrench of a joint or constraint: force f and moment m (the cut force).
 
-    It is what the body of frame_a exerts on the body of frame_b, about the origin of frame_b.
+    It is the wrench that the body of frame_a exerts on the body of frame_b, about the origin of
+    frame_b.
 
     Attributes:
-        joint: its name.
-        axes: in which they are: "a" or "b" for those of the joint's frame_a or frame_b, or
+        joint: name of the joint or constraint.
+        axes: axes of the vectors: "a" or "b" for those of the joint's frame_a or frame_b, or
             "world".
     """
 
@@ -248,12 +249,12 @@ class WrenchSensor(OnJoint):
 
 @dataclass(frozen=True, slots=True)
 class PowerSensor(OnJoint):
-    """Power P that the body of frame_b takes through a joint or constraint [W].
+    """Power P that the body of frame_b receives through a joint or constraint [W].
 
     It is the transmitted wrench times the velocity of frame_b in the world.
 
     Attributes:
-        joint: its name.
+        joint: name of the joint or constraint.
     """
 
     reads = "power"

@@ -1,4 +1,4 @@
-"""What bodies look like: boxes, cylinders, capsules, spheres and meshes, without mass."""
+"""Shapes of bodies in pictures: boxes, cylinders, capsules, spheres and meshes, without mass."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ _SIZES: dict[str, str] = {
     "mesh": "factors along x, y, z",
 }
 _MESH_KINDS = (".stl", ".obj", ".dae")
-"""Files of meshes that are drawn."""
+"""Endings of mesh files that can be drawn."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """What a body looks like at a point of it; it has no mass and touches nothing.
+    """Shape of a body at one of its points, for pictures, without mass and contact.
 
-    A cylinder and a capsule lie along z. All but meshes have their middle at the point.
+    The axis of a cylinder or a capsule is z. All shapes except meshes are centred at the point.
 
     Attributes:
         kind: box, cylinder, capsule, sphere, ellipsoid or mesh.
-        size: lengths [m]: the three sides of a box, radius and length of a cylinder and of a
-            capsule (without its round ends), radius of a sphere, half axes of an ellipsoid; of a
-            mesh the three factors of its lengths, which may be negative to mirror it.
-        colour: red, green and blue from 0 to 1; None for that of the link.
-        mesh: the .stl, .obj or .dae file of a mesh, which is read when a picture is made.
+        size: lengths [m]: three sides of a box, radius and length of a cylinder or of a capsule
+            (without its round ends), radius of a sphere, half axes of an ellipsoid. For a mesh:
+            three scale factors, which may be negative to mirror it.
+        colour: red, green and blue from 0 to 1. None for the colour of the link.
+        mesh: .stl, .obj or .dae file of a mesh, which is read when a picture is made.
     """
 
     kind: ShapeKind
@@ -78,24 +78,24 @@ class Shape:
             )
 
     def _is_possible(self, size: tuple[float, ...]) -> bool:
-        """Whether a shape of the kind has these lengths."""
+        """Return whether the lengths are valid for the kind of shape."""
         expected = {"sphere": 1, "cylinder": 2, "capsule": 2}.get(self.kind, 3)
         if len(size) != expected or not all(map(math.isfinite, size)):
             return False
         if self.kind == "mesh":
             return all(size)
-        if self.kind == "capsule":  # a sphere where it has no length
+        if self.kind == "capsule":  # a capsule without length is a sphere
             return size[0] > 0 and size[1] >= 0
         return all(length > 0 for length in size)
 
 
 def is_mesh_file(name: str) -> bool:
-    """Whether the ending of a file is that of a mesh that can be drawn."""
+    """Return whether a file has the ending of a mesh format that can be drawn."""
     return name.lower().endswith(_MESH_KINDS)
 
 
 def _numbers(values: Any) -> tuple[float, ...]:
-    """The numbers that a user wrote; none where they are something else."""
+    """Return the numbers in a value; an empty tuple if it is not numeric."""
     try:
         return tuple(float(value) for value in np.ravel(np.asarray(values, dtype=float)))
     except (TypeError, ValueError):

@@ -292,7 +292,7 @@ class PeriodicSource(SignalSource):
         return begun if at.count is None else casadi.logic_and(begun, number < at.count)
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Rates of the clock and of the time to the next event; zero behind the last period."""
+        """Rates of the clock and of the time to the next event; zero after the last period."""
         over = SX(0) if at.count is None else at.number >= at.count
         return {**SignalSource.rates(self, at), "left": casadi.if_else(over, 0, -1)}
 
@@ -323,7 +323,7 @@ class PeriodicSource(SignalSource):
         follow = {
             "phase": next_phase,
             "number": counted,
-            # behind the last period the time to the next event stays at some positive value
+            # after the last period the time to the next event stays at some positive value
             "left": casadi.if_else(over, period, _at(durations, next_phase)),
             "entered": at.clock,
         }
@@ -335,7 +335,7 @@ class PeriodicSource(SignalSource):
 
 
 def _at(values: Sequence[SX], index: SX) -> SX:
-    """The value with an index that is an expression."""
+    """Return the value at an index that is an expression."""
     return sum((casadi.if_else(index == k, value, 0) for k, value in enumerate(values)), SX(0))
 
 
@@ -417,9 +417,9 @@ class Trapezoid(PeriodicSource):
 
 
 SMOOTHNESS = ("linear", "hold", "akima", "monotone")
-"""How a table is read between its points."""
+"""Interpolation of a table between its points."""
 EXTRAPOLATION = ("hold", "linear", "periodic")
-"""How a table is read before its first and behind its last point."""
+"""Extrapolation of a table before its first and after its last point."""
 
 
 class Table(SignalSource):
@@ -491,7 +491,7 @@ class Table(SignalSource):
             )
         object.__setattr__(self, "times", tuple(times.tolist()))
         object.__setattr__(self, "values", tuple(values.tolist()))
-        self._intervals()  # a missing package is an error here, not during assembly
+        self._intervals()  # raises here, not during assembly, if scipy is missing
 
     def _column(self, name: str) -> Array:
         try:
@@ -577,7 +577,7 @@ class Table(SignalSource):
         return np.concatenate([begins[:1], begins, t[-1:]]), every
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Rates of the clock and of the time to the next event, which stops behind the table."""
+        """Rates of the clock and of the time to the next event, which stops after the table."""
         last = len(self._intervals()[0]) - 1
         return {**SignalSource.rates(self, at), "left": casadi.if_else(at.row == last, 0, -1)}
 
@@ -604,7 +604,7 @@ class Table(SignalSource):
         end = _rows_at(np.append(begins[1:], begins[-1] + 1.0)[:, None], row)[0]
         knot = casadi.if_else(first, turns + begin, at.clock)
         left = casadi.if_else(first, end - within, end - begin)
-        # behind the table the time to the next event stays at 1 s
+        # after the table the time to the next event stays at 1 s
         then = {"left": casadi.if_else(row == last, 1, left), "row": row, "knot": knot}
         return {
             "next": Event(at.left, {**then, **dict(zip(("c0", "c1", "c2", "c3"), c, strict=True))})

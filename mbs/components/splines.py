@@ -1,8 +1,8 @@
 """Cubic splines through given points, as expressions with two continuous derivatives.
 
-Which piece holds is a sum of steps, whose derivatives are zero: values and derivatives are those
-of one polynomial everywhere, at the knots too, where comparisons of neighbours would give half of
-one and half of the other.
+The active piece is selected by a sum of steps, whose derivatives are zero. Values and derivatives
+are therefore from a single polynomial everywhere, also at the knots. A comparison of neighbouring
+pieces would average the derivatives of both at the knots.
 
 Source: Boor 1978.
 """
@@ -22,12 +22,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spline:
-    """A curve of cubic pieces, each in the distance from its own knot.
+    """A curve of cubic pieces, each a polynomial in the distance from its knot.
 
     Attributes:
-        knots: (m,) where the pieces begin; the first piece holds before them, too.
-        coefficients: (4, m, d) of the powers 0 .. 3.
-        period: after which everything repeats, None for a curve that goes on straight.
+        knots: (m,) start of each piece. The first piece also holds before its knot.
+        coefficients: (4, m, d) coefficients of the powers 0 .. 3.
+        period: period of the curve. None for a curve that continues straight beyond its ends.
     """
 
     knots: Array
@@ -35,7 +35,7 @@ class Spline:
     period: float | None
 
     def at(self, t: SX) -> SX:
-        """(d, 1) the point at t, (1, 1)."""
+        """Return the point (d, 1) of the curve at t, (1, 1)."""
         t, _ = self._within(t)
         steps = [t >= knot for knot in self.knots[1:]]
         u = t - _chosen(self.knots, steps)
@@ -43,15 +43,16 @@ class Spline:
         return casadi.vertcat(*(self._element(k, u, steps) for k in range(dimension)))
 
     def bend(self, t: SX) -> SX:
-        """What passes through zero at every knot, where the third derivative jumps.
+        """Return an event indicator that is zero at the knots, where the third derivative jumps.
 
-        Between two knots it is a parabola, up and down in turn; its slope at them is 1 or -1.
+        It is a parabola between two knots, alternately positive and negative, with slopes of 1 or
+        -1 at the knots.
         """
         t, turns = self._within(t)
         knots = np.unique(self.knots)
         if self.period is not None:
             knots = np.append(knots, knots[0] + self.period)
-        # of the pieces between knots the first and the last go on beyond the ends
+        # the first and the last of the parabolas between knots continue beyond the ends
         steps = [t >= knot for knot in knots[1:-1]]
         count = turns * (len(knots) - 1) + sum(steps, SX(0))
         sign = 1 - 2 * casadi.fmod(casadi.fabs(count), 2)
@@ -59,7 +60,7 @@ class Spline:
         return SX(sign * (t - before) * (after - t) / (after - before))
 
     def _within(self, t: SX) -> tuple[SX, SX]:
-        """The place within the first period that is like t, and how many periods lie between."""
+        """Return t reduced to the first period, and the number of periods between."""
         if self.period is None:
             return t, SX(0)
         turns = casadi.floor((t - self.knots[0]) / self.period)
@@ -73,7 +74,7 @@ class Spline:
 
 
 def _chosen(values: Array, steps: Sequence[SX]) -> SX:
-    """The value of the piece that holds."""
+    """Return the value of the active piece."""
     found = SX(float(values[0]))
     for step, jump in zip(steps, np.diff(values), strict=True):
         found += step * float(jump)
@@ -81,10 +82,10 @@ def _chosen(values: Array, steps: Sequence[SX]) -> SX:
 
 
 def natural_spline(t: Array, points: Array) -> Spline:
-    """The spline through points (n, d) at t (n,), straight before the first and after the last."""
+    """Return the natural spline through points (n, d) at t (n,), straight beyond its ends."""
     h: Array = np.diff(t)
     slopes: Array = np.diff(points, axis=0) / h[:, None]
-    # second derivatives: zero at the ends, where the straight lines begin
+    # second derivatives are zero at the ends, where straight lines continue
     A = np.eye(len(t))
     right = np.zeros_like(points)
     for k in range(1, len(t) - 1):
@@ -92,7 +93,8 @@ def natural_spline(t: Array, points: Array) -> Spline:
         right[k] = 6 * (slopes[k] - slopes[k - 1])
     M: Array = np.linalg.solve(A, right).astype(np.float64)
     pieces = _pieces(points, slopes, h, M)
-    # the lines at both ends: the first begins at the first knot, so that it is found before it
+    # straight lines at both ends; the first has the first knot, since the first piece holds before
+    # it
     first = np.stack([points[0], pieces[1, 0], 0 * points[0], 0 * points[0]])[:, None]
     end: Array = slopes[-1] + h[-1] * (M[-2] + 2 * M[-1]) / 6
     last = np.stack([points[-1], end, 0 * end, 0 * end])[:, None]
@@ -101,7 +103,7 @@ def natural_spline(t: Array, points: Array) -> Spline:
 
 
 def periodic_spline(t: Array, points: Array, period: float) -> Spline:
-    """The spline through points (n, d) at t (n,) that repeats itself after a period."""
+    """Return the spline through points (n, d) at t (n,) that is periodic."""
     n = len(t)
     h: Array = np.diff(np.append(t, t[0] + period))
     slopes = np.diff(np.concatenate([points, points[:1]]), axis=0) / h[:, None]
@@ -118,7 +120,7 @@ def periodic_spline(t: Array, points: Array, period: float) -> Spline:
 
 
 def _pieces(points: Array, slopes: Array, h: Array, M: Array) -> Array:
-    """(4, m, d) coefficients from values, slopes of chords and second derivatives."""
+    """Return (4, m, d) coefficients from values, slopes of chords and second derivatives."""
     h = h[:, None]
     first = slopes - h * (2 * M[:-1] + M[1:]) / 6
     return np.stack([points[: len(h)], first, M[:-1] / 2, np.diff(M, axis=0) / (6 * h)])

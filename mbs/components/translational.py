@@ -1,9 +1,8 @@
-"""Lines of parts that slide: masses, springs, dampers and gaps along one direction.
+"""Translational parts of drive lines: masses, springs, dampers and gaps along one direction.
 
-Their flanges have a position, which is the same for all flanges that are connected, and a force,
-and the forces of connected flanges add up to zero. They are connected to each other and to
-`joint.flange` of prismatic joints; an IdealGear or ElasticGear leads from a shaft to a part that
-slides.
+Connected flanges have the same position, and their forces add up to zero. They are connected to
+each other and to `joint.flange` of prismatic joints. An IdealGear or ElasticGear connects a shaft
+to a sliding part.
 """
 
 from __future__ import annotations
@@ -21,18 +20,18 @@ from mbs.components.rotational import capacity_of, friction_of
 from mbs.expressions import Expression, expression
 
 _TOUCH = 1e-4
-"""Depth over which surfaces that touch become stiff [m]: a tenth of a millimetre, as rough ones."""
+"""Depth over which surfaces in contact become stiff [m]: 0.1 mm, as for rough surfaces."""
 _CREEP = 1e-3
-"""Speed below which a brake counts as closed [m/s], that of JointFriction: four metres an hour."""
+"""Speed below which a brake counts as closed [m/s], as in JointFriction: four metres an hour."""
 
 
 class SlidingMass(RigidPart):
-    """A mass that slides; its two flanges are the two ends of one rigid body without length.
+    """A sliding mass, whose two flanges are the two ends of one rigid body without length.
 
     Gravity does not act on it, since a line of sliding parts has no direction in space.
 
     Attributes:
-        mass: [kg].
+        mass: mass [kg].
     """
 
     flange_a = custom.flange(slides=True)
@@ -41,24 +40,24 @@ class SlidingMass(RigidPart):
 
     @property
     def own_inertia(self) -> Expression:
-        """All of it."""
+        """The mass, all of which slides."""
         return expression(self.mass)
 
 
 class _BetweenSlides(TwoFlanges):
-    """What acts on x = position_b - position_a by a force that draws the flanges together."""
+    """Base of elements that pull two flanges together, functions of x = position_b - position_a."""
 
     flange_a = custom.flange(slides=True)
     flange_b = custom.flange(slides=True)
     force = custom.output("N")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """The tension, each flange towards the other."""
+        """Return the tension on each flange, towards the other."""
         F = self._tension(at)
         return {"flange_a": F, "flange_b": -F}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The tension, less than zero where the flanges are pushed apart."""
+        """Return the tension, negative if the flanges are pushed apart."""
         return {"force": self._tension(at)}
 
     def _tension(self, at: Any) -> SX:
@@ -72,14 +71,14 @@ class _BetweenSlides(TwoFlanges):
 
 
 class SlidingSpring(_BetweenSlides):
-    """A spring, with a damper beside it: tension stiffness (x - length) + damping dx/dt.
+    """A spring with a parallel damper: tension stiffness (x - length) + damping dx/dt.
 
-    x is the position of flange_b less that of flange_a.
+    x is position_b - position_a.
 
     Attributes:
-        stiffness: [N/m].
-        length: x at which it is relaxed [m].
-        damping: [N s/m].
+        stiffness: stiffness of the spring [N/m].
+        length: x at which the spring is relaxed [m].
+        damping: damping of the damper [N s/m].
     """
 
     stiffness = custom.parameter("N/m", min=0)
@@ -91,11 +90,11 @@ class SlidingSpring(_BetweenSlides):
         self._require_effect("stiffness", "damping")
 
     def energy(self, at: Any) -> SX:
-        """What it stores."""
+        """Return the energy stored in the spring."""
         return SX(0.5 * at.stiffness * (self._extent(at) - at.length) ** 2)
 
     def dissipation(self, at: Any) -> SX:
-        """What the damper takes."""
+        """Return the power dissipated by the damper [W]."""
         return SX(at.damping * self._rate(at) ** 2)
 
     def _tension(self, at: Any) -> SX:
@@ -104,16 +103,16 @@ class SlidingSpring(_BetweenSlides):
 
 
 class SlidingDamper(_BetweenSlides):
-    """A damper between two flanges that slide: tension damping dx/dt, x = position_b - position_a.
+    """A damper between two sliding flanges: tension damping dx/dt, x = position_b - position_a.
 
     Attributes:
-        damping: [N s/m].
+        damping: damping [N s/m].
     """
 
     damping = custom.parameter("N.s/m", min=0)
 
     def dissipation(self, at: Any) -> SX:
-        """All its power."""
+        """Return the power dissipated by the damper [W]."""
         return SX(at.damping * self._rate(at) ** 2)
 
     def _tension(self, at: Any) -> SX:
@@ -121,21 +120,21 @@ class SlidingDamper(_BetweenSlides):
 
 
 class ElastoGap(_BetweenSlides):
-    """A spring and a damper that push where two parts touch, and nothing where they do not.
+    """A spring and a damper that push two parts apart in contact, with no force otherwise.
 
-    They touch where x = position_b - position_a is below `length`; with the depth
+    The parts are in contact if x = position_b - position_a is below `length`. With the depth
     d = length - x they are pushed apart by stiffness r(d) - damping s(d) dx/dt, with the ramp r and
     its slope s of a JointStop: over the first `width` the stiffness grows from zero to its full
-    value, so that the force of the spring and two derivatives of it are continuous. The damper
-    exerts at most as much as the spring, so that it never holds back parts that separate.
+    value, so that the spring force and its first two derivatives are continuous. The damping force
+    is at most as large as the spring force, so that separating parts are never pulled.
 
     Source: Modelica Association 2023 for the element.
 
     Attributes:
-        stiffness: [N/m].
-        length: x at which they touch [m].
-        damping: while they touch [N s/m].
-        width: over which the stiffness grows [m].
+        stiffness: stiffness in contact [N/m].
+        length: x at which contact begins [m].
+        damping: damping in contact [N s/m].
+        width: depth over which the stiffness grows [m].
     """
 
     stiffness = custom.parameter("N/m", positive=True)
@@ -144,18 +143,18 @@ class ElastoGap(_BetweenSlides):
     width = custom.parameter("m", _TOUCH, positive=True)
 
     def energy(self, at: Any) -> SX:
-        """What is stored where they touch."""
+        """Return the energy stored in the contact."""
         return SX(at.stiffness * self._contact(at)[2])
 
     def dissipation(self, at: Any) -> SX:
-        """What the damper takes."""
+        """Return the power dissipated by the damper [W]."""
         return SX(self._tensions(at)[1] * self._rate(at))
 
     def _tension(self, at: Any) -> SX:
         return sum(self._tensions(at), SX(0))
 
     def _tensions(self, at: Any) -> tuple[SX, SX]:
-        """The tension of the spring, never above zero, and that of the damper."""
+        """Return the tension of the spring, never positive, and the tension of the damper."""
         slope, ramped, _ = self._contact(at)
         spring = at.stiffness * ramped
         return -spring, one_sided_damping(at.damping * slope * self._rate(at), spring)
@@ -167,14 +166,14 @@ class ElastoGap(_BetweenSlides):
 class SlidingBrake(OneFlange):
     """A brake between a sliding part and its rail: force -capacity engagement tanh(v / width).
 
-    The input `engagement` is the share of the normal force, from 0 for a brake that is released
-    to 1; below zero it counts as zero. The law is smooth and has no event of sticking: a load
-    below the capacity moves the part at a speed below `width`.
+    The input `engagement` is the fraction of the normal force, from 0 for a released brake
+    to 1. Negative values count as zero. The law is smooth, without sticking: a load below the
+    capacity moves the part at a speed below `width`.
 
     Source: Modelica Association 2023 for the element.
 
     Attributes:
-        capacity: force of the brake when it is fully engaged [N].
+        capacity: force of the fully engaged brake [N].
         width: speed over which the friction changes sign [m/s].
     """
 
@@ -185,15 +184,15 @@ class SlidingBrake(OneFlange):
     force = custom.output("N")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Against the speed."""
+        """Return the force against the speed."""
         return {"flange": -self._force(at)}
 
     def dissipation(self, at: Any) -> SX:
-        """All its power."""
+        """Return the power of the friction [W]."""
         return SX(self._force(at) * at.flange.speed)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """What the part loses."""
+        """Return the braking force."""
         return {"force": self._force(at)}
 
     def _force(self, at: Any) -> SX:
@@ -201,13 +200,13 @@ class SlidingBrake(OneFlange):
 
 
 class RigidSlidingBrake(OneFlange):
-    """A brake between a sliding part and its rail that sticks, as a `RigidBrake` on a shaft does.
+    """A brake with sticking between a sliding part and its rail, as a `RigidBrake` on a shaft.
 
     Source: Pfeiffer and Glocker 1996, chapter 5.
 
     Attributes:
-        capacity: force of the brake when it is fully engaged [N].
-        sticking: the largest force at which it sticks, for a unit force while it slides.
+        capacity: force of the fully engaged brake [N].
+        sticking: largest sticking force divided by the sliding force.
     """
 
     flange = custom.flange(slides=True)
@@ -216,5 +215,5 @@ class RigidSlidingBrake(OneFlange):
     engagement = custom.input()
 
     def frictions(self, at: Any) -> Mapping[str, Friction]:
-        """On the speed of the part."""
+        """Return the friction on the speed of the part."""
         return {"": capacity_of(at, at.flange.speed)}

@@ -1,4 +1,4 @@
-"""Wheels that roll without slipping, several on one axle."""
+"""Wheel sets that roll without slipping."""
 
 from __future__ import annotations
 
@@ -17,21 +17,22 @@ class WheelSet(Custom):
 
     The plane is z = 0 of the frame `ground`, whose z points to the wheels. The axle is y of the
     frame `axle`, whose origin is the middle between the wheels; the left wheel is at y > 0. Two
-    rows of positions keep the axle at the height of the radius and parallel to the plane. Three
-    rows of velocities, in the direction of travel and along the axle, forbid slip: they are
-    independent at every heading. The wheels themselves are bodies on revolute joints about y.
+    constraint rows on positions keep the axle at the height of the radius and parallel to the
+    plane. Three rows on velocities, in the direction of travel and along the axle, prevent slip.
+    They are independent at every heading. The wheels themselves are bodies on revolute joints about
+    y.
 
     Source: Modelica Association 2023, `Joints.RollingWheelSet`, whose axle does not pitch.
 
     Attributes:
-        ground: the plane.
-        axle: of the body that carries the wheels.
+        ground: frame of the plane.
+        axle: frame on the body that carries the wheels.
         left: name of the coordinate of the left wheel, its angle relative to `axle` about y.
-        right: likewise of the right wheel.
-        radius: of the wheels [m].
+        right: name of the coordinate of the right wheel, its angle relative to `axle` about y.
+        radius: radius of the wheels [m].
         track: distance of the wheels [m].
         force_left: force of the ground on the left wheel in the direction of travel [N].
-        force_right: likewise on the right wheel.
+        force_right: force of the ground on the right wheel in the direction of travel [N].
         force_lateral: force of the ground on both wheels along the axle [N].
         force_normal: force of the ground on both wheels away from the plane [N].
     """
@@ -48,16 +49,16 @@ class WheelSet(Custom):
     force_normal = custom.output("N")
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """The height of the axle, and its inclination."""
+        """Return rows of the height of the axle and of its inclination."""
         motion = at.ground.to(at.axle)
         return {"height": motion.p[2] - at.radius, "level": Row(motion.R[2, 1], "1")}
 
     def positive(self, at: Any) -> Mapping[str, SX]:
-        """The z axes of axle and plane may differ by any pitch below a right angle."""
+        """Return the cosine of the z axes of axle and plane: the pitch is below a right angle."""
         return {"upright": at.ground.to(at.axle).R[2, 2]}
 
     def velocity_rows(self, at: Any) -> Mapping[str, SX]:
-        """Velocities of the lowest points of the wheels, along the axle and in travel."""
+        """Return velocities of the lowest wheel points, along the axle and in travel direction."""
         motion = at.ground.to(at.axle)
         axle = motion.R[:, 1]
         ahead = casadi.vertcat(axle[1], -axle[0], SX(0))
@@ -70,7 +71,7 @@ class WheelSet(Custom):
         }
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The forces of the ground."""
+        """Return the forces of the ground."""
         return {
             "force_left": at.lam["left"],
             "force_right": at.lam["right"],

@@ -1,4 +1,4 @@
-"""What calls of generated C are checked for, and what they return."""
+"""Input checks of generated C functions, and the status codes that they return."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ STATUS_OF: dict[Kind, str] = {
     "open": "MBS_OPEN",
     "undetermined": "MBS_UNDETERMINED",
 }
-"""The status of a call where a row does not hold."""
+"""Status code of a call, by the kind of the violated condition."""
 
 _SINGLE: dict[Kind, float] = {"open": 1e-5, "undetermined": -1e-6}
-"""Bounds in single precision: positions that close loops leave some 1e-6 of the size when each is
-rounded to 6e-8 of itself, and a squared sine below 1e-6 is rounding of its rows."""
+"""Bounds in single precision. Closed positions that are rounded to a relative error of 6e-8 have
+closure residuals of about 1e-6 of the size. Rounding of the rows makes squared sines below 1e-6."""
 
 STATUS = """\
 #ifndef MBS_STATUS
@@ -54,11 +54,12 @@ NO_FAST_MATH = """\
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StatusCheck:
-    """What the inputs of a model must fulfil beside being numbers.
+    """Conditions on the inputs of a model, in addition to being finite.
 
     Attributes:
-        function: of the inputs of the model, all of them: (k, 1), 1 where a row holds, else 0.
-        statuses: (k) what a call returns where a row does not hold; the first one counts.
+        function: function of all inputs of the model. It returns (k, 1): 1 if a condition holds,
+            else 0.
+        statuses: status codes (k,) of violated conditions. A call returns the first violated one.
     """
 
     function: Function
@@ -66,11 +67,11 @@ class StatusCheck:
 
 
 def check_of(model: Function, real: Real) -> StatusCheck | None:
-    """The rows of validity that a model asks for; None where it asks for numbers alone.
+    """Return the conditions on the inputs of a model, or None if they only must be finite.
 
     Args:
         model: any Function.
-        real: precision in which it is evaluated.
+        real: precision in which the model is evaluated.
     """
     if not isinstance(model, ModelFunction):
         return None
@@ -92,7 +93,7 @@ def check_of(model: Function, real: Real) -> StatusCheck | None:
 
 
 def _holds(rows: Sequence[ValidityRow], real: Real) -> SX:
-    """A comparison with NaN is false."""
+    """Return whether each condition holds. A NaN residual violates its condition."""
     single = _SINGLE if real == "float" else {}
     values = [row.residual <= single.get(row.kind, row.bound) for row in rows]
     return casadi.vertcat(*values)

@@ -1,4 +1,4 @@
-"""C source of models: one .c, one .h with documented prototypes, CMake, and a program that runs."""
+"""Export of models as C source: .c and .h files, CMakeLists.txt and an example program."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from mbs.native.handwritten import handwritten_text, names_declared
 from mbs.native.scalar_source import NOINLINE, Real, Target, bare_source, literal
 from mbs.text import in_c_comment, quoted
 
-# Names that C, C++ and CMake leave free.
+# Names that are reserved in C, C++ and CMake.
 
 
 def _words(text: str) -> list[str]:
@@ -80,7 +80,7 @@ _OF_CASADI = ("null", "jac", "hess")
 
 
 def library_name(folder: str) -> str:
-    """The name of files and of the CMake target for a folder of this name."""
+    """Return the name of the files and of the CMake target for a folder name."""
     name = re.sub(r"\W", "_", folder, flags=re.ASCII)
     if not re.search(r"[A-Za-z0-9]", name):
         return "models"
@@ -90,14 +90,15 @@ def library_name(folder: str) -> str:
 
 
 def check_function_names(names: Sequence[str], where: str) -> None:
-    """Refuse names of Functions that no C library can have.
+    """Check that names of Functions are valid and distinct names of C functions.
 
     Args:
-        names: of all Functions of a library, different.
-        where: which library, for the message.
+        names: names of all Functions of a library.
+        where: name of the library, for the error message.
 
     Raises:
-        ModelError: a name is no identifier, is one of C or C++, or meets another one.
+        ModelError: a name is no identifier, is reserved in C or C++, or two names lead to the same
+            name in C.
     """
     owner: dict[str, str] = {}
     for name in names:
@@ -122,13 +123,14 @@ def check_function_names(names: Sequence[str], where: str) -> None:
 
 
 def parameter_names(names: Iterable[str], taken: Iterable[str]) -> list[str]:
-    """Names of parameters in C, each the given one where it is free.
+    """Return valid, distinct names of C parameters, unchanged if possible.
 
-    What is no letter, digit or underscore of ASCII becomes an underscore.
+    Characters other than ASCII letters, digits and underscores become underscores. Underscores are
+    appended to names that are not free.
 
     Args:
-        names: desired.
-        taken: names that mean something else there.
+        names: desired names.
+        taken: names that are already used in the same scope.
     """
     used = set(taken)
     free = []
@@ -213,10 +215,10 @@ _LARGEST: dict[Real, tuple[str, str]] = {
     "double": ("fabs", "DBL_MAX"),
     "float": ("fabsf", "FLT_MAX"),
 }
-"""The absolute value, and the largest number."""
+"""C function of the absolute value, and C constant of the largest number, by type."""
 
 _FEW = 64
-"""Numbers that one expression adds up; where it overflows, each is looked at."""
+"""Largest number of values that one sum checks for NaN. If the sum overflows, each is checked."""
 
 Model = Function | System
 Functions = Model | Sequence[Model] | Mapping[str, Model]
@@ -230,49 +232,48 @@ def c_library(
     real: Real = "double",
     checked: bool = True,
 ) -> Path:
-    """Write models as C source that compiles anywhere.
+    """Write models as portable C source.
 
-    The folder holds `NAME.c` (generated code and plain wrappers), `NAME.h` (a documented
-    prototype for each function), `CMakeLists.txt`, and `example.c`, a program that calls every
-    function once and prints its outputs. NAME is the name of the folder, made fit for C: `2r` gives
-    models_2r, `math` gives math_models. Inputs named like a word of C get an underscore.
+    The folder contains `NAME.c` (generated code and wrappers), `NAME.h` (a documented prototype for
+    each function), `CMakeLists.txt`, and `example.c`, a program that calls every function once and
+    prints its outputs. NAME is the name of the folder as a C identifier: `2r` becomes models_2r,
+    and `math` becomes math_models. Inputs with a reserved name of C get an underscore.
 
-    A call returns an `mbs_status`, which the header explains: MBS_OK, or why the model has no
-    meaning there; then all outputs are NaN. It refuses what a call in Python refuses: numbers that
-    are not finite, quaternions that are not of unit length, parameters out of their bounds, loops
-    that are open by more than the same part of the size of the mechanism, independent joints that
-    do not determine the others, and results that are not finite. A casadi.Function that is no model
-    is asked for finite inputs and outputs alone. Columns that all configurations of the general
-    inverse geometric model leave empty are NaN, and no fault.
+    A call returns an `mbs_status`, documented in the header: MBS_OK, or the error, with all outputs
+    NaN. Calls in Python have the same checks. An error is an input or result that is not finite,
+    a quaternion that is not unit, a parameter out of its bounds, an open loop (beyond a tolerance
+    relative to the size of the mechanism), or a configuration in which the independent joints do
+    not determine the others. A casadi.Function that is no model is only checked for finite inputs
+    and outputs. The unused columns of the general inverse geometric model (solutions that do not
+    exist) are NaN without an error.
 
     With target="bare" the code is for microcontrollers: C99 in scalar operations, without heap,
-    files and variables that change outside of functions; it needs math.h, memset and memcpy. A
-    system among the functions becomes its motion, in a file of its own: a state that the caller
-    owns and `SYSTEM_start`, `SYSTEM_step`, a step of the classical Runge-Kutta method with the
-    loops closed at every evaluation, and `SYSTEM_motion`, the positions, velocities and
-    accelerations of all joints. Compiled in double without fused multiplications (`-std=c99` or
-    `-ffp-contract=off` of GCC and clang) its numbers are those of
-    `mbs.export.fmu(system, solver="rk4")`.
+    files and global variables. It needs math.h, memset and memcpy. A system in `functions` becomes
+    a simulation of its motion in a separate file. The caller owns its state. `SYSTEM_start` sets
+    the start. `SYSTEM_step` makes a step of the classical Runge-Kutta method, with loops closed at
+    every evaluation. `SYSTEM_motion` computes positions, velocities and accelerations of all
+    joints. If it is compiled in double without fused multiplications (`-std=c99` or
+    `-ffp-contract=off` of GCC and clang), results equal `mbs.export.fmu(system, solver="rk4")`.
 
     Args:
-        functions: models of one or several systems with different names, or name in C to model;
-            with target="bare", systems too.
-        folder: where to write; it is made, with the folders above it. Files there that mbs wrote
-            are replaced, others are not.
-        target: "hosted", or "bare" for what has no operating system.
-        real: type of numbers of a bare library: "double" or "float". In single precision loops may
-            be open by 1e-5 of the size of the mechanism, since positions round to 6e-8.
-        checked: whether calls are checked. Without it they return 0 for any numbers, also where
-            the model has no meaning; steps are checked always.
+        functions: models of one or several systems with distinct names, or dict from name in C to
+            model. Systems too with target="bare".
+        folder: folder to write to. It is created if it does not exist. Files that mbs wrote are
+            replaced.
+        target: "hosted", or "bare" for systems without an operating system.
+        real: type of numbers of a bare library: "double" or "float". In single precision, loops
+            may be open by 1e-5 of the size of the mechanism, because positions round to 6e-8.
+        checked: whether calls are checked. If False, a call returns 0 for all inputs, also if the
+            model is not valid there. Steps are always checked.
 
     Returns:
-        The folder.
+        Path of the folder.
 
     Raises:
-        ExportError: the folder cannot be written, or holds such a file that mbs did not write;
-            nothing is written. The target or type is unknown.
-        ModelError: a name does not fit, a function cannot be written as C, or a system has events,
-            which steps of a fixed length cannot follow.
+        ExportError: the folder cannot be written, or contains a file of this name that mbs did not
+            write. Nothing is written then. The target or type is unknown.
+        ModelError: a name is invalid, a function cannot be written as C, or a system has events,
+            which steps of a fixed length cannot locate.
     """
     place = path_of(folder)
     library = _library(place, target, real, checked)
@@ -301,13 +302,13 @@ def c_library(
 
 @dataclass(frozen=True, slots=True)
 class _Library:
-    """What all functions of a library share.
+    """Settings of a library.
 
     Attributes:
-        name: of its files.
-        bare: for what has no operating system.
+        name: name of the files.
+        bare: whether the code is for systems without an operating system.
         real: type of numbers.
-        checked: calls are checked.
+        checked: whether calls are checked.
     """
 
     name: str
@@ -317,7 +318,7 @@ class _Library:
 
     @property
     def type(self) -> str:
-        """Its name in the header."""
+        """Name of the number type in the header."""
         return f"{self.name}_real" if self.bare else "double"
 
 
@@ -334,16 +335,16 @@ def _library(place: Path, target: object, real: object, checked: bool) -> _Libra
 
 @dataclass(frozen=True, slots=True)
 class _Entry:
-    """A function of the library.
+    """Function of the library.
 
     Attributes:
-        name: in C.
-        model: as it was given.
-        code: the same under this name, with dense inputs and outputs, and where calls are checked
-            for more than numbers, whether each row holds.
-        statuses: what a call returns where a row does not hold.
-        inputs: names of its parameters in C.
-        outputs: likewise.
+        name: name in C.
+        model: function as given by the user.
+        code: the same function under this name with dense inputs and outputs. If the inputs have
+            conditions, its last output is 1 for each condition that holds, else 0.
+        statuses: status codes of violated conditions.
+        inputs: names of the input parameters in C.
+        outputs: names of the output parameters in C.
     """
 
     name: str
@@ -391,7 +392,7 @@ def _entries(
 def _check_handwritten(
     functions: Sequence[tuple[str, Function]], where: str, library: _Library
 ) -> None:
-    """Refuse what does not go with C that is written by hand."""
+    """Raise ModelError for single precision or names that conflict with handwritten C code."""
     text = handwritten_text([function for _, function in functions])
     if text and library.real == "float":
         raise ModelError(
@@ -408,7 +409,7 @@ def _check_handwritten(
 
 
 def _pairs(functions: Any) -> list[tuple[str, Model]]:
-    """The functions with their names in C."""
+    """Return pairs of name in C and model."""
     if isinstance(functions, Mapping):
         for function in functions.values():
             _require_model(function)
@@ -427,7 +428,7 @@ def _require_model(model: object) -> None:
 
 
 def _name(model: Model) -> str:
-    """The name in C; of a system, its name with underscores for what C does not take."""
+    """Return the name in C of a model. In the name of a System, invalid characters become _."""
     if isinstance(model, Function):
         return model.name()
     text = re.sub(r"[^A-Za-z0-9]+", "_", model.name).lstrip("_")
@@ -446,9 +447,9 @@ def _entry(name: str, model: Function, library: _Library) -> _Entry:
 
 
 def _code(name: str, model: Function, check: StatusCheck | None) -> Function:
-    """The function under a name, every input and output dense, and the check as its last output.
+    """Return the function under a name, with dense inputs and outputs and the check as last output.
 
-    They share what they have in common, such as the sines and cosines of a configuration.
+    Common subexpressions of both, such as sines and cosines of joint angles, are computed once.
     """
     patterns = [model.sparsity_in(k) for k in range(model.n_in())]
     patterns += [model.sparsity_out(k) for k in range(model.n_out())]
@@ -464,7 +465,7 @@ def _code(name: str, model: Function, check: StatusCheck | None) -> Function:
 
 
 def _check_ours(file: Path) -> None:
-    """Refuse to replace what somebody else wrote."""
+    """Raise ExportError if a file exists that mbs did not write."""
     try:
         with file.open(encoding="utf-8", errors="replace") as stream:
             first = stream.readline()
@@ -479,14 +480,17 @@ def _check_ours(file: Path) -> None:
 
 
 def _source(entries: Sequence[_Entry], library: _Library, where: str) -> str:
-    """Scalar operations as static functions, which compilers inline; the rest as CasADi has it."""
+    """Return the text of NAME.c.
+
+    Functions of scalar operations are static, so that compilers inline them. CasADi writes others.
+    """
     scalar = [entry.code for entry in entries if _is_scalar(entry, library)]
     others = [entry.code for entry in entries if not _is_scalar(entry, library)]
     parts = [f'/* {_MARK}. */\n#include "{library.name}.h"\n']
     parts.append("#include <float.h>\n#include <math.h>\n#include <string.h>\n")
     if scalar:
         parts += [NOINLINE, bare_source(scalar, library.real)[0]]
-    if others:  # what CasADi adds to them is visible, and another library has it too
+    if others:  # the helper functions of CasADi have external linkage, so they need a prefix
         parts.append(generated(others, library.name, with_header=False, casadi_int="long long int"))
         if problem := unwritten(parts[-1]):
             raise ModelError(f"{where}: {problem}")
@@ -497,7 +501,7 @@ def _source(entries: Sequence[_Entry], library: _Library, where: str) -> str:
 
 
 def _is_scalar(entry: _Entry, library: _Library) -> bool:
-    """Whether its code is written without CasADi, which is left to calls and maps."""
+    """Whether the code is written as scalar operations, and not by CasADi (calls and maps)."""
     return entry.code.is_a("SXFunction") or (library.bare and not handwritten_text([entry.code]))
 
 
@@ -545,13 +549,13 @@ def _checking_body(entry: _Entry, library: _Library, call: str) -> str:
 
 
 def _all_finite(arrays: Iterable[tuple[str, int]], real: Real) -> str:
-    """Whether all are numbers: by one sum of them where they are few, which costs least."""
+    """Return the C condition that all values are finite: one sum for few values, else a loop."""
     given = [(name, n) for name, n in arrays if n]
     one_by_one = " && ".join(f"mbs__finite({name}, {n})" for name, n in given) or "1"
     if not 0 < sum(n for _, n in given) <= _FEW:
         return one_by_one
     sums = (" + ".join(f"{name}[{k}]" for k in range(n)) for name, n in given)
-    total = " +\n        ".join(f"({text})" for text in sums)  # side by side, not after each other
+    total = " +\n        ".join(f"({text})" for text in sums)  # sums run in parallel
     size, largest = _LARGEST[real]
     return f"{size}({total}) <= {largest} ||\n        ({one_by_one})"
 
@@ -597,7 +601,7 @@ def _prototype(entry: _Entry, library: _Library) -> str:
 
 
 def _returns(entry: _Entry, library: _Library) -> str:
-    """What a call may return, in words."""
+    """Return the possible status codes of a call as text."""
     if not library.checked:
         return "MBS_OK: nothing is checked"
     every = ["MBS_OK", "MBS_NOT_FINITE", *dict.fromkeys(entry.statuses)]
@@ -605,14 +609,14 @@ def _returns(entry: _Entry, library: _Library) -> str:
 
 
 def _scratch(entry: _Entry, library: _Library) -> int:
-    """Numbers in w."""
+    """Return the number of elements of the work array w."""
     if _is_scalar(entry, library):
         return bare_source([entry.code], library.real)[1]
     return max(1, entry.code.sz_w())
 
 
 def _elements(model: Function, name: str) -> str:
-    """What the elements of an input or output are, where the model knows their names."""
+    """Return names and units of the elements of an input or output, empty if unknown."""
     known = model.elements(name) if isinstance(model, ModelFunction) else []
     return ": " + ", ".join(in_c_comment(f"{e} [{unit}]") for e, unit in known) if known else ""
 
@@ -628,7 +632,7 @@ def _example(entries: Sequence[_Entry], steps: Mapping[str, StepTexts], library:
 
 
 def _example_call(entry: _Entry, library: _Library) -> str:
-    """A block that calls one model and prints every output in full digits, or its status."""
+    """Return a C block that calls a model and prints its outputs with all digits, or its status."""
     model, real = entry.model, library.type
     lines = ["  {\n"]
     for k, name in enumerate(entry.inputs):
@@ -652,14 +656,14 @@ def _example_call(entry: _Entry, library: _Library) -> str:
 
 
 def example_input(model: Function, k: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """The numbers that the example program gives to input k, (rows, columns).
+    """Return the values (rows, columns) of input k in the example program.
 
-    They are irregular, but positions are those of the assembled mechanism where loops, quaternions
-    or parameters ask for such, and parameters have their default values.
+    Values are irregular. Parameters have their default values. For mechanisms with loops,
+    quaternions or parameters, positions come from the assembled configuration.
     """
     rows, columns = model.size_in(k)
     numbers = np.arange(rows * columns, dtype=float)
-    # between -0.2 and some units, other for every input and every element
+    # irregular values from -0.2 up, different for every input and element
     values = (0.1 + 0.2 * k + 0.3 * np.sin(1.0 + numbers)).reshape(rows, columns, order="F")
     if not isinstance(model, ModelFunction):
         return values

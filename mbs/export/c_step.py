@@ -1,4 +1,4 @@
-"""The motion of a mechanism as C without heap: a state, and steps of a fixed length."""
+"""Simulation of a mechanism in C without heap: a state and steps of a fixed length."""
 
 from __future__ import annotations
 
@@ -167,11 +167,11 @@ _EXAMPLE = """\
 
 @dataclass(frozen=True, slots=True)
 class StepTexts:
-    """The texts of a system's motion.
+    """C texts of the simulation of a system.
 
     Attributes:
-        header: part of the header of its library.
-        source: a C file.
+        header: part of the header of the library.
+        source: text of a C file.
         example: part of the example program.
     """
 
@@ -181,18 +181,18 @@ class StepTexts:
 
 
 def step_texts(system: System, name: str, library: str, real: Real, mark: str) -> StepTexts:
-    """The C of the motion of a system.
+    """Return the C texts of the simulation of a system.
 
     Args:
-        system: open or closed, without rigid stops and Coulomb friction.
-        name: of it in C.
+        system: mechanism, open or closed, without rigid stops and Coulomb friction.
+        name: name of the system in C.
         library: name of the library.
         real: type of numbers.
-        mark: what says that a file is generated.
+        mark: text in the first line of generated files.
 
     Raises:
-        ModelError: there are events, nothing can move, a parameter has no value, or an equation is
-            not made of scalar operations.
+        ModelError: the system has events, nothing can move, a parameter has no value, or an
+            equation contains operations that are not scalar.
     """
     state = minimal_state(system, lambda seen: [seen.q, seen.v, seen.a])
     if state.events is not None:
@@ -231,14 +231,14 @@ def step_texts(system: System, name: str, library: str, real: Real, mark: str) -
             nu=max(1, sizes["NU"]),
             nq=sizes["NQ"],
             nv=sizes["NV"],
-            step=literal(0.001, real),  # [s] as a controller at 1 kHz takes them
+            step=literal(0.001, real),  # step [s] of the example, as of a controller at 1 kHz
         ),
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _Variables:
-    """The elements of x, z, u and p."""
+    """Variables of the elements of x, z, u and p."""
 
     x: tuple[FmuVariable, ...]
     z: tuple[FmuVariable, ...]
@@ -247,7 +247,7 @@ class _Variables:
 
 
 def _functions(system: System, state: MinimalState, variables: _Variables) -> list[Function]:
-    """The functions that step.c, closure.c and watch.c call, every input and output dense."""
+    """Return the functions that step.c, closure.c and watch.c call, with dense arguments."""
     sizes = [len(own) for own in (variables.x, variables.z, variables.u, variables.p)]
     t, (x, z, u, p) = MX.sym("t"), (MX.sym("s", size) for size in sizes)
     point = [t, x, z, u, p]
@@ -289,7 +289,7 @@ def _sizes(system: System, state: MinimalState, variables: _Variables, work: int
 
 
 def _quaternions(system: System, state: MinimalState) -> list[int]:
-    """Where quaternions that are states as a whole begin in x."""
+    """Return the first index in x of each quaternion whose four elements are all states."""
     indices = [state.positions.index(k) if k in state.positions else -1 for k in range(system.nq)]
     starts = []
     for part in quaternion_slices(system.tree):
@@ -394,7 +394,7 @@ def _places(name: str, values: Sequence[int]) -> str:
 
 
 def _share(file: str) -> str:
-    """A file that FMUs have too; what it includes of theirs stands before it here."""
+    """Return the text of a C file that FMUs use too, without #include lines."""
     folder = resources.files("mbs.export.fmu") / "c"
     lines = (folder / file).read_text(encoding="utf-8").splitlines()
     return "\n".join(line for line in lines if not line.startswith("#include")) + "\n"

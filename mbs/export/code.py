@@ -1,4 +1,4 @@
-"""Readable source text of Functions, in the names of the classic notation."""
+"""Export of Functions as readable source code with the names of the classic notation."""
 
 from __future__ import annotations
 
@@ -21,30 +21,31 @@ def code(
     path: str | os.PathLike[str] | None = None,
     name: str | None = None,
 ) -> str:
-    """A Function as source text that people can read.
+    """Write a Function as readable source code.
 
-    One quantity a line, in assignments that need no loop. Sines and cosines of joint angles are
-    S2, C2, S23 (of q2 + q3); velocities, accelerations and efforts of the joints QP2, QDP2, GAM2;
-    what the model names keeps its name (W32 is component 3 of the angular velocity of link 2);
-    the rest is Z1, Z2 and so on. What depends on parameters alone comes first.
+    The code has one assignment per line and no loops. Sines and cosines of joint angles are named
+    S2, C2, S23 (sine of q2 + q3). Velocities, accelerations and efforts of the joints are QP2, QDP2
+    and GAM2. Quantities with a name in the model keep it, such as W32 for component 3 of the
+    angular velocity of link 2. Other quantities are Z1, Z2, .... Expressions that depend only on
+    parameters come first.
 
     Args:
-        function: made of scalar operations, or a Function that can be expanded to them.
+        function: Function of scalar operations, or one that can be expanded to them.
         language: "c", "fortran", "matlab" or "octave", "maple", "mathematica", "python", "julia",
-            "rust", "latex", or "symoro" for the classic text of equations; or a `Language` of your
-            own.
-        path: a file to write the text to as well.
-        name: of the function in the text, its own when left out.
+            "rust", "latex", "symoro" for the classic listing of equations, or a user-defined
+            `Language`.
+        path: file to which the text is also written, or None.
+        name: name of the function in the text. By default the name of the Function.
 
     Returns:
-        A complete unit: one function, subroutine or procedure, or one document.
+        Text of a complete function, subroutine, procedure or document.
 
     Raises:
-        ModelError: there is no such language, it is no Function, or the Function has operations
-            that the language cannot write.
+        ModelError: the language is unknown, function is not a Function, or it has operations
+            that the language does not support.
         ExportError: the file cannot be written.
     """
-    from mbs.export.languages.build import build  # with sympy, which takes a second to load
+    from mbs.export.languages.build import build  # imports sympy, which takes a second
 
     target = language_of(language)
     require_function(function)

@@ -1,4 +1,4 @@
-"""Model files of MuJoCo (MJCF) from any mechanism: its tree as bodies, its loops as equalities."""
+"""Export of mechanisms as MuJoCo model files (MJCF): links as bodies, loops as equalities."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ from mbs.spatial import Pose
 Vector = NDArray[np.float64]
 
 _LEAST = 2e-15
-"""Mass [kg] and principal moment [kg m^2] of moving bodies that have less; MuJoCo asks for more
-than 1e-15."""
+"""Smallest mass [kg] and principal moment [kg m^2] of moving bodies; MuJoCo requires more than
+1e-15."""
 _SAME = 1e-12
-"""Distance [m or 1] from the identity of frames that are one but for rounding."""
+"""Deviation from the identity [m or 1] below which two frames are equal except for rounding."""
 _APART = 0.1
-"""Distance [m] of the two points at which a revolute joint that closes a loop is anchored."""
+"""Distance [m] between the two connect points of a revolute joint that closes a loop."""
 _TYPES = {
     Motion.REVOLUTE: "hinge",
     Motion.PRISMATIC: "slide",
@@ -65,26 +65,28 @@ def mjcf(
 ) -> None:
     """Write a mechanism as a model file of MuJoCo.
 
-    Every link is a body under its antecedent, with the name of the first body that it carries and
-    the inertia of all of them; the others are welded to it without a mass of their own. q is
-    MuJoCo's qpos, the assembled configuration its keyframe `home`. Only spherical and free joints
-    that connect the outer body to the inner one have another qpos: the pose of the outer body. A
-    loop closes by connect or weld, which MuJoCo keeps softly; couplings are equalities of joints or
-    fixed tendons, springs and dampers between points are spatial tendons. Actuated joints have
-    motors of gear 1.
+    Every link becomes a body, a child of its antecedent. The body has the name of the first body on
+    the link and the total inertia. Other bodies become massless child bodies. q equals qpos of
+    MuJoCo, and the assembled configuration is the keyframe `home`. Only spherical and free joints
+    with the
+    child body on frame_a differ: their qpos is the pose of the child body in the parent body. A
+    loop becomes a connect or weld constraint, which is soft in MuJoCo. Couplings become equalities
+    of joints or fixed tendons, and springs and dampers between points become spatial tendons.
+    Actuated joints have motors of gear 1.
 
-    What is lost: symbols, whose values are written; largest velocities; the width of Coulomb
-    friction, which is a constraint in MuJoCo. Masses and moments of moving bodies that are zero
-    become 2e-15, since MuJoCo asks for some; moments across the axis of a first joint, which have
-    no effect and which tables leave out, become as large as a body needs.
+    The file does not contain symbols (only their values), velocity limits, and the width of Coulomb
+    friction, which is a constraint in MuJoCo. Zero masses and moments of moving bodies become
+    2e-15, because MuJoCo requires positive values. The moments of the first link across its
+    revolute axis have no effect, and robot tables omit them. They are increased to values that a
+    rigid body can have.
 
     Args:
-        system: any; a Mechanism is assembled first.
-        path: of the .xml file.
-        parameters: values of symbols, the others at their defaults.
+        system: any mechanism. A Mechanism is assembled first.
+        path: path of the .xml file.
+        parameters: dict of values of symbols. Other symbols have their default values.
 
     Raises:
-        ModelError: it is neither, or has something that the format cannot say.
+        ModelError: system has another type, or the format does not support a part of it.
         ExportError: the file cannot be written.
     """
     system = system_of(system)
@@ -93,12 +95,13 @@ def mjcf(
 
 
 class _Writer:
-    """Turns a system into the elements of a file.
+    """Writer of the XML elements of an MJCF file.
 
     Attributes:
-        system: the system.
-        bodies: for each link, the base first, its element, and the body's frame in the link's.
-        sites: how many were added.
+        system: mechanism to write.
+        bodies: XML element of the body of each link, the base first, and the pose of the body frame
+            in the link frame.
+        sites: number of sites that were added.
     """
 
     def __init__(self, system: System, parameters: Mapping[str, float] | None) -> None:
@@ -115,7 +118,7 @@ class _Writer:
         }
 
     def model(self) -> Element:
-        """The root element."""
+        """Return the root element of the file."""
         system = self.system
         self._check()
         root = Element("mujoco", model=system.name)
@@ -145,7 +148,7 @@ class _Writer:
         return ModelError(f"{self.system.name}/{what}; {remedy}")
 
     def _check(self) -> None:
-        """Refuse what the format cannot say."""
+        """Raise ModelError if the format does not support a part of the system."""
         system = self.system
         check_backward_drives(system, "MJCF")
         for part in [*(row.name for row in system.shafts), *(row.name for row in system.devices)]:
@@ -165,16 +168,16 @@ class _Writer:
                 )
 
     def _zero(self) -> SX:
-        """(nq, 1) the configuration qpos0 of the file."""
+        """Return the configuration (nq, 1) that is qpos0 in the file: zero, or unit quaternions."""
         q = SX.zeros(self.system.nq)
         for part in quaternion_slices(self.system.tree):
             q[part.start] = 1
         return q
 
-    # Numbers: symbols at their values.
+    # Numeric values of expressions.
 
     def _number(self, value: Any) -> Vector:
-        """Numbers of an expression, as an array of its shape."""
+        """Evaluate an expression at the values of the symbols. Returns an array of its shape."""
         expression = SX(value)
         if expression.is_constant():
             return np.array(DM(expression))
@@ -184,14 +187,14 @@ class _Writer:
         return float(self._number(value).item())
 
     def _text(self, values: Any) -> str:
-        """Numbers separated by blanks, which MuJoCo reads back to the last bit."""
+        """Format values separated by blanks, with all digits of a double."""
         flat = self._number(values).ravel(order="F")
         if not np.all(np.isfinite(flat)):
             raise self._refuse("a number of the file is not finite", "give every parameter a value")
         return " ".join(repr(float(value) + 0.0) for value in flat)
 
     def _place(self, pose: Pose) -> dict[str, str]:
-        """The attributes pos and quat of a frame, without those of the identity."""
+        """Return the attributes pos and quat of a frame, omitted if they are the identity."""
         p, R = self._number(pose.p).ravel(), self._number(pose.R)
         found = {}
         if np.max(np.abs(p)) > 0:
@@ -207,7 +210,7 @@ class _Writer:
         bodies = [row.name for row in system.bodies if row.link == number]
         above, frame_above = self.bodies[link.antecedent + 1]
         is_free = link.motion is Motion.FREE
-        # the body has the frame of the first body, and where q is a quaternion that of the link
+        # the MJCF body has the frame of the first body; for quaternion joints that of the link
         own = Pose.identity()
         main = bodies[0] if bodies else None
         if main is not None:
@@ -244,7 +247,7 @@ class _Writer:
         return found
 
     def _add_inertia(self, body: Element, link: Link, own: Pose) -> None:
-        """The element <inertial>: about the centre of mass, principal moments and their axes."""
+        """Append <inertial>: mass, centre of mass, principal moments about it and their axes."""
         R, p = self._number(own.R), self._number(own.p).ravel()
         ten = self._number(link.inertia.parameters).ravel()
         XX, XY, XZ, YY, YZ, ZZ, *first, mass = (float(value) for value in ten)
@@ -257,14 +260,14 @@ class _Writer:
             )
         J = J - mass * (com @ com * np.eye(3) - np.outer(com, com))
         if link.motion is Motion.REVOLUTE and link.antecedent < 0:
-            # moments across an axis that stands still have no effect; tables leave them out
+            # moments across an axis that does not move have no effect; robot tables omit them
             J[:2, :2] += max(0.0, J[2, 2] - J[0, 0] - J[1, 1]) / 2 * np.eye(2)
         J = R.T @ J @ R
         moments, axes = np.linalg.eigh((J + J.T) / 2)
         if np.linalg.det(axes) < 0:
             axes[:, 0] = -axes[:, 0]
         scale = max(float(np.max(np.abs(ten))), _LEAST)
-        rounding = 1e-9 * scale  # of the difference of moments about two points
+        rounding = 1e-9 * scale  # rounding error of the moments after the shift to the centre
         possible = moments[0] > -rounding and moments[0] + moments[1] > moments[2] - rounding
         if mass < 0 or not possible:
             raise self._refuse(
@@ -274,7 +277,7 @@ class _Writer:
                 "give it the inertia of a body",
             )
         moments = np.maximum(moments, _LEAST)
-        # rounding may break the triangle inequality of a flat body, and MuJoCo knows no tolerance
+        # rounding may violate the triangle inequality of a flat body; MuJoCo has no tolerance
         moments[2] = min(moments[2], moments[0] + moments[1])
         given = {
             "pos": self._text(R.T @ (com - p)),
@@ -311,7 +314,7 @@ class _Writer:
         SubElement(body, "joint", given)
 
     def _add_static_bodies(self) -> None:
-        """Bodies that are welded to the world."""
+        """Append the bodies that are fixed to the world."""
         moving = {row.name for row in self.system.bodies}
         world, _ = self.bodies[0]
         for name, (number, pose) in self.system.frames.items():
@@ -348,7 +351,7 @@ class _Writer:
             )
             for frame in cut.frames:
                 SubElement(tendon, "site", site=self._new_site(frame))
-            # MuJoCo counts from the length at qpos = 0
+            # the equality of MuJoCo is relative to the length at qpos0
             at_zero = relative_pose(self.system.tree, self._zero(), *cut.frames).p
             longer = casadi.SX(to_sx(joint.length, self._symbols)) - casadi.norm_2(at_zero)
             SubElement(
@@ -359,7 +362,7 @@ class _Writer:
                 polycoef=self._text(casadi.vertcat(longer, SX.zeros(4))),
             )
         elif isinstance(joint, Revolute):
-            # two points of the axis
+            # connect constraints at two points of the axis
             for k, along in enumerate((-_APART / 2, _APART / 2)):
                 shift = Pose.translation(SX(DM(along * np.array(joint.axis))))
                 ends = [(number, pose @ shift) for number, pose in (frame_a, frame_b)]
@@ -463,9 +466,9 @@ class _Writer:
 
 
 def _quaternion(R: Vector) -> Vector:
-    """The unit quaternion (w, x, y, z) of a rotation, by its largest element.
+    """Return the unit quaternion (w, x, y, z) of a rotation matrix (3, 3).
 
-    Source: Shepperd 1978.
+    It is computed from its largest element. Source: Shepperd 1978.
     """
     trace = float(np.trace(R))
     squares = np.array([trace, R[0, 0], R[1, 1], R[2, 2]])

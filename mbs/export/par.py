@@ -1,4 +1,4 @@
-"""Robot files of SYMORO (.par) from mechanisms that were composed, or read from other formats."""
+"""Export of mechanisms as SYMORO robot files (.par)."""
 
 from __future__ import annotations
 
@@ -26,29 +26,30 @@ from mbs.spatial import Khalil, Pose, align_z, frames_to
 from mbs.spatial.inertia import TEN_PARAMETERS
 
 Text = Callable[[SX], str]
-"""What writes a scalar of numbers and symbols in the grammar of expressions."""
+"""Function that writes a scalar expression in the grammar of the file."""
 
 _SIGMA = {Motion.REVOLUTE: 0, Motion.PRISMATIC: 1}
 _OF_THE_JOINT = [name for name in BODY_SCALARS if name not in TEN_PARAMETERS]
-"""What acts on the joint of a body row, such as Fv; links call it the same."""
+"""Joint quantities of a body row, such as Fv. They have the same names as attributes of a link."""
 
 
 def par(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
     """Write a mechanism as a robot file of SYMORO.
 
-    Link j of the system is frame j of the file, its joint variable q<j>; where fixed frames lead
-    to a link they come before it. Bodies that are welded together are one link. Symbols stay
-    symbols, and their values are in comments that `mbs.load` reads. Names of joints and bodies and
-    limits are lost. A mount is the vector Z, with symbols at their defaults.
+    Link j of the system becomes frame j of the file, with joint variable q<j>. Fixed frames on the
+    path to a link come before it and increase its index. Bodies that are fixed to each other are
+    one link. Symbols are kept; their values are in comments that `mbs.load` reads. Names of joints
+    and bodies, and limits, are not in the file. A mount becomes the vector Z, with symbols at their
+    default values.
 
     Args:
-        system: of revolute and prismatic motions; cut joints are one of the two. A Mechanism is
-            assembled first.
-        path: of the .par file.
+        system: mechanism with revolute and prismatic motions, also of the cut joints. A Mechanism
+            is assembled first.
+        path: path of the .par file.
 
     Raises:
-        ModelError: it is neither, or it has a motion or a coupling that the format cannot say.
-        DescriptionError: a symbol is named like a joint variable of the format.
+        ModelError: system has another type, or the format does not support a motion or coupling.
+        DescriptionError: a symbol has the name of a joint variable of the format.
         ExportError: the file cannot be written.
     """
     system = system_of(system)
@@ -57,22 +58,22 @@ def par(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
 
 
 def robot_table(system: System, file: str = ".par") -> RobotTable:
-    """The table of frames of a system: link j is frame j, its joint q<j>.
+    """Return the table of frames of a system: link j is frame j with joint variable q<j>.
 
-    Fixed frames come before the link whose path they are on, which moves its number; cuts are last.
+    Fixed frames on the path to a link come before it and increase its index. Cut joints are last.
 
     Args:
-        system: as for `par`.
-        file: ending of the file that it is for, in messages.
+        system: mechanism as for `par`.
+        file: file extension, for error messages.
 
     Raises:
-        ModelError: it has a motion or a coupling that a table cannot say.
+        ModelError: the format does not support a motion, coupling or force element.
     """
     _check(system, file)
     text = _text_of(system)
     size = max(map(_length, _shifts(system)), default=0.0) or 1.0
     frames: list[FrameRow] = []
-    number = {-1: 0}  # of the frame of each link; of the base
+    number = {-1: 0}  # link index to frame index in the file; the base is frame 0
     for j, link in enumerate(system.tree.links):
         before = number[link.antecedent]
         for frame in link.via:
@@ -121,7 +122,7 @@ def robot_table(system: System, file: str = ".par") -> RobotTable:
 
 
 def _shifts(system: System) -> Iterator[SX]:
-    """Positions of the links and of the cut joints on the links before them [m]."""
+    """Yield the origins [m] of links and cut joints in the frames of their antecedents."""
     defaults = SX(DM(system.p_default))
     for p in (
         *(link.pose().p for link in system.tree.links),
@@ -131,7 +132,7 @@ def _shifts(system: System) -> Iterator[SX]:
 
 
 def _length(p: SX) -> float:
-    """Of a shift in numbers [m]; zero where a symbol has no value."""
+    """Return the length [m] of a vector, or zero if it contains NaN of a symbol without value."""
     length = float(casadi.norm_2(DM(p)))
     return length if length == length else 0.0
 

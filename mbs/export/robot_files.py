@@ -1,4 +1,4 @@
-"""Functions that all writers of robot files use: assembly, coordinates, notes, files."""
+"""Common functions of the writers of robot files: assembly, coordinates, notes, files."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ Array = NDArray[np.float64]
 
 
 def system_of(system: object) -> System:
-    """The system that a user gave; a Mechanism is assembled.
+    """Return the argument of a user as a System. A Mechanism is assembled.
 
     Raises:
-        ModelError: it is neither.
+        ModelError: the argument has another type.
     """
     if isinstance(system, Mechanism):
         return system.assemble()
@@ -56,7 +56,7 @@ def child_positions(system: System, q: Sequence[float]) -> list[float]:
 
 
 def check_backward_drives(system: System, file: str) -> None:
-    """Refuse drives and friction of free and spherical joints with the child body on frame_a.
+    """Check free and spherical joints with the child body on frame_a for drives and friction.
 
     Raises:
         ModelError: friction or rotor inertia acts on velocities that the file does not have.
@@ -106,8 +106,8 @@ def write_xml(root: Element, path: str | os.PathLike[str], note: str = "") -> No
 
     Args:
         root: element of the robot.
-        path: of the file.
-        note: becomes a comment at the begin.
+        path: path of the file.
+        note: text of a comment at the beginning of the file.
 
     Raises:
         ExportError: the file cannot be written.

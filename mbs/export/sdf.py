@@ -1,4 +1,4 @@
-"""SDFormat robot files from mechanisms, with their loops."""
+"""Export of mechanisms, including closed loops, as SDFormat robot files."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from mbs.spatial.rotation import quaternion_rotation
 
 Array = NDArray[np.float64]
 
-_DOWN = (0.0, 0.0, -9.81)  # [m/s^2] what SDF files without a world suppose of gravity
+_DOWN = (0.0, 0.0, -9.81)  # gravity [m/s^2] that SDF readers assume for a file without a world
 _NAMESPACE = "http://drake.mit.edu"
 _GROUND = "ground"
 _TYPES = {
@@ -54,22 +54,24 @@ _CLOSING = {
 def sdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
     """Write a mechanism as an SDFormat file, symbols at their default values.
 
-    Every link of the tree is a link with the name and the frame of a body that it carries, and the
-    inertia of all of them; other bodies and named frames are frames. Joints that close loops are
-    joints with a second parent. An SDF file has joints at zero where it is drawn: mechanisms with
-    loops are drawn in `system.configuration`, from which their positions then count, others at
-    zero. Free links start in it, and have the free joint `root_joint` when the file is read again.
-    Couplings of degree one are mimics, Ia is Drake's rotor inertia, a joint without a motor has an
-    effort of zero.
+    Every link of the tree becomes a link with the name and frame of its first body and the total
+    inertia of its bodies. Other bodies and named frames become frames. Joints that close loops are
+    joints whose child link has a second parent. In an SDF file all joint positions are zero in the
+    drawn configuration. Mechanisms with loops are drawn in `system.configuration`, and their joint
+    positions are relative to it. Other mechanisms are drawn at zero positions. Free links start in
+    `system.configuration`; `mbs.load` gives them the free joint `root_joint`. Couplings of degree
+    one become mimics, and Ia becomes the rotor inertia of Drake. A joint without a motor has an
+    effort limit of zero.
 
     Args:
-        system: of revolute, prismatic, spherical and free motions; a Mechanism is assembled first.
-        path: of the .sdf file.
+        system: mechanism with revolute, prismatic, spherical and free motions. A Mechanism is
+            assembled first.
+        path: path of the .sdf file.
 
     Raises:
-        ModelError: it is neither, it has rotors, force elements, a drive line, a free joint that
-            is not on the world, couplings of a higher degree, a loop that closes by another joint
-            than a fixed, revolute, prismatic, spherical or universal one, or a symbol has no value.
+        ModelError: system has another type, rotors, force elements, a drive line, a free joint that
+            is not on the world, couplings of a higher degree, or a loop closed by a joint other
+            than fixed, revolute, prismatic, spherical or universal. A symbol has no value.
         ExportError: the file cannot be written.
     """
     system = system_of(system)
@@ -83,7 +85,7 @@ def _refusal(system: System, what: str) -> ModelError:
 
 
 def _check(system: System) -> None:
-    """Refuse what the format cannot say."""
+    """Raise ModelError if the format does not support a part of the system."""
     if system.parts or system.shafts:
         raise _refusal(system, "it has force elements or a drive line")
     for link in system.tree.links:
@@ -113,16 +115,17 @@ def _check_loops(system: System) -> None:
 
 @dataclass(slots=True)
 class _SdfWriting:
-    """Writes the elements of one file.
+    """Writer of the XML elements of an SDF file.
 
     Attributes:
-        system: that is written.
-        number: numbers of its expressions.
-        start: positions at which it is drawn.
-        frame: of each link (-1 for the world): its name, and its (4, 4) pose in that of the tree.
-        drawn: (4, 4) pose of each frame of the tree in the world.
-        joints: the element of each joint of the tree, by where its position stands in q.
-        names: those that were given, by those of the system.
+        system: mechanism to write.
+        number: function that evaluates expressions at the default values of symbols.
+        start: joint positions q (nq,) of the drawn configuration.
+        frame: dict from link index (-1 for the world) to the name of the link in the file and the
+            pose (4, 4) of its frame in the link frame of the tree.
+        drawn: dict from link index to the pose (4, 4) of the link frame in the world, as drawn.
+        joints: dict from the index of a joint position in q to the XML element of the joint.
+        names: dict from names in the system to names in the file.
     """
 
     system: System
@@ -162,7 +165,7 @@ class _SdfWriting:
         return root
 
     def _name(self, name: str) -> str:
-        """A name that the format takes, of its own."""
+        """Return the name in the file for a name of the system: valid and unique."""
         if name not in self.names:
             plain = name.replace("::", "_").replace(".", "_")
             while plain in self.names.values() or plain in ("world", "__model__"):
@@ -171,7 +174,7 @@ class _SdfWriting:
         return self.names[name]
 
     def _unused_name(self, name: str) -> str:
-        """A name that nothing of the system has."""
+        """Return a name in the file, based on `name`, that no part of the system has."""
         system = self.system
         while name in self.names or name in system.frames or name in self.names.values():
             name += "_"
@@ -207,7 +210,7 @@ class _SdfWriting:
         self._drive(joint, link)
 
     def _motion(self, link: Link) -> Array:
-        """(4, 4) displacement of a link from its placement, where it is drawn."""
+        """Return the joint displacement (4, 4) of a link in the drawn configuration."""
         T, q = np.eye(4), self.start[link.q]
         if link.motion is Motion.REVOLUTE:
             c, s = math.cos(q[0]), math.sin(q[0])
@@ -221,7 +224,7 @@ class _SdfWriting:
         return inverse(T) if link.backward else T
 
     def _drive(self, joint: Element, link: Link) -> None:
-        """Axis, dynamics, limits and motor of a joint of one axis."""
+        """Append axis, dynamics, limits and motor of a revolute or prismatic joint."""
         system, zero = self.system, float(self.start[link.q.start])
         axis = SubElement(joint, "axis")
         _say(axis, "xyz", "0 0 1")
@@ -254,10 +257,10 @@ class _SdfWriting:
     # Loops, couplings, named frames.
 
     def _close(self, model: Element, cut: Cut) -> None:
-        """A joint with a second parent: at zero where the loop is drawn."""
+        """Append a loop-closing joint, with position zero in the drawn configuration."""
         joint = cut.edge.joint
         ends = [(number, self.number(pose.matrix)) for number, pose in cut.frames]
-        # the world is no child
+        # the world cannot be the child link
         (a, at_a), (b, at_b) = ends if ends[1][0] >= 0 else ends[::-1]
         parent, child = self.frame[a][0], self.frame[b][0]
         kind = "fixed" if cut.welded else _CLOSING[type(joint)]
@@ -301,14 +304,14 @@ class _SdfWriting:
                 _say(mimic, tag, value)
 
     def _add_frames(self, model: Element, frames_by_name: Mapping[str, tuple[int, Array]]) -> None:
-        """Bodies that are no links of the file, and named frames."""
+        """Append frames for named frames and for the bodies that are not links of the file."""
         written = {name for name, _ in self.frame.values()}
         ground = ""
         for name, (number, pose) in frames_by_name.items():
             if self._name(name) in written:
                 continue
             carrier, before = self.frame[number]
-            if number < 0:  # no frame of a model is attached to the world but through a link
+            if number < 0:  # a frame of a model can only be attached to the world through a link
                 if not ground:
                     ground = self._unused_name(_GROUND)
                     _inertial(SubElement(model, "link", name=ground), 1.0, np.zeros(3), np.eye(3))
@@ -319,7 +322,10 @@ class _SdfWriting:
 
 
 def _position(T: Array, axis: Array, kind: str) -> float:
-    """Of a revolute or prismatic joint about or along a unit axis, by the pose of its frames."""
+    """Return the position of a revolute or prismatic joint from the pose T (4, 4) of its frames.
+
+    axis: unit axis (3,) of the joint.
+    """
     if kind == "prismatic":
         return float(axis @ T[:3, 3])
     R = T[:3, :3]

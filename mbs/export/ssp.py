@@ -1,4 +1,4 @@
-"""A system of connected FMUs as one file: System Structure and Parameterization, SSP 1.0."""
+"""Export of connected FMUs as an SSP file (System Structure and Parameterization 1.0)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SPACES = {
     "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
 }
 START_SET = "initialValues"
-"""Name of the set of start values, one in each component, as tools of co-simulation name it."""
+"""Name of the set of start values in each component, as in other co-simulation tools."""
 
 _BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 _INTEGERS = frozenset(
@@ -40,13 +40,13 @@ _KINDS = {"Real": "Real", "Float64": "Real", "Float32": "Real", "Boolean": "Bool
 
 @dataclass(frozen=True, slots=True)
 class SspPart:
-    """A component of a system structure.
+    """Component of a system structure.
 
     Attributes:
-        name: of the component.
-        source: its FMU in the archive, such as `resources/robot.fmu`.
-        description: the model description of the FMU, as fmpy reads it.
-        start: variable to its value before initialization.
+        name: name of the component.
+        source: path of its FMU in the archive, such as `resources/robot.fmu`.
+        description: model description of the FMU, as read by fmpy.
+        start: dict from variable name to its value before initialization.
     """
 
     name: str
@@ -56,17 +56,17 @@ class SspPart:
 
     @property
     def variables(self) -> dict[str, Any]:
-        """Every variable of the FMU by its name."""
+        """Dict from name to variable of the FMU."""
         return {v.name: v for v in self.description.modelVariables}
 
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """A value that one component gives to another.
+    """Connection from an output of a component to an input of a component.
 
     Attributes:
-        source: component and output.
-        target: component and input.
+        source: names of component and output.
+        target: names of component and input.
     """
 
     source: tuple[str, str]
@@ -74,19 +74,24 @@ class Connection:
 
 
 def ssp_kind(variable: Any) -> str | None:
-    """The type of a connector for a variable; None where SSP 1.0 has none for it."""
+    """Return the connector type of a variable of fmpy, or None if SSP 1.0 has no such type."""
     return None if getattr(variable, "dimensions", None) else _KINDS.get(variable.type)
 
 
 def unit_of(variable: Any) -> str | None:
-    """The name of the unit of a variable, which its type may declare; None without one."""
+    """Return the unit name of a variable of fmpy, also from its declared type, or None."""
     declared = variable.declaredType
     unit = variable.unit or (None if declared is None else declared.unit)
     return unit if ssp_kind(variable) == "Real" and unit else None
 
 
 def unit_exponents(description: Any, name: str) -> dict[str, str] | None:
-    """The attributes of a unit's BaseUnit in an FMU; None where it does not define the unit."""
+    """Return the BaseUnit attributes of a unit in an FMU, or None if the unit is not defined.
+
+    Args:
+        description: model description of the FMU, as read by fmpy.
+        name: name of the unit.
+    """
     for unit in description.unitDefinitions:
         if unit.name == name and unit.baseUnit is not None:
             base = unit.baseUnit
@@ -103,16 +108,16 @@ def structure_description(
     connections: Iterable[Connection],
     span: tuple[float, float],
 ) -> str:
-    """The file SystemStructure.ssd.
+    """Return the text of the file SystemStructure.ssd.
 
     Args:
-        name: of the system.
-        parts: its components.
-        connections: between them.
+        name: name of the system.
+        parts: components of the system.
+        connections: connections of the components.
         span: default start and end of a simulation [s].
 
     Returns:
-        its text.
+        Text of the XML file.
     """
     for prefix, space in _SPACES.items():
         register_namespace(prefix, space)
@@ -202,7 +207,7 @@ def _write_connections(parent: Element, connections: list[Connection]) -> None:
 
 
 def _units(parts: list[SspPart]) -> dict[str, dict[str, str]]:
-    """Every unit of a connector, and the attributes of its BaseUnit."""
+    """Return dict from the unit names of all connectors to their BaseUnit attributes."""
     return {
         unit: unit_exponents(part.description, unit) or {}
         for part in parts
@@ -219,7 +224,7 @@ def _add_units(parent: Element, units: Mapping[str, Mapping[str, str]]) -> None:
 
 Components = Mapping[str, str | os.PathLike[str]] | Sequence[str | os.PathLike[str]]
 
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # equal systems give equal files
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # date of all files, so that equal systems give equal archives
 
 
 def ssp(
@@ -231,23 +236,24 @@ def ssp(
     name: str | None = None,
     stop_time: float | None = None,
 ) -> Path:
-    """Write FMUs and their connections as one SSP, which co-simulation tools open.
+    """Write FMUs and their connections as an SSP file for co-simulation tools.
 
-    Every input and output is a connector with its unit. Variables are written
-    `component.variable`, such as `robot.j1.tau`; the name of a component has no dot.
+    Every input and output becomes a connector with its unit. Variables are named
+    `component.variable`, such as `robot.j1.tau`. The name of a component has no dot.
 
     Args:
-        path: file to write, such as cell.ssp; it is replaced as a whole, or left alone.
-        components: name of each component to the path of its FMU, of FMI 2.0 or 3.0 with
-            co-simulation; or paths, whose file names then name the components.
+        path: file to write, such as cell.ssp. An existing file is replaced only if the export
+            succeeds.
+        components: dict from the name of each component to the path of its FMU (FMI 2.0 or 3.0 with
+            co-simulation). Or list of paths, whose file names are the names of the components.
         connections: (output, input) pairs, such as ("controller.tau1", "robot.j1.tau").
         start: values of parameters, inputs and states before initialization, in the units of the
             FMUs.
-        name: of the system; the name of the file when left out.
-        stop_time: default end of a simulation [s]; the latest that an FMU proposes when left out.
+        name: name of the system. By default the name of the file.
+        stop_time: default end of a simulation [s]. By default the latest stop time of the FMUs.
 
     Returns:
-        the path written.
+        Path of the file.
 
     Raises:
         ExportError: a file cannot be read or written, an FMU has no co-simulation, a name is
@@ -271,7 +277,7 @@ def ssp(
 
 
 def _files(components: Any) -> dict[str, Path]:
-    """The path of each component."""
+    """Return dict from component name to path of the FMU, after checks of the names."""
     if not isinstance(components, Iterable):
         raise ExportError(f"SSP: components is {quoted(components)}; give a dict of names to paths")
     if isinstance(components, Mapping):
@@ -325,7 +331,7 @@ def _describe(part: str, file: Path) -> Any:
 
 
 def _sources(files: Mapping[str, Path], contents: Mapping[str, bytes]) -> dict[str, str]:
-    """The place of each FMU in the archive; equal files are there once."""
+    """Return the path of each component's FMU in the archive. Identical FMUs share a path."""
     paths: dict[bytes, str] = {}
     for part, file in files.items():
         if contents[part] not in paths:
@@ -339,7 +345,7 @@ def _sources(files: Mapping[str, Path], contents: Mapping[str, bytes]) -> dict[s
 def _start_values(
     described: Mapping[str, Any], start: Mapping[str, float]
 ) -> dict[str, dict[str, float]]:
-    """Start values of each component, checked."""
+    """Return the start values by component, after checks of names and values."""
     found: dict[str, dict[str, float]] = {}
     for address, value in start.items():
         part, variable = _variable(described, "start", address)
@@ -361,7 +367,7 @@ def _settable(variable: Any) -> bool:
 
 
 def _variable(described: Mapping[str, Any], what: str, address: object) -> tuple[str, Any]:
-    """The component and the variable that an address names."""
+    """Return component name and variable of an address such as `robot.j1.tau`."""
     part, dot, name = address.partition(".") if isinstance(address, str) else ("", "", "")
     if not dot:
         raise ExportError(
@@ -433,7 +439,7 @@ def _check_types(source: tuple[str, Any], target: tuple[str, Any]) -> None:
 
 
 def _check_units(source: tuple[str, Any, Any], target: tuple[str, Any, Any]) -> None:
-    """Refuse units of different kind or size; an end without one, or in 1, takes any."""
+    """Raise ExportError if the units of two ends differ. No unit and "1" match every unit."""
     ends = [(unit_of(variable), description) for _, variable, description in (source, target)]
     (given, _), (expected, _) = ends
     if {given, expected} & {None, "1"}:
@@ -465,7 +471,7 @@ def _zip(files: Mapping[str, bytes]) -> bytes:
     with zipfile.ZipFile(stream, "w") as archive:
         for file, content in files.items():
             info = zipfile.ZipInfo(file, _EPOCH)
-            stored = file.endswith(".fmu")  # an archive itself
+            stored = file.endswith(".fmu")  # an FMU is compressed already
             info.compress_type = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
             info.external_attr = 0o644 << 16
             archive.writestr(info, content)

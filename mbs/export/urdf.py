@@ -1,4 +1,4 @@
-"""URDF robot files from mechanisms without loops."""
+"""Export of mechanisms without loops as URDF robot files."""
 
 from __future__ import annotations
 
@@ -33,28 +33,29 @@ from mbs.text import listed, quoted
 Array = NDArray[np.float64]
 
 _ON_AXIS = 1e-14
-"""How far a body may be from the axis that its joint is written on [m]: rounding, no more."""
+"""Largest distance [m] of the origin of a body from its joint axis: only rounding."""
 _SAME = 1e-12
-"""Difference of gravity [m/s^2] or of a transform [m] that is rounding, which is below 1e-14."""
-_DOWN = (0.0, 0.0, -9.81)  # [m/s^2] what readers of URDF files suppose, which cannot say it
+"""Difference of gravity [m/s^2] or of a transform [m] that counts as rounding (below 1e-14)."""
+_DOWN = (0.0, 0.0, -9.81)  # gravity [m/s^2] that readers assume, because URDF cannot specify it
 
 
 def urdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
-    """Write a mechanism without loops as a URDF file, symbols at their default values.
+    """Write a mechanism without loops as a URDF file, with symbols at their default values.
 
-    Every body is a link of its name, every named frame a link without mass, and every motion a
-    joint. Of bodies that are welded together one has the whole inertia. Couplings of degree one
-    are mimics, rotor inertia Ia is that of a transmission of ratio one. Which joints have motors,
-    the width of Coulomb friction and one-sided ranges of a motor the format cannot say; they are
-    lost, the last are refused. A rotated mount makes the frame "outer_world" the world of the file.
+    Every body becomes a link of the same name, every named frame a link without mass, and every
+    motion a joint. Of bodies that are fixed to each other, one body has the total inertia.
+    Couplings of degree one become mimics, and rotor inertia Ia becomes the motor inertia of a
+    transmission of ratio one. The format does not contain the actuated joints and the width of
+    Coulomb friction. If a mount rotates the base, the frame "outer_world" is the world of the file.
 
     Args:
-        system: of revolute, prismatic and free motions; a Mechanism is assembled first.
-        path: of the .urdf file.
+        system: mechanism with revolute, prismatic and free motions. A Mechanism is assembled first.
+        path: path of the .urdf file.
 
     Raises:
-        ModelError: it is neither, it has loops, a spherical joint, springs, rotors, force elements
-            or other gravity than 9.81 m/s^2 along -z, or a symbol has no value.
+        ModelError: system has another type, loops, a spherical joint, springs, rotors, force
+            elements, effort or velocity limits that differ by direction, a gravity other than
+            9.81 m/s^2 along -z, or a symbol without value.
         ExportError: the file cannot be written.
     """
     system = system_of(system)
@@ -64,11 +65,11 @@ def urdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
 
 
 class Numbers:
-    """Numbers of a system, its symbols at their defaults.
+    """Function that evaluates expressions of a system at the default values of its symbols.
 
     Args:
-        system: that is written.
-        file: its kind, for messages.
+        system: mechanism to write.
+        file: kind of file, for error messages.
     """
 
     def __init__(self, system: System, file: str) -> None:
@@ -82,13 +83,13 @@ class Numbers:
         self.p, self.values = system.p, system.p_default
 
     def __call__(self, value: SX) -> Array:
-        """The numbers of an expression, as an array of its shape."""
+        """Evaluate an expression. Returns an array of its shape."""
         function = Function("value", [self.p], [casadi.densify(SX(value))])
         return np.array(function(self.values), dtype=float)
 
 
 def _check(system: System) -> None:
-    """Refuse what URDF cannot say."""
+    """Raise ModelError if URDF does not support a part of the system."""
 
     def fail(what: str) -> None:
         raise ModelError(f"{system.name}: {what}, which URDF cannot say; take it away first")
@@ -112,12 +113,13 @@ def _check(system: System) -> None:
 
 @dataclass(slots=True)
 class _Writing:
-    """Writes the elements of one robot.
+    """Writer of the XML elements of a URDF file.
 
     Attributes:
-        system: that is written.
-        number: numbers of its expressions.
-        frame: of each link (-1 for the world): its name, and its (4, 4) pose in that of the tree.
+        system: mechanism to write.
+        number: function that evaluates expressions at the default values of symbols.
+        frame: dict from link index (-1 for the world) to the name of the link in the file and the
+            pose (4, 4) of its frame in the link frame of the tree.
     """
 
     system: System
@@ -147,11 +149,11 @@ class _Writing:
         return root
 
     def _mount(self, gravity: Array) -> None:
-        """Make the world of the file the one in which the gravity of a mounted robot is given.
+        """Make the outer world of a mounted robot, with gravity along -z, the world of the file.
 
         Raises:
-            ModelError: the robot has no mount that makes its gravity that of URDF, or it has a
-                free joint, whose coordinates are relative to the base.
+            ModelError: no mount rotates gravity to that of URDF, or the robot has a free joint,
+                whose coordinates are relative to the base.
         """
         system = self.system
         pose = base_pose(system)
@@ -204,7 +206,7 @@ class _Writing:
         self._rotor(root, link)
 
     def _rotor(self, root: Element, link: Link) -> None:
-        """The rotor inertia of a joint, as that of a motor with the ratio 1."""
+        """Append the rotor inertia of a joint as a transmission with reduction 1."""
         inertia = float(self.number(link.Ia).item())
         if not inertia:
             return
@@ -217,7 +219,10 @@ class _Writing:
     def _carrier(
         self, j: int, link: Link, frames_by_name: Mapping[str, tuple[int, Array]]
     ) -> tuple[str, Array]:
-        """The frame of a link of the file: a body on the axis of its joint, or one of its own."""
+        """Return name and pose (4, 4) of the link frame in the file.
+
+        It is the frame of a body with its origin on the joint axis, or else the link frame itself.
+        """
         bodies = [body.name for body in self.system.bodies]
         for name, (number, pose) in frames_by_name.items():
             away = pose[:2, 3] if link.motion is Motion.REVOLUTE else np.zeros(2)
@@ -244,7 +249,7 @@ class _Writing:
                 )
 
     def _add_fixed_joint(self, root: Element, name: str, number: int, pose: Array) -> None:
-        """A body or a named frame that is fixed on a link."""
+        """Append a link with a fixed joint for a body or named frame on link `number`."""
         parent, before = self.frame[number]
         SubElement(root, "link", name=name)
         joint = SubElement(root, "joint", name=f"{name}_fixed", type="fixed")
@@ -254,13 +259,16 @@ class _Writing:
 
 
 def inertia_of(system: str, link: Link, pose: Array, number: Numbers) -> tuple[float, Array, Array]:
-    """Mass, centre of mass, and inertia about it, in a frame on a link.
+    """Return mass, centre of mass (3,) and inertia about it (3, 3), in a frame on a link.
 
     Args:
-        system: its name, for messages.
-        link: that has the inertia.
-        pose: (4, 4) of the frame, in that of the link.
-        number: numbers of the system.
+        system: name of the system, for error messages.
+        link: link of the tree.
+        pose: pose (4, 4) of the frame in the link frame.
+        number: function that evaluates expressions.
+
+    Raises:
+        ModelError: the link has first moments but no mass.
     """
     ten = number(link.inertia.parameters).ravel()
     J = ten[[0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(3, 3)
@@ -279,12 +287,15 @@ def inertia_of(system: str, link: Link, pose: Array, number: Numbers) -> tuple[f
 def limits_of(
     system: System, link: Link, file: str
 ) -> tuple[tuple[float, float] | None, float, float]:
-    """Range of the position, largest velocity and largest effort of the motion of a link.
+    """Return position limits (or None), velocity limit and effort limit of the joint of a link.
 
     Args:
-        system: that is written.
-        link: of it.
-        file: its kind, for messages.
+        system: mechanism to write.
+        link: link of the tree.
+        file: kind of file, for error messages.
+
+    Raises:
+        ModelError: a velocity or effort limit differs by direction.
     """
     if link.motion in (Motion.FREE, Motion.SPHERICAL):
         return None, UNLIMITED, UNLIMITED
@@ -302,12 +313,12 @@ def limits_of(
 
 
 def text_of(values: Any) -> str:
-    """Numbers that are read again to the last bit."""
+    """Format values separated by blanks, with all digits of a double."""
     return " ".join(repr(float(value) + 0.0) for value in values)
 
 
 def inverse(pose: Array) -> Array:
-    """The (4, 4) transform of the other direction."""
+    """Return the inverse of a homogeneous transform (4, 4)."""
     R, p = pose[:3, :3], pose[:3, 3]
     return np.block([[R.T, -(R.T @ p)[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
 
@@ -317,9 +328,9 @@ def _origin(element: Element, pose: Array) -> None:
 
 
 def angles(R: Array) -> tuple[float, float, float]:
-    """Roll, pitch and yaw of a rotation, to the last digits also where the pitch is +-pi/2.
+    """Return roll, pitch and yaw [rad] of a rotation matrix, accurate also at pitch +-pi/2.
 
-    Any yaw is right where the other two are taken for it.
+    Yaw is arbitrary at pitch +-pi/2; roll and pitch are computed for the chosen yaw.
     """
     yaw = math.atan2(R[1, 0], R[0, 0])
     c, s = math.cos(yaw), math.sin(yaw)

@@ -1,7 +1,7 @@
-"""Numbers that may be symbols: the grammar of every number a user or a file writes.
+"""Numbers that may contain symbols: the grammar of all numbers that a user or a file writes.
 
-A scalar is a number, a `Parameter`, or a text such as `"pi/2 + A"`. Texts are parsed here, by a
-grammar of numbers, symbols, `+ - * / ^`, sin, cos, tan, sqrt, atan2 and pi; they are never run.
+A scalar is a number, a `Parameter`, or a text such as `"pi/2 + A"`. Texts are parsed by a grammar
+of numbers, symbols, `+ - * / ^`, sin, cos, tan, sqrt, atan2 and pi; they are never executed.
 
     sum      := product (("+" | "-") product)*
     product  := unary (("*" | "/") unary)*

@@ -1,4 +1,4 @@
-"""What an expression is worth, and which parameters are in it."""
+"""Values and parameters of expressions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ T = TypeVar("T")
 
 
 def parameters_of(value: Expression) -> Iterator[Parameter]:
-    """Every parameter in the expression, in the order of the text, repeats included."""
+    """Yield the parameters of an expression in the order of the text, including repetitions."""
     if isinstance(value, Parameter):
         yield value
     elif isinstance(value, Operation):
@@ -35,7 +35,7 @@ def parameters_of(value: Expression) -> Iterator[Parameter]:
 
 
 def renamed(value: Expression, prefix: str) -> Expression:
-    """The expression with every parameter name put in a scope: L2 becomes prefix.L2."""
+    """Return the expression with a prefix on every parameter name: L2 becomes prefix.L2."""
     if isinstance(value, Parameter):
         return replace(value, name=f"{prefix}.{value.name}")
     if isinstance(value, Operation):
@@ -44,7 +44,7 @@ def renamed(value: Expression, prefix: str) -> Expression:
 
 
 def without_defaults(value: Expression) -> Expression:
-    """The expression whose parameters have no value of their own."""
+    """Return the expression with parameters that have no default value."""
     if isinstance(value, Parameter):
         return replace(value, default=None)
     if isinstance(value, Operation):
@@ -53,10 +53,12 @@ def without_defaults(value: Expression) -> Expression:
 
 
 def with_values(value: Expression, values: Mapping[str, float]) -> Expression:
-    """The expression with numbers in the place of parameters whose values are known.
+    """Return the expression with numbers instead of parameters with known values.
+
+    The default of a parameter is its value if `values` does not contain it.
 
     Raises:
-        ExpressionError: it has no finite value there.
+        ExpressionError: the expression has no finite value.
     """
     if isinstance(value, Parameter):
         known = values.get(value.name, value.default)
@@ -67,14 +69,14 @@ def with_values(value: Expression, values: Mapping[str, float]) -> Expression:
 
 
 def to_sx(value: Scalar, symbols: Mapping[str, SX]) -> SX:
-    """The expression on CasADi symbols, one per parameter name."""
+    """Return the expression in CasADi symbols, by parameter name."""
     return _fold(expression(value), SX, lambda p: symbols[p.name], _apply_sx)
 
 
 def to_float(value: Scalar, values: Mapping[str, float] | None = None) -> float | None:
-    """The number, with `values` or the defaults for its parameters; None if it is not known.
+    """Return the value of an expression, with parameters from `values` or by default.
 
-    It is not known either where the expression has no finite value, such as 1/A with A = 0.
+    None if a parameter has no value, or if the result is not finite, such as 1/A with A = 0.
     """
     known = values or {}
 

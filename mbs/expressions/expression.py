@@ -1,4 +1,4 @@
-"""Expressions: numbers, symbols with defaults, and operations on them."""
+"""Expressions: numbers, symbols with defaults, and operations on expressions."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from mbs.errors import ExpressionError
 from mbs.text import quoted
 from mbs.units import UNITS
 
-# The operators of the grammar on numbers, or on anything that adds and multiplies.
+# Operators of the grammar, on floats or on any type with arithmetic.
 
 
 _ROUNDING = 4e-16
-"""Functions of quarter turns miss -1, 0 and 1 by this much; they are put exactly there."""
+"""Error of functions at multiples of pi/2; results this close to an integer are rounded to it."""
 
 
 def apply_float(operator: str, values: list[float]) -> float:
-    """The result of an operator or function on numbers, NaN where there is none."""
+    """Return the value of an operator or function on numbers; NaN if it is undefined."""
     try:
         with np.errstate(all="ignore"):
             result = arithmetic(operator, [np.float64(v) for v in values])
@@ -39,7 +39,7 @@ def apply_float(operator: str, values: list[float]) -> float:
 
 
 def arithmetic(operator: str, values: list[Any]) -> Any:
-    """The result of an operator, None for a function."""
+    """Return the value of an operator; None for a function."""
     first, *rest = values
     match operator:
         case "+":
@@ -57,13 +57,13 @@ def arithmetic(operator: str, values: list[Any]) -> Any:
     return None
 
 
-# Words of the grammar: names, functions and constants.
+# Tokens of the grammar: names, functions and constants.
 
 
 FUNCTIONS = {"sin": 1, "cos": 1, "tan": 1, "sqrt": 1, "atan2": 2}
 CONSTANTS = {"pi": math.pi, "Pi": math.pi}
 NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-"""Pattern of a number without its sign."""
+"""Regular expression of a number without sign."""
 
 TOKEN = re.compile(
     rf"\s*(?:(?P<number>{NUMBER})"
@@ -75,7 +75,7 @@ _NOT_NUMBERS = ("nan", "inf", "infinity")
 
 
 def is_reserved(name: str) -> bool:
-    """Whether the name means something else than a symbol."""
+    """Return whether a name is a function, a constant or "nan", "inf", "infinity"."""
     return name in (*FUNCTIONS, *CONSTANTS) or name.lower() in _NOT_NUMBERS
 
 
@@ -84,7 +84,7 @@ _LONGEST_CHAIN = 200
 
 
 class Expression:
-    """A number, a symbol, or an operation on expressions; arithmetic on it gives expressions."""
+    """Number, symbol, or operation on expressions. Arithmetic on expressions gives expressions."""
 
     __slots__ = ()
 
@@ -129,12 +129,12 @@ class Expression:
 
 
 MORE_THAN_ZERO = sys.float_info.min
-"""The least value of what must be more than zero: the smallest normal number."""
+"""Lower bound of values that must be greater than zero: the smallest normal number."""
 
 
 @dataclass(frozen=True, slots=True)
 class Number(Expression):
-    """A number that is known."""
+    """Expression that is a known number."""
 
     value: float
 
@@ -142,7 +142,7 @@ class Number(Expression):
 
 
 def out_of_bounds(value: float, low: float | None, high: float | None) -> str:
-    """What to give in place of a value, the end of a sentence; empty where it is within bounds."""
+    """Return advice for a value out of bounds, as the end of an error message; else empty."""
     if low is not None and not value >= low:
         least = "more than zero" if low == MORE_THAN_ZERO else f"{low:g} or more"
         return f"give {'zero or more' if low == 0 else least}"
@@ -153,16 +153,15 @@ def out_of_bounds(value: float, low: float | None, high: float | None) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Parameter(Expression):
-    """A symbol that stays in the equations, with the value used when none is given.
+    """Symbol that remains in the equations, with a default value.
 
     Attributes:
         name: letters, digits and underscores; a dot separates the names of nested mechanisms.
-        default: its value in `default_in` of the Functions, or None when it has none.
-        unit: a unit of `mbs.units.UNITS`.
-        description: what it means, for tables and FMUs.
-        min: the least value that has a sense, or None; components add their own rules, such as of
-            masses.
-        max: the greatest, or None.
+        default: value in `default_in` of the Functions; None if it must be given.
+        unit: unit, a key of `mbs.units.UNITS`.
+        description: meaning, for tables and FMUs.
+        min: smallest valid value, or None. Components add their own rules, for example for masses.
+        max: largest valid value, or None.
     """
 
     name: str
@@ -203,7 +202,7 @@ class Parameter(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Operation(Expression):
-    """An operator or function applied to expressions."""
+    """Operator or function applied to expressions."""
 
     operator: str
     arguments: tuple[Expression, ...]
@@ -222,18 +221,18 @@ class Operation(Expression):
 
 
 Scalar = float | int | str | Expression
-"""What a user may write where a number is wanted."""
+"""Types that a user may write instead of a number."""
 
 
 def expression(value: Scalar, where: str = "value") -> Expression:
-    """The expression that a number, a text or an expression stands for.
+    """Return the expression of a number, a text or an expression.
 
     Args:
-        value: the scalar as the user wrote it.
-        where: which field of which component, for the error message.
+        value: number, text or expression as the user wrote it.
+        where: component and field, for the error message.
 
     Raises:
-        ExpressionError: it is not a finite number and not a text of the grammar.
+        ExpressionError: the value is neither a finite number nor a text of the grammar.
     """
     if isinstance(value, Expression):
         return value
@@ -246,7 +245,7 @@ def expression(value: Scalar, where: str = "value") -> Expression:
 
 
 def operation(operator: str, *operands: Scalar) -> Expression:
-    """An operator or function applied, at once where its operands are numbers."""
+    """Apply an operator or function; if all operands are numbers, it is evaluated immediately."""
     arguments = tuple(expression(operand) for operand in operands)
     if all(isinstance(argument, Number) for argument in arguments):
         result = apply_float(operator, [a.value for a in arguments])  # type: ignore[attr-defined]
@@ -259,7 +258,7 @@ def operation(operator: str, *operands: Scalar) -> Expression:
 
 
 def finite(value: object, where: str) -> float:
-    """The number, refused when it is not finite; also of an array of no dimension or a 1x1 DM."""
+    """Return a finite value as a float, also from a 0-dimensional array or 1x1 DM; else raise."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     elif isinstance(value, DM) and value.is_scalar():
@@ -281,7 +280,7 @@ def _text(value: Expression, outer: int = 0) -> str:
     if isinstance(value, Number):
         text = repr(value.value)
         text = text.removesuffix(".0")
-        # The sign, since -0 is less than nothing only in its text: a minus binds weaker than ^.
+        # -0.0 also has a sign, in its text only. Brackets are needed: minus binds weaker than ^.
         return f"({text})" if math.copysign(1.0, value.value) < 0 and outer else text
     if isinstance(value, Parameter):
         return value.name
@@ -308,7 +307,7 @@ _DEEPEST_NESTING = 100
 
 @lru_cache(maxsize=4096)
 def parse(text: str) -> Expression:
-    """The expression that a text stands for."""
+    """Parse a text to an expression."""
     parser = _Parser(text)
     value = parser.sum()
     if parser.token is not None:
@@ -317,7 +316,7 @@ def parse(text: str) -> Expression:
 
 
 class _Parser:
-    """The text, one token ahead."""
+    """Parser of a text with one token of lookahead."""
 
     def __init__(self, text: str) -> None:
         self.text = text

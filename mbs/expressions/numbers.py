@@ -1,7 +1,7 @@
-"""Numbers in text: files, tables, the command line and the page read them by one rule.
+"""Numbers in text, by one rule for files, tables, the command line and the page.
 
-A number is a text of the grammar without symbols, such as 0.3 or pi/2; formats whose own tools
-take nothing but digits have plain numbers. Neither is infinite.
+A number is a text of the grammar without symbols, such as 0.3 or pi/2. Formats whose own tools
+accept digits only use plain numbers. Infinite numbers are errors.
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ _PLAIN = re.compile(rf"[-+]?{NUMBER}", re.ASCII)
 
 
 def number(value: Scalar, where: str) -> float:
-    """The number that a text, or an expression whose symbols have values, is.
+    """Return the value of a number, of its text, or of an expression with known symbols.
 
     Args:
-        value: as it was written.
-        where: which file, field or option, for the error message.
+        value: number, text or expression as the user wrote it.
+        where: name of the file, field or option, for the error message.
 
     Raises:
-        ExpressionError: it is not of the grammar, has a symbol in it, or is True or False.
+        ExpressionError: the text is not in the grammar, a symbol has no value, or the value is
+            True or False.
     """
     found = _find(value, where)
     if found is None:
@@ -36,7 +37,7 @@ def number(value: Scalar, where: str) -> float:
 
 
 def whole_number(value: Scalar, where: str) -> int:
-    """The whole number that a text or an expression is; arguments and errors as for `number`."""
+    """Return the integer that a text or an expression is; arguments and errors as for `number`."""
     found = _find(value, where)
     if found is None or not found.is_integer():
         raise ExpressionError(f"{where}: {_given(value)} is not a whole number; write one")
@@ -52,15 +53,15 @@ def _given(value: Scalar) -> str:
 
 
 def plain_numbers(text: str, count: int, where: str) -> tuple[float, ...]:
-    """Numbers in digits, between blanks.
+    """Return numbers that are written in digits and separated by blanks.
 
     Args:
-        text: as it was written.
-        count: how many there must be.
-        where: which file, field or option, for the error message.
+        text: text as the user wrote it.
+        count: required number of numbers.
+        where: name of the file, field or option, for the error message.
 
     Raises:
-        ExpressionError: there are others than so many finite numbers.
+        ExpressionError: the text is not exactly `count` finite numbers.
     """
     words = text.split()
     values = tuple(float(word) for word in words if _PLAIN.fullmatch(word))

@@ -1,4 +1,4 @@
-"""Robot files: tables of frames (TOML, dict, .par), URDF, SDFormat and MJCF, read as mechanisms."""
+"""Readers and writers of robot files: tables of frames (TOML, dict, .par), URDF, SDF and MJCF."""
 
 from mbs.formats.mjcf import read_mjcf
 from mbs.formats.par import read_par

@@ -1,4 +1,4 @@
-"""Bytes and texts read from files, and names that components can bear."""
+"""Reading of bytes and texts from files, and conversion of names to component names."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from mbs.errors import DescriptionError
 from mbs.text import quoted, seen
 
 LARGEST_FILE = 64_000_000
-"""Bytes that are read of a file; the largest descriptions of robots have a few millions."""
+"""Maximum number of bytes of a file; the largest robot descriptions have a few millions."""
 LONGEST_NAME = 80
-"""Letters that a name keeps, as many as messages quote."""
+"""Maximum length of a name, equal to the length that messages quote."""
 
 _NOT_IN_NAMES = re.compile(r"[\s.'\"]+")
 _MARKS = {
@@ -25,15 +25,15 @@ _MARKS = {
 
 
 def read_bytes(path: str | Path) -> bytes:
-    """The content of a file.
+    """Return the content of a file.
 
     Raises:
-        DescriptionError: it is no path, there is no such file, it is not a plain one, it has more
-            bytes than `LARGEST_FILE`, or it cannot be read.
+        DescriptionError: the argument is not a path, the file does not exist or is not a regular
+            file, it has more than `LARGEST_FILE` bytes, or it cannot be read.
     """
     try:
         place = Path(path)
-        plain = stat.S_ISREG(place.stat().st_mode)  # a pipe or a device may never end
+        plain = stat.S_ISREG(place.stat().st_mode)  # reading a pipe or a device may never end
         with place.open("rb") if plain else io.BytesIO() as file:
             content = file.read(LARGEST_FILE + 1)
     except (TypeError, ValueError):
@@ -57,16 +57,18 @@ def read_bytes(path: str | Path) -> bytes:
 
 
 def read_text(path: str | Path) -> str:
-    """The text of a file, UTF-8 or what its byte-order mark says; other bytes are replaced.
+    """Return the text of a file, decoded by its byte-order mark or as UTF-8.
+
+    Invalid bytes are replaced.
 
     Raises:
-        DescriptionError: as in `read_bytes`.
+        DescriptionError: the errors of `read_bytes`.
     """
     return decoded(read_bytes(path))
 
 
 def decoded(content: bytes, encoding: str = "utf-8") -> str:
-    """A text by its byte-order mark, else in an encoding; bad bytes are replaced."""
+    """Decode a text by its byte-order mark, or else with `encoding`. Invalid bytes are replaced."""
     for mark, name in _MARKS.items():
         if content.startswith(mark):
             return content.decode(name, errors="replace")
@@ -74,5 +76,8 @@ def decoded(content: bytes, encoding: str = "utf-8") -> str:
 
 
 def component_name(text: str) -> str:
-    """The text with blanks, dots and quotes replaced by underscores, without unseen letters."""
+    """Return a valid component name: the text with blanks, dots and quotes replaced by underscores.
+
+    Invisible characters are removed, and the name is cut to `LONGEST_NAME` characters.
+    """
     return seen(_NOT_IN_NAMES.sub("_", text.strip()))[:LONGEST_NAME]

@@ -1,4 +1,4 @@
-"""Files of meshes that descriptions of robots name: where they are, and which may be read."""
+"""Search for the mesh files that robot descriptions refer to."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ _SEARCH = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH", "GAZEBO_MODEL_PATH")
 
 @dataclass(slots=True)
 class MeshFiles:
-    """Finds the meshes of one description, and says once which were not found.
+    """Search for the mesh files of a robot description; a note reports missing files.
 
-    A package is looked for in `packages`, then among the folders above the file and those in them,
-    then where ROS has its packages. A path inside of a package stays there.
+    A package is searched in `packages`, then among the parent folders of the file and their
+    subfolders, then in the package paths of ROS. Paths cannot leave the folder of their package.
 
     Attributes:
-        folder: that relative paths start at; None where no other file may be looked at.
-        packages: folders of packages by name.
-        missing: what was not found, and the line of the file that names it.
-        folders: of the packages that were looked for.
+        folder: folder of relative paths; None if no other files may be read.
+        packages: folder of each package, by package name.
+        missing: names of files that were not found, with the line of the description.
+        folders: cache of candidate folders by package name.
     """
 
     folder: Path | None
@@ -38,24 +38,26 @@ class MeshFiles:
     folders: dict[str, list[Path]] = field(default_factory=dict)
 
     def find(self, name: str, line: int | None = None) -> Path | None:
-        """The file that a name in the description stands for; None, remembered, if there is none.
+        """Return the path of a mesh file, or None if there is no such file.
+
+        A missing name is recorded for `note`.
 
         Args:
             name: package://package/path, file:///path, or a path.
-            line: of the description.
+            line: line number of the name in the description.
         """
         found = None
         if self.folder is not None and is_mesh_file(name):
             try:
                 found = next((p for p in self._candidates(name, self.folder) if p.is_file()), None)
-            except (OSError, ValueError):  # names that no file can have
+            except (OSError, ValueError):  # names that are invalid as file names
                 found = None
         if found is None:
             self.missing.setdefault(name, line)
         return found
 
     def note(self, notes: Notes) -> None:
-        """Take one note of all meshes that are missing."""
+        """Add one note on all missing meshes."""
         if not self.missing:
             return
         first, line = next(iter(self.missing.items()))
@@ -86,7 +88,7 @@ class MeshFiles:
         return [folder / name.replace("\\", "/")]
 
     def _package(self, name: str, folder: Path) -> list[Path]:
-        """Folders that may be the package of this name."""
+        """Return the folders that may contain the package of this name."""
         if name not in self.folders:
             found = [Path(self.packages[name])] if name in self.packages else []
             if not found and name not in (".", ".."):
@@ -101,6 +103,6 @@ class MeshFiles:
 
 
 def _within(folder: Path, name: str) -> Path | None:
-    """A path in a folder; None where it leads out of it."""
+    """Return the path of a file in a folder; None if the path is outside the folder."""
     path = Path(os.path.normpath(folder / name))
     return path if path.is_relative_to(os.path.normpath(folder)) else None

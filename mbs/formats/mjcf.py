@@ -1,10 +1,9 @@
-"""MJCF model files, read through MuJoCo as mechanisms.
+"""Reader of MJCF model files, compiled by MuJoCo.
 
-The file is compiled by MuJoCo, so that defaults, frames, angle units, orientations and inertias
-from geoms are what MuJoCo makes of them; the mechanism is built from the compiled model. What has
-no part in the motion, such as meshes of bodies whose inertia is given, textures and sensors, is
-taken out before with all that refers to it, so that its files may be missing. Contacts are not
-read.
+The mechanism is built from the compiled model, so defaults, frames, angle units, orientations and
+inertias from geoms are interpreted by MuJoCo. Elements without effect on the motion (meshes of
+bodies with a given inertia, textures, sensors) are removed before compilation with all references
+to them, so that their files may be missing. Contacts are not read.
 """
 
 from __future__ import annotations
@@ -47,50 +46,51 @@ from mbs.formats.xml import parse_xml
 from mbs.mechanism import Mechanism
 from mbs.text import install_command, quoted
 
-# What the flags of an MJCF file switch off.
-#
-# MuJoCo keeps two sets of bits in its options, `disableflags` and `enableflags`; the groups of
-# `actuatorgroupdisable` are a third. Versions differ in their names: springs and dampers had one
-# flag, `passive`, before they had one each.
+# Effect of the flags of an MJCF file.
+
+# MuJoCo has two sets of bits in its options, `disableflags` and `enableflags`; the groups of
+# `actuatorgroupdisable` are a third set. The names depend on the version: older versions have one
+# flag `passive` for springs and dampers, newer versions have one flag for each.
 
 
 _EFFECTIVE = {
     *("CONSTRAINT", "EQUALITY", "FRICTIONLOSS", "LIMIT", "GRAVITY", "CLAMPCTRL", "ACTUATION"),
     *("PASSIVE", "SPRING", "DAMPER"),
 }
-"""Disable flags that change what is read; `Flags` says how."""
+"""Disable flags that change the mechanism; see `Flags`."""
 _WITHOUT_EFFECT = {
     *("CONTACT", "FILTERPARENT", "MIDPHASE", "NATIVECCD", "MULTICCD"),  # contacts are not read
-    *("REFSAFE", "WARMSTART", "ISLAND"),  # the solver of soft constraints; ours are exact
-    *("EULERDAMP", "AUTORESET"),  # the integrator and what it does with bad states
+    *("REFSAFE", "WARMSTART", "ISLAND"),  # solver of soft constraints; constraints of mbs are exact
+    *("EULERDAMP", "AUTORESET"),  # integrator and its reset after invalid states
     "SENSOR",  # sensors are not read
 }
-"""Disable flags that do not change the equations of motion, and why."""
+"""Disable flags without effect on the equations of motion, with the reason."""
 _ENABLED_WITHOUT_EFFECT = {
     *("OVERRIDE", "MULTICCD", "IPC", "SPECULATIVE"),  # contacts are not read
-    *("ISLAND", "DIAGEXACT", "SLEEP"),  # the solver of soft constraints, and what it skips
-    *("ENERGY", "FWDINV"),  # further outputs
-    "INVDISCRETE",  # how the inverse dynamics of MuJoCo take accelerations of a discrete step
+    *("ISLAND", "DIAGEXACT", "SLEEP"),  # solver of soft constraints, and bodies that it skips
+    *("ENERGY", "FWDINV"),  # additional outputs
+    "INVDISCRETE",  # discrete-time accelerations in the inverse dynamics of MuJoCo
 }
-"""Enable flags that do not change the equations of motion, and why."""
+"""Enable flags without effect on the equations of motion, with the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class Flags:
-    """What acts in a compiled model.
+    """Active parts of a compiled model.
 
     Attributes:
-        gravity: weight.
-        springs: springs of joints and tendons.
-        dampers: viscous friction of joints and tendons.
-        passive: the medium and gravity compensation, which stop when springs and dampers both do.
-        friction: Coulomb friction of joints and tendons, which is a constraint in MuJoCo.
-        limits: ranges of joints.
-        equalities: closing joints, welds and couplings.
-        actuation: actuators of all groups.
-        control_ranges: whether controls stay in their ranges.
-        disabled_groups: bits of the groups of actuators that do not act.
-        unknown: names of flags that are set and that this reader does not know.
+        gravity: whether gravity acts.
+        springs: whether springs of joints and tendons act.
+        dampers: whether viscous friction of joints and tendons acts.
+        passive: whether the medium and gravity compensation act; they are disabled with both
+            springs and dampers.
+        friction: whether Coulomb friction of joints and tendons acts (a constraint in MuJoCo).
+        limits: whether joint ranges are active.
+        equalities: whether equality constraints (connect, weld, joint, tendon) are active.
+        actuation: whether actuators act.
+        control_ranges: whether controls are clamped to their ranges.
+        disabled_groups: bit mask of disabled actuator groups.
+        unknown: names of set flags that this reader does not support.
     """
 
     gravity: bool
@@ -107,7 +107,7 @@ class Flags:
 
     @staticmethod
     def of(mujoco: Any, model: Any) -> Flags:
-        """The flags of a compiled model."""
+        """Return the flags of a compiled model."""
         disabled = set(_flag_names(mujoco.mjtDisableBit, "mjDSBL_", int(model.opt.disableflags)))
         enabled = set(_flag_names(mujoco.mjtEnableBit, "mjENBL_", int(model.opt.enableflags)))
         unknown = (disabled - _EFFECTIVE - _WITHOUT_EFFECT) | (enabled - _ENABLED_WITHOUT_EFFECT)
@@ -128,34 +128,34 @@ class Flags:
         )
 
     def drives(self, group: int) -> bool:
-        """Whether actuators of a group act; groups that have no bit always do."""
+        """Whether actuators of a group act; groups without a bit are always active."""
         return self.actuation and not (0 <= group < 31 and self.disabled_groups >> group & 1)
 
 
 def _flag_names(kinds: Any, prefix: str, bits: int) -> Iterator[str]:
-    """Names of the bits that are set, `bit N` of those that have none."""
+    """Yield the names of the set bits, or "bit N" for bits without a name."""
     known = {int(kind): name for name, kind in kinds.__members__.items() if name.startswith(prefix)}
     for k in range(bits.bit_length()):
         if bits >> k & 1:
             yield known.get(1 << k, f"bit {k}").removeprefix(prefix)
 
 
-# A model that MuJoCo compiled, with names that components can bear.
+# Compiled MuJoCo model with valid component names.
 
 
 @dataclass(frozen=True, slots=True)
 class MjcfModel:
-    """A compiled model.
+    """Compiled MuJoCo model with valid and unique component names.
 
     Attributes:
-        mujoco: the module.
+        mujoco: the mujoco module.
         data: the mujoco.MjModel.
-        notes: what is said of the file; `notes.path` is its path.
-        bodies, joints, sites, equalities, tendons: names, by MuJoCo's numbers.
-        acting: numbers of the actuators that are not switched off.
-        flags: what acts in the model.
-        locked: positions of the joints that do not move, since equalities lock them [rad or m],
-            or since their roots are fixed.
+        notes: import notes of the file; `notes.path` is its path.
+        bodies, joints, sites, equalities, tendons: component names, by MuJoCo index.
+        acting: indices of the active actuators.
+        flags: active parts of the model.
+        locked: positions of joints that are locked by equalities [rad or m], and 0 for free joints
+            of fixed roots.
     """
 
     mujoco: Any
@@ -172,7 +172,7 @@ class MjcfModel:
 
     @staticmethod
     def of(mujoco: Any, model: Any, notes: Notes) -> MjcfModel:
-        """The model with its names made fit for components, each of them used once."""
+        """Return the model with valid component names, each used once."""
         taken = {"base", "world"}
         plain = _names((model.body(k).name for k in range(model.nbody)), "body")
 
@@ -215,11 +215,11 @@ class MjcfModel:
 
     @property
     def path(self) -> str:
-        """Of the file, for messages."""
+        """Path of the file, for error messages."""
         return self.notes.path
 
     def refuse(self, what: str, remedy: str = "take it out of the file") -> NoReturn:
-        """Refuse the file for something of it."""
+        """Raise an error about the file."""
         raise DescriptionError(f"{self.path}: {what}; {remedy}")
 
     def has_one_axis(self, j: int) -> bool:
@@ -228,11 +228,11 @@ class MjcfModel:
         return int(self.data.jnt_type[j]) in (int(kinds.mjJNT_HINGE), int(kinds.mjJNT_SLIDE))
 
     def drawn(self, j: int) -> float:
-        """The position of a hinge or slide as the file draws it [rad or m]."""
+        """Return the position of a hinge or slide in the initial configuration qpos0 [rad or m]."""
         return float(self.data.qpos0[self.data.jnt_qposadr[j]])
 
     def terms(self, k: int) -> dict[int, float] | None:
-        """The factor of every joint in the length of a fixed tendon; None for a spatial one."""
+        """Return the coefficients of the joints in a fixed tendon length; None if it is spatial."""
         found: dict[int, float] = {}
         first = int(self.data.tendon_adr[k])
         for w in range(first, first + int(self.data.tendon_num[k])):
@@ -243,7 +243,7 @@ class MjcfModel:
         return found
 
     def path_bodies(self, k: int) -> list[int]:
-        """The bodies that a spatial tendon is led over."""
+        """Return the bodies on the path of a spatial tendon."""
         kinds = self.mujoco.mjtWrap
         first = int(self.data.tendon_adr[k])
         found = []
@@ -256,7 +256,7 @@ class MjcfModel:
         return found
 
     def joints_above(self, k: int) -> set[int]:
-        """The joints that move body k."""
+        """Return the joints that move body k, without locked joints."""
         found: set[int] = set()
         while k:
             first = int(self.data.body_jntadr[k])
@@ -266,16 +266,16 @@ class MjcfModel:
 
 
 def placed(point: Point, pos: Sequence[float], quat: Sequence[float]) -> Point:
-    """The frame at a position [m] and a quaternion (w, x, y, z) of a frame."""
+    """Return the frame at a position [m] and quaternion (w, x, y, z) relative to a frame."""
     R = matrix_of(quat)
-    # rounding of a normalised quaternion (1, 0, 0, 0); any rotation that is written is larger
+    # larger than rounding errors of a normalised (1, 0, 0, 0), smaller than any rotation in files
     turned = None if np.allclose(R, np.eye(3), rtol=0, atol=1e-15) else R.tolist()
     x, y, z = (float(value) for value in pos)
     return point.at(x, y, z, rotation=turned)
 
 
 def matrix_of(quat: Sequence[float]) -> Any:
-    """(3, 3) rotation of a quaternion (w, x, y, z) of any length but zero."""
+    """Return the rotation matrix (3, 3) of a nonzero quaternion (w, x, y, z)."""
     w, x, y, z = np.asarray(quat, dtype=float) / math.hypot(*quat)
     return np.array(
         [
@@ -297,7 +297,7 @@ def _joint_name(model: Any, j: int, bodies: tuple[str, ...]) -> str:
 
 
 def _apart(name: str, taken: set[str], kind: str) -> str:
-    """The name, made different from those taken, which it joins."""
+    """Return the name, made unique by a suffix, and add it to `taken`."""
     if name in taken:
         name = f"{name}_{kind}"
     found, number = name, 2
@@ -307,28 +307,28 @@ def _apart(name: str, taken: set[str], kind: str) -> str:
     return found
 
 
-# The actuators of a compiled MuJoCo model: what they drive, and what they can give a joint.
+# Actuators of a compiled MuJoCo model: driven joints and effort limits.
 
 
 _Range = tuple[float, float]
 
 
 def _actuators_in(model: Any) -> int:
-    """Number of actuators. Since MuJoCo 4 one actuator may have several controls."""
+    """Return the number of actuators. From MuJoCo 4 an actuator may have several controls."""
     return int(getattr(model, "nactuator", model.nu))
 
 
 def _first_of(model: Any, address: str, k: int) -> int:
-    """Row of the first control ("ctrladr") or the first output ("outadr") of actuator k."""
-    rows = getattr(model, f"actuator_{address}", None)  # MuJoCo before 4 has one row each
+    """Return the row of the first control ("ctrladr") or output ("outadr") of actuator k."""
+    rows = getattr(model, f"actuator_{address}", None)  # MuJoCo before version 4 has one row each
     return k if rows is None else int(rows[k])
 
 
 def drives(mjcf: MjcfModel) -> dict[int, dict[int, float | None]]:
-    """For each joint the actuators that drive it, and how much effort it gets of a unit of force.
+    """Return for each joint its actuators, with the joint effort per unit of actuator force.
 
-    A fixed tendon drives its joints by its coefficients; a spatial one, and the rod of a
-    slider-crank, all joints between the bodies that it is led over, by factors that depend on the
+    A fixed tendon drives its joints with its coefficients. A spatial tendon and the rod of a
+    slider-crank drive all joints between the bodies on their path, with factors that depend on the
     configuration and are None here. Forces on sites and bodies drive no joint.
     """
     model, kinds = mjcf.data, mjcf.mujoco.mjtTrn
@@ -351,7 +351,7 @@ def drives(mjcf: MjcfModel) -> dict[int, dict[int, float | None]]:
                 _between_bodies(mjcf, [int(model.site_bodyid[site]) for site in sites])
             )
         elif kind == getattr(kinds, "mjTRN_SO3", None) and int(model.actuator_trnid[k, 1]) < 0:
-            shares = {number: None}  # of a ball joint; between two sites it drives no joint
+            shares = {number: None}  # actuates a ball joint; between two sites it drives no joint
         for j, share in shares.items():
             found.setdefault(j, {})[k] = share
         _note_actuator(mjcf, k, sorted(shares))
@@ -359,14 +359,14 @@ def drives(mjcf: MjcfModel) -> dict[int, dict[int, float | None]]:
 
 
 def _between_bodies(mjcf: MjcfModel, bodies: Sequence[int]) -> set[int]:
-    """The joints that move some of the bodies and not all of them."""
+    """Return the joints that move some but not all of the bodies."""
     above = [mjcf.joints_above(k) for k in bodies]
     some: set[int] = set()
     return some.union(*above) - above[0].intersection(*above) if above else some
 
 
 def _note_actuator(mjcf: MjcfModel, k: int, joints: Sequence[int]) -> None:
-    """Say what of an actuator is not in the mechanism."""
+    """Add notes about the properties of an actuator that the mechanism does not include."""
     model, kinds = mjcf.data, mjcf.mujoco.mjtTrn
     element = f"actuator {quoted(model.actuator(k).name or k)}"
     kind = int(model.actuator_trntype[k])
@@ -395,16 +395,16 @@ def _note_actuator(mjcf: MjcfModel, k: int, joints: Sequence[int]) -> None:
 def effort_range(
     mjcf: MjcfModel, j: int, acting: Mapping[int, float | None]
 ) -> tuple[float, float] | None:
-    """(lower, upper) of the effort of joint j [N m or N], None where it is not limited.
+    """Return the range (lower, upper) of the effort of joint j [N m or N]; None if unlimited.
 
-    The sum of the forcerange of its actuators times their gear, within the actuatorfrcrange of the
-    joint; a motor, which has no dynamics and no feedback, is limited by its ctrlrange too, unless
-    the flag clampctrl is disabled.
+    It is the sum of the forcerange of the actuators times their gear, limited to the
+    actuatorfrcrange of the joint. A motor without dynamics and feedback is also limited by its
+    ctrlrange, unless the flag clampctrl is disabled.
 
     Args:
-        mjcf: the model.
-        j: number of a hinge or slide.
-        acting: the actuators that drive it, and their shares.
+        mjcf: compiled model.
+        j: index of a hinge or slide.
+        acting: joint effort per unit of actuator force, by actuator; see `drives`.
     """
     model = mjcf.data
     lower, upper = (0.0, 0.0) if acting else (-math.inf, math.inf)
@@ -422,7 +422,7 @@ def effort_range(
 
 
 def _is_plain(mjcf: MjcfModel, k: int) -> bool:
-    """Whether actuator k is a motor: its force is a multiple of its control."""
+    """Whether actuator k is a motor: its force is proportional to its control."""
     model, kinds = mjcf.data, mjcf.mujoco
     return (
         int(model.actuator_gaintype[k]) == int(kinds.mjtGain.mjGAIN_FIXED)
@@ -432,7 +432,7 @@ def _is_plain(mjcf: MjcfModel, k: int) -> bool:
 
 
 def _force(mjcf: MjcfModel, k: int) -> _Range:
-    """What actuator k gives before its gear."""
+    """Return the range of the force of actuator k, without its gear."""
     model = mjcf.data
     low, high = -math.inf, math.inf
     if model.actuator_forcelimited[k]:
@@ -449,13 +449,14 @@ def _force(mjcf: MjcfModel, k: int) -> _Range:
 
 
 class Joints:
-    """Adds the joints of a model to a mechanism.
+    """Builder that adds the joints of a model to a mechanism.
 
     Attributes:
-        mechanism: that they join.
-        mjcf: the model.
-        base: "fixed" welds free roots to the world, "free" frees those without joints.
-        acting: for each joint the actuators that drive it.
+        mechanism: mechanism under construction.
+        mjcf: compiled model.
+        base: "fixed" fixes free roots to the world, "free" adds free joints to roots without
+            joints.
+        acting: actuators of each joint; see `drives`.
     """
 
     def __init__(self, mechanism: Mechanism, mjcf: MjcfModel, base: Base | None) -> None:
@@ -463,10 +464,10 @@ class Joints:
         self.acting = drives(mjcf)
 
     def connect(self, k: int, parent: Point) -> None:
-        """Connect body k, which the mechanism has already, to its parent by its joints.
+        """Connect body k, which is already in the mechanism, to its parent by its joints.
 
-        A body without joints is welded. Several joints follow one another from the parent to the
-        body, with a body without mass between any two of them.
+        A body without joints is fixed to its parent. Several joints are connected in series from
+        the parent to the body, with a massless body between two joints.
         """
         mjcf, mechanism = self.mjcf, self.mechanism
         model = mjcf.data
@@ -495,7 +496,7 @@ class Joints:
             point = moved.frame
 
     def _connect(self, j: int, parent: Point, point: Point, moved: RigidBody) -> None:
-        """Put joint j between the frame of its parent as it is drawn and the body it moves."""
+        """Connect joint j between `point`, the frame of the body at qpos0, and the moved body."""
         mjcf, mechanism = self.mjcf, self.mechanism
         if mjcf.mujoco.mjtJoint(int(mjcf.data.jnt_type[j])) == mjcf.mujoco.mjtJoint.mjJNT_FREE:
             if self.base == "fixed":
@@ -548,7 +549,7 @@ class Joints:
 
 
 def unused_name(mechanism: Mechanism, mjcf: MjcfModel, name: str) -> str:
-    """The name, with a number where something of the mechanism or of the file has it."""
+    """Return the name, with a number if it is used in the mechanism or the file."""
     known = {*mjcf.bodies, *mjcf.joints, *mjcf.sites, *mjcf.equalities, *mjcf.tendons}
     found, number = name, 2
     while found in known or found in mechanism.components:
@@ -562,12 +563,12 @@ def _free_joints(mjcf: MjcfModel) -> list[int]:
 
 
 def _is_root(mjcf: MjcfModel, k: int) -> bool:
-    """Whether body k stands in the world and is moved by nobody."""
+    """Whether body k is a child of the world and is not a mocap body."""
     return int(mjcf.data.body_parentid[k]) == 0 and int(mjcf.data.body_mocapid[k]) < 0
 
 
 def _displace(mjcf: MjcfModel, j: int, point: Point, position: float) -> Point:
-    """The frame moved along or about the axis of a hinge or slide [rad or m]."""
+    """Displace a frame along or about the axis of a hinge or slide [rad or m]."""
     if position == 0:
         return point
     axis = np.array(mjcf.data.jnt_axis[j], dtype=float)
@@ -584,7 +585,7 @@ def _displace(mjcf: MjcfModel, j: int, point: Point, position: float) -> Point:
 
 
 def _equalities(mjcf: MjcfModel) -> Iterator[tuple[int, Any]]:
-    """Number and kind of the equalities that act."""
+    """Yield index and kind of the active equalities."""
     kinds = mjcf.mujoco.mjtEq
     for k in range(mjcf.data.neq if mjcf.flags.equalities else 0):
         if mjcf.data.eq_active0[k]:
@@ -592,7 +593,7 @@ def _equalities(mjcf: MjcfModel) -> Iterator[tuple[int, Any]]:
 
 
 def _locked(mjcf: MjcfModel) -> dict[int, float]:
-    """Positions of the joints that equalities lock, and of those that these lead [rad or m]."""
+    """Return the positions of joints that equalities lock, directly or by couplings [rad or m]."""
     kinds = mjcf.mujoco.mjtEq
     found: dict[int, float] = {}
     linear = [_linear(mjcf, k, kind) for k, kind in _equalities(mjcf)]
@@ -632,19 +633,19 @@ def _locked(mjcf: MjcfModel) -> dict[int, float]:
 
 
 _REAL = 1e-9
-"""Imaginary part [rad or m] of a root that is real but for rounding."""
+"""Largest imaginary part [rad or m] of a real root, which is a rounding error."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Row:
-    """Sum of factors times positions of hinges and slides = value."""
+    """Linear equation of hinge and slide positions: sum of factors times positions = value."""
 
     terms: dict[int, float]
     value: float
 
 
 def _linear(mjcf: MjcfModel, k: int, kind: Any) -> _Row | None:
-    """What an equality says, where that is linear; None for the others, and for two joints."""
+    """Return an equality as a linear equation; None if it is not linear or couples two joints."""
     model, kinds = mjcf.data, mjcf.mujoco.mjtEq
     one, two = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
     constant, slope, *higher = (float(value) for value in model.eq_data[k, :5])
@@ -665,19 +666,19 @@ def _linear(mjcf: MjcfModel, k: int, kind: Any) -> _Row | None:
 def add_closures(
     mechanism: Mechanism, mjcf: MjcfModel, bodies: Sequence[Point], sites: Sequence[Point]
 ) -> list[int]:
-    """Add what the active equalities say, and open the loops there.
+    """Add the active equalities to the mechanism, and cut loops at closing joints.
 
     Args:
-        mechanism: with all bodies and joints of the model.
-        mjcf: the model.
-        bodies: the frames of the bodies, the world first.
-        sites: the frames of the sites.
+        mechanism: mechanism with all bodies and joints of the model.
+        mjcf: compiled model.
+        bodies: frames of the bodies, starting with the world.
+        sites: frames of the sites.
 
     Returns:
-        the equalities that are there now.
+        Indices of the equalities that were added.
 
     Raises:
-        DescriptionError: an equality is of a kind that mbs does not model.
+        DescriptionError: the kind of an equality is not supported.
     """
     kinds = mjcf.mujoco.mjtEq
     taken = []
@@ -708,7 +709,7 @@ def add_closures(
 
 
 def _rod(mjcf: MjcfModel, k: int, sites: Sequence[Point]) -> tuple[Point, Rod, Point]:
-    """The two ends and the rod that an equality makes of a spatial tendon between two sites."""
+    """Return a rod and its end frames, for an equality of a spatial tendon between two sites."""
     model, name = mjcf.data, mjcf.equalities[k]
     tendon = int(model.eq_obj1id[k])
     ends = _two_sites(mjcf, tendon) if mjcf.terms(tendon) is None else None
@@ -730,7 +731,7 @@ def _close(
     bodies: Sequence[Point],
     sites: Sequence[Point],
 ) -> bool:
-    """Close a loop by a connect or a weld; whether there is one to close."""
+    """Close a loop by a connect or weld; return False if there is no loop to close."""
     model, mujoco = mjcf.data, mjcf.mujoco
     one, two = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
     values = [float(value) for value in model.eq_data[k]]
@@ -749,7 +750,7 @@ def _close(
     if not set.symmetric_difference(*(mjcf.joints_above(i) for i in joined)):
         mjcf.notes.add("ignored", element, "it joins two bodies that never move apart")
         return False
-    # a weld whose torquescale is zero has no rows for the rotation
+    # a weld with zero torquescale has no rotational equations
     spherical = not is_weld or values[10] == 0
     if of_sites:
         a, b = sites[one], sites[two]
@@ -766,19 +767,19 @@ def _close(
 
 
 def _is_moved(mjcf: MjcfModel, k: int) -> bool:
-    """Whether body k or one that carries it is a mocap body."""
+    """Whether body k or an ancestor is a mocap body."""
     return int(mjcf.data.body_mocapid[mjcf.data.body_rootid[k]]) >= 0 and k > 0
 
 
 def _joints_of(mjcf: MjcfModel, k: int) -> tuple[int, int]:
-    """The driven and the driving joint of an equality of joints."""
+    """Return the driven and the driving joint of a joint equality."""
     return int(mjcf.data.eq_obj1id[k]), int(mjcf.data.eq_obj2id[k])
 
 
 def _polynomial(mjcf: MjcfModel, k: int) -> Polynomial:
-    """Position of the driven joint of an equality by that of the driving one [rad or m].
+    """Return the position of the driven joint as a polynomial of the driving joint [rad or m].
 
-    Y - y0 = sum of a_k (x - x0)^k, about the positions in which the joints are drawn.
+    It is y - y0 = sum of a_k (x - x0)^k, where x0 and y0 are the positions at qpos0.
     """
     y0, x0 = (mjcf.drawn(j) for j in _joints_of(mjcf, k))
     return Polynomial(mjcf.data.eq_data[k, :5])(Polynomial([-x0, 1.0])) + y0
@@ -791,7 +792,7 @@ def _coupling(mjcf: MjcfModel, k: int) -> Coupling:
 
 
 def _linear_coupling(mjcf: MjcfModel, k: int, row: _Row) -> Coupling:
-    """The joint of the largest factor follows the others."""
+    """Return a coupling in which the joint with the largest factor follows the other joints."""
     value = row.value - sum(c * mjcf.locked[j] for j, c in row.terms.items() if j in mjcf.locked)
     moving = {j: c for j, c in row.terms.items() if j not in mjcf.locked}
     driven = max(moving, key=lambda j: abs(moving[j]))
@@ -813,16 +814,16 @@ def _linear_coupling(mjcf: MjcfModel, k: int, row: _Row) -> Coupling:
 def add_forces(
     mechanism: Mechanism, mjcf: MjcfModel, bodies: Sequence[Point], sites: Sequence[Point]
 ) -> None:
-    """Add tendons that pull, and the forces that compensate the weight of bodies.
+    """Add tendons with springs, damping or friction, and forces for gravity compensation.
 
     Args:
-        mechanism: with all bodies and joints of the model.
-        mjcf: the model.
-        bodies: the frames of the bodies, the world first.
-        sites: the frames of the sites.
+        mechanism: mechanism with all bodies and joints of the model.
+        mjcf: compiled model.
+        bodies: frames of the bodies, starting with the world.
+        sites: frames of the sites.
 
     Raises:
-        DescriptionError: a spatial tendon that pulls is more than a line between two sites.
+        DescriptionError: a spatial tendon with forces is not a straight line between two sites.
     """
     for k, name in enumerate(mjcf.tendons):
         _add_tendon(mechanism, mjcf, k, name, sites)
@@ -840,7 +841,7 @@ def _add_tendon(
             "ignored", f"tendon {name!r}", "it has a range, and only joints have limits here"
         )
     stiffness = float(model.tendon_stiffness[k]) if flags.springs else 0.0
-    # a number before MuJoCo 3.7, the first of a polynomial since
+    # scalar before MuJoCo 3.7, first coefficient of a polynomial in later versions
     damping = float(np.ravel(model.tendon_damping[k])[0]) if flags.dampers else 0.0
     friction = float(model.tendon_frictionloss[k]) if flags.friction else 0.0
     if not (stiffness or damping or friction):
@@ -874,7 +875,7 @@ def _add_tendon(
 
 
 def _two_sites(mjcf: MjcfModel, k: int) -> tuple[int, int] | None:
-    """The ends of a spatial tendon that is a line between two sites; None for the others."""
+    """Return the two sites of a straight spatial tendon; None for other tendons."""
     model, site = mjcf.data, int(mjcf.mujoco.mjtWrap.mjWRAP_SITE)
     first, count = int(model.tendon_adr[k]), int(model.tendon_num[k])
     kinds = [int(model.wrap_type[w]) for w in range(first, first + count)]
@@ -884,7 +885,7 @@ def _two_sites(mjcf: MjcfModel, k: int) -> tuple[int, int] | None:
 
 
 def _add_compensation(mechanism: Mechanism, mjcf: MjcfModel, k: int, body: Point) -> None:
-    """A force against the weight of a body, at its centre of mass."""
+    """Add a force that compensates the weight of a body, at its centre of mass."""
     model = mjcf.data
     share, joints = float(model.body_gravcomp[k]), mjcf.joints_above(k)
     gravity = [float(value) for value in model.opt.gravity]
@@ -907,24 +908,24 @@ def _add_compensation(mechanism: Mechanism, mjcf: MjcfModel, k: int, body: Point
     mechanism.add(Force(name, body.at(x, y, z), force=tuple(scale * g for g in gravity)))
 
 
-# Where a motion starts: the keyframes and the configuration that the file draws.
+# Initial configuration: keyframes and qpos0 of the file.
 
 
 _CLOSED_AS_WRITTEN = 1e-2
-"""Opening [m or rad] up to which a configuration of the file is meant to close the loops: keyframes
-are written with few digits, and are states of soft constraints."""
+"""Largest loop error [m or rad] of a configuration of the file that counts as closed: keyframes
+have few digits and are states of soft constraints."""
 
 
 def starting_configuration(mechanism: Mechanism, mjcf: MjcfModel, closures: Sequence[int]) -> None:
-    """Let the mechanism start where the file does.
+    """Set the initial guess of the mechanism to a configuration of the file.
 
-    That is the first of the keyframe `home`, the first keyframe and the configuration that the
-    file draws, which closes the loops; the one that closes them best where none does.
+    It is the first configuration that closes the loops, in the order: keyframe `home`, first
+    keyframe, qpos0. If there is none, it is the configuration with the smallest loop error.
 
     Args:
-        mechanism: with all joints of the model; its guess is set.
-        mjcf: the model.
-        closures: the equalities that are in the mechanism.
+        mechanism: mechanism with all joints of the model; its guess is set.
+        mjcf: compiled model.
+        closures: indices of the equalities in the mechanism.
     """
     model = mjcf.data
     keys = [model.key(k) for k in range(model.nkey)]
@@ -941,7 +942,7 @@ def starting_configuration(mechanism: Mechanism, mjcf: MjcfModel, closures: Sequ
 
 
 def _opening(mjcf: MjcfModel, qpos: Any, closures: Sequence[int]) -> float:
-    """How far the equalities are from being met at a configuration [m or rad]."""
+    """Return the largest error of the equalities at a configuration [m or rad]."""
     if not closures or not np.all(np.isfinite(qpos)):
         return 0.0 if np.all(np.isfinite(qpos)) else math.inf
     mujoco, model = mjcf.mujoco, mjcf.data
@@ -962,7 +963,7 @@ _QUATERNION = ("qw", "qx", "qy", "qz")
 
 
 def _positions(mjcf: MjcfModel, j: int, qpos: Any, all_of_them: bool) -> dict[str, float]:
-    """Positions of joint j by coordinate; those where it starts anyway only if wanted."""
+    """Return the positions of joint j by coordinate name; empty if zero, unless `all_of_them`."""
     kinds = mjcf.mujoco.mjtJoint
     kind, at = kinds(int(mjcf.data.jnt_type[j])), int(mjcf.data.jnt_qposadr[j])
     name = mjcf.joints[j]
@@ -981,24 +982,25 @@ def _positions(mjcf: MjcfModel, j: int, qpos: Any, all_of_them: bool) -> dict[st
     return values if all_of_them or any(values.values()) else {}
 
 
-# What bodies look like: their geoms, for pictures alone.
+# Shapes of bodies for pictures: their geoms.
 
 
 _SEEN_GROUPS = (0, 1, 2)
-"""Groups of geoms that MuJoCo's viewer shows until others are switched on; files put what only
-touches in the others."""
+"""Geom groups that the viewer of MuJoCo shows by default; files put collision geoms in other
+groups."""
 _DEFAULT_COLOUR = (0.5, 0.5, 0.5, 1.0)
-"""Of geoms that have none of their own, as MuJoCo has it; then that of their material counts."""
+"""Default colour of geoms in MuJoCo; for geoms with this colour, the colour of the material
+counts."""
 
 
 @dataclass(frozen=True, slots=True)
 class MeshAssets:
-    """The files of meshes and the factors of their lengths.
+    """Mesh files and the scale factors of their lengths.
 
     Attributes:
-        of_meshes: by names of meshes.
-        of_geoms: by names of geoms for which balls stand.
-        others: names of meshes that are not as in a file.
+        of_meshes: file and scale, by mesh name.
+        of_geoms: file and scale, by name of geoms that were replaced by spheres.
+        others: names of meshes that are not identical to a file.
     """
 
     of_meshes: dict[str, tuple[str, tuple[float, ...]]]
@@ -1007,7 +1009,7 @@ class MeshAssets:
 
 
 def _mesh_assets(spec: Any) -> MeshAssets:
-    """The meshes that are read as they are in their files."""
+    """Return the meshes that are used as in their files."""
     found, others = {}, []
     for mesh in spec.meshes:
         moved = any(mesh.refpos) or tuple(mesh.refquat) != (1.0, 0.0, 0.0, 0.0)
@@ -1028,14 +1030,14 @@ def add_shapes(
     assets: MeshAssets,
     meshes: MeshFiles,
 ) -> None:
-    """Give the bodies the shapes of their geoms.
+    """Add the geoms of the bodies as shapes.
 
     Args:
-        mechanism: that gets them.
-        mjcf: the model.
+        mechanism: mechanism that receives the shapes.
+        mjcf: compiled model.
         points: frames of the bodies.
-        assets: files of meshes.
-        meshes: finds them.
+        assets: mesh files and scale factors.
+        meshes: search for the mesh files.
     """
     model = mjcf.data
     groups = [int(group) for group in model.geom_group]
@@ -1047,7 +1049,7 @@ def add_shapes(
             continue
         colour = _geom_colour(mjcf, g)
         if colour[3] == 0:
-            continue  # it is there to be invisible
+            continue  # it is intentionally invisible
         made = _geom_shape(mjcf, g, colour[:3], assets, meshes)
         if made is not None:
             point = placed(points[model.geom_bodyid[g]], model.geom_pos[g], model.geom_quat[g])
@@ -1057,7 +1059,7 @@ def add_shapes(
 def _geom_colour(mjcf: MjcfModel, g: int) -> tuple[float, ...]:
     model = mjcf.data
     colour, material = tuple(map(float, model.geom_rgba[g])), int(model.geom_matid[g])
-    if np.allclose(colour, _DEFAULT_COLOUR) and material >= 0:  # MuJoCo keeps single precision
+    if np.allclose(colour, _DEFAULT_COLOUR) and material >= 0:  # MuJoCo stores single precision
         colour = tuple(map(float, model.mat_rgba[material]))
     return tuple(min(max(part, 0.0), 1.0) for part in colour)
 
@@ -1093,7 +1095,7 @@ def _geom_shape(
 
 
 def _file_frame(mjcf: MjcfModel, g: int, point: Point) -> Point:
-    """The frame of the file of a mesh, which MuJoCo moves to its centre of mass."""
+    """Return the frame of a mesh file; MuJoCo moves meshes to their centre of mass."""
     model = mjcf.data
     if int(model.geom_type[g]) != int(mjcf.mujoco.mjtGeom.mjGEOM_MESH):
         return point
@@ -1102,16 +1104,16 @@ def _file_frame(mjcf: MjcfModel, g: int, point: Point) -> Point:
     return placed(point, -R @ model.mesh_pos[mesh], model.mesh_quat[mesh] * [1, -1, -1, -1])
 
 
-# What a compiled MuJoCo model may have that changes the motion and that mbs does not model.
+# Unsupported elements of a compiled MuJoCo model that change the motion.
 
 
 def check_supported(mjcf: MjcfModel) -> None:
-    """Refuse fluids, flexible bodies, springs that are not linear, and the like.
+    """Raise if the model has fluids, flexible bodies, nonlinear springs or similar elements.
 
-    What the flags of the file switch off may be there.
+    Elements that are disabled by flags of the file are allowed.
 
     Raises:
-        DescriptionError: the first such thing, by its name.
+        DescriptionError: an unsupported element was found; the message names it.
     """
     for checks in (_model, _joints, _tendons, _actuators):
         for complaint in checks(mjcf):
@@ -1160,56 +1162,57 @@ def _actuators(mjcf: MjcfModel) -> Iterator[str]:
 
 
 def _any(model: Any, field: str, k: int) -> bool:
-    """Whether a field, which older versions of MuJoCo may lack, is not zero at k."""
+    """Whether a field is nonzero at k; older versions of MuJoCo may not have the field."""
     values = getattr(model, field, None)
     return values is not None and bool(np.any(values[k]))
 
 
-# Reading.
+# Reader of complete files.
 
 
 _LONGEST_REASON = 400
-"""Letters of a message of MuJoCo that are repeated: it quotes names of any length."""
+"""Maximum number of characters of a MuJoCo message that are quoted; it may contain long names."""
 
 
 def read_mjcf(
     path: str | Path, base: Base | None = None, strict: bool = False, other_files: bool = True
 ) -> Mechanism:
-    """The mechanism in an MJCF file.
+    """Read an MJCF file as a mechanism.
 
-    Bodies, joints and sites keep their names, with blanks, dots and quotes replaced by
-    underscores; joints without a name are called after their body, and a name that is taken gets
-    the kind of its element at its end. Several joints in a body become a chain over bodies without
-    mass. A closing `connect` becomes a spherical joint and a `weld` a fixed one, where the loop is
-    then opened; an equality of joints or of fixed tendons becomes a coupling, and one that locks a
-    joint welds its bodies. Joint positions are MuJoCo's qpos: `ref` is taken into account. The
-    mechanism starts (its `guess`) at the keyframe `home`, at the first keyframe or as it is drawn,
-    whichever comes first and closes the loops.
+    Bodies, joints and sites keep their names, with blanks, dots and quotes replaced by underscores.
+    Joints without a name are named after their body, and the kind of the element is appended to
+    names that are already used. Several joints of a body become a chain with massless bodies. A
+    closing `connect` becomes a spherical joint and a `weld` a fixed joint, at which the loop is
+    cut. An equality of joints or of fixed tendons becomes a coupling; an equality that locks a
+    joint fixes its bodies to each other. Joint positions are the qpos of MuJoCo, with `ref` taken
+    into account. The `guess` of the mechanism is the first configuration that closes the loops, in
+    the order: keyframe `home`, first keyframe, qpos0.
 
-    Of actuators only the joints that they drive are read, those without one are passive then. The
-    inputs of the models are joint efforts; gear, kp, ctrlrange and the dynamics of an actuator
-    belong to what commands it, and a position or velocity servo to a controller.
+    Only the driven joints of actuators are read; if the file has actuators, joints without an
+    actuator are passive. The inputs of the models are joint efforts. Gear, kp, ctrlrange and
+    dynamics of actuators are not part of the mechanism, and a position or velocity servo must be
+    modelled as a controller.
 
-    What the flags of the file and its groups of actuators switch off is left out: springs, dampers,
-    Coulomb friction, gravity, equalities, ranges of joints and of controls, actuators.
+    Elements that are disabled by flags or actuator groups of the file are left out: springs,
+    dampers, Coulomb friction, gravity, equalities, ranges of joints and controls, actuators.
 
-    Pictures show the geoms that MuJoCo's viewer shows at first, those of the groups 0 to 2, and all
-    of a file that has none of them; planes and height fields are not drawn.
+    Pictures show the geoms of groups 0 to 2, as the viewer of MuJoCo does by default, or all geoms
+    if no body has a geom of these groups. Planes and height fields are not drawn.
 
     Args:
-        path: of the file.
-        base: "free" gives every root body without a joint a Free joint, `root_joint` and so on,
-            "fixed" welds roots with a free joint to the world where they are drawn.
-        strict: refuse what would be noted.
-        other_files: look for the meshes that pictures show; not for files of people nobody knows.
+        path: path of the file.
+        base: "free" adds a Free joint (`root_joint`, ...) to every root body without joints;
+            "fixed" fixes roots with a free joint to the world at their pose in the file.
+        strict: whether to raise an error instead of adding a note.
+        other_files: whether to read the mesh files for pictures; set to False for files from
+            untrusted sources.
 
     Returns:
-        the mechanism; its `notes` say what of the file is not in it, or under another name.
+        The mechanism. Its `notes` list ignored and renamed elements.
 
     Raises:
-        DescriptionError: mujoco is not installed, the file is missing or malformed, or it has
-            something that changes the motion and that mbs does not model; in strict reading,
-            whatever would be a note.
+        DescriptionError: mujoco is not installed, the file is missing or malformed, or it contains
+            an unsupported element that changes the motion. In strict mode, also for each note.
     """
     if base not in (None, "fixed", "free"):
         raise DescriptionError(f"{path}: base is {quoted(base)}; give 'fixed', 'free' or None")
@@ -1270,11 +1273,12 @@ def _model_name(path: str | Path) -> str:
 
 
 _MOST_COPIES = 10_000
-"""Of one element: models of crowds have hundreds of copies; MuJoCo makes any number, in hours."""
+"""Maximum number of copies of an element: models of crowds have hundreds, and MuJoCo would
+generate any number, for hours."""
 
 
 def _refuse_many_copies(path: str | Path, element: Element, copies: int) -> None:
-    """Refuse an element that its own count and those around it multiply beyond reason."""
+    """Raise if nested counts multiply an element to more than `_MOST_COPIES` copies."""
     if element.tag in ("replicate", "composite", "flexcomp"):
         counts = [int(count) for count in re.findall(r"\d{1,18}", element.get("count", ""))]
         copies *= math.prod(counts)
@@ -1299,7 +1303,7 @@ def _mujoco() -> Any:
 
 
 def _compile(mujoco: Any, path: str, notes: Notes) -> tuple[Any, MeshAssets]:
-    """The model without what has no part in the motion; the whole of it where that fails."""
+    """Compile the model, if possible after removal of elements that do not affect the motion."""
     reasons: list[str] = []
     for stripped in (True, False):
         with warnings.catch_warnings(record=True) as heard:
@@ -1320,7 +1324,7 @@ def _compile(mujoco: Any, path: str, notes: Notes) -> tuple[Any, MeshAssets]:
 
 
 def _sentence(said: object) -> str:
-    """What MuJoCo says, on one line, its middle left out where it is long."""
+    """Return a MuJoCo message on one line, shortened in the middle if it is long."""
     text = " ".join(str(said).removeprefix("Error: ").split())
     half = _LONGEST_REASON // 2
     return text if len(text) <= _LONGEST_REASON else f"{text[:half]} ... {text[-half:]}"
@@ -1334,9 +1338,9 @@ def _spec(mujoco: Any, path: str) -> Any:
 
 
 def _strip(mujoco: Any, spec: Any, assets: MeshAssets) -> None:
-    """Take out what has no part in the motion, and may name files that are missing.
+    """Remove elements without effect on the motion, whose files may be missing.
 
-    A ball stands for a mesh that gives no inertia, so that its place is known.
+    A mesh without effect on the inertia is replaced by a sphere, which keeps its pose.
     """
     for kind in ("sensors", "pairs", "excludes", "skins", "cameras", "lights", "tuples"):
         for element in list(getattr(spec, kind)):
@@ -1348,7 +1352,7 @@ def _strip(mujoco: Any, spec: Any, assets: MeshAssets) -> None:
             continue
         geom.name = geom.name or f"mesh of the picture {number}"
         assets.of_geoms[geom.name] = asset
-        # its size and mass say nothing, since the inertia of the body is given
+        # size and mass have no effect, since the inertia of the body is given
         geom.type, geom.meshname, geom.size, geom.mass = (
             mujoco.mjtGeom.mjGEOM_SPHERE,
             "",
@@ -1366,7 +1370,7 @@ def _strip(mujoco: Any, spec: Any, assets: MeshAssets) -> None:
 
 
 def _without_part(mujoco: Any, spec: Any) -> Iterator[Any]:
-    """Geoms with assets that give no inertia."""
+    """Yield geoms with assets that do not contribute to the inertia."""
     always = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
     kinds = mujoco.mjtGeom
     with_assets = (kinds.mjGEOM_MESH, kinds.mjGEOM_HFIELD, kinds.mjGEOM_SDF)
@@ -1386,7 +1390,7 @@ def _gravity(mjcf: MjcfModel) -> tuple[float, ...]:
 
 def _body(mjcf: MjcfModel, k: int) -> Body:
     model, kinds = mjcf.data, mjcf.mujoco.mjtSameFrame
-    # MuJoCo takes frames that differ by 1e-8 as one, and computes so
+    # MuJoCo treats frames that differ by 1e-8 as equal, and computes with equal frames
     same = int(model.body_sameframe[k])
     turned = same not in (int(kinds.mjSAMEFRAME_BODY), int(kinds.mjSAMEFRAME_BODYROT))
     R = matrix_of(model.body_iquat[k]) if turned else np.eye(3)

@@ -1,4 +1,4 @@
-"""The notes that a reader takes of a file; in strict reading each of them is an error."""
+"""Import notes of the file readers. In strict mode each note is an error."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from mbs.errors import DescriptionError
 
 @dataclass(slots=True)
 class Notes:
-    """Collects the notes of one file.
+    """Collection of the import notes of one file.
 
     Attributes:
-        path: of the file, as messages say it.
-        strict: refuse the file where a note would be taken.
-        lines: whether the lines are those of the file, and not of a text made from it.
-        taken: the notes, in the order of the file as far as it is read in order.
+        path: path of the file, for error messages.
+        strict: whether to raise an error instead of adding a note.
+        lines: whether line numbers refer to the file; False for a text that was generated from it.
+        taken: the notes, in reading order.
     """
 
     path: str
@@ -25,16 +25,16 @@ class Notes:
     taken: list[Note] = field(default_factory=list)
 
     def add(self, kind: NoteKind, element: str, text: str, line: int | None = None) -> None:
-        """Take a note.
+        """Add a note.
 
         Args:
-            kind: of the note.
-            element: of the file, such as "link 'base'".
-            text: what is written there, and what was made of it.
-            line: of the file.
+            kind: kind of the note.
+            element: element of the file, such as "link 'base'".
+            text: text in the file and its interpretation.
+            line: line number in the file.
 
         Raises:
-            DescriptionError: reading is strict.
+            DescriptionError: `strict` is True.
         """
         note = Note(kind, element, text, line if self.lines else None)
         if self.strict:

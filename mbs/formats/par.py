@@ -1,8 +1,8 @@
-"""SYMORO+ and OpenSYMORO robot files (.par), read as tables of frames.
+"""Reader of SYMORO+ and OpenSYMORO robot files (.par) as tables of frames.
 
 With NL links, NJ joints and B = NJ - NL loops there are NF = NJ + B frames: loop k is cut between
-the frames NL + k, which moves, and NJ + k, which is fixed. The joint variable is the symbol that
-stands in theta of a revolute and in r of a prismatic joint.
+the frames NL + k, which moves with the joint, and NJ + k, which is fixed. The joint variable is the
+symbol in theta of a revolute joint and in r of a prismatic joint.
 """
 
 from __future__ import annotations
@@ -29,34 +29,33 @@ from mbs.formats.files import read_text
 from mbs.formats.table import DRIVE, GEOMETRY, CutRow, FrameRow, InertiaRow, RobotTable
 from mbs.text import quoted
 
-# The keys and the lines of .par files, before they mean a robot.
-#
-# A file holds `KEY = number` and `KEY = {value, ...}`, where a vector may run over several lines.
-# `(* ... *)` is a comment; comments `(* Value L = 0.3 *)`, `(* Guess q2 = -1.57 *)` and `(*
-# Fs_width 3 = 0.01 *)`, `(* rest 3 = 0.1 *)`, `(* grouped 3 = 1 *)` say what the format has no
-# key for.
+# Keys and lines of .par files, without interpretation.
+
+# A file contains `KEY = number` and `KEY = {value, ...}`; a vector may have several lines. `(* ...
+# *)` is a comment. The comments `(* Value L = 0.3 *)`, `(* Guess q2 = -1.57 *)`, `(* Fs_width 3 =
+# 0.01 *)`, `(* rest 3 = 0.1 *)` and `(* grouped 3 = 1 *)` contain data without a key in the format.
 
 
 FRAME_KEYS = ("ant", "sigma", "b", "d", "r", "gamma", "alpha", "mu", "theta")
-"""Vectors with one value for each frame."""
+"""Vectors with one value per frame."""
 
 BODY_KEYS = {
     **{key: key for key in ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")},
     **{"IA": "Ia", "FV": "Fv", "FS": "Fs"},
 }
-"""Vectors with one value for each link, and the field of a body row that takes them."""
+"""Vectors with one value per link, and the field of the body row for each."""
 
 LINK_EXTRAS = ("FX", "FY", "FZ", "CX", "CY", "CZ")
-"""Wrenches that links exert on their environment, kept as texts."""
+"""Wrenches of links on their environment, stored as texts."""
 
 FLEXIBLE, STIFFNESS = "eta", "k"
-"""Vectors with one value for each joint: 1 for a flexible one, and its stiffness."""
+"""Vectors with one value per joint: 1 for a joint with a spring, and its stiffness."""
 
 JOINT_EXTRAS = ("QP", "QDP", "GAM")
-"""Vectors with one value for each joint, kept as texts."""
+"""Vectors with one value per joint, stored as texts."""
 
 BASE_EXTRAS = {"W0": 3, "WP0": 3, "V0": 3, "VP0": 3, "Z": 16}
-"""Vectors about the base, kept as texts, and their lengths."""
+"""Vectors of the base, stored as texts, and their lengths."""
 
 _OTHER_KEYS = ("NL", "NJ", "NF", "Type", "G", "is_floating", "is_mobile")
 
@@ -86,19 +85,19 @@ _ASSIGNMENT = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*(.*)", re.DOTALL)
 _REMARKS = ("Value", "Guess", "Fs_width", "rest", "grouped")
 _REMARKED = re.compile(r"[\w.]+")
 _SHORTEST_MISSPELT, _SIMILAR = 3, 0.75
-"""Letters from which a key may be misspelt, and the part of letters that match, of difflib: one
-wrong letter in four, so that two of three letters alike are another name."""
+"""Minimum length of a key that is checked for misspelling, and similarity ratio of difflib: one
+wrong letter in four. With two of three letters alike it is considered another name."""
 
 
 @dataclass(frozen=True, slots=True)
 class ParFile:
-    """The assignments and remarks of a file.
+    """Assignments and comments of a .par file.
 
     Attributes:
-        path: of the file.
-        name, source: of the robot, empty where the file does not say them.
+        path: path of the file.
+        name, source: name and source of the robot; empty if the file does not contain them.
         entries: key -> (line number, texts of the values).
-        remarks: (kind, name) -> (line number, text), the kind Value, Guess, Fs_width, rest or
+        remarks: (kind, name) -> (line number, text), with the kind Value, Guess, Fs_width, rest or
             grouped.
     """
 
@@ -110,14 +109,14 @@ class ParFile:
 
     @staticmethod
     def of(path: str, text: str) -> ParFile:
-        """The file with this text.
+        """Parse the text of a file.
 
         Raises:
             DescriptionError: a line cannot be read, or its key is misspelt or given twice.
         """
         lines, comments = _without_comments(text)
         entries, remarks = _entries(path, lines), _line_remarks(path, comments)
-        said = [_say(comment) for _, comment in reversed(comments)]  # the first of a kind counts
+        said = [_say(comment) for _, comment in reversed(comments)]  # first of a kind counts
         quotes = {key: value[1:] for key, value in said if value[:1] == "'"}
         name, closed, _ = quotes.get("Robotname", "").partition("'")
         source = quotes.get("Source", "")
@@ -130,11 +129,11 @@ class ParFile:
         )
 
     def where(self, key: str) -> str:
-        """File, line and key for messages."""
+        """File, line and key, for error messages."""
         return f"{self.path}:{self.entries[key][0]}: {key}" if key in self.entries else self.path
 
     def vector(self, key: str, length: int, per: str) -> tuple[str, ...] | None:
-        """The values of a key, None where the file does not have it."""
+        """Return the values of a key, or None if the file does not contain it."""
         if key not in self.entries:
             return None
         values = self.entries[key][1]
@@ -145,11 +144,11 @@ class ParFile:
         return values
 
     def integer(self, key: str, text: str) -> int:
-        """The whole number that a value of a key is."""
+        """Convert a value of a key to an integer."""
         return whole_number(text, self.where(key))
 
     def count(self, key: str) -> int:
-        """The number of links, joints or frames."""
+        """Return the number of links, joints or frames."""
         if key not in self.entries:
             raise DescriptionError(f"{self.path}: {key} is missing; add a line {key} = <number>")
         values = self.vector(key, 1, "robot")
@@ -159,18 +158,18 @@ class ParFile:
         return count
 
     def remarked(self, kind: str) -> Iterator[tuple[str, str, str]]:
-        """Place, name and text of every remark of a kind."""
+        """Yield the location, name and text of every comment of a kind."""
         for (found, name), (line, text) in self.remarks.items():
             if found == kind:
                 yield f"{self.path}:{line}: {kind} {name}", name, text
 
     def numbers(self, kind: str) -> dict[str, float]:
-        """The remarks of a kind that must be numbers, by name."""
+        """Return the comments of a kind as numbers, by name."""
         return {name: number(text, where) for where, name, text in self.remarked(kind)}
 
 
 def _without_comments(text: str) -> tuple[list[str], list[tuple[int, str]]]:
-    """The lines of a text without its comments; line and inside of every comment."""
+    """Return the lines of a text without comments, and (line number, text) of every comment."""
     kept, comments = [], []
     after, line = 0, 1
     while (start := text.find("(*", after)) >= 0 and (end := text.find("*)", start + 2)) >= 0:
@@ -185,7 +184,7 @@ def _without_comments(text: str) -> tuple[list[str], list[tuple[int, str]]]:
 
 
 def _say(comment: str) -> tuple[str, str]:
-    """What a comment such as `Source = 'a book'` speaks of, and what it says."""
+    """Split a comment such as `Source = 'a book'` into key and value."""
     key, _, value = comment.partition("=")
     return " ".join(key.split()), value.strip()
 
@@ -218,7 +217,7 @@ def _line_remarks(
         kind, _, name = key.partition(" ")
         if kind not in _REMARKS or not _REMARKED.fullmatch(name) or "=" not in comment:
             continue
-        if "\n" in value:  # prose
+        if "\n" in value:  # an ordinary text, not an assignment
             continue
         if (kind, name) in remarks:
             raise DescriptionError(
@@ -244,7 +243,7 @@ def _assignment(where: str, line: str) -> tuple[str, tuple[str, ...]]:
 
 
 def _split(text: str) -> tuple[str, ...]:
-    """The values between commas that stand outside of brackets."""
+    """Split a text at the commas outside parentheses."""
     depth, start, parts = 0, 0, []
     for k, letter in enumerate(text):
         depth += (letter == "(") - (letter == ")")
@@ -255,7 +254,7 @@ def _split(text: str) -> tuple[str, ...]:
 
 
 def _check_spelling(where: str, key: str) -> None:
-    """Refuse a key that is nearly a known one; other unknown keys are of no use here."""
+    """Raise if a key is similar to a known key. Other unknown keys are ignored."""
     if key in _KNOWN:
         return
     folded = {known.casefold() for known in _KNOWN}
@@ -267,30 +266,31 @@ def _check_spelling(where: str, key: str) -> None:
         raise DescriptionError(f"{where}: key {key!r} is unknown; did you mean {nearest!r}?")
 
 
-# The joint variable inside an expression such as `th2 - Pi/2`, and the constant beside it.
+# Joint variable in an expression such as `th2 - Pi/2`, and its constant offset.
 
 
 _USUAL = {0: r"(th|theta|q|t)_?{j}", 1: r"(r|q|R)_?{j}"}
 _SHORT = {0: "th", 1: "r"}
-"""The name of SYMORO, which is the variable among several that would be."""
+"""Variable names of SYMORO, which are preferred if several symbols are candidates."""
 
 _KIND = {0: "revolute", 1: "prismatic"}
 
 
 def split_variable(where: str, value: Expression, j: int, sigma: int) -> tuple[str, Expression]:
-    """The joint variable of frame j and what is added to it.
+    """Split an expression into the joint variable of frame j and a constant.
 
-    It is the only symbol in the expression or, among several, the one that is named after the
-    joint: th2, else theta2, q2 or t2 in a revolute, r2, else q2 in a prismatic joint 2.
+    The variable is the only symbol in the expression or, among several, the symbol named after the
+    joint: th2, else theta2, q2 or t2 in revolute joint 2; r2, else q2 or R2 in prismatic joint 2.
 
     Args:
-        where: of the expression, for the messages.
-        value: theta of a revolute or r of a prismatic joint.
+        where: location of the expression, for error messages.
+        value: theta of a revolute joint or r of a prismatic joint.
         j: number of the frame.
         sigma: 0 revolute, 1 prismatic.
 
     Raises:
-        DescriptionError: there is no variable, or more is done with it than adding a constant.
+        DescriptionError: there is no variable, or the expression is not the variable plus a
+            constant.
     """
     variable = _variable(where, value, j, sigma)
     rest: Expression | None = None
@@ -324,7 +324,7 @@ def _variable(where: str, value: Expression, j: int, sigma: int) -> str:
 
 
 def _terms(value: Expression, variable: str, sign: int = 1) -> Iterator[tuple[int, Expression]]:
-    """Signed terms of a sum, the variable a term of its own."""
+    """Yield the signed terms of a sum, with the variable as a separate term."""
     if isinstance(value, Operation) and value.operator in ("+", "-"):
         left, right = value.arguments
         other = sign if value.operator == "+" else -sign
@@ -346,15 +346,15 @@ def _add(rest: Expression | None, sign: int, term: Expression) -> Expression:
 
 
 def read_par(path: str | Path, parameters: Mapping[str, float] | None = None) -> RobotTable:
-    """The table in a .par file.
+    """Read a .par file as a table of frames.
 
     Args:
-        path: of the file.
-        parameters: values of the symbols in it; the others stay without a value.
+        path: path of the file.
+        parameters: values of symbols in the file. Other symbols have no value.
 
     Raises:
         DescriptionError: a line cannot be read, a key is misspelt, a vector has the wrong length,
-            or the table is impossible; the message names the file and the line.
+            or the table is inconsistent. The message names the file and the line.
     """
     file = ParFile.of(str(path), read_text(path))
     NL, NJ = file.count("NL"), file.count("NJ")
@@ -472,7 +472,7 @@ def _bodies(
 
 
 def _springs(file: ParFile, NJ: int, frames: tuple[FrameRow, ...]) -> dict[int, Expression]:
-    """The stiffness of the joints that eta makes flexible."""
+    """Return the stiffness of the joints that are flexible according to eta."""
     eta = file.vector(FLEXIBLE, NJ, "joint") or ()
     stiffness = file.vector(STIFFNESS, NJ, "joint")
     springs: dict[int, Expression] = {}
@@ -500,7 +500,7 @@ def _body(file: ParFile, j: int, NL: int, *, fixed: bool) -> dict[str, Any]:
 
 
 def _remarks(file: ParFile, kind: str, NJ: int) -> dict[int, Expression]:
-    """What remarks of a kind say of joints."""
+    """Return the expressions in comments of a kind, by joint number."""
     values: dict[int, Expression] = {}
     for where, name, text in file.remarked(kind):
         if not name.isdecimal() or not 1 <= int(name) <= NJ:

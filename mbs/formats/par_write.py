@@ -1,4 +1,4 @@
-"""Tables of frames written as SYMORO+ and OpenSYMORO robot files (.par)."""
+"""Writer of SYMORO+ and OpenSYMORO robot files (.par) from tables of frames."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ _VARIABLE = {0: ("theta", "th"), 1: ("r", "r")}
 
 
 def write_par(table: RobotTable, path: str | Path, *, note: str = "") -> None:
-    """Write the table as a .par file.
+    """Write a table as a .par file.
 
-    The format knows no names of joints and bodies and no limits: these are lost, and joint j is
-    q<j> when the file is read again. Values of symbols, `guess`, `Fs_width`, `rest` and which
-    inertial parameters no body can have are written as comments, which `read_par` reads. The file
-    says of every joint whether a motor drives it: where the table leaves the choice to the
-    assembly, what it chooses.
+    The format has no names of joints and bodies and no limits. They are lost, and joint j is named
+    q<j> when the file is read again. Values of symbols, `guess`, `Fs_width`, `rest` and the marks
+    of bodies with grouped inertial parameters are written as comments, which `read_par` reads. The
+    file specifies for every joint whether it is actuated. If the table does not, the choice of the
+    assembly is written.
 
     Args:
-        table: of frames.
-        path: of the .par file.
-        note: becomes a comment at the begin.
+        table: table of frames.
+        path: path of the .par file.
+        note: text of a comment at the beginning of the file.
 
     Raises:
-        DescriptionError: it is not a table, or a loop, a symbol, a rotor, or the drive of a cut
-            joint cannot be said in this format.
+        DescriptionError: `table` is not a table, or a loop, a symbol, a rotor, or the drive of a
+            cut joint cannot be expressed in this format.
         ExportError: the file cannot be written.
     """
     require_table(table)
@@ -82,7 +82,7 @@ def _lines(table: RobotTable, note: str) -> Iterator[str]:
 
 
 def _remarks(table: RobotTable, NJ: int) -> Iterator[str]:
-    """Comments for what the format has no key for."""
+    """Yield comments for data that have no key in the format."""
     numbers = {table.joint_name(j): j for j in range(1, len(table.frames) + 1)}
     yield from (f"(* Value {name} = {value!r} *)" for name, value in table.parameters.items())
     yield from (f"(* Guess q{numbers[name]} = {value!r} *)" for name, value in table.guess.items())
@@ -106,7 +106,7 @@ def _springs(table: RobotTable, NJ: int) -> Iterator[str]:
 
 
 def _motors(table: RobotTable) -> Iterator[int]:
-    """What the assembly chooses where the table does not say it: no motors inside of loops."""
+    """Yield 1 for actuated frames, else 0. By default, joints inside loops are passive."""
     passive = set(table.cut_frames)
     for loop in table.loops:
         moving, fixed = (_path(table, frame) for frame in loop.cut)
@@ -117,7 +117,7 @@ def _motors(table: RobotTable) -> Iterator[int]:
 
 
 def _path(table: RobotTable, frame: int) -> set[int]:
-    """The frames from the base to this one."""
+    """Return the frames on the path from the base to this frame."""
     path: set[int] = set()
     while frame:
         path.add(frame)

@@ -1,11 +1,11 @@
-"""SDFormat robot files (.sdf, .world), read as mechanisms with their loops.
+"""Reader of SDFormat robot files (.sdf, .world), including closed loops.
 
-Versions 1.4 to 1.12. Only what moves is read: links, inertials, frames, joints, their limits,
-friction, springs, gears and mimics. A file is taken as far as it has a meaning, and what was made
-of the rest is in the notes of the mechanism; what would change the motion is refused.
+Versions 1.4 to 1.12. The reader uses the elements that affect the motion: links, inertials, frames,
+joints, and their limits, friction, springs, gears and mimics. Incomplete or invalid data are read
+as far as possible, with a note in the mechanism. Unsupported elements that would change the motion
+raise an error.
 
-Source: the specification at sdformat.org; rotor inertias and joints without motors as Drake has
-them.
+Source: the specification at sdformat.org; rotor inertias and joints without motors as in Drake.
 """
 
 from __future__ import annotations
@@ -47,41 +47,43 @@ from mbs.text import did_you_mean, quoted
 Array = NDArray[np.float64]
 
 UNLIMITED = 1e16
-"""A limit from which on there is none: what the format wrote before it had infinity."""
+"""Magnitude from which a limit counts as infinite: the largest value in versions without
+infinity."""
 
 WORLD_GRAVITY = (0.0, 0.0, -9.8)
-"""Of a world that does not say it [m/s^2]; a model alone has that of mbs."""
+"""Default gravity of a world [m/s^2]. A model without a world has the default gravity of mbs."""
 
 _NEWEST = (1, 12)
 _OLDEST = (1, 4)
 _SAME = 1e-15
-"""Distance of a rotation from the identity that is rounding of one product."""
+"""Difference between a rotation matrix and the identity that is a rounding error of one product."""
 _SHORT = 16
-"""Steps between frames that are multiplied one by one; longer ways lead over the world, so that
-the time stays linear in the size of the file."""
+"""Maximum number of frame transforms that are multiplied directly. Longer chains go through the
+world frame, so that the time is linear in the size of the file."""
 _PARALLEL = 1e-6
-"""Of unit vectors: axes of gears and universal joints are written with six digits or more."""
+"""Tolerance of parallel and perpendicular unit vectors: axes of gears and universal joints are
+written with six digits or more."""
 
 
-# Numbers and words of elements, which are texts of elements in them.
+# Numbers and words of elements, stored as texts of child elements.
 
 
 @dataclass(frozen=True, slots=True)
 class SdfReader(Reader):
-    """Reads the numbers of one element and takes notes of it."""
+    """Reader of the numbers of one element, which adds notes about it."""
 
     def values(self, parent: Element | None, tag: str, default: Vector) -> Vector:
-        """The numbers in an element in this one, the default where there is none."""
+        """Return the numbers in the child element `tag`, or the default if there is none."""
         element = None if parent is None else parent.find(tag)
         text = "" if element is None else (element.text or "").strip()
         return self.numbers(element, tag, text, len(default)) if text else default
 
     def value(self, parent: Element | None, tag: str, default: float) -> float:
-        """One number."""
+        """Return one number in the child element `tag`, or the default if there is none."""
         return self.values(parent, tag, (default,))[0]
 
     def limit(self, parent: Element | None, tag: str, default: float) -> float:
-        """A number that may be infinite, or not be one."""
+        """Return a number that may be infinite or NaN, or the default if there is none."""
         element = None if parent is None else parent.find(tag)
         text = "" if element is None else (element.text or "").strip()
         if not text:
@@ -93,7 +95,7 @@ class SdfReader(Reader):
         return value if not abs(value) >= UNLIMITED else math.copysign(math.inf, value)
 
     def flag(self, parent: Element | None, tag: str, default: bool = False) -> bool:
-        """Whether something is so."""
+        """Return the truth value of the child element `tag`, or the default if there is none."""
         word = self.word(parent, tag).lower()
         if word in ("true", "1"):
             return True
@@ -104,12 +106,12 @@ class SdfReader(Reader):
         return default
 
     def word(self, parent: Element | None, tag: str) -> str:
-        """The text of an element, empty where there is none."""
+        """Return the text of the child element `tag`, empty if there is none."""
         element = None if parent is None else parent.find(tag)
         return "" if element is None else (element.text or "").strip()
 
     def pose(self, element: Element) -> tuple[str, Array]:
-        """What the <pose> of an element is relative to, empty where it says nothing; (4, 4)."""
+        """Return the reference frame of the <pose> of an element (or "") and its matrix (4, 4)."""
         pose = element.find("pose")
         if pose is None:
             return "", np.eye(4)
@@ -140,7 +142,7 @@ class SdfReader(Reader):
 
 
 def _of_angles(roll: float, pitch: float, yaw: float) -> Array:
-    """(3, 3) turned about the fixed axes x, y, z in this order."""
+    """Return the rotation (3, 3) by roll, pitch and yaw about the fixed axes x, y and z."""
     (a, b, c), (x, y, z) = map(math.cos, (roll, pitch, yaw)), map(math.sin, (roll, pitch, yaw))
     return np.array(
         [
@@ -158,23 +160,23 @@ def _transform(R: Any, p: Any) -> Array:
 
 
 def inverse(T: Array) -> Array:
-    """The (4, 4) transform of the other direction."""
+    """Return the inverse of a transform (4, 4)."""
     R = T[:3, :3].T
     return _transform(R, -R @ T[:3, 3])
 
 
-# The frames of a file, each placed in another one.
+# Frames of a file, each placed relative to another frame.
 
 
 @dataclass(slots=True)
 class _Frames:
-    """Places of frames by their full names; links, joints, frames and models all have one.
+    """Poses of frames by their full names. Links, joints, frames and models each have a frame.
 
     Attributes:
-        path: of the file.
-        places: what a frame is placed in, and its pose there.
-        attached: what carries a frame that is not a link.
-        known: poses in the world that were asked for.
+        path: path of the file.
+        places: reference frame of each frame, and its pose in the reference frame.
+        attached: frame or link to which a frame is rigidly attached, if it is not a link.
+        known: cache of poses in the world.
     """
 
     path: str
@@ -183,7 +185,7 @@ class _Frames:
     known: dict[str, Array] = field(default_factory=lambda: {"world": np.eye(4)})
 
     def in_world(self, frame: str) -> Array:
-        """(4, 4) pose of a frame in the world."""
+        """Return the pose (4, 4) of a frame in the world."""
         chain, met = [frame], {frame}
         while chain[-1] not in self.known:
             before = self.places[chain[-1]][0]
@@ -197,8 +199,11 @@ class _Frames:
         return T
 
     def seen_from(self, other: str, frame: str) -> Array:
-        """(4, 4) pose of a frame in another one, without a detour where it is placed in that."""
-        wanted = self.in_world(frame)  # and no cycle
+        """Return the pose (4, 4) of a frame relative to another frame.
+
+        It is the exact product of poses if the frame is placed in the other frame.
+        """
+        wanted = self.in_world(frame)  # raises an error if there is a cycle
         T, name = np.eye(4), frame
         for _ in range(_SHORT):
             if name in (other, "world"):
@@ -208,14 +213,14 @@ class _Frames:
         return T if name == other else inverse(self.in_world(other)) @ wanted
 
     def carrier(self, frame: str) -> str:
-        """The link that carries a frame, or the world."""
+        """Return the link to which a frame is rigidly attached, or the world."""
         name, met = frame, set[str]()
         while name in self.attached:
             if name in met:
                 self._cycle(name, "attached to")
             met.add(name)
             name = self.attached[name]
-        self.attached.update(dict.fromkeys(met, name))  # a long chain is walked through once
+        self.attached.update(dict.fromkeys(met, name))  # long chains are followed once
         return name
 
     def _cycle(self, name: str, how: str) -> NoReturn:
@@ -224,16 +229,16 @@ class _Frames:
         )
 
 
-# The elements of a model and of the models in it.
+# Elements of a model and of its nested models.
 
 
 @dataclass(frozen=True, slots=True)
 class _Scope:
-    """A model, in which names are looked up.
+    """Model as the scope of names.
 
     Attributes:
         key: full name of its frame.
-        prefix: of the full names of what is in it.
+        prefix: prefix of the full names of its elements.
     """
 
     key: str
@@ -242,13 +247,13 @@ class _Scope:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """A link, joint or frame.
+    """Link, joint or frame.
 
     Attributes:
         key: full name of its frame.
         name: its full name.
-        scope: of the model that it is in.
-        element: itself.
+        scope: model that contains it.
+        element: XML element.
     """
 
     key: str
@@ -282,29 +287,30 @@ _SILENT: Mapping[str, set[str]] = {
     },
     "frame": {"pose"},
 }
-"""Elements that are read, noted elsewhere, or known to be without effect on the equations."""
+"""Elements that are read, have a note of their own, or have no effect on the equations."""
 
 _LONGEST_NOTE = 8
-"""Names of links in one note: more are counted, since some files have hundreds."""
+"""Maximum number of link names in one note. Further names are counted, since some files have
+hundreds."""
 
 _MOVING = {
     *("joint", "mimic", "ball_constraint", "distance_constraint"),
     *("linear_bushing_rpy", "linear_spring_damper", "prismatic_spring"),
     *("tendon_constraint",),
 }
-"""Elements of other tools that would change the motion, without their prefix."""
+"""Elements of other tools (without prefix) that would change the motion."""
 
 
 @dataclass(slots=True)
 class _SdfFile:
-    """What a file says, before it is a mechanism.
+    """Parsed content of a file, before the mechanism is built.
 
     Attributes:
-        notes: of the file.
-        version: of the format.
-        frames: of links, joints, frames and models.
-        links, joints, named: the parts by the full names of their frames.
-        scopes: the parts of each model.
+        notes: notes of the file.
+        version: version of the format.
+        frames: frames of links, joints, frames and models.
+        links, joints, named: links, joints and named frames, by the full names of their frames.
+        scopes: elements of each model.
     """
 
     notes: Notes
@@ -316,11 +322,11 @@ class _SdfFile:
     scopes: dict[str, list[_Part]] = field(default_factory=dict)
 
     def reader(self, part: _Part) -> SdfReader:
-        """Reads the numbers of a part."""
+        """Return a reader of the numbers of a part."""
         return SdfReader(f"{part.element.tag} {quoted(part.name)}", part.element, self.notes)
 
     def add_model(self, element: Element, name: str, outer: _Scope | None) -> None:
-        """Take the parts of a model, and of the models in it."""
+        """Register the parts of a model and of its nested models."""
         prefix = "" if outer is None else f"{name}::"
         scope = _Scope("__model__" if outer is None else name, prefix)
         reader = SdfReader(f"model {quoted(name)}", element, self.notes)
@@ -345,7 +351,7 @@ class _SdfFile:
         )
 
     def place_model(self, element: Element, name: str, outer: _Scope | None) -> None:
-        """Place a model and what is in it, once all names are known."""
+        """Place a model and its parts, after all names are registered."""
         reader = SdfReader(f"model {quoted(name)}", element, self.notes)
         scope = _Scope("__model__", "") if outer is None else _Scope(name, f"{name}::")
         relative, T = reader.pose(element)
@@ -366,7 +372,7 @@ class _SdfFile:
             self._put_by_placement(element, name, scope)
 
     def _put_by_placement(self, element: Element, name: str, scope: _Scope) -> None:
-        """Where a model is placed by a frame in it: models in it first."""
+        """Move models that are placed by one of their own frames, nested models first."""
         for child in element.findall("model"):
             inner = scope.prefix + self._name(child)
             self._put_by_placement(child, inner, _Scope(inner, f"{inner}::"))
@@ -380,12 +386,12 @@ class _SdfFile:
             self.frames.known = {"world": np.eye(4)}
 
     def cuts(self, joint: _Part) -> bool:
-        """Whether the file wants a loop to be opened at a joint."""
+        """Whether the file requires that a loop is cut at this joint."""
         simbody = joint.element.find("physics/simbody")
         return simbody is not None and self.reader(joint).flag(simbody, "must_be_loop_joint")
 
     def resolved(self, reader: SdfReader, scope: _Scope, name: str, what: str) -> str:
-        """The full name of a frame that an element names."""
+        """Return the full name of a frame that an element refers to."""
         if name == "__model__":
             return scope.key
         if name == "world" and what in ("parent", "child", "gearbox_reference_body"):
@@ -410,7 +416,7 @@ class _SdfFile:
         name = scope.prefix + self._name(element)
         key = name
         if parts is self.joints and name in self.links and self.version < (1, 7):
-            key = f"joint {name}"  # before version 1.7 a link and a joint might have one name
+            key = f"joint {name}"  # before version 1.7, a link and a joint may have the same name
         if key in self.frames.places:
             raise DescriptionError(
                 f"{self.notes.path}: line {line_of(element)}: {element.tag} {quoted(name)}: another"
@@ -422,7 +428,7 @@ class _SdfFile:
         self._note_unread(self.reader(parts[key]))
 
     def _place(self, part: _Part) -> None:
-        """Place a part, and say what carries it."""
+        """Set the pose of a part and the frame to which it is attached."""
         reader, scope = self.reader(part), part.scope
         default = scope.key
         if part.key in self.joints:
@@ -438,7 +444,7 @@ class _SdfFile:
         self.frames.places[part.key] = default, T
 
     def _note_unread(self, reader: SdfReader) -> None:
-        """Notes of what is not read; what would change the motion is refused."""
+        """Add notes about unknown elements; raise if an element would change the motion."""
         tag = reader.element.tag
         for child in reader.element:
             if child.tag in _SILENT[tag]:
@@ -453,24 +459,24 @@ class _SdfFile:
             reader.note("ignored", text, child)
 
 
-# Building the mechanism.
+# Construction of the mechanism.
 
 
 @dataclass(slots=True)
 class _SdfBuilding:
-    """Puts the links and joints of a file into a mechanism.
+    """Builder of a mechanism from the links and joints of a file.
 
     Attributes:
-        mechanism: that is built.
-        file: what the file says.
-        base: as the user gave it.
-        static: whether nothing moves.
-        gravity: acceleration [m/s^2].
-        names: of the components.
-        points: the frame of each link and of the world, by its full name.
-        coordinates: names of coordinates, by the joint and its "axis" or "axis2".
-        kept: the joints that are connected, with their ends.
-        between: the joints that connect two links.
+        mechanism: mechanism under construction.
+        file: parsed content of the file.
+        base: base option of the user.
+        static: whether all links are fixed to the world.
+        gravity: acceleration of gravity [m/s^2].
+        names: names of the components.
+        points: frame of each link and of the world, by full name.
+        coordinates: names of coordinates, by joint and "axis" or "axis2".
+        kept: parent and child link of each joint of the mechanism.
+        between: joints that connect two links.
     """
 
     mechanism: Mechanism
@@ -531,10 +537,13 @@ class _SdfBuilding:
             reader.fail(f"type {quoted(kind)} is unknown; {did_you_mean(kind, _KINDS)}")
         return kind
 
-    # What holds together, and what it stands on.
+    # Connected groups of links, and their connection to the world.
 
     def _groups(self) -> _Groups:
-        """The links that joints connect; fixed joints first, so that they close no loop."""
+        """Return the groups of connected links.
+
+        Fixed joints are processed first, so that they do not close loops.
+        """
         file = self.file
         groups = _Groups({key: key for key in ("world", *file.links)})
         fixed: list[_Part] = []
@@ -555,7 +564,7 @@ class _SdfBuilding:
             self.between.setdefault(frozenset(ends), []).append(joint.key)
             if kind != "gearbox":
                 (fixed if kind == "fixed" else moving).append(joint)
-        # joints that the file wants loops cut at come last, and after fixed ones
+        # joints that the file marks as loop joints come last
         for joint in (*fixed, *moving):
             if file.cuts(joint):
                 last.append(joint)
@@ -566,7 +575,7 @@ class _SdfBuilding:
         return groups
 
     def _add_roots(self, groups: _Groups) -> None:
-        """Free what no joint leads to from the world, or weld it there."""
+        """Connect each group without a joint to the world by a free or fixed joint."""
         file, mechanism = self.file, self.mechanism
         children = {child for _, child in self.kept.values()}
         canonical = file.frames.carrier("__model__")
@@ -617,7 +626,7 @@ class _SdfBuilding:
         return body
 
     def _inertial(self, reader: SdfReader, inertial: Element | None) -> Inertial:
-        """The inertial of a link; what it does not say is one kilogram, and 1 kg m^2 each."""
+        """Return the inertial of a link. Missing values are 1 kg and 1 kg m^2."""
         if inertial is None:
             text = "it has no <inertial>; of 1 kg and 1 kg m^2, as the format has it"
             reader.note("completed", text)
@@ -684,7 +693,7 @@ class _SdfBuilding:
     def _connect_two(
         self, joint: _Part, reader: SdfReader, name: str, ends: tuple[Point, Point]
     ) -> Joint:
-        """A universal joint, or two revolute ones one after the other."""
+        """Connect a universal joint, or two revolute joints in series; return the last joint."""
         a, b = ends
         first = self._one_axis(joint, reader, f"{name}_1", "revolute")
         second = self._one_axis(joint, reader, f"{name}_2", "revolute", "axis2")
@@ -724,7 +733,7 @@ class _SdfBuilding:
         return last
 
     def _pitch(self, reader: SdfReader, element: Element) -> float:
-        """Advance for a turn [m], positive for a right-hand thread."""
+        """Return the advance per revolution [m], positive for a right-hand thread."""
         if reader.word(element, "screw_thread_pitch") or not reader.word(element, "thread_pitch"):
             return reader.value(element, "screw_thread_pitch", 1.0)
         turns = reader.value(element, "thread_pitch", 1.0)  # rad/m of a left-hand thread
@@ -733,7 +742,7 @@ class _SdfBuilding:
         return -2 * math.pi / turns
 
     def _axis(self, joint: _Part, reader: SdfReader, tag: str) -> tuple[float, float, float]:
-        """Unit vector of an axis in the frame of the joint."""
+        """Return the unit vector of an axis in the frame of the joint."""
         file, element = self.file, joint.element.find(tag)
         if element is None:
             reader.note("completed", f"it has no <{tag}>; taken as 0 0 1")
@@ -763,7 +772,7 @@ class _SdfBuilding:
             limits = self._limits(reader, limit)
         effort = reader.limit(limit, "effort", -1.0)
         follows = element is not None and element.find("mimic") is not None
-        # a largest effort of zero says that there is no motor, one above zero that there is one
+        # an effort limit of zero means a passive joint, a positive limit an actuated joint
         actuated = False if follows or effort == 0 else True if effort > 0 else None
         one = Prismatic if kind == "prismatic" else Revolute
         n = reader.value(joint.element, "drake:gear_ratio", 1.0)
@@ -803,7 +812,7 @@ class _SdfBuilding:
     # Gears and mimics.
 
     def _add_gears(self, gears: _Part) -> None:
-        """theta_2 = -ratio theta_1, the angles of child and parent seen from a third link."""
+        """Add theta_2 = -ratio theta_1, for angles of child and parent relative to a third link."""
         reader, file = self.file.reader(gears), self.file
         word = reader.word(gears.element, "gearbox_reference_body")
         third = file.frames.carrier(
@@ -822,7 +831,7 @@ class _SdfBuilding:
         self.mechanism.add(Coupling(name, driven, driver, (0.0, factor)))
 
     def _angle(self, reader: SdfReader, third: str, link: str, axis: Array) -> tuple[str, float]:
-        """The joint between two links, and the sign of its angle about an axis in the world."""
+        """Return the joint between two links, and the sign of its angle about a world axis."""
         file = self.file
         for key in self.between.get(frozenset((third, link)), ()):
             joint, ends = file.joints[key], self.kept[key]
@@ -858,33 +867,33 @@ class _SdfBuilding:
 
 
 class _Groups:
-    """Links that are connected: a forest in which roots stand for groups."""
+    """Groups of connected links as a disjoint-set forest; the root represents its group."""
 
     def __init__(self, above: dict[str, str]) -> None:
         self.above = above
         self.closing: set[str] = set()
 
     def root(self, key: str) -> str:
-        """What stands for the group of a link."""
+        """Return the representative of the group of a link."""
         while self.above[key] != key:
             self.above[key] = self.above[self.above[key]]
             key = self.above[key]
         return key
 
     def join(self, joint: str, one: str, other: str) -> None:
-        """Connect two links by a joint, which may close a loop."""
+        """Connect two links by a joint, and record whether it closes a loop."""
         a, b = self.root(one), self.root(other)
         if a == b:
             self.closing.add(joint)
         self.above[a] = b
 
     def closes(self, joint: str) -> bool:
-        """Whether a joint connects what was connected before it."""
+        """Whether a joint connects links that were already connected."""
         return joint in self.closing
 
 
 def _at(point: Point, T: Array) -> Point:
-    """A point displaced by a (4, 4) transform."""
+    """Return a point displaced by a transform (4, 4)."""
     R = T[:3, :3]
     x, y, z = (float(value) for value in T[:3, 3])
     turned = None if np.abs(R - np.eye(3)).max() <= _SAME else R.tolist()
@@ -892,9 +901,12 @@ def _at(point: Point, T: Array) -> Point:
 
 
 def quaternion(R: Array) -> Array:
-    """The unit quaternion (w, x, y, z) of a rotation, by its largest element.
+    """Return the unit quaternion (w, x, y, z) of a rotation matrix, by its largest element.
 
     Source: Shepperd 1978.
+
+    Args:
+        R: (3, 3) rotation matrix.
     """
     trace = float(np.trace(R))
     K = np.array(
@@ -910,29 +922,29 @@ def quaternion(R: Array) -> Array:
     return np.array(found / np.linalg.norm(found))
 
 
-# Reading.
+# Reader of complete files.
 
 
 def read_sdf(path: str | Path, *, base: Base | None = None, strict: bool = False) -> Mechanism:
-    """The mechanism in an SDFormat file: its one model, with loops.
+    """Read an SDFormat file with one model, including closed loops, as a mechanism.
 
-    Links, joints and frames keep their names, those of models in models with `model::` before
-    them; names that cannot be kept are changed, with a note. A link with several parents closes
-    loops, which the assembly opens where it finds it best. A joint has a motor where its largest
-    effort is above zero, and none where it is zero; without one the assembly chooses.
+    Links, joints and frames keep their names; names in nested models have the prefix `model::`.
+    Invalid names are changed, with a note. A link with several parents closes loops; the assembly
+    selects the joints at which they are cut. A joint is actuated if its effort limit is positive
+    and passive if it is zero; without a limit, the assembly decides.
 
     Args:
-        path: of the file.
-        base: None is as the format has it: what no joint connects with the world is free, on
-            "root_joint", and starts where it is drawn; "fixed" welds it to the world there, and
-            "free" leaves out the fixed joints to the world. A static model stands still where
-            this is None, and moves where it is given.
-        strict: refuse the file where a note would be taken.
+        path: path of the file.
+        base: None follows the format: links that no joint connects to the world are free, on the
+            joint "root_joint", and start at the pose in the file. "fixed" fixes them to the world
+            at this pose. "free" ignores fixed joints to the world. A static model is fixed if this
+            is None, and moves otherwise.
+        strict: whether to raise an error instead of adding a note.
 
     Raises:
         DescriptionError: the file is missing or malformed, has several models that move, or
-            something that changes the motion and that mbs does not model; reading is strict and
-            something would be noted.
+            contains an unsupported element that changes the motion. In strict mode, also for each
+            note.
     """
     if base not in (None, "fixed", "free"):
         raise DescriptionError(f"{path}: base is {quoted(base)}; give 'fixed', 'free' or None")
@@ -948,7 +960,7 @@ def read_sdf(path: str | Path, *, base: Base | None = None, strict: bool = False
     if not name:
         name = component_name(Path(path).stem) or "robot"
         notes.add("completed", "<model>", f"it has no name; named {quoted(name)}", line_of(model))
-    gravity: Vector = (0.0, 0.0, -9.81)  # [m/s^2] a model without a world says nothing: as of URDF
+    gravity: Vector = (0.0, 0.0, -9.81)  # [m/s^2] default for a model without a world, as in URDF
     if world is not None:
         gravity = _read_world(file, world)
     mechanism = Mechanism(name, gravity=gravity, source=f"SDF file {Path(path).name}")
@@ -971,7 +983,7 @@ def read_sdf(path: str | Path, *, base: Base | None = None, strict: bool = False
 
 
 def _note_visuals(file: _SdfFile) -> None:
-    """One note of the visuals, which are not read."""
+    """Add one note about the visuals, which are not read."""
     counts = {link.name: len(link.element.findall("visual")) for link in file.links.values()}
     drawn = [quoted(name) for name, count in counts.items() if count]
     if drawn:
@@ -1001,7 +1013,7 @@ def _version(root: Element, notes: Notes) -> tuple[int, ...]:
 
 
 def _choose(root: Element, notes: Notes) -> tuple[Element | None, Element]:
-    """The world, where there is one, and the model that is read."""
+    """Return the world element, if there is one, and the model element to read."""
     worlds = root.findall("world")
     if len(worlds) > 1:
         raise DescriptionError(f"{notes.path}: there are {len(worlds)} worlds; give a file of one")
@@ -1031,7 +1043,7 @@ def _is_static(model: Element) -> bool:
 
 
 def _read_world(file: _SdfFile, world: Element) -> Vector:
-    """Gravity of a world; its frames are taken, and what is not read is noted."""
+    """Return the gravity of a world. Its frames are registered, and unread elements are noted."""
     reader = SdfReader(f"world {quoted(world.get('name', ''))}", world, file.notes)
     if world.find("joint") is not None:
         reader.fail("it has joints of its own, between models; write them in the model")
@@ -1053,7 +1065,7 @@ def _read_world(file: _SdfFile, world: Element) -> Vector:
 
 
 def _refuse_parts(reader: SdfReader, model: Element) -> None:
-    """Refuse parts of the model in other files."""
+    """Raise if the model includes parts from other files."""
     for element in model.iter("include"):
         uri = quoted((element.findtext("uri") or "").strip())
         reader.fail(f"it includes {uri}, which is not read; put the whole model in one file")

@@ -1,7 +1,7 @@
-"""A robot as a table of frames: the description of Khalil & Kleinfinger 1986 as plain data.
+"""Robot as a table of frames: description of Khalil & Kleinfinger 1986 as plain data.
 
-Frames are numbered from 1 in the order of the rows; antecedent 0 is the base. Rows hold what was
-written, as expressions; nothing is computed here.
+Frames are numbered from 1 in the order of the rows; antecedent 0 is the base. Rows contain the
+given expressions without evaluation.
 """
 
 from __future__ import annotations
@@ -39,35 +39,37 @@ from mbs.text import did_you_mean, quoted
 
 
 GEOMETRY = ("gamma", "b", "alpha", "d", "theta", "r")
-"""The six parameters of a frame, in the order in which the displacements are made."""
+"""Six geometric parameters of a frame, in the order of the transformations."""
 
 DRIVE = ("Ia", "Fv", "Fs", "stiffness")
-"""Rotor inertia, friction and spring of the joint of a body row, zero where there are none."""
+"""Rotor inertia, friction and spring of the joint of a body row; zero by default."""
 
 BODY_SCALARS = (*TEN_PARAMETERS, *DRIVE, "Fs_width", "rest")
-"""The scalars of a body row."""
+"""Scalar fields of a body row."""
 
 JOINTS = ("revolute", "prismatic", "fixed")
 """Names of the joint types sigma = 0, 1, 2."""
 
 LOOP_JOINTS = (*JOINTS, "cylindrical", "universal", "spherical", "planar")
-"""Names of the joint types that may close a loop."""
+"""Names of the joint types at which a loop may be cut."""
 
 
 @dataclass(frozen=True, slots=True)
 class FrameRow:
-    """Frame j and the joint that moves it with respect to its antecedent.
+    """Frame j and its joint, which moves it relative to its antecedent.
 
     Attributes:
-        antecedent: number of the frame it is placed on, 0 for the base.
+        antecedent: number of the antecedent frame, 0 for the base.
         sigma: 0 revolute, 1 prismatic, 2 fixed.
-        actuated: whether a motor drives the joint (mu); None leaves the choice to the assembly.
-        gamma, b, alpha, d, theta, r: Khalil parameters [rad, m]; the joint variable is added to
-            theta of a revolute joint and to r of a prismatic one.
-        limits: (lower, upper) of the joint variable [rad or m].
-        name: of the joint, q<j> when empty.
-        velocity: (lower, upper) of its rate, or the largest in both directions [rad/s or m/s].
-        effort: likewise of its motor [N m or N].
+        actuated: whether the joint is actuated (mu); None if the assembly decides.
+        gamma, b, alpha, d, theta, r: Khalil parameters [rad, m]. The joint variable is added to
+            theta of a revolute joint and to r of a prismatic joint.
+        limits: (lower, upper) limits of the joint variable [rad or m].
+        name: name of the joint; q<j> if empty.
+        velocity: (lower, upper) limits of the joint velocity, or one limit for both directions
+            [rad/s or m/s].
+        effort: (lower, upper) limits of the motor effort, or one limit for both directions [N m or
+            N].
     """
 
     antecedent: int
@@ -92,22 +94,22 @@ class FrameRow:
 
 @dataclass(frozen=True, slots=True)
 class InertiaRow:
-    """The body fixed on frame j and the drive of joint j.
+    """Body of frame j and drive of joint j.
 
     Attributes:
         frame: number of the frame.
         XX, XY, XZ, YY, YZ, ZZ: inertia about the origin of the frame, in its axes [kg m^2].
         MX, MY, MZ: first moments [kg m].
         M: mass [kg].
-        Ia: inertia of the rotor seen at the joint [kg m^2 or kg].
+        Ia: rotor inertia, referred to the joint [kg m^2 or kg].
         Fv, Fs: viscous [N m s/rad or N s/m] and Coulomb friction [N m or N].
         Fs_width: velocity over which Coulomb friction changes sign [rad/s or m/s], 0 for a step.
-        stiffness: of the spring of the joint [N m/rad or N/m].
-        rest: position at which the spring is at rest [rad or m].
-        rotor: that spins with the joint, on the antecedent of the frame; its axis, where given,
-            is in the axes of frame j at the zero position.
-        name: of the body, link<j> when empty.
-        grouped: the values are base parameters, which need not belong to a single body.
+        stiffness: stiffness of the joint spring [N m/rad or N/m].
+        rest: rest position of the joint spring [rad or m].
+        rotor: rotor that is driven by the joint and mounted on the antecedent of the frame. Its
+            axis, if given, is in the axes of frame j at the zero position.
+        name: name of the body; link<j> if empty.
+        grouped: whether the values are base parameters, which may not belong to a physical body.
     """
 
     frame: int
@@ -133,7 +135,7 @@ class InertiaRow:
 
     @property
     def is_body(self) -> bool:
-        """Whether its inertial parameters are those of a body; symbols leave it open."""
+        """Whether the inertial parameters are numeric and physically consistent."""
         values: dict[str, Any] = {name: expression(getattr(self, name)) for name in TEN_PARAMETERS}
         if not all(isinstance(value, Number) for value in values.values()):
             return False
@@ -145,18 +147,19 @@ class InertiaRow:
 
     @property
     def drive(self) -> list[str]:
-        """Names of what acts on the joint and is not zero."""
+        """Names of the nonzero drive parameters of the joint."""
         given = [name for name in DRIVE if to_float(expression(getattr(self, name))) != 0]
         return [*given, *(["rotor"] if self.rotor is not None else [])]
 
 
 @dataclass(frozen=True, slots=True)
 class CutRow:
-    """A loop that is opened at a joint, which then has a frame on either side.
+    """Loop that is cut at a joint, with one frame on each side of the joint.
 
     Attributes:
-        cut: (k, k+B): frame k carries the variable of the cut joint, frame k+B is fixed on the
-            other side; they coincide when the loop is closed. Other frames may stand on k+B.
+        cut: (k, k+B): frame k moves with the variable of the cut joint, frame k+B is fixed on the
+            other side. They coincide if the loop is closed. Frame k+B may be the antecedent of
+            other frames.
         joint: type of the cut joint.
     """
 
@@ -166,23 +169,23 @@ class CutRow:
 
 @dataclass(frozen=True, slots=True)
 class RobotTable:
-    """A robot by its frames, bodies and loops.
+    """Robot as a table of frames, bodies and loops.
 
     Attributes:
-        name: of the robot.
+        name: name of the robot.
         frames: rows 1 .. N.
-        bodies: at most one row for each frame; frames without one have no mass.
-        loops: where closed loops are opened.
-        gravity: gravity acceleration in the base frame [m/s^2].
+        bodies: at most one row per frame; frames without a row have no mass.
+        loops: cuts of the closed loops.
+        gravity: acceleration of gravity in the base frame [m/s^2].
         parameters: values of the symbols in the rows.
-        source: where the data come from.
-        guess: joint positions near which the loops are closed, by the names of joints that
-            `joint_name` gives [rad or m].
-        extras: what a file says beyond the mechanism, as texts, kept for writing it again. "Z" has
-            the 16 elements, row by row, of the pose of the base in the world: the mount.
+        source: origin of the data.
+        guess: joint positions near which the loops are closed, by joint name of `joint_name` [rad
+            or m].
+        extras: further data of a file as texts, kept for writing. "Z" has the 16 elements, row by
+            row, of the pose of the base in the world (mount).
 
     Raises:
-        DescriptionError: a row contradicts itself or the others; the message names the row.
+        DescriptionError: rows are inconsistent; the message names the row.
     """
 
     name: str
@@ -219,25 +222,25 @@ class RobotTable:
 
     @property
     def cut_frames(self) -> frozenset[int]:
-        """Numbers of the frames on either side of the cut joints."""
+        """Numbers of the frames on both sides of the cut joints."""
         return frozenset(frame for loop in self.loops for frame in loop.cut)
 
     @property
     def symbols(self) -> frozenset[str]:
-        """Names of the symbols in its rows."""
+        """Names of the symbols in the rows."""
         scalars = _scalars((self.frames, self.bodies, self.gravity))
         return frozenset(symbol.name for scalar in scalars for symbol in parameters_of(scalar))
 
     def joint_name(self, j: int) -> str:
-        """The name of the joint of frame j."""
+        """Return the name of the joint of frame j."""
         return self.frames[j - 1].name or f"q{j}"
 
 
 def require_table(table: object) -> None:
-    """Refuse what is not a table of frames.
+    """Raise if the argument is not a table of frames.
 
     Raises:
-        DescriptionError: it is a mechanism, a system, or something else.
+        DescriptionError: the argument is a mechanism, a system or another object.
     """
     if not isinstance(table, RobotTable):
         raise DescriptionError(
@@ -255,7 +258,7 @@ def _with_scalars(where: str, row: Row, names: tuple[str, ...]) -> Row:
 
 
 def _bare(row: Row, names: tuple[str, ...]) -> Row:
-    """The row with symbols that are names only: their values are kept in the table."""
+    """Return the row with symbols without default values, which are stored in the table."""
     values: dict[str, Any] = {n: expression(str(getattr(row, n))) for n in names}
     if isinstance(row, InertiaRow):
         values["frame"] = int(row.frame) if _is_int(row.frame) else row.frame
@@ -268,7 +271,7 @@ def _bare_scalars(rotor: Rotor) -> dict[str, Expression]:
 
 
 def _plain_cut(loop: CutRow) -> CutRow:
-    """The row with the numbers of the cut as Python writes them."""
+    """Return the row with frame numbers as Python integers."""
     cut: Any = tuple(int(k) if _is_int(k) else k for k in loop.cut)
     return replace(loop, cut=cut)
 
@@ -316,7 +319,7 @@ def _gravity(name: str, gravity: Any) -> tuple[Expression, ...]:
 
 
 def _values(name: str, given: Mapping[str, float], rows: Any) -> dict[str, float]:
-    """The values of the symbols: those given, and the defaults of Parameters in the rows."""
+    """Return the values of the symbols: given values, and defaults of Parameters in the rows."""
     used: dict[str, float | None] = {}
     for scalar in _scalars(rows):
         for symbol in parameters_of(scalar):
@@ -397,7 +400,7 @@ def _check_loops(table: RobotTable) -> None:
 
 
 def _is_moving(table: RobotTable, frame: int) -> bool:
-    """Whether the frame carries the variable of a cut joint."""
+    """Whether the frame moves with the variable of a cut joint."""
     return any(loop.cut[0] == frame for loop in table.loops)
 
 
@@ -434,7 +437,7 @@ def _is_int(value: object) -> bool:
     return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
 
 
-# The mechanism that a table of frames describes.
+# Conversion of a table of frames to a mechanism.
 
 
 _MOVING = (Revolute, Prismatic)
@@ -451,14 +454,14 @@ _BASE_MOTION = ("W0", "WP0", "V0", "VP0")
 
 
 def to_mechanism(table: RobotTable) -> Mechanism:
-    """The bodies and joints of a table, numbered as its frames are.
+    """Convert a table to a mechanism, with the numbering of its frames.
 
-    Joint j is named q<j> and body j link<j>, unless the rows name them. A fixed frame is a body
-    that is welded to its antecedent. The two frames of a cut become one passive joint, between
-    the links that carry them, where the loop is then opened.
+    Joint j is named q<j> and body j link<j>, unless the rows have names. A fixed frame becomes a
+    body fixed to its antecedent. The two frames of a cut become one joint between their links, at
+    which the loop is cut. It is passive unless the row of its moving frame is actuated.
 
     Raises:
-        DescriptionError: a body is impossible, two names are equal, or the base moves.
+        DescriptionError: a body is physically inconsistent, two names are equal, or the base moves.
     """
     require_table(table)
     _check_base(table)
@@ -506,9 +509,9 @@ def _close(
 
 
 def _place(table: RobotTable, j: int, links: Mapping[int, RigidBody]) -> Point:
-    """Where frame j is before its joint moves it, on a link that is there already.
+    """Return the zero position of frame j, relative to an existing link.
 
-    Its antecedent may be the fixed end frame of a loop, which stands on a link in its turn.
+    The antecedent may be the fixed frame of a cut, which is itself fixed to a link.
     """
     rows = [table.frames[j - 1]]
     while rows[-1].antecedent not in links:

@@ -1,4 +1,4 @@
-"""Tables of frames as TOML files, and as dicts of the same schema."""
+"""Reader and writer of tables of frames as TOML files, and as dicts of the same schema."""
 
 from __future__ import annotations
 
@@ -37,25 +37,25 @@ _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def read_toml(path: str | Path) -> RobotTable:
-    """The table in a TOML file.
+    """Read a TOML file as a table of frames.
 
     Raises:
-        DescriptionError: the file is missing or not TOML, or the table is impossible.
+        DescriptionError: the file is missing or not TOML, or the table is inconsistent.
     """
     text = read_text(path)
     try:
         data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # also of brackets and digits without end
+    except (ValueError, RecursionError) as error:  # also for unterminated brackets and digits
         raise DescriptionError(f"{path}: the file is not TOML: {error}; correct it") from None
     return from_dict(data)
 
 
 def from_dict(data: Mapping[str, Any]) -> RobotTable:
-    """The table that a dict of the TOML schema describes.
+    """Return the table of a dict in the TOML schema.
 
     Raises:
-        DescriptionError: a key is unknown or missing, a value has the wrong type, or the table
-            is impossible.
+        DescriptionError: a key is unknown or missing, a value has the wrong type, or the table is
+            inconsistent.
     """
     if not isinstance(data, Mapping):
         raise DescriptionError(f"robot: {data!r} is not a table; give a dict with name and frame")
@@ -68,7 +68,7 @@ def from_dict(data: Mapping[str, Any]) -> RobotTable:
         frames=tuple(_frame(row, where) for row, where in _rows(data, "frame", name)),
         bodies=tuple(_body(row, where) for row, where in _rows(data, "body", name)),
         loops=tuple(_loop(row, where) for row, where in _rows(data, "loop", name)),
-        # where the file has none: downwards along z, as in `Mechanism` [m/s^2]
+        # default of a file without gravity: along -z, as in `Mechanism` [m/s^2]
         gravity=data.get("gravity", (0.0, 0.0, -9.81)),
         parameters=_table(data, "parameters", name),
         source=_text(data, "source", name),
@@ -78,20 +78,20 @@ def from_dict(data: Mapping[str, Any]) -> RobotTable:
 
 
 def write_toml(table: RobotTable, path: str | Path) -> None:
-    """Write the table as a TOML file that `read_toml` reads as an equal table.
+    """Write a table as a TOML file, which `read_toml` reads as an equal table.
 
     Raises:
-        DescriptionError: it is not a table.
+        DescriptionError: the argument is not a table.
         ExportError: the file cannot be written.
     """
     write_text("\n".join(_lines(to_dict(table))) + "\n", path)
 
 
 def to_dict(table: RobotTable) -> dict[str, Any]:
-    """The dict of the TOML schema that describes the table; defaults are left out.
+    """Return a table as a dict in the TOML schema, without default values.
 
     Raises:
-        DescriptionError: it is not a table.
+        DescriptionError: the argument is not a table.
     """
     require_table(table)
     data: dict[str, Any] = {"name": table.name}
@@ -232,7 +232,7 @@ def _frame_dict(row: FrameRow) -> dict[str, Any]:
 
 
 def _range(pair: tuple[float, float]) -> float | list[float]:
-    """The largest value alone where it is the same in both directions."""
+    """Return one number if the limits are symmetric, otherwise [lower, upper]."""
     lower, upper = pair
     return upper if lower == -upper else [lower, upper]
 

@@ -1,10 +1,10 @@
-"""URDF robot files, read as mechanisms; xacro files after `xacrodoc` has expanded them.
+"""Reader of URDF robot files, and of xacro files after expansion by `xacrodoc`.
 
-What moves is read: links, inertials, joints, limits, friction, mimics and the rotors of
-transmissions; and what links look like, for pictures. A file is taken as far as it has a meaning,
-and what was made of the rest is in the notes of the mechanism.
+The reader uses the elements that affect the motion (links, inertials, joints, limits, friction,
+mimics and rotors of transmissions) and the shapes of links for pictures. Incomplete or invalid data
+are read as far as possible, with a note in the mechanism.
 
-The reader is our own, without MuJoCo's: see "URDF without MuJoCo" in docs/decisions.md.
+The reader does not use MuJoCo; see "URDF without MuJoCo" in docs/decisions.md.
 """
 
 from __future__ import annotations
@@ -49,20 +49,20 @@ from mbs.text import did_you_mean, install_command, quoted
 Vector = tuple[float, ...]
 
 UNLIMITED = 1e30
-"""A limit from which on there is none, in a format that has no infinity."""
+"""Magnitude from which a limit counts as infinite, in a format without infinity."""
 
 _LARGEST = 1e30
-"""Of lengths, masses and the like in SI units: their products stay finite in double precision."""
+"""Largest length, mass and other number in SI units: products stay finite in double precision."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """Reads the numbers of one link or joint, and takes notes of it.
+    """Reader of the numbers of one link or joint, which adds notes about it.
 
     Attributes:
-        what: the element, such as "joint 'j1'".
-        element: itself.
-        notes: of the file.
+        what: name of the element in messages, such as "joint 'j1'".
+        element: XML element.
+        notes: notes of the file.
     """
 
     what: str
@@ -70,29 +70,29 @@ class Reader:
     notes: Notes
 
     def fail(self, message: str) -> NoReturn:
-        """Refuse the element."""
+        """Raise a DescriptionError about the element."""
         raise DescriptionError(f"{self.where}: {message}")
 
     def note(self, kind: NoteKind, text: str, element: Element | None = None) -> None:
-        """Take a note of the element, or of one in it."""
+        """Add a note about the element, or about an element inside it."""
         line = line_of(self.element if element is None else element)
         self.notes.add(kind, self.what, text, line)
 
     @property
     def where(self) -> str:
-        """The element in messages."""
+        """File and element, for error messages."""
         return f"{self.notes.path}: {self.what}"
 
     def number(
         self, element: Element | None, key: str, default: float, largest: float = _LARGEST
     ) -> float:
-        """One number of an element that may be missing."""
+        """Return one number of an element, or the default if it is missing."""
         return self.vector(element, key, (default,), largest)[0]
 
     def vector(
         self, element: Element | None, key: str, default: Vector, largest: float = _LARGEST
     ) -> Vector:
-        """As many numbers as the default has."""
+        """Return a vector attribute as long as the default, or the default if it is missing."""
         text = None if element is None else element.get(key)
         if text is None:
             return default
@@ -101,14 +101,14 @@ class Reader:
     def numbers(
         self, element: Element | None, key: str, text: str, count: int, largest: float = _LARGEST
     ) -> Vector:
-        """The numbers in a text, so many of them.
+        """Return the `count` numbers in a text.
 
         Args:
-            element: that they stand in, for notes.
-            key: what they are, for messages.
-            text: as it is written.
-            count: how many there must be.
-            largest: that one of them may be.
+            element: element that contains the text, for notes.
+            key: name of the quantity, for error messages.
+            text: text in the file.
+            count: required number of values.
+            largest: largest allowed magnitude.
         """
         if "${" in text or "$(" in text:
             self.fail(f"{key} is {quoted(text)}, which xacro has not expanded; {_EXPAND}")
@@ -120,8 +120,8 @@ class Reader:
         return values
 
     def _without_commas(self, element: Element | None, key: str, text: str) -> str:
-        """The text with blanks for commas between numbers, not for those that are in numbers."""
-        bare = len(text.split()) == 1 and text.count(",") > 1  # 1,2,3 are three numbers
+        """Replace commas between numbers by blanks, but not commas inside numbers."""
+        bare = len(text.split()) == 1 and text.count(",") > 1  # "1,2,3" is three numbers
         spaced = text.replace(",", " ") if bare else _COMMA.sub(" ", text)
         if spaced != text:
             self.note(
@@ -136,7 +136,7 @@ _EXPAND = "load the .xacro file itself, or expand it first"
 
 @dataclass(frozen=True, slots=True)
 class Inertial:
-    """Mass [kg], centre of mass [m] and (3, 3) inertia about it [kg m^2], in the link's frame."""
+    """Mass [kg], centre of mass [m] and inertia (3, 3) about it [kg m^2], in the link frame."""
 
     mass: float = 0.0
     com: Vector = (0.0, 0.0, 0.0)
@@ -144,12 +144,12 @@ class Inertial:
 
     @property
     def is_zero(self) -> bool:
-        """Whether the link has no inertia at all."""
+        """Whether mass and inertia are zero."""
         return self.mass == 0 and not np.any(self.tensor)
 
 
 def origin_of(reader: Reader, element: Element) -> tuple[Vector, list[tuple[str, float]]]:
-    """Position [m] and the turns about z, y, x [rad] of the <origin> of an element."""
+    """Return position [m] and rotations about z, y, x [rad] of the <origin> of an element."""
     origin = element.find("origin")
     xyz = reader.vector(origin, "xyz", (0.0, 0.0, 0.0))
     roll, pitch, yaw = reader.vector(origin, "rpy", (0.0, 0.0, 0.0))
@@ -161,7 +161,7 @@ _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def read_inertial(reader: Reader) -> Inertial:
-    """The inertial of a link, without mass if it has none.
+    """Return the inertial of a link, zero if it has none or no mass.
 
     Raises:
         DescriptionError: a number cannot be read.
@@ -196,7 +196,7 @@ def _turn(axis: str, angle: float) -> Any:
     return R
 
 
-# Which links and joints a URDF file has, and how they hang together.
+# Links and joints of a URDF file, and their tree.
 
 
 _ONE_AXIS: Mapping[str, type[Revolute] | type[Prismatic]] = {
@@ -209,7 +209,7 @@ _KINDS = (*_ONE_AXIS, "fixed", "floating", "planar")
 
 @dataclass(frozen=True, slots=True)
 class JointElement:
-    """A joint and the links on either side."""
+    """Joint of a URDF file with the names of its parent and child links."""
 
     name: str
     parent: str
@@ -218,13 +218,13 @@ class JointElement:
 
     @property
     def kind(self) -> str:
-        """Its type."""
+        """Joint type, as in the file."""
         return self.element.get("type", "").strip()
 
 
 @dataclass(frozen=True, slots=True)
 class UrdfTree:
-    """The links by name, and the joints in an order in which parents come first."""
+    """Links by name, and joints in an order in which parents precede children."""
 
     notes: Notes
     root: str
@@ -232,20 +232,20 @@ class UrdfTree:
     joints: tuple[JointElement, ...]
 
     def link(self, name: str) -> Reader:
-        """A reader of the numbers of a link."""
+        """Return a reader of the numbers of a link."""
         return Reader(f"link {quoted(name)}", self.links[name], self.notes)
 
     def joint(self, joint: JointElement) -> Reader:
-        """A reader of the numbers of a joint."""
+        """Return a reader of the numbers of a joint."""
         return Reader(f"joint {quoted(joint.name)}", joint.element, self.notes)
 
 
 def read_tree(root: Element, notes: Notes) -> UrdfTree:
-    """The links and joints of a <robot>, checked to be a tree.
+    """Return the links and joints of a <robot>, after a check that they form a tree.
 
     Raises:
-        DescriptionError: an end of a joint is unknown, links of one name differ, or there is not
-            one root.
+        DescriptionError: a joint refers to an unknown link, two different links have the same name,
+            a link has two parents, or there is not exactly one root.
     """
     path = notes.path
     links = _links(root, notes)
@@ -329,10 +329,10 @@ def _joints(root: Element, notes: Notes) -> dict[str, Element]:
 
 
 class _Texts(dict[Element, str]):
-    """The texts of elements, which are written once."""
+    """Cache of the XML texts of elements."""
 
     def same(self, one: Element, other: Element) -> bool:
-        """Whether two elements say the same, however they are laid out."""
+        """Whether two elements have the same content, apart from white space."""
         if one not in self:
             self[one] = self._text(one)
         return self[one] == self._text(other)
@@ -379,17 +379,17 @@ def _order(
     return tuple(ordered)
 
 
-# Names that components can bear, each of them once.
+# Unique and valid component names.
 
 
 @dataclass(slots=True)
 class KeptNames:
-    """Gives every element a name of its own: that of the file, changed where it cannot be kept.
+    """Assign a unique name to every element: the name in the file, changed if it is not allowed.
 
     Attributes:
-        taken: what no further component may be called.
-        wanted: what elements of the file are called, which renamed ones keep away from.
-        number: of the last name that was made of another one.
+        taken: names that are already assigned.
+        wanted: names of elements in the file, which changed names must avoid.
+        number: last counter for each changed name.
     """
 
     taken: set[str]
@@ -397,13 +397,13 @@ class KeptNames:
     number: dict[str, int] = field(default_factory=dict)
 
     def give(self, reader: Reader, text: str, suffix: str, why: str) -> str:
-        """A name for an element.
+        """Return a name for an element, and mark it as assigned.
 
         Args:
-            reader: of the element.
-            text: its name in the file.
-            suffix: what is put behind a name that cannot be kept.
-            why: it cannot, in words.
+            reader: reader of the element.
+            text: name of the element in the file.
+            suffix: suffix that is appended if the name is not allowed.
+            why: reason why it is not allowed, for the note.
         """
         name = component_name(text) or suffix
         if name not in self.taken:
@@ -422,7 +422,7 @@ class KeptNames:
 
 @dataclass(frozen=True, slots=True)
 class Named:
-    """What the links, the moving joints, the couplings of mimics and a free root are called."""
+    """Component names of links, moving joints and the free root joint, by name in the file."""
 
     links: Mapping[str, str]
     joints: Mapping[str, str]
@@ -430,7 +430,7 @@ class Named:
 
 
 def element_names(tree: UrdfTree, base: Base | None) -> Named:
-    """What the elements are called in the mechanism; changed names are noted."""
+    """Return the names of the elements in the mechanism, with a note for each change."""
     moving = [joint for joint in tree.joints if joint.kind != "fixed"]
     wanted = {component_name(name) for name in (*tree.links, *(j.name for j in moving))}
     names = KeptNames({"world"}, wanted)
@@ -455,7 +455,7 @@ def element_names(tree: UrdfTree, base: Base | None) -> Named:
     of_link = {}
     for link in tree.links:
         if link == tree.root == "world" and base != "free":
-            of_link[link] = link  # the world itself
+            of_link[link] = link  # the world frame itself
             continue
         reserved = component_name(link) == "base" and link not in at_world
         if reserved:
@@ -470,7 +470,7 @@ def element_names(tree: UrdfTree, base: Base | None) -> Named:
 
 
 def _floats(tree: UrdfTree) -> bool:
-    """Whether the root is a place in the world alone, from which a floating joint leads."""
+    """Whether root and links fixed to it have no inertial, and a floating joint starts there."""
     held = {tree.root}
     for joint in tree.joints:
         if joint.parent in held and joint.kind == "fixed":
@@ -480,7 +480,7 @@ def _floats(tree: UrdfTree) -> bool:
 
 
 def _at_world(tree: UrdfTree) -> set[str]:
-    """The links whose frame is that of the world, where the root is welded to it."""
+    """Return the links whose frame coincides with the world frame, if the root is fixed to it."""
     found = {tree.root}
     for joint in tree.joints:
         if joint.kind == "fixed" and joint.parent in found:
@@ -499,26 +499,26 @@ def read_urdf(
     packages: Mapping[str, str | Path] | None = None,
     other_files: bool = True,
 ) -> Mechanism:
-    """The mechanism in a URDF file, or in a xacro file.
+    """Read a URDF or xacro file as a mechanism.
 
-    Every link becomes a body of its name, fixed ones as well, and every joint that moves a joint
-    of its name; names that cannot be kept are changed, with a note. The root link is the world
-    when it is named "world" or has no mass; otherwise it is a body welded to the world. With a
-    free base the root is always a body, on the Free joint "root_joint". One-axis joints are
-    actuated unless they mimic another one; floating ones are not. Pictures show the visuals of the
-    links, and the collisions of those without.
+    Every link becomes a body of the same name, including links on fixed joints, and every moving
+    joint a joint of the same name. Names that are not allowed are changed, with a note. The root
+    link is the world if it is named "world" or has no mass; otherwise it is a body fixed to the
+    world. With a free base, the root is always a body on the Free joint "root_joint". One-axis
+    joints are actuated unless they mimic another joint; floating joints are passive. Pictures show
+    the visuals of links, or the collision shapes of links without visuals.
 
     Args:
-        path: of the file; one that ends in .xacro is expanded by the library `xacrodoc`.
-        base: "free" for a root that nothing holds; otherwise it is welded to the world.
-        strict: refuse the file where a note would be taken.
+        path: path of the file; a file with the suffix .xacro is expanded by the library `xacrodoc`.
+        base: "free" for a floating base; otherwise the root is fixed to the world.
+        strict: whether to raise an error instead of adding a note.
         xacro: values of the arguments of a xacro file.
-        packages: folders of the packages that a xacro file or `package://` names.
-        other_files: look for the meshes that it names; not for files of people nobody knows.
+        packages: folders of the packages in a xacro file or in `package://` names.
+        other_files: whether to read the mesh files; set to False for files from untrusted sources.
 
     Raises:
-        DescriptionError: the file is missing or malformed, its links and joints form no tree, or
-            reading is strict and something would be noted.
+        DescriptionError: the file is missing or malformed, or its links and joints do not form a
+            tree. In strict mode, also for each note.
     """
     notes = Notes(str(path), strict)
     content = read_bytes(path)
@@ -551,14 +551,14 @@ def read_urdf(
 def expanded(
     path: str | Path, arguments: Mapping[str, object], packages: Mapping[str, str | Path]
 ) -> bytes:
-    """The URDF text that a xacro file stands for.
+    """Expand a xacro file to URDF text.
 
-    xacro evaluates Python expressions: expand files of people that you trust.
+    xacro evaluates Python expressions, so only expand files from trusted sources.
 
     Args:
-        path: of the file; packages are looked for in the folders above it as well.
-        arguments: of the file, by name; True and False are written as xacro has them.
-        packages: folder of each package that is found nowhere else.
+        path: path of the file; packages are also searched in its parent folders.
+        arguments: arguments of the file by name; True and False are converted to true and false.
+        packages: folder of each package that is not found elsewhere.
 
     Raises:
         DescriptionError: the library is not installed, or the file cannot be expanded.
@@ -573,13 +573,13 @@ def expanded(
     given = {k: str(v).lower() if isinstance(v, bool) else str(v) for k, v in arguments.items()}
     said = io.StringIO()
     try:
-        with contextlib.redirect_stderr(said):  # xacro prints what it also raises
+        with contextlib.redirect_stderr(said):  # xacro prints the errors that it raises
             xacrodoc.packages.update_package_cache(dict(packages))
             document = xacrodoc.XacroDoc.from_file(
                 Path(path).resolve(), subargs=given, resolve_packages=False
             )
             return str(document.to_urdf_string()).encode()
-    except (Exception, SystemExit) as error:  # macros raise what their expressions raise
+    except (Exception, SystemExit) as error:  # macros raise any exception of their expressions
         reason = quoted(str(error) or type(error).__name__)
         raise DescriptionError(
             f"{path}: xacro cannot expand it: {reason}; give its arguments as xacro={{...}} and the"
@@ -587,7 +587,7 @@ def expanded(
         ) from None
 
 
-# What a file holds beside links and joints.
+# Elements of a file other than links and joints.
 
 
 _SILENT = {
@@ -601,14 +601,14 @@ _SILENT = {
         *("safety_controller", "calibration"),
     },
 }
-"""Elements that are read, noted elsewhere, or known to be without effect on the equations."""
+"""Elements that are read, have a note of their own, or have no effect on the equations."""
 
 _LOOPS = ("loop", "constraint", "loop_joint")
 _WITH_EFFECT = {"springStiffness", "springReference", "turnGravityOff", "kinematic"}
 
 
 def _note_unread(root: Element, notes: Notes) -> None:
-    """Notes of the elements that are not read, one for each kind of them."""
+    """Add one note for each kind of element that is not read."""
     unread: dict[tuple[str, str], list[Element]] = {}
     for parent in (root, *root.findall("link"), *root.findall("joint")):
         for child in parent:
@@ -625,7 +625,7 @@ def _note_unread(root: Element, notes: Notes) -> None:
 
 
 def _note_effects(root: Element, notes: Notes) -> None:
-    """Notes of what would change the motion: loops, and springs and the like of Gazebo."""
+    """Add notes about unread elements that would change the motion, such as loops and springs."""
     for element in root:
         local = element.tag.rpartition(":")[2]
         if local in _LOOPS:
@@ -639,7 +639,7 @@ def _note_effects(root: Element, notes: Notes) -> None:
 
 
 def _effects(gazebo: Element) -> Iterator[Element]:
-    """What an element for Gazebo says that changes the motion."""
+    """Yield the children of a <gazebo> element that would change the motion."""
     for inner in gazebo:
         text = (inner.text or "").strip().lower()
         off = text in ("", "0", "false") or _is_zero(text)
@@ -660,13 +660,13 @@ _ROTOR = ("motorInertia", "rotorInertia", "rotor_inertia")
 
 
 def _rotors(root: Element, tree: UrdfTree) -> dict[str, float]:
-    """Inertia of the rotors of transmissions seen at their joints, Ia [kg m^2 or kg].
+    """Return the rotor inertias of transmissions, referred to their joints, Ia [kg m^2 or kg].
 
-    A rotor of inertia J behind a reduction n is n^2 J at the joint; a reduction alone changes no
-    equation, since the inputs of the models are efforts at the joints.
+    A rotor inertia J with reduction n is n^2 J at the joint. A reduction without rotor inertia has
+    no effect, since the inputs of the models are joint efforts.
     """
     found: dict[str, float] = {}
-    # armatures of free joints have no other place in the format
+    # the format has no other element for the armature of free joints
     moving = {joint.name for joint in tree.joints if joint.kind in (*_ONE_AXIS, "floating")}
     for element in root.findall("transmission"):
         name = quoted((element.get("name") or "").strip())
@@ -685,7 +685,7 @@ def _rotors(root: Element, tree: UrdfTree) -> dict[str, float]:
 
 
 def _scalar_in(element: Element, tags: Collection[str]) -> float | None:
-    """The first number in elements of these names, whatever their prefix."""
+    """Return the first number in elements with these names, with any prefix."""
     for inner in element.iter():
         if inner.tag.rpartition(":")[2] in tags:
             try:
@@ -702,16 +702,16 @@ def _scalar_in(element: Element, tags: Collection[str]) -> float | None:
 
 @dataclass(slots=True)
 class _Building:
-    """Puts the links and joints of a tree into a mechanism.
+    """Builder of a mechanism from the links and joints of a tree.
 
     Attributes:
-        mechanism: that is built.
-        tree: of the file.
-        names: of its elements.
-        rotors: Ia of joints by their names in the file.
-        inertials: of the links.
-        leaders: of the joints that mimic another one.
-        points: the frames of the links.
+        mechanism: mechanism under construction.
+        tree: tree of the file.
+        names: names of the elements in the mechanism.
+        rotors: rotor inertia Ia by joint name in the file.
+        inertials: inertial of each link.
+        leaders: for each mimic joint, the joint that it follows.
+        points: frame of each link.
     """
 
     mechanism: Mechanism
@@ -790,7 +790,7 @@ class _Building:
         )
 
     def _note_massless(self, base: Base | None) -> None:
-        """Notes of the joints that move nothing that has inertia."""
+        """Add notes about joints whose descendants have no inertia."""
         tree = self.tree
         moves = {link: not self.inertials[link].is_zero for link in tree.links}
         for joint in reversed(tree.joints):
@@ -820,13 +820,13 @@ class _Building:
 
 
 def body_of(reader: Reader, name: str, inertial: Inertial, element: Element | None) -> Body:
-    """A body with an inertia as the file has it; one that no body has is noted.
+    """Return a body with the inertia of the file, with a note if it is physically inconsistent.
 
     Args:
-        reader: of the link.
-        name: of the body.
-        inertial: of the link.
-        element: that says it.
+        reader: reader of the link.
+        name: name of the body.
+        inertial: inertial of the link.
+        element: XML element of the inertial.
     """
     numbers = {"mass": inertial.mass, "com": inertial.com, "inertia": inertial.tensor}
     try:
@@ -841,7 +841,7 @@ def body_of(reader: Reader, name: str, inertial: Inertial, element: Element | No
 
 
 def _leaders(tree: UrdfTree) -> dict[str, str]:
-    """What each joint mimics; notes of those that cannot."""
+    """Return the joint that each mimic joint follows, with notes about invalid mimics."""
     found: dict[str, str] = {}
     last: dict[str, str] = {}
     kinds = {joint.name: joint.kind for joint in tree.joints}
@@ -861,13 +861,13 @@ def _leaders(tree: UrdfTree) -> dict[str, str]:
 def _mimic_fault(
     joint: JointElement, leader: str, kinds: Mapping[str, str], leaders: dict[str, str]
 ) -> str:
-    """Why a joint cannot follow another one; empty where it can.
+    """Return the reason why a joint cannot follow another joint; empty if it can.
 
     Args:
-        joint: that mimics.
-        leader: what it mimics.
-        kinds: of all joints.
-        leaders: of the joints before it, or those that lead these; changed.
+        joint: mimic joint.
+        leader: name of the joint to follow.
+        kinds: types of all joints.
+        leaders: joint that each earlier mimic joint follows; long chains are shortened in place.
     """
     if joint.kind not in _ONE_AXIS:
         return f"but is {joint.kind} and has not one position"
@@ -879,7 +879,7 @@ def _mimic_fault(
     while leader in leaders:
         passed.append(leader)
         leader = leaders[leader]
-    leaders.update(dict.fromkeys(passed, leader))  # a long chain is walked through once
+    leaders.update(dict.fromkeys(passed, leader))  # long chains are followed once
     return "which follows it" if leader == joint.name else ""
 
 
@@ -895,7 +895,7 @@ _INFINITE = {"inf": math.inf, "infinity": math.inf, "nan": math.nan}
 
 
 def _limit(reader: Reader, limit: Element | None, key: str) -> float:
-    """A number of a <limit>, which may be infinite there, or not be one."""
+    """Return a number of a <limit>, which may be infinite or NaN."""
     text = ("" if limit is None else limit.get(key, "")).strip().lower()
     if text.lstrip("+-") in _INFINITE:
         return _INFINITE[text.lstrip("+-")] * (-1 if text.startswith("-") else 1)
@@ -920,7 +920,7 @@ def _limits(reader: Reader) -> tuple[float, float] | None:
 
 
 def _largest(reader: Reader, key: str) -> float | None:
-    """The largest velocity or effort; files write zero where it is not known."""
+    """Return the velocity or effort limit, or None; files contain zero if it is unknown."""
     limit = reader.element.find("limit")
     value = _limit(reader, limit, key)
     if value < 0 or math.isnan(value):
@@ -928,18 +928,18 @@ def _largest(reader: Reader, key: str) -> float | None:
     return value if 0 < value < math.inf else None
 
 
-# What links look like: visuals, else collisions, for pictures alone.
+# Shapes of links for pictures: visuals, or else collision shapes.
 
 
 Colour = tuple[float, float, float]
 _PRIMITIVES = {"box": ("size",), "sphere": ("radius",)} | dict.fromkeys(
     ("cylinder", "capsule"), ("radius", "length")
 )
-"""Attributes of the elements that are shapes of their own."""
+"""Attributes of the primitive shapes."""
 
 
 def material_colours(root: Element) -> dict[str, Vector]:
-    """Red, green, blue and opacity of materials by name; the first of a name counts."""
+    """Return (red, green, blue, opacity) of materials by name, by the first definition."""
     found: dict[str, Vector] = {}
     own = (m for tag in ("visual", "collision") for v in root.iter(tag) for m in v.iter("material"))
     for material in (*root.findall("material"), *own):
@@ -950,7 +950,7 @@ def material_colours(root: Element) -> dict[str, Vector]:
 
 
 def _rgba(material: Element) -> Vector | None:
-    """The colour that stands in a material."""
+    """Return the colour in a material element, or None."""
     colour = material.find("color")
     text = "" if colour is None else colour.get("rgba", "")
     try:
@@ -967,16 +967,16 @@ def add_shapes(
     colours: Mapping[str, Vector],
     meshes: MeshFiles,
 ) -> None:
-    """Give the links their visuals, or their collisions where none of these can be drawn.
+    """Add the visuals of the links, or their collision shapes if no visual can be drawn.
 
-    A link without a visual is not seen, unless the whole file has none.
+    If any link of the file has a visual, links without visuals get no shape.
 
     Args:
-        mechanism: that gets the shapes.
-        tree: of the file.
+        mechanism: mechanism that receives the shapes.
+        tree: tree of the file.
         points: frames of the links.
-        colours: of materials by name.
-        meshes: finds the files of meshes.
+        colours: colours of materials by name.
+        meshes: search for the mesh files.
     """
     seen = any(element.find("visual") is not None for element in tree.links.values())
     for link, element in tree.links.items():
@@ -997,14 +997,14 @@ def add_shapes(
 def _shape(
     reader: Reader, frame: Point, colours: Mapping[str, Vector], meshes: MeshFiles
 ) -> tuple[Point, Shape] | None:
-    """A visual or collision and where it is; None, with a note, if it cannot be drawn."""
+    """Return the frame and the shape of a visual or collision; None if it cannot be drawn."""
     element = reader.element
     colour = None
     material = element.find("material")
     if material is not None:
         colour = _rgba(material) or colours.get((material.get("name") or "").strip())
     if colour is not None and colour[3] == 0:
-        return None  # it is there to be invisible
+        return None  # it is intentionally invisible
     geometry = element.find("geometry")
     kinds = {} if geometry is None else {inner.tag: inner for inner in geometry}
     kind = next((tag for tag in kinds if tag in _PRIMITIVES or tag == "mesh"), None)

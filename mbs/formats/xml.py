@@ -1,8 +1,9 @@
-"""XML as robots' files hold it: with the lines of the elements, and lenient as their own tools.
+"""XML parser for robot files, with line numbers and the tolerance of common robot tools.
 
-Prefixes need no declaration, since names are taken as they are written. What expat refuses and the
-tools of URDF do not (TinyXML) is mended, with a note: a declaration that is not at the beginning,
-two hyphens in a comment, a bare `&`, bytes that are not of the encoding, what follows the root.
+Prefixes need no declaration, since tag names are not interpreted. Errors that expat rejects and the
+tools of URDF (TinyXML) accept are repaired, with a note: a declaration that is not at the
+beginning, two hyphens in a comment, a bare `&`, bytes that are invalid in the encoding, text after
+the root element.
 """
 
 from __future__ import annotations
@@ -18,31 +19,31 @@ from mbs.errors import DescriptionError
 from mbs.formats.files import decoded, read_bytes
 from mbs.formats.notes import Notes
 
-_MOST_ELEMENTS = 1_000_000  # a file of the largest size could hold 16 times as many: gigabytes
-_DEEPEST = 200  # elements in elements; robots' files have ten
+_MOST_ELEMENTS = 1_000_000  # limit of memory: a file of the largest size could have 16 times more
+_DEEPEST = 200  # maximum nesting of elements; robot files have about ten levels
 
 
 class XmlElement(Element):
-    """An element that knows where it stands.
+    """Element with its line number.
 
     Attributes:
-        line: of the file, from 1; None where the text is not that of a file.
+        line: line number in the file, from 1; None for a text that is not from a file.
     """
 
     line: int | None = None
 
 
 def line_of(element: Element | None) -> int | None:
-    """The line of the file where an element begins, where it is known."""
+    """Return the line number at which an element begins, or None if it is unknown."""
     return getattr(element, "line", None)
 
 
 def parse_xml(path: str | Path, notes: Notes | None = None) -> Element:
-    """The root element of an XML file, an `XmlElement` like all in it.
+    """Return the root element of an XML file; all elements are `XmlElement`.
 
     Args:
-        path: of the file.
-        notes: takes what had to be mended.
+        path: path of the file.
+        notes: collection that receives one note per repair of the file.
 
     Raises:
         DescriptionError: the file is missing, too large or is not XML.
@@ -51,22 +52,22 @@ def parse_xml(path: str | Path, notes: Notes | None = None) -> Element:
 
 
 def parse_content(path: str, content: bytes, notes: Notes | None = None) -> Element:
-    """The root element of the content of an XML file.
+    """Return the root element of the content of an XML file.
 
     Args:
-        path: of the file, for messages.
-        content: of it.
-        notes: takes what had to be mended.
+        path: path of the file, for error messages.
+        content: content of the file.
+        notes: collection that receives one note per repair of the content.
 
     Raises:
-        DescriptionError: it is too large or is not XML.
+        DescriptionError: the content is too large or is not XML.
     """
     try:
         return _Builder(path).parse(content)
     except DescriptionError:
         raise
     except (expat.ExpatError, LookupError, ValueError):
-        pass  # an encoding that expat does not know raises the last two
+        pass  # expat raises the last two for an unknown encoding
     notes = Notes(path) if notes is None else notes
     text = _mend(content, notes)
     builder = _Builder(path)
@@ -87,7 +88,7 @@ _JUNK = expat.errors.codes[expat.errors.XML_ERROR_JUNK_AFTER_DOC_ELEMENT]
 
 
 class _Builder:
-    """Builds the elements of one file as expat meets them."""
+    """Element tree builder that receives the events of expat."""
 
     def __init__(self, path: str) -> None:
         self.path = path
@@ -95,16 +96,16 @@ class _Builder:
         self.open: list[XmlElement] = []
         self.count = 0
         self.closed: XmlElement | None = None
-        self.parser: Any = expat.ParserCreate()  # without a separator: prefixes are part of names
+        self.parser: Any = expat.ParserCreate()  # without a separator, names keep their prefixes
         self.parser.buffer_text = True
-        self.parser.buffer_size = 1 << 20  # each full buffer copies the text of an element so far
+        self.parser.buffer_size = 1 << 20  # each full buffer copies the element text so far
         self.parser.StartElementHandler = self._start
         self.parser.EndElementHandler = self._end
         self.parser.CharacterDataHandler = self._data
 
     def parse(self, content: bytes | str) -> Element:
         self.parser.Parse(content, True)
-        assert self.root is not None  # expat refuses a text without elements
+        assert self.root is not None  # expat raises if a text has no elements
         return self.root
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
@@ -147,19 +148,19 @@ _MENDS = (
 
 
 def _mend(content: bytes, notes: Notes) -> str:
-    """A text that expat takes, its lines those of the file."""
+    """Return a repaired text with the line numbers of the file."""
     declared = _DECLARED.search(content[:200])
     encoding = declared.group(1).decode() if declared else "utf-8"
     try:
         known = codecs.lookup(encoding).name
     except LookupError:
         known = ""
-    # A declaration that can be read as plain letters is not written in two bytes for each.
+    # A declaration that is readable as ASCII is not encoded in UTF-16 or UTF-32.
     if not known or known.startswith(("utf-16", "utf-32")):
         known = "utf-8"
     try:
         text = decoded(content, known)
-    except (LookupError, ValueError):  # codecs that are not of texts
+    except (LookupError, ValueError):  # codecs that do not decode to text
         text = decoded(content)
     if "\ufffd" in text:
         line = text[: text.index("\ufffd")].count("\n") + 1
@@ -167,7 +168,7 @@ def _mend(content: bytes, notes: Notes) -> str:
         text = content.decode("latin-1")
     text = _without_comments(text)
     first = _DECLARATION.match(text)
-    if first is not None:  # it has been read, for the encoding
+    if first is not None:  # its encoding has already been read
         text = text[first.end() :]
     for pattern, by, element, what in _MENDS:
         found = pattern.search(text)
@@ -179,7 +180,7 @@ def _mend(content: bytes, notes: Notes) -> str:
 
 
 def _replace(pattern: re.Pattern[str], by: str, text: str) -> str:
-    """The text with every match replaced, its ends of lines kept."""
+    """Replace every match, and keep the line breaks of the matches."""
 
     def replacement(found: re.Match[str]) -> str:
         return by + "\n" * found.group().count("\n")
@@ -188,7 +189,7 @@ def _replace(pattern: re.Pattern[str], by: str, text: str) -> str:
 
 
 def _without_comments(text: str) -> str:
-    """The text with blanks for comments, which may hold two hyphens in the files of others."""
+    """Remove comments and keep their line breaks; comments may contain two hyphens."""
     parts, at = [], 0
     while (start := text.find("<!--", at)) >= 0:
         end = text.find("-->", start + 4)

@@ -1,4 +1,4 @@
-"""Base inertial parameters and identification."""
+"""Base inertial parameters and parameter identification."""
 
 from mbs.identification.base_parameters import BaseParameters, base_parameters
 from mbs.identification.bodies import (

@@ -1,4 +1,4 @@
-"""Base inertial parameters: the fewest that give the same equations of motion."""
+"""Base inertial parameters: smallest set of parameters of the equations of motion."""
 
 from __future__ import annotations
 
@@ -60,17 +60,17 @@ from mbs.loops.closure import closure_rows
 from mbs.spatial import Inertia, elements
 from mbs.text import did_you_mean, quoted
 
-# A system whose links and joints have other inertial parameters.
+# Systems with changed inertial and joint parameters.
 
 
 _OF_THE_JOINT = ("Ia", "Fv", "Fs")
 
 
 def with_parameters(system: System, columns: Sequence[Column], values: SX) -> System:
-    """The same mechanism with these parameters, those of no column as they were.
+    """Return a copy of the system with these parameter values. Other parameters are unchanged.
 
-    Masses of its bodies are no longer known. Offsets and motors of two joints stay away, since a
-    system has none.
+    The masses of its bodies become unknown. Offsets and parameters of coupled motors are ignored,
+    since a system does not contain them.
 
     Args:
         system: open or closed.
@@ -97,30 +97,30 @@ def _with(link: Link, values: Mapping[str, SX]) -> Link:
     return replace(link, inertia=inertia, rotor=rotor, **joint)
 
 
-# Symbols that a grouping depends on, and the system in which they are constants.
-#
-# Columns of the regressor depend on each other in a way that lengths, angles and gravity decide.
-# What is found at numbers of these symbols holds there alone, so that a system in which it is
-# used must not take other numbers for them.
+# Symbols on which a grouping depends, and systems in which they are constants.
+
+# The linear dependence of regressor columns depends on lengths, angles and gravity. A grouping that
+# was computed at numeric values of these symbols is valid for these values only, so the system that
+# uses it must not accept other values.
 
 
 def deciding_symbols(
     system: System, columns: Sequence[Column], *, base_moves: bool = False
 ) -> tuple[str, ...]:
-    """Names of the parameters on which the regressor or the closed configurations depend.
+    """Return the names of the parameters on which the regressor or the loop closure depends.
 
-    Parameters that are only inertial parameters or friction of a link are not among them.
+    Symbols that occur only in inertial parameters or friction are excluded.
 
     Args:
         system: open or closed.
         columns: the parameters that are grouped.
-        base_moves: whether the base has a motion of its own.
+        base_moves: whether the base has a prescribed motion.
     """
     if not system.parameters:
         return ()
     D = regressor(system, every_column(system, columns), moving_base=base_moves)
     found = {int(k) for k in D.jac_sparsity(0, D.name_in().index("p")).get_col()}
-    # The distance of two points of the base decides how loops close, and D may not show it.
+    # Distances between points of the base affect the loop closure, but may be absent from D.
     if system.is_closed:
         rows = closure_rows(system, SX.sym("q", system.nq))
         found |= {k for k in range(len(system.parameters)) if casadi.depends_on(rows, system.p[k])}
@@ -128,17 +128,16 @@ def deciding_symbols(
 
 
 def with_constants(system: System, names: Sequence[str]) -> System:
-    """The system in which some symbols are the constants of their defaults, and no parameters.
+    """Return a copy of the system with some symbols replaced by their default values.
 
-    The input p of its models has the other parameters only: values other than these constants
-    cannot be given to it.
+    The input p of its models contains only the other parameters.
 
     Args:
         system: open or closed.
-        names: of the parameters that become constants.
+        names: names of the parameters that become constants.
 
     Raises:
-        ModelError: one of them has no default.
+        ModelError: a named parameter has no default value.
     """
     if not names:
         return system
@@ -159,7 +158,7 @@ def with_constants(system: System, names: Sequence[str]) -> System:
 
 
 def _changer(symbols: Mapping[str, SX], values: Mapping[str, float]) -> Callable[[Any], Any]:
-    """What puts numbers into everything that a system holds, expressions of components too."""
+    """Return a function that substitutes numbers for symbols in nested data of a system."""
     before = casadi.vertcat(*(symbols[name] for name in values))
     after = SX(casadi.DM(np.array(list(values.values()))))
     done: dict[int, tuple[Any, Any]] = {}
@@ -169,8 +168,8 @@ def _changer(symbols: Mapping[str, SX], values: Mapping[str, float]) -> Callable
             return casadi.substitute(value, before, after) if depends(value) else value
         if isinstance(value, Expression):
             return _with_numbers(value, values)
-        if id(value) not in done:  # what is shared is changed once
-            # kept with the original, so that no other object gets its id
+        if id(value) not in done:  # shared objects are changed once
+            # the original is kept alive, so that its id is not reused
             done[id(value)] = (value, inside(value))
         return done[id(value)][1]
 
@@ -192,11 +191,12 @@ def _changer(symbols: Mapping[str, SX], values: Mapping[str, float]) -> Callable
 
 
 def _rebuilt(value: Any, change: Callable[[Any], Any]) -> Any:
-    """A copy of a dataclass with its fields changed; itself where nothing changes."""
+    """Return a copy of a dataclass with changed fields, or the same object if nothing changes."""
     fresh = {f.name: change(getattr(value, f.name)) for f in fields(value)}
     if all(fresh[name] is getattr(value, name) for name in fresh):
         return value
-    # Not `replace`: what the constructor computes must be changed too, and is checked already.
+    # Not `replace`: attributes that the constructor computes must be changed too, without its
+    # checks.
     made = copy.copy(value)
     for name, one in fresh.items():
         object.__setattr__(made, name, one)
@@ -204,7 +204,7 @@ def _rebuilt(value: Any, change: Callable[[Any], Any]) -> Any:
 
 
 def _with_numbers(value: Expression, values: Mapping[str, float]) -> Expression:
-    """The expression with numbers in the place of these parameters; others stay symbols."""
+    """Return the expression with numbers for the parameters in `values`."""
     if isinstance(value, Parameter):
         return Number(values[value.name]) if value.name in values else value
     if isinstance(value, Operation):
@@ -212,7 +212,7 @@ def _with_numbers(value: Expression, values: Mapping[str, float]) -> Expression:
     return value
 
 
-# Groupings in numbers, and their check at other values of the symbols than their defaults.
+# Numeric groupings, and their check at values of the symbols other than the defaults.
 
 
 _SEED = 20260412
@@ -221,7 +221,7 @@ _SEED = 20260412
 def numbers_at(
     system: System, columns: Sequence[Column], grouping: Grouping, p: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(kept, columns) the coefficients of a grouping at values p (np,) of the symbols."""
+    """Return the coefficient matrix (kept, columns) of a grouping at parameter values p (np,)."""
     rows = {k: row for row, k in enumerate(grouping.kept)}
     B = SX(len(rows), len(columns))
     for k, column, x in coefficients(grouping):
@@ -236,14 +236,14 @@ def checked_elsewhere(
     order: Sequence[int],
     structure: Structure,
 ) -> Check | None:
-    """What states at other values of the symbols say against a grouping; None when nothing.
+    """Check a grouping at random states with other values of the symbols; None if it holds.
 
     Args:
         system: open, with symbols.
-        columns: its parameters.
-        grouping: by rules.
-        order: of preference.
-        structure: of its tree.
+        columns: parameters of the system.
+        grouping: grouping from the symbolic rules.
+        order: column indices in the order of preference.
+        structure: structure of the tree.
     """
     p = parameter_samples(system, system.p)[1]
     sample = RegressorSample.of(system, columns, p, _SEED, base_moves=structure.base_moves)
@@ -254,7 +254,7 @@ def checked_elsewhere(
     return replace(check, text=told)
 
 
-# Grouping by rules: those of trees, then those of closed loops.
+# Grouping by symbolic rules: tree rules first, then rules of closed loops.
 
 
 def grouped_by_rules(
@@ -263,13 +263,13 @@ def grouped_by_rules(
     configurations: Sequence[ClosedConfigurations],
     structure: Structure,
 ) -> Grouping:
-    """What the rules find.
+    """Return the grouping that the symbolic rules produce.
 
     Args:
         system: open or closed.
         columns: the parameters.
-        configurations: that close the loops; none for an open system.
-        structure: of its tree.
+        configurations: configurations that close the loops; empty for an open system.
+        structure: structure of the tree.
     """
     indices = _column_indices(columns)
     grouping = _by_tree(structure, Grouping.none(len(columns)), indices)
@@ -297,18 +297,18 @@ def _by_tree(structure: Structure, grouping: Grouping, indices: Mapping[Key, int
 
 
 def _column_indices(columns: Sequence[Column]) -> dict[Key, int]:
-    """Numbers of the parameters of one link or joint."""
+    """Map (link, kind) to the column index, for parameters of one link or joint."""
     return {(c.link - 1, c.kind): k for k, c in enumerate(columns) if not c.other}
 
 
 def _terms(effects: Mapping[Key, SX], indices: Mapping[Key, int]) -> Terms | None:
-    """The combination in numbers of columns; None when a parameter of it is no column."""
+    """Map the keys of a combination to column indices; None if a parameter has no column."""
     if any(key not in indices for key in effects):
         return None
     return {indices[key]: x for key, x in effects.items()}
 
 
-# Base inertial parameters: the fewest parameters that give the same equations of motion.
+# Base inertial parameters: smallest set of parameters of the equations of motion.
 
 
 METHODS = ("symbolic", "numeric")
@@ -319,18 +319,19 @@ class BaseParameters:
     """Base inertial parameters of a system: K_base = B K, and D K = D_kept K_base.
 
     Attributes:
-        system: whose parameters they are; of the numeric method, one in which the symbols that
-            the regressor depends on are constants.
+        system: system of the parameters. For the numeric method, the symbols on which the regressor
+            depends are constants in it.
         method: "symbolic" or "numeric".
-        columns: all parameters K.
-        kept: those that remain, with others added to them.
-        eliminated: those that leave.
-        symbols: (n, 1) a symbol for every parameter, in the order of `columns`.
-        grouping: (count, 1) base parameters in these symbols and the parameters of the system.
-        matrix: (count, n) B in numbers, at the defaults of the parameters of the system.
-        function: ``base_parameters(K) -> K_base``, with the input p when the system has
+        columns: all n parameters K.
+        kept: parameters that remain; each base parameter is a kept parameter plus a combination of
+            eliminated parameters.
+        eliminated: parameters that are removed.
+        symbols: (n, 1) symbols of the parameters, in the order of `columns`.
+        grouping: (count, 1) base parameters as expressions of `symbols` and the system parameters.
+        matrix: (count, n) numeric B, at the default values of the system parameters.
+        function: ``base_parameters(K) -> K_base``, with the additional input p if the system has
             parameters.
-        check: what random states say about the count and the grouping.
+        check: check of the count and the grouping at random states.
     """
 
     system: System
@@ -355,33 +356,33 @@ class BaseParameters:
 
     @property
     def indices(self) -> list[int]:
-        """Numbers of the kept columns among all."""
+        """Indices of the kept columns in `columns`."""
         return [self.columns.index(column) for column in self.kept]
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the base parameters; R says that others were added, as in "XX2R"."""
+        """Names of the base parameters; the suffix R, as in "XX2R", marks grouped parameters."""
         pairs = zip(self.kept, self._terms, strict=True)
         return tuple(f"{c.name}R" if len(terms) > 1 else c.name for c, terms in pairs)
 
     @property
     def columns_in_base(self) -> tuple[Column, ...]:
-        """The kept columns under the names of the base parameters, such as for `regressor`."""
+        """Kept columns with the names of the base parameters, as input of `regressor`."""
         return tuple(replace(c, name=n) for c, n in zip(self.kept, self.names, strict=True))
 
     @property
     def equations(self) -> tuple[str, ...]:
-        """Every base parameter as text, such as "XX2R = XX2 - YY2 + 0.25*M3"."""
+        """Equation of each base parameter, such as "XX2R = XX2 - YY2 + 0.25*M3"."""
         return tuple(map(equation, self.names, self._terms))
 
     @property
     def without_effect(self) -> tuple[Column, ...]:
-        """Eliminated parameters that are in no base parameter."""
+        """Eliminated parameters that occur in no base parameter."""
         used = {name for terms in self._terms for name in terms}
         return tuple(column for column in self.eliminated if column.name not in used)
 
     def text(self) -> str:
-        """The set, its equations and the check, in plain lines."""
+        """Return the base parameters, their equations and the check as plain text."""
         rows = [(name, c.unit) for name, c in zip(self.names, self.kept, strict=True)]
         without = ", ".join(column.name for column in self.without_effect) or "none"
         grouped = [c.name for c in self.eliminated if c not in self.without_effect]
@@ -400,11 +401,12 @@ class BaseParameters:
         return "\n".join(lines)
 
     def apply(self) -> System:
-        """The system in base parameters: the same equations of motion, most parameters zero.
+        """Return a system with the base parameters and the same equations of motion.
 
-        Eliminated parameters are zero, kept ones have the grouped values. Links are then no
-        longer bodies that could exist; wrenches between them and energies of single links differ.
-        It holds for this gravity alone, and for a base at rest unless `moving_base` was said.
+        Eliminated parameters are zero and kept parameters have the grouped values. The links are no
+        longer physical bodies; wrenches between links and energies of single links differ. The
+        result is valid for the present gravity only, and for a base at rest unless `moving_base`
+        was set.
         """
         inputs = [values_of(self.system, self.columns)]
         inputs += [self.system.p] if self.system.parameters else []
@@ -423,29 +425,30 @@ def base_parameters(
     seed: int = 1,
     moving_base: bool = False,
 ) -> BaseParameters:
-    """The base inertial parameters of a system.
+    """Compute the base inertial parameters of a system.
 
-    The symbolic method applies rules to the joints, from the last to the first, then to closed
-    loops; it keeps symbols of lengths and angles. Random states check the result. What the rules
-    did not find is told in `check` and, where it does not depend on symbols, applied too. The
-    numeric method takes the rank of the regressor in random states, at the defaults of the symbols
-    on which the regressor depends; they are constants in the result: `.system`, `.function` and
-    `.apply()` have no such parameter, only those that are inertial parameters themselves.
+    The symbolic method applies rules to the joints, from the last to the first, then to the closed
+    loops, and keeps symbols of lengths and angles. The result is checked at random states.
+    Relations that the rules miss are reported in `check`; they are also applied if they do not
+    depend on symbols. The numeric method computes the rank of the regressor at random states, at
+    the default values of the symbols on which the regressor depends. These symbols are constants in
+    the `.system`, `.function` and `.apply()` of the result. Symbols that are inertial parameters
+    remain parameters.
 
-    Source: Gautier & Khalil 1990 and Khalil & Bennis 1995 for the rules, Gautier 1991 for the
-    rank.
+    Source: Gautier & Khalil 1990 and Khalil & Bennis 1995 for the rules, Gautier 1991 for the rank.
 
     Args:
-        system: open or closed; of a closed one the branch of its assembled configuration.
+        system: open or closed. A closed system is treated on the branch of its assembled
+            configuration.
         method: "symbolic" or "numeric".
-        order: for the numeric method, names of parameters to keep before all others.
-        columns: parameters to look at; `columns_of(system)` when left out.
-        seed: of the random states.
-        moving_base: whether the base has a motion of its own, which no joint effort produces.
+        order: names of parameters to keep with priority, for the numeric method.
+        columns: parameters to group; `columns_of(system)` by default.
+        seed: seed of the random states.
+        moving_base: whether the base has a prescribed motion, which no joint effort produces.
 
     Raises:
-        ModelError: the method or a name is unknown, the loops cannot be closed, or the numeric
-            method meets a length, an angle or gravity that is a symbol without default.
+        ModelError: the method or a name is unknown, the loops cannot be closed, or a length, an
+            angle or gravity is a symbol without default value and the numeric method is used.
     """
     require_system(system)
     _check_method(system, method, order)
@@ -454,7 +457,7 @@ def base_parameters(
     preference = preferred_order(chosen, first)
     deciding = deciding_symbols(system, chosen, base_moves=moving_base)
     if method == "numeric":
-        # What is found at the defaults of these symbols holds there alone.
+        # The result at the default values of these symbols is valid for these values only.
         system = with_constants(system, deciding)
     sample = RegressorSample.of(
         system, chosen, default_parameters(system), seed, base_moves=moving_base
@@ -476,7 +479,7 @@ def base_parameters(
 
 
 def _at_constants(check: Check, names: Sequence[str]) -> Check:
-    """The check, which says at which constants the grouping holds."""
+    """Add to the check the symbols at whose default values the grouping holds."""
     if not names:
         return check
     return replace(
@@ -493,9 +496,9 @@ def _by_rules(
     *,
     symbolic: bool,
 ) -> tuple[Grouping, Check] | None:
-    """The grouping that the rules find, checked and completed by random states.
+    """Return the grouping of the symbolic rules, checked and completed at random states.
 
-    None where the rules are not exact and the rank has to decide.
+    None if the rules are not exact, so that the numeric rank must be used.
     """
     configurations = _configurations(system, seed, symbolic=symbolic)
     grouping = grouped_by_rules(system, sample.columns, configurations, structure)
@@ -515,7 +518,7 @@ def _complete(
     *,
     symbolic: bool,
 ) -> tuple[Grouping, Check] | None:
-    """The grouping with the relations that the rules missed, where they hold for all symbols."""
+    """Add the relations that the rules missed, if they hold for all values of the symbols."""
     if check.agrees:
         return grouping, check
     if not check.relations:
@@ -529,9 +532,9 @@ def _complete(
 
 
 def _configurations(system: System, seed: int, *, symbolic: bool) -> list[ClosedConfigurations]:
-    """Closed configurations at the defaults of the symbols, and at other values of them.
+    """Return closed configurations at the default values of the symbols, and at other values.
 
-    They are others than those of the check.
+    They differ from the configurations of the check.
     """
     if not system.is_closed:
         return []

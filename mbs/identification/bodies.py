@@ -1,4 +1,4 @@
-"""Bodies that explain identified parameters, and what is known of them before."""
+"""Physically consistent parameters: bodies that explain identified parameters, and priors."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ from mbs.numbers import NONZERO
 from mbs.spatial.inertia import Inertia, PseudoInertia
 from mbs.text import quoted
 
-# What is known of the bodies before anything was measured.
+# Prior knowledge of the bodies.
 
 
 Array = npt.NDArray[np.float64]
 
 HEAVIEST = 100.0
-"""Bound on the mass of a link where none is given [kg]."""
+"""Default upper bound on the mass of a link [kg]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior:
-    """Bounds on masses, and a set of parameters to stay near where a record says nothing.
+    """Mass bounds, and a guess of the parameters for regularisation.
 
     Source: Lee, Wensing & Park 2020 (divergence from a guess).
 
     Attributes:
-        guess: (k,) parameters such as those of a drawing, in the order of the columns; balls of
-            1 kg at the origins of the links when None.
-        emphasis: weight of the divergence from the guess; 1 lets it count as one equation.
-        heaviest: bound on the mass of every link, or of each in turn [kg].
-        total_mass: of all links together [kg], or None where it was not weighed.
+        guess: (k,) parameters, such as CAD values, in the order of the columns. None means a ball
+            of 1 kg at the origin of each link.
+        emphasis: weight of the divergence from the guess. Weight 1 counts as one equation.
+        heaviest: upper bound on the mass of every link, or one bound for each link [kg].
+        total_mass: total mass of all links [kg], or None if unknown.
     """
 
     guess: npt.ArrayLike | None = None
@@ -65,10 +65,11 @@ class Prior:
             )
 
     def masses(self, links: int) -> Array:
-        """(links,) bounds on the masses [kg].
+        """Return the upper bounds (links,) on the masses [kg].
 
         Raises:
-            ModelError: there are not as many bounds as links, or the total mass is beyond them.
+            ModelError: the number of bounds differs from the number of links, or the total mass
+                exceeds their sum.
         """
         given = np.atleast_1d(np.asarray(self.heaviest, dtype=float))
         if given.size not in (1, links):
@@ -85,48 +86,49 @@ class Prior:
         return bounds
 
 
-# Full sets of parameters that some distribution of mass has: the search for the likeliest.
-#
-# Every link has the pseudo-inertia P = C L L' C', where C C' is that of a link guessed beforehand
-# and L is lower triangular with the exponentials of free numbers on its diagonal, so that P stays
-# positive definite without any constraint.
-#
+# Physically consistent full parameter sets: maximum-likelihood estimation.
+
+# Every link has the pseudo-inertia P = C L L' C', where C C' is the pseudo-inertia of the guess and
+# L is lower triangular with exponentials of free variables on its diagonal. P is therefore positive
+# definite without constraints.
+
 # Source: Wensing, Kim & Slotine 2018 (pseudo-inertia); Rucker & Wensing 2022 (log-Cholesky); Lee,
 # Wensing & Park 2020 (entropic divergence from the guess).
 
 
 FREE_KINDS = ("offset",)
-"""Kinds that may be negative though they belong to a joint."""
+"""Kinds of joint parameters that may be negative."""
 
 _MASS, _RADIUS = 1.0, 0.1
-"""Of the ball that every body is guessed to be [kg, m]: the middle of what links of robots are, by
-logarithms, in which the search moves."""
+"""Mass and radius of the ball that is the default guess of every body [kg, m]: the middle of
+typical robot links on a logarithmic scale, which is the scale of the variables."""
 _ROUNDS = 500
-"""Steps of the search at most: where it takes more, units or the record do not fit the model."""
+"""Maximum number of iterations. More are needed only if the units or the record do not fit the
+model."""
 _OPTIONS = {
     "ipopt": {
         "print_level": 0,
         "sb": "yes",
         "max_iter": _ROUNDS,
-        "tol": 1e-7,  # of the scaled slope, where the misfit counts in deviations
+        "tol": 1e-7,  # tolerance of the scaled gradient, with the misfit in standard deviations
         "bound_relax_factor": 0.0,
     },
     "print_time": False,
     "error_on_fail": False,
 }
 _SMALLEST_ROOT, _LARGEST_ROOT = -7.0, 7.0
-"""Logarithms of the factors on roots of the guess: masses and moments of inertia within a factor of
-1e6 of it, so that exponentials do not overflow on the way."""
+"""Bounds on the logarithms of the diagonal of L: masses and moments of inertia stay within a
+factor of 1e6 of the guess, so that exponentials do not overflow during the iteration."""
 _OFF_DIAGONAL = tuple((r, c) for r in range(4) for c in range(r))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Misfit:
-    """Half the square of R K - rho, in standard deviations.
+    """Least-squares cost: half of |R K - rho|^2, in standard deviations.
 
     Attributes:
-        R: (rows, k).
-        rho: (rows,).
+        R: (rows, k) matrix of the equations.
+        rho: (rows,) right-hand side.
     """
 
     R: Array
@@ -134,15 +136,15 @@ class Misfit:
 
     @classmethod
     def of_rows(cls, A: Array, b: Array) -> Misfit:
-        """The same sum of squares, but for a constant, in at most k + 1 rows."""
+        """Return an equivalent misfit with at most k + 1 rows, equal up to a constant."""
         return cls(*compressed(A, b))
 
 
 def whole_links(columns: Sequence[Column]) -> list[int]:
-    """Numbers of the links of which all ten inertial parameters are among the columns.
+    """Return the numbers of the links whose ten inertial parameters are all among the columns.
 
     Raises:
-        ModelError: a link has some of them only.
+        ModelError: a link has only some of its inertial parameters.
     """
     kinds: dict[int, set[str]] = {}
     for column in columns:
@@ -159,11 +161,13 @@ def whole_links(columns: Sequence[Column]) -> list[int]:
 
 
 def pseudo_inertias(columns: Sequence[Column], values: Array) -> dict[int, Array]:
-    """For each link its (4, 4) pseudo-inertia [kg m^2, kg m, kg]; a body has a positive one.
+    """Return the pseudo-inertia (4, 4) of each link [kg m^2, kg m, kg], by link number.
+
+    It is positive definite for a physical body.
 
     Args:
-        columns: with all ten inertial parameters of every link.
-        values: (k,) of the columns.
+        columns: parameters, with all ten inertial parameters of every link.
+        values: (k,) values of the columns.
     """
     at = {(column.kind, column.link): k for k, column in enumerate(columns)}
     found = {}
@@ -174,7 +178,7 @@ def pseudo_inertias(columns: Sequence[Column], values: Array) -> dict[int, Array
 
 
 def consistent_links(columns: Sequence[Column], values: Array) -> list[int]:
-    """Numbers of the links whose pseudo-inertia is positive definite: a body may have it."""
+    """Return the numbers of the links with a positive definite pseudo-inertia (physical bodies)."""
     pairs = pseudo_inertias(columns, values).items()
     return [link for link, P in pairs if np.linalg.eigvalsh(P)[0] > 0]
 
@@ -182,21 +186,21 @@ def consistent_links(columns: Sequence[Column], values: Array) -> list[int]:
 def likeliest(
     misfit: Misfit, columns: Sequence[Column], prior: Prior, watch: Watch | None = None
 ) -> tuple[Array, Array]:
-    """The set of parameters of least misfit plus the weighted divergence from the guess.
+    """Return the parameters that minimise the misfit plus the weighted divergence from the guess.
 
     Args:
-        misfit: of the k columns.
-        columns: with all ten inertial parameters of every link; rotors and friction are kept from
-            being negative.
+        misfit: least-squares cost of the k columns.
+        columns: parameters, with all ten inertial parameters of every link. Rotor inertias and
+            friction are constrained to be nonnegative.
         prior: guess and bounds.
-        watch: is told the part of the search that is over, between 0 and 1.
+        watch: progress callback; its argument is the completed fraction, between 0 and 1.
 
     Returns:
-        (k,) values and (k, k) their covariance, the guess taken as a measurement.
+        Values (k,) and their covariance (k, k), with the guess treated as a measurement.
 
     Raises:
-        ModelError: the guess is no consistent set, or the bounds do not fit.
-        SolverError: the search did not end.
+        ModelError: the guess is not physically consistent, or the bounds do not match the links.
+        SolverError: the optimisation did not converge.
     """
     problem = _PhysicalProblem(misfit, tuple(columns), _guessed_roots(columns, prior.guess), prior)
     values = problem.solved(watch)
@@ -205,7 +209,7 @@ def likeliest(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _PhysicalProblem:
-    """The non-linear programme in the logarithms of the roots."""
+    """Nonlinear programme in the log-Cholesky variables of the links."""
 
     misfit: Misfit
     columns: tuple[Column, ...]
@@ -213,7 +217,7 @@ class _PhysicalProblem:
     prior: Prior
 
     def solved(self, watch: Watch | None) -> Array:
-        """(k,) the parameters at the minimum."""
+        """Return the parameters (k,) at the minimum."""
         own = [c for c in self.columns if c.kind not in INERTIAL]
         scale = self._scales(own)
         x, z = SX.sym("x", 10, len(self.roots)), SX.sym("z", len(own))
@@ -239,7 +243,7 @@ class _PhysicalProblem:
         upper = [_LARGEST_ROOT] * 4 + [np.inf] * 6
         least = [-np.inf if c.kind in FREE_KINDS else 0.0 for c in own]
         answer = solver(
-            # bodies start at the guess, what must not be negative a tenth of its scale above zero
+            # bodies start at the guess, nonnegative parameters at a tenth of their scale
             x0=[0.0] * (10 * links) + [0.0 if low < 0 else 0.1 for low in least],
             lbx=lower * links + least,
             ubx=upper * links + [np.inf] * len(own),
@@ -255,13 +259,13 @@ class _PhysicalProblem:
         return DM(answer["x"])
 
     def _scales(self, own: list[Column]) -> list[float]:
-        """What each parameter of a joint has to be to move the misfit by one."""
+        """Return the values of the joint parameters that change the misfit by about one."""
         lengths = np.linalg.norm(self.misfit.R, axis=0)
         at = {c.name: float(lengths[k]) or 1.0 for k, c in enumerate(self.columns)}
         return [max(float(np.linalg.norm(self.misfit.rho)), 1.0) / at[c.name] for c in own]
 
     def _link(self, link: int, x: SX) -> SX:
-        """(10, 1) parameters of the pseudo-inertia C L L' C'."""
+        """Return the inertial parameters (10, 1) of the pseudo-inertia C L L' C'."""
         root = casadi.mtimes(DM(self.roots[link]), _triangle(x))
         P = casadi.mtimes(root, root.T)
         return PseudoInertia(P[:3, :3], P[:3, 3], P[3, 3]).inertia().parameters
@@ -275,7 +279,7 @@ class _PhysicalProblem:
 
 
 def _triangle(x: SX) -> SX:
-    """(4, 4) lower triangle: four logarithms of its diagonal, then the six others row by row."""
+    """Return L (4, 4), from four logarithms of its diagonal, then six other elements row by row."""
     L = SX(4, 4)
     for k in range(4):
         L[k, k] = casadi.exp(x[k])
@@ -285,12 +289,12 @@ def _triangle(x: SX) -> SX:
 
 
 def _divergence(x: SX) -> SX:
-    """tr(P0^-1 P) - log det(P0^-1 P) - 4, zero where P is the guess P0."""
+    """Return tr(P0^-1 P) - log det(P0^-1 P) - 4, which is zero if P is the guess P0."""
     return casadi.sumsqr(_triangle(x)) - 2 * casadi.sum1(x[:4]) - 4
 
 
 def _guessed_roots(columns: Sequence[Column], guess: npt.ArrayLike | None) -> dict[int, Array]:
-    """For each link C with C C' the guessed pseudo-inertia."""
+    """Return for each link a matrix C with C C' equal to the pseudo-inertia of the guess."""
     if guess is None:
         ball = np.diag([np.sqrt(_MASS / 5) * _RADIUS] * 3 + [np.sqrt(_MASS)])
         return {link: ball for link in whole_links(columns)}
@@ -312,7 +316,7 @@ def _guessed_roots(columns: Sequence[Column], guess: npt.ArrayLike | None) -> di
 
 
 def _covariance(misfit: Misfit, columns: Sequence[Column], values: Array, emphasis: float) -> Array:
-    """Inverse of the second derivative of misfit and divergence by the parameters."""
+    """Return the inverse Hessian of misfit and divergence in the parameters."""
     H = misfit.R.T @ misfit.R
     at = {(column.kind, column.link): k for k, column in enumerate(columns)}
     for link, P in pseudo_inertias(columns, values).items():
@@ -341,18 +345,18 @@ def _numbers(value: Any) -> Array:
     return np.asarray(DM(value).full(), dtype=float)
 
 
-# Identified bodies as drawings have them: mass, centre of mass and central inertia.
+# Identified bodies as in drawings: mass, centre of mass and central inertia.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyValues:
-    """What moves with a link, in the frame of its first body.
+    """Mass properties of a link, in the frame of its first body.
 
     Attributes:
-        name: of the body; several that are fixed to each other are joined by " + ".
-        mass: [kg].
+        name: name of the body; names of bodies fixed to each other are joined by " + ".
+        mass: mass [kg].
         centre: (3,) centre of mass in the frame of the body [m].
-        inertia: (3, 3) about the centre of mass, in the axes of the frame [kg m2].
+        inertia: (3, 3) inertia about the centre of mass, in the axes of the frame [kg m2].
     """
 
     name: str
@@ -362,12 +366,12 @@ class BodyValues:
 
 
 def body_values(system: System, columns: Sequence[Column], values: Array) -> tuple[BodyValues, ...]:
-    """Every body that moves, at the defaults of the symbols.
+    """Return the mass properties of every moving body, at the default values of the symbols.
 
     Args:
-        system: whose bodies they are.
-        columns: with all ten inertial parameters of its links.
-        values: (k,) of the columns, masses positive.
+        system: system of the bodies.
+        columns: parameters, with all ten inertial parameters of the links.
+        values: (k,) values of the columns, with positive masses.
     """
     found = []
     for link, P in pseudo_inertias(columns, values).items():
@@ -384,7 +388,7 @@ def body_values(system: System, columns: Sequence[Column], values: Array) -> tup
 
 
 def bodies_table(system: System, columns: Sequence[Column], values: Array) -> str:
-    """The same in plain lines, kg, m and kg m2."""
+    """Return the mass properties of `body_values` as a text table, in kg, m and kg m2."""
     rows = body_values(system, columns, values)
     width = max([len("body"), *(len(row.name) for row in rows)])
     heads = ("mass", "x", "y", "z", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
@@ -399,44 +403,45 @@ def bodies_table(system: System, columns: Sequence[Column], values: Array) -> st
 
 
 def _pose(system: System, frame: str | int) -> Array:
-    """(4, 4) of a frame seen from its link."""
+    """Return the pose (4, 4) of a frame relative to its link."""
     pose = system.frame(frame)[1].matrix
     at = Function("pose", [system.p], [pose])(DM(system.parameter_values()))
     return np.asarray(DM(at).full(), dtype=float)
 
 
-# Identification of a full set of parameters that bodies can have.
+# Identification of a physically consistent full parameter set.
 
 
 _RANK = 1e-9
-"""Singular values of scaled columns below this part of the largest count as zero: those of
-dependent columns are rounding, 1e-15 times the root of the number of rows."""
+"""Singular values of scaled columns below this fraction of the largest count as zero. For
+dependent columns they are rounding errors, 1e-15 times the root of the number of rows."""
 _EXACT = 1e-3
-"""Part of an effort below which its error is not believed: what simulations give fits too well
-for the search to end, and no sensor is that good."""
+"""Smallest standard deviation of an effort, as a fraction of its root mean square. Simulated
+data fit so well that the optimisation would not converge; no sensor is that accurate."""
 _NO_DEVIATION = 1e-12
-"""Deviation [N m or N] of an effort that is zero throughout, which is divided by."""
+"""Smallest standard deviation of an effort [N m or N]; it avoids a division by zero."""
 
 
 def consistent(
     observations: Observations, prior: Prior | None = None, watch: Watch | None = None
 ) -> Estimate:
-    """The likeliest full set of parameters that bodies can have, with errors alike in all joints.
+    """Estimate a physically consistent full parameter set, with equal error variance of all joints.
 
-    Every pseudo-inertia is positive definite, masses keep their bounds, rotors and friction are
-    not negative. What the record does not show comes from the guess. Deviations are those of
-    errors that repeat themselves from row to row as the residuals do.
+    Every pseudo-inertia is positive definite, masses are within their bounds, and rotor inertias
+    and friction are nonnegative. The guess determines the parameters that are not observable in the
+    record. The standard deviations account for the autocorrelation of the residuals.
 
     Source: Wensing, Kim & Slotine 2018; Rucker & Wensing 2022; Lee, Wensing & Park 2020.
 
     Args:
-        observations: in the full set of parameters.
-        prior: guess and bounds; `Prior()` when None.
-        watch: is told the part of the search that is over, between 0 and 1.
+        observations: observations in the full parameter set.
+        prior: guess and bounds; `Prior()` if None.
+        watch: progress callback; its argument is the completed fraction, between 0 and 1.
 
     Raises:
-        ModelError: a rotor or friction cannot be seen, or the set is not a full one.
-        SolverError: the search did not end.
+        ModelError: a rotor inertia or friction parameter is not observable, or the parameter set is
+            not complete.
+        SolverError: the optimisation did not converge.
     """
     error = unconstrained_error(observations)
     freedom = max(error.size - observations.W.shape[2], 1)
@@ -448,12 +453,12 @@ def consistent(
 def consistent_weighted(
     observations: Observations, prior: Prior | None = None, watch: Watch | None = None
 ) -> Estimate:
-    """As `consistent`, every effort divided by the deviation of its own error.
+    """Estimate as `consistent`, with each effort weighted by its own error deviation.
 
     Args:
-        observations: in the full set of parameters.
-        prior: as for `consistent`.
-        watch: as for `consistent`.
+        observations: observations in the full parameter set.
+        prior: guess and bounds; `Prior()` if None.
+        watch: progress callback; its argument is the completed fraction, between 0 and 1.
     """
     error = unconstrained_error(observations)
     rms = np.sqrt(np.mean(error**2, axis=0))
@@ -464,7 +469,7 @@ def consistent_weighted(
 
 
 def unconstrained_error(observations: Observations) -> Array:
-    """(n, m) what least squares leave of the efforts, whether or not the set is minimal."""
+    """Return the least-squares residual (n, m) of the efforts, also for dependent columns."""
     W, y = observations.rows
     lengths = np.linalg.norm(W, axis=0)
     x = np.linalg.lstsq(W / np.where(lengths > 0, lengths, 1.0), y, rcond=_RANK)[0]
@@ -473,7 +478,7 @@ def unconstrained_error(observations: Observations) -> Array:
 
 
 def _positive(deviation: float, efforts: Array) -> float:
-    """The deviation, or a small part of the efforts where the equations fit exactly."""
+    """Return the deviation, or a small fraction of the efforts if the equations fit exactly."""
     return max(deviation, _EXACT * float(np.sqrt(np.mean(efforts**2))), _NO_DEVIATION)
 
 
@@ -498,19 +503,20 @@ def _with_weights(
     return Estimate(method, observations.columns, values, covariance, weights, observations)
 
 
-# From identified base parameters to a full set of parameters that bodies can have.
+# Full parameter sets of physical bodies from identified base parameters.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FullSet(NamedValues):
-    """A full set of parameters and how far it is from the base parameters it was made of.
+    """Full parameter set recovered from base parameters, and its error.
 
     Attributes:
         columns: the k parameters.
-        values: (k,) in the unit of each.
-        covariance: (k, k) of the values, the guess taken as a measurement.
-        base_names: of the base parameters.
-        misfit: (count,) its base parameters minus the identified ones, in standard deviations.
+        values: (k,) values, in the units of the columns.
+        covariance: (k, k) covariance of the values, with the guess treated as a measurement.
+        base_names: names of the base parameters.
+        misfit: (count,) base parameters of the full set minus identified base parameters, in
+            standard deviations.
     """
 
     what: ClassVar[str] = "full set"
@@ -528,22 +534,22 @@ def recovered(
     matrix: Array,
     prior: Prior | None = None,
 ) -> FullSet:
-    """The full set nearest to the guess among those that explain the base parameters.
+    """Return the full parameter set that is closest to the guess and explains the base parameters.
 
-    Nearest in the entropic divergence; it yields to the base parameters in the measure of their
-    covariance.
+    The distance is the entropic divergence. Deviations from the base parameters are weighted by the
+    inverse of their covariance.
 
     Source: Lee, Wensing & Park 2020; Gautier & Venture 2013 (standard parameters from base ones).
 
     Args:
-        estimate: of base parameters.
-        columns: the full set.
-        matrix: (count, k) base parameters from full ones, `BaseParameters.matrix`.
-        prior: full set to stay near, and bounds; `Prior()` when None.
+        estimate: estimate of base parameters.
+        columns: columns of the full set.
+        matrix: (count, k) mapping from full to base parameters, `BaseParameters.matrix`.
+        prior: guess and bounds; `Prior()` if None.
 
     Raises:
-        ModelError: the matrix does not fit, or the estimate has no covariance.
-        SolverError: the search did not end.
+        ModelError: the shape of the matrix does not match, or the estimate has no covariance.
+        SolverError: the optimisation did not converge.
     """
     if matrix.shape != (len(estimate.values), len(columns)):
         raise ModelError(

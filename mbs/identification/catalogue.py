@@ -1,4 +1,4 @@
-"""The models of identification as menus show them."""
+"""Menu entries of the identification models."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mbs.models.catalogue.entry import MOVING_BASE, choice
 
 
 def entries() -> tuple[Entry, ...]:
-    """The models in the order of the menu."""
+    """Return the menu entries of the identification models, in menu order."""
     return _ENTRIES
 
 

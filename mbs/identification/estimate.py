@@ -1,4 +1,4 @@
-"""Identified parameters, how sure they are, and what they leave unexplained."""
+"""Parameter estimates, their standard deviations and residuals."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from mbs.identification.regressors import Column
 from mbs.result import _figure, _save
 from mbs.text import did_you_mean
 
-# Values that have names and a covariance: what estimates and full sets share.
+# Named values with a covariance: base class of estimates and full sets.
 
 
 Array = npt.NDArray[np.float64]
 
 
 class NamedValues:
-    """Parameters by name, and how sure they are.
+    """Parameter values with names and a covariance.
 
     Attributes:
-        what: they are, for messages.
+        what: kind of the values, for error messages.
         columns: the k parameters.
-        values: (k,) in the unit of each.
-        covariance: (k, k) of the values.
+        values: (k,) values, in the units of the columns.
+        covariance: (k, k) covariance of the values.
     """
 
     __slots__ = ()
@@ -52,39 +52,39 @@ class NamedValues:
 
     @property
     def deviations(self) -> Array:
-        """(k,) standard deviations, in the unit of each parameter."""
+        """Standard deviations (k,), in the units of the parameters."""
         return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=float)
 
     @property
     def percent(self) -> Array:
-        """(k,) standard deviations in percent of the values; infinite for a value of zero."""
+        """Standard deviations (k,) in percent of the values; infinite for a value of zero."""
         return percent_of(self.values, self.covariance)
 
 
 def percent_of(values: Array, covariance: Array) -> Array:
-    """(k,) standard deviations in percent of the values; infinite for a value of zero."""
+    """Return standard deviations (k,) in percent of the values; infinite for a value of zero."""
     sizes = np.abs(values)
     share = 100 * np.sqrt(np.diag(covariance)) / np.where(sizes > 0, sizes, 1.0)
     return np.asarray(np.where(sizes > 0, share, np.inf), dtype=float)
 
 
-# What a set of parameters leaves unexplained.
+# Residuals of a set of parameters.
 
 
 _CHANCE = 2.0
-"""Correlation of independent errors that is rarely passed, in parts of 1/sqrt(n)."""
+"""Autocorrelation that independent errors rarely exceed, as a multiple of 1/sqrt(n)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Residuals:
-    """Measured efforts and those that the parameters predict.
+    """Measured efforts and efforts predicted by the parameters.
 
     Attributes:
-        time: (n,) [s].
-        measured: (n, m) [N m or N].
-        predicted: (n, m) [N m or N].
+        time: (n,) instants [s].
+        measured: (n, m) measured efforts [N m or N].
+        predicted: (n, m) predicted efforts [N m or N].
         efforts: names of the m efforts.
-        effort_units: their units.
+        effort_units: units of the efforts.
     """
 
     time: Array
@@ -95,43 +95,43 @@ class Residuals:
 
     @property
     def error(self) -> Array:
-        """(n, m) measured minus predicted [N m or N]."""
+        """Residuals (n, m): measured minus predicted efforts [N m or N]."""
         return self.measured - self.predicted
 
     @property
     def rms(self) -> Array:
-        """(m,) root mean square of the error of each effort [N m or N]."""
+        """Root mean square (m,) of the residuals of each effort [N m or N]."""
         return np.asarray(np.sqrt(np.mean(self.error**2, axis=0)), dtype=float)
 
     @property
     def percent(self) -> Array:
-        """(m,) norm of the error of each effort in percent of the norm of the effort."""
+        """Norm (m,) of the residuals of each effort in percent of the norm of the effort."""
         sizes = np.linalg.norm(self.measured, axis=0)
         shares = np.linalg.norm(self.error, axis=0) / np.where(sizes > 0, sizes, 1.0)
         return np.asarray(100 * shares, dtype=float)
 
     @property
     def repetition(self) -> Array:
-        """(m,) rows that say as much as one of independent error; see `repetition`."""
+        """Number (m,) of correlated rows per independent row; see `repetition`."""
         return repetition(self.error)
 
     @property
     def total_percent(self) -> float:
-        """Norm of all errors in percent of the norm of all efforts."""
+        """Norm of all residuals in percent of the norm of all efforts."""
         size = float(np.linalg.norm(self.measured))
         return 100 * float(np.linalg.norm(self.error)) / (size or 1.0)
 
 
 def repetition(error: Array) -> Array:
-    """(m,) rows that say as much as one of independent error: one plus twice the correlations.
+    """Return the number (m,) of correlated rows with the information of one independent row.
 
-    Correlations of each column with itself are summed from one row to the next up to the first
-    that could be chance.
+    It is 1 plus twice the sum of the autocorrelations of each column, up to the first lag whose
+    autocorrelation could be random.
 
     Source: Bayley & Hammersley 1946.
 
     Args:
-        error: (n, m) in equal steps of time.
+        error: (n, m) residuals at equal time steps.
     """
     n = len(error)
     found = np.ones(error.shape[1])
@@ -149,16 +149,16 @@ def repetition(error: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Estimate(NamedValues):
-    """Values of parameters found from observations.
+    """Parameter values estimated from observations.
 
     Attributes:
-        method: how they were found.
+        method: name of the estimation method.
         columns: the k parameters.
-        values: (k,) in the unit of each.
-        covariance: (k, k) of the values; NaN where the method has none.
+        values: (k,) values, in the units of the columns.
+        covariance: (k, k) covariance of the values; NaN if the method has none.
         weights: (m,) factor of each effort in the sum of squares [1/(N m) or 1/N].
-        observations: that they were found from.
-        rounds: how often the weights were set.
+        observations: observations of the estimation.
+        rounds: number of iterations of the weights.
     """
 
     what: ClassVar[str] = "estimate"
@@ -177,14 +177,14 @@ class Estimate(NamedValues):
 
     @property
     def residuals(self) -> Residuals:
-        """What it leaves unexplained of the observations that it was found from."""
+        """Residuals on the observations of the estimation."""
         return self.residuals_on(self.observations)
 
     def residuals_on(self, observations: Observations) -> Residuals:
-        """What it leaves unexplained of other observations, such as a part that was held out.
+        """Return the residuals on other observations, such as a part that was held out.
 
         Raises:
-            ModelError: they have other parameters.
+            ModelError: the observations have other parameters.
         """
         if observations.names != self.names:
             raise ModelError(
@@ -201,28 +201,29 @@ class Estimate(NamedValues):
 
 
 Estimator = Callable[[Observations], Estimate]
-"""A method: least_squares, weighted, reweighted, robust, or one of them with its options."""
+"""Estimation method: least_squares, weighted, reweighted, robust, or such a function with
+options set."""
 
 
 def held_out(estimator: Estimator, observations: Observations, part: float = 0.75) -> Residuals:
-    """Residuals of the end of a record of parameters found from its beginning.
+    """Estimate parameters from the beginning of a record and return residuals on its end.
 
     Args:
-        estimator: the method.
-        observations: of the whole record.
-        part: of the time from which the parameters are found.
+        estimator: estimation method.
+        observations: observations of the whole record.
+        part: fraction of the duration that is used for the estimation.
     """
     known, unknown = observations.split(part)
     return estimator(known).residuals_on(unknown)
 
 
 def cross_validated(estimator: Estimator, observations: Observations, count: int = 4) -> Residuals:
-    """Residuals of every part of a record of parameters found from the other parts.
+    """Return the residuals of each part of a record, with parameters from the other parts.
 
     Args:
-        estimator: the method.
-        observations: of the whole record.
-        count: into how many parts it is cut; at least two.
+        estimator: estimation method.
+        observations: observations of the whole record.
+        count: number of parts, at least two.
     """
     if count < 2:
         raise ModelError(f"cross-validation: the record is cut into {count} parts; give 2 or more")
@@ -234,21 +235,21 @@ def cross_validated(estimator: Estimator, observations: Observations, count: int
     return Residuals(time, measured, predicted, observations.efforts, observations.effort_units)
 
 
-# Pictures of measured and predicted efforts.
+# Plots of measured and predicted efforts.
 
 
 def plot_residuals(
     residuals: Residuals, path: str | os.PathLike[str] | None = None, title: str = ""
 ) -> Any:
-    """Measured and predicted effort and their difference, a panel for each joint.
+    """Plot measured and predicted effort and their difference, with one panel per joint.
 
     Args:
-        residuals: to draw.
-        path: file to save the picture to, in the format that its ending names.
-        title: above the panels.
+        residuals: residuals to plot.
+        path: path of the image file to write; its suffix selects the format.
+        title: title above the panels.
 
     Returns:
-        the matplotlib Figure.
+        The matplotlib Figure.
 
     Raises:
         ModelError: matplotlib is missing.
@@ -265,7 +266,7 @@ def plot_residuals(
         share = f"{residuals.percent[k]:.1f} %"
         panel.set_title(f"{residuals.efforts[k]}: error {share}", fontsize="small")
         panel.set_ylabel(f"[{residuals.effort_units[k]}]")
-        panel.grid(True, alpha=0.3)  # fainter than lines
+        panel.grid(True, alpha=0.3)  # grid fainter than the curves
     panels[0].legend(loc="upper right", fontsize="small")
     panels[-1].set_xlabel("time [s]")
     if path is not None:

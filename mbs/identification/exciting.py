@@ -1,4 +1,4 @@
-"""Motions that show the parameters of a robot, found by a nonlinear programme."""
+"""Exciting trajectories for parameter identification, optimised by nonlinear programming."""
 
 from __future__ import annotations
 
@@ -36,22 +36,25 @@ from mbs.numbers import NONZERO
 from mbs.progress import progress
 from mbs.text import did_you_mean, quoted
 
-# How badly observations W tell parameters apart, as a number with an exact gradient.
-#
-# Source: Swevers, Ganseman, Tukel, Schutter & Brussel 1997 (log-determinant); Gautier & Khalil
-# 1992 (condition number).
+# Excitation criteria of the observation matrix W, with exact gradients.
+
+# Source: Swevers, Ganseman, Tukel, Schutter & Brussel 1997 (log-determinant); Gautier & Khalil 1992
+# (condition number).
 
 
 Array = npt.NDArray[np.float64]
 
 Criterion = Callable[[Array], tuple[float, Array]]
-"""Value, and its (n, n) gradient, for the Gram matrix W'W (n, n) of the observations."""
+"""Function of the Gram matrix G = W'W (n, n) that returns a criterion and its gradient (n, n)."""
 
 _POWER = 8
 
 
 def log_det(G: Array) -> tuple[float, Array]:
-    """-log det(W'W)/n: the mean logarithm of the variances, the same in all units but for a sum."""
+    """Return -log det(G)/n for G = W'W, and its gradient.
+
+    It is the mean logarithm of the parameter variances. A change of units adds a constant only.
+    """
     size = np.sqrt(np.maximum(np.diag(G), NONZERO))
     values, vectors = np.linalg.eigh(G / np.outer(size, size))
     if values[0] <= 0:
@@ -61,10 +64,10 @@ def log_det(G: Array) -> tuple[float, Array]:
 
 
 def condition(G: Array) -> tuple[float, Array]:
-    """The logarithm of the condition number of W in SI units, made smooth.
+    """Return a smooth bound of the logarithm of the condition number of W, and its gradient in G.
 
-    The largest and the smallest eigenvalue of W'W are taken as norms of high order of all
-    eigenvalues and of their inverses, which are never smaller.
+    The largest eigenvalue of G = W'W is replaced by a high-order norm of all eigenvalues, and the
+    smallest by the same norm of their inverses, which gives an upper bound.
     """
     values, vectors = np.linalg.eigh(G)
     if values[0] <= 0:
@@ -76,7 +79,7 @@ def condition(G: Array) -> tuple[float, Array]:
 
 
 def scaled_condition(G: Array) -> tuple[float, Array]:
-    """The same of W with columns of length one, which no choice of units moves."""
+    """Return `condition` for columns of W of unit length, which is independent of units."""
     size = np.sqrt(np.maximum(np.diag(G), NONZERO))
     S = G / np.outer(size, size)
     value, slope = condition(S)
@@ -93,9 +96,9 @@ CRITERIA: Mapping[str, Criterion] = {
 
 
 class CriterionFunction(casadi.Callback):
-    """``criterion(G) -> f`` within a CasADi graph; its Jacobian is the gradient of the criterion.
+    """CasADi callback ``criterion(G) -> f`` with the exact gradient of the criterion.
 
-    It must be kept as long as a Function that holds it.
+    Keep a reference to it for as long as a Function that contains it is used.
     """
 
     def __init__(self, criterion: Criterion, n: int) -> None:
@@ -106,31 +109,31 @@ class CriterionFunction(casadi.Callback):
         self.construct("criterion", {})
 
     def get_n_in(self) -> int:
-        """G."""
+        """Number of inputs: G."""
         return 1
 
     def get_n_out(self) -> int:
-        """Its value."""
+        """Number of outputs: the value of the criterion."""
         return 1
 
     def get_sparsity_in(self, _: int) -> Sparsity:
-        """(n, n)."""
+        """Shape (n, n) of G."""
         return Sparsity.dense(self._n, self._n)
 
     def get_sparsity_out(self, _: int) -> Sparsity:
-        """(1, 1)."""
+        """Shape (1, 1) of the value."""
         return Sparsity.dense(1, 1)
 
     def eval(self, arguments: Sequence[DM]) -> list[DM]:
-        """The value."""
+        """Evaluate the criterion."""
         return [DM(self._criterion(np.array(arguments[0]))[0])]
 
     def has_jacobian(self) -> bool:
-        """Yes."""
+        """Whether a Jacobian is available: always."""
         return True
 
     def get_jacobian(self, name: str, *_: Any) -> casadi.Function:
-        """The gradient as one row."""
+        """Return a callback for the gradient as one row (1, n^2)."""
         self._slopes.append(_Slope(self._criterion, self._n, name))
         return self._slopes[-1]
 
@@ -161,17 +164,20 @@ class _Slope(casadi.Callback):
         return [DM(gradient.reshape(1, -1))]
 
 
-# A search by IPOPT that tells how far it has come.
+# Optimisation by IPOPT with progress reports.
 
 
 Watch = Callable[[float], None]
-"""Is told the part of a long work that is over, between 0 and 1."""
+"""Progress callback; its argument is the completed fraction of the work, between 0 and 1."""
 
 _OUTPUTS = ("x", "f", "g", "lam_x", "lam_g", "lam_p")
 
 
 class SolverFollower(casadi.Callback):
-    """Called by the solver after every step; it must be kept as long as the solver."""
+    """Iteration callback of the solver that reports progress.
+
+    Keep a reference to it for as long as the solver is used.
+    """
 
     def __init__(
         self, programme: Mapping[str, SX | MX], most: int, watch: Watch | None = None
@@ -185,57 +191,58 @@ class SolverFollower(casadi.Callback):
 
     @property
     def options(self) -> dict[str, Any]:
-        """What the solver has to know; nothing where nobody watches."""
+        """Solver options that install the callback; empty if there is no `watch`."""
         return {} if self._watch is None else {"iteration_callback": self}
 
     def get_n_in(self) -> int:
-        """What the solver gives after a step."""
+        """Number of inputs: outputs of the solver at an iteration."""
         return len(_OUTPUTS)
 
     def get_n_out(self) -> int:
-        """Whether it is to stop."""
+        """Number of outputs: the stop flag."""
         return 1
 
     def get_name_in(self, k: int) -> str:
-        """As the solver calls its outputs."""
+        """Name of input k, equal to that of the solver output."""
         return _OUTPUTS[k]
 
     def get_sparsity_in(self, k: int) -> Sparsity:
-        """Columns; there are no parameters."""
+        """Shape of input k, a column; the programme has no parameters."""
         x, f, g = self._sizes
         return Sparsity.dense((x, f, g, x, g, 0)[k], 1 if k < 5 else 0)
 
     def eval(self, _: Sequence[DM]) -> list[int]:
-        """Never stops the solver."""
+        """Report the progress and return 0, which lets the solver continue."""
         self._steps += 1
         if self._watch is not None:
             self._watch(min(self._steps / self._most, 1.0))
         return [0]
 
 
-# The search for Fourier coefficients as a nonlinear programme with exact gradients.
+# Optimisation of Fourier coefficients as a nonlinear programme with exact gradients.
 
 
 _STARTS = 30
-"""Random motions of which the best is taken to begin with."""
+"""Number of random motions, of which the motion with the lowest criterion is the initial guess."""
 _FILLED = 0.9
-"""Part of the ranges that these fill at most, a half and a quarter of it as well: inside all
-limits, and with room for limits of models, such as efforts, that are met sooner."""
+"""Largest fraction of the ranges that random motions use; a half and a quarter of it are tried
+as well. The motions are thus inside all ranges, with a margin for limits such as efforts, which
+may be reached earlier."""
 _ROUNDING = 1e-12
-"""Part of the largest element of its column below which an element of the rates is zero: sines are
-rounded to 1e-16, and the least of those that are not zero is far above 1e-6."""
+"""Magnitude, relative to the largest element of its column, below which a matrix element counts
+as zero. Rounding errors of sines are 1e-16; the smallest nonzero elements are far above 1e-6."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchEnd:
-    """How a search ended.
+    """Result of an optimisation.
 
     Attributes:
-        x: variables.
-        value: of the criterion.
-        violation: largest of a limit, as part of its range.
-        status: of IPOPT.
-        steps: of IPOPT.
+        x: variables at the end.
+        value: value of the criterion.
+        violation: largest violation of a limit, as a fraction of its range.
+        status: return status of IPOPT.
+        steps: number of iterations of IPOPT.
     """
 
     x: Array
@@ -247,18 +254,18 @@ class SearchEnd:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Programme:
-    """A motion of rest-to-rest Fourier series and what is asked of it.
+    """Nonlinear programme for a rest-to-rest Fourier series within limits.
 
-    The variables are q0 (m, 1), then the coefficients of each joint in the basis of motions that
-    start at rest.
+    The variables are q0 (m, 1), followed by the coefficients of each joint in the basis of motions
+    that start at rest.
 
     Attributes:
-        period: [s].
-        harmonics: two or more.
-        samples: instants in equal steps of one period.
-        instant: see `mbs.identification.trajectory.instant`.
-        criterion: of the observations at all samples.
-        limits: of the motion.
+        period: period of the motion [s].
+        harmonics: number of harmonics, two or more.
+        samples: number of equally spaced instants in one period.
+        instant: Function of `mbs.identification.trajectory.instant`.
+        criterion: criterion of the observations at all samples.
+        limits: limits of the motion.
     """
 
     period: float
@@ -270,20 +277,20 @@ class Programme:
 
     @property
     def joints(self) -> int:
-        """M."""
+        """Number m of independent joints."""
         return int(self.instant.size1_in(0))
 
     def series(self, x: Array) -> FourierSeries:
-        """The motion that variables stand for."""
+        """Return the Fourier series of the variables x."""
         m, H = self.joints, self.harmonics
         Y = x[m:].reshape(m, 2 * H - 2) @ resting_coefficients(self.period, H).T
         return FourierSeries(self.period, x[:m], Y[:, :H], Y[:, H:])
 
     def start(self, rng: np.random.Generator) -> Array:
-        """Variables of the best of some random motions that keep the ranges of the joints.
+        """Return the variables of the best random motion within the ranges of the joints.
 
         Raises:
-            SolverError: none of them gives observations that tell all columns apart.
+            SolverError: no random motion gives observations of full column rank.
         """
         rates, value_at = self._rates(), self._evaluation()
         found: list[tuple[float, Array]] = []
@@ -300,7 +307,7 @@ class Programme:
         return min(found, key=lambda pair: pair[0])[1]
 
     def _random(self, rates: Array, filled: float, rng: np.random.Generator) -> Array:
-        """Variables of a motion that fills this part of the ranges about their middles."""
+        """Return the variables of a random motion that uses the fraction `filled` of the ranges."""
         m = self.joints
         lower, upper = self._ranges(1.0)
         middle = (lower[:m] + upper[:m]) / 2
@@ -313,16 +320,16 @@ class Programme:
     def improve(
         self, x: Array, tightened: Array, rounds: int, watch: Watch | None = None
     ) -> SearchEnd:
-        """Variables at a minimum of the criterion within the limits.
+        """Minimise the criterion within the limits.
 
         Args:
-            x: to start from.
-            tightened: (r,) by how much the ranges of the models' quantities are narrowed.
-            rounds: largest number of steps.
-            watch: is told the part of the steps that is over, between 0 and 1.
+            x: variables of the initial guess.
+            tightened: (r,) reduction of the ranges of model quantities at each end.
+            rounds: maximum number of iterations.
+            watch: progress callback; its argument is the completed fraction of the iterations.
 
         Returns:
-            the last variables, also where they are no minimum.
+            Result with the last variables, even if they are not a minimum.
         """
         variables, W, bounded = self._graph()
         criterion = CriterionFunction(self.criterion, W.shape[0])
@@ -348,7 +355,7 @@ class Programme:
         )
 
     def _graph(self) -> tuple[MX, MX, MX]:
-        """Variables, W' (k, m samples) and bounded (r, samples)."""
+        """Return the variables, W' (k, m samples) and bounded model quantities (r, samples)."""
         variables = MX.sym("x", self.joints * (2 * self.harmonics - 1))
         moved = casadi.reshape(_product(self._rates(), variables), self.samples, 3 * self.joints).T
         q, v, a = casadi.vertsplit(moved, self.joints)
@@ -361,7 +368,7 @@ class Programme:
         return lambda x: self.criterion(np.array(gram(x)))[0]
 
     def _rates(self) -> Array:
-        """(3 m samples, variables): positions, velocities, accelerations, joint by joint."""
+        """Return the matrix (3 m samples, variables) that maps variables to q, v and a."""
         m, H = self.joints, self.harmonics
         t = np.arange(self.samples) * self.period / self.samples
         basis = resting_coefficients(self.period, H)
@@ -374,21 +381,27 @@ class Programme:
         return np.vstack(blocks)
 
     def _ranges(self, part: float) -> tuple[Array, Array]:
-        """(3 m,) ends of the ranges of positions, velocities and accelerations."""
+        """Return the lower and upper ends (3 m,) of the ranges of q, v and a.
+
+        The ranges are scaled about their middles by the factor `part`.
+        """
         ends = np.array([(limit.lower, limit.upper) for limit in self.limits.of_rates])
         limited = np.isfinite(ends).all(axis=1)
         half = np.where(limited[:, None], ends, 0.0).sum(axis=1) / 2
         return half + part * (ends[:, 0] - half), half + part * (ends[:, 1] - half)
 
     def _bounded_rates(self) -> tuple[Array, Array, Array]:
-        """Rows of `_rates` that are limited, and the ends of their ranges between samples too."""
+        """Return the limited rows of `_rates` and the ends of their ranges.
+
+        The ranges are reduced so that the limits also hold between samples.
+        """
         lower, upper = self._ranges(between_samples(self.samples, self.harmonics))
         limited = np.repeat(np.isfinite(lower) & np.isfinite(upper), self.samples)
         first, last = (np.repeat(x, self.samples)[limited] for x in (lower, upper))
         return self._rates()[limited], first, last
 
     def _bounded_models(self, tightened: Array) -> tuple[list[int], Array]:
-        """Rows of the models' quantities that are limited, and (rows, 2) ends of their ranges."""
+        """Return the indices of the limited model quantities and their ranges (rows, 2)."""
         every: tuple[MotionLimit, ...] = self.limits.of_models
         rows = [k for k, limit in enumerate(every) if limit.is_finite]
         ends = [(every[k].lower + tightened[k], every[k].upper - tightened[k]) for k in rows]
@@ -396,7 +409,7 @@ class Programme:
 
 
 def _product(A: Array, x: MX) -> MX:
-    """A x, dense also where rows of A are zero, as those of velocities at rest are."""
+    """Return A x as a dense vector, including rows of A that are zero (velocities at rest)."""
     sizes = np.abs(A)
     structure = np.where(sizes > _ROUNDING * sizes.max(axis=0, initial=0.0), A, 0.0)
     product: MX = casadi.densify(casadi.sparsify(DM(structure)) @ x)
@@ -404,7 +417,7 @@ def _product(A: Array, x: MX) -> MX:
 
 
 def _spans(ends: Array) -> Array:
-    """(rows,) sizes of ranges; of those open on one side, one."""
+    """Return the widths (rows,) of ranges; 1 for ranges that are open on one side."""
     span = ends[:, 1] - ends[:, 0]
     return np.where(np.isfinite(span), span, 1.0)
 
@@ -415,41 +428,42 @@ def _options(rounds: int) -> dict[str, Any]:
             "print_level": 0,
             "sb": "yes",
             "max_iter": rounds,
-            "tol": 1e-4,  # a criterion is a mean logarithm: what is left changes no deviation
+            "tol": 1e-4,  # of a mean logarithm: such an error does not change deviations
             "hessian_approximation": "limited-memory",
             "mu_strategy": "adaptive",
-            "constr_viol_tol": 1e-8,  # in parts of a limit, below what is allowed in the end
+            "constr_viol_tol": 1e-8,  # fraction of a limit, below the tolerance of the final check
         },
         "print_time": False,
         "error_on_fail": False,
     }
 
 
-# Motions of a robot that show its dynamic parameters as well as its limits allow.
+# Exciting motions of a robot within its limits.
 
 
 _FINE = 8
 _TRIES = 4
 _FIRST_ROUNDS = 60
 _SIGN_PART = 0.02
-"""Part of the largest velocity over which Coulomb friction changes sign in the search: some samples
-of a motion see the change, and its slope is one that a search can follow."""
+"""Fraction of the largest velocity over which Coulomb friction changes sign during
+optimisation: some samples lie in the transition, and its slope is small enough for a gradient
+method."""
 _ALLOWED = 1e-6
-"""Part of a limit by which a motion may pass it: less than any drive tells, more than the search
-leaves."""
+"""Fraction of a limit by which a motion may exceed it: less than the resolution of any drive,
+and more than the tolerance of the optimisation."""
 _MORE = 1.2
-"""How much more than they are passed limits are narrowed by, so that the next search ends
-inside."""
+"""Factor on the excess over a limit by which the limit is tightened, so that the next
+optimisation ends inside."""
 
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """The form of the motion and how it is sampled.
+    """Settings of the Fourier series of an excitation and of its sampling.
 
     Attributes:
-        period: [s].
-        harmonics: of 1/period; two or more.
-        samples: of one period, at which the criterion and the limits are computed.
+        period: period [s].
+        harmonics: number of multiples of 1/period, two or more.
+        samples: number of samples per period at which the criterion and the limits are evaluated.
     """
 
     period: float = 10.0
@@ -491,42 +505,44 @@ def excitation(
     seed: int = 1,
     quiet: bool = False,
 ) -> Trajectory:
-    """A periodic motion from rest to rest that shows the parameters well within the limits.
+    """Compute a periodic rest-to-rest motion within limits that excites the parameters.
 
-    The coefficients of Fourier series of the independent joints minimise a criterion of the
-    regressor at all samples, by IPOPT with exact gradients. Efforts are those of the parameters
-    that the system has. Ranges of positions, velocities and accelerations hold at every instant;
-    those of efforts and planes, at instants eight times as dense as the samples. Closed systems
-    keep clear of configurations at which the independent joints do not lead the others.
+    IPOPT minimises a criterion of the regressor at all samples over the Fourier coefficients of the
+    independent joints, with exact gradients. Efforts are computed with the present parameters of
+    the system. Limits of positions, velocities and accelerations hold at every instant; limits of
+    efforts and planes hold at instants eight times as dense as the samples. Closed systems stay
+    away from configurations at which the independent joints do not determine the other joints.
 
-    The sign of velocities is smoothed over a fiftieth of the largest velocity while the motion is
-    sought; the condition numbers of the answer are of the regressor as it is.
+    During optimisation, the sign of velocities in Coulomb friction is smoothed over 1/50 of the
+    largest velocity. The condition numbers of the result are of the regressor without smoothing.
 
     Source: Swevers, Ganseman, Tukel, Schutter & Brussel 1997.
 
     Args:
-        system: open or closed, its independent joints revolute or prismatic.
-        columns: what is to be identified: base parameters, or columns that do not depend on each
-            other; `base_parameters(system)` when left out.
+        system: open or closed; its independent joints are revolute or prismatic.
+        columns: parameters to be identified: base parameters, or linearly independent columns. The
+            default is `base_parameters(system)`.
         series: period, harmonics and samples.
-        position: limits of the m independent joints [rad or m]; the ranges of the joints when
-            left out. A number is meant as +-; a sequence gives each joint its own; a dict names
-            joints, those that follow the independent ones included.
-        velocity: likewise [rad/s or m/s], those that the joints describe when left out; None in
-            a sequence or dict is no limit.
-        acceleration: likewise [rad/s2 or m/s2], none when left out.
-        effort: likewise [N m or N], those that the joints describe when left out.
-        planes: that points must not pass.
-        objective: "log_det" (smallest volume of the parameters' uncertainty), "condition" (of the
-            regressor in SI units) or "scaled_condition" (with columns of length one).
-        starts: random motions that are improved; the best goes on.
-        rounds: largest number of steps of the last search.
-        seed: of the random motions.
-        quiet: no progress bar.
+        position: limits of the m independent joints [rad or m]. A number means a symmetric range
+            +-; a sequence has one entry for each joint; a dict maps joint names to ranges and may
+            contain passive joints. The default is the range of each joint.
+        velocity: limits in the same form [rad/s or m/s]. The default is the velocity limits of the
+            joints; None in a sequence or dict means no limit.
+        acceleration: limits in the same form [rad/s2 or m/s2]. The default is no limit.
+        effort: limits in the same form [N m or N]. The default is the effort limits of the joints.
+        planes: planes that points of the robot must not cross.
+        objective: "log_det" (smallest volume of the confidence ellipsoid of the parameters),
+            "condition" (condition number of the regressor in SI units) or "scaled_condition" (with
+            columns of unit length).
+        starts: number of initial motions that are optimised briefly; the best is optimised further.
+        rounds: maximum number of iterations of the final optimisation.
+        seed: seed of the random motions.
+        quiet: whether to hide the progress bar.
 
     Raises:
-        ModelError: a limit, a name or a number has no sense.
-        SolverError: no motion within the limits was found, or none tells the columns apart.
+        ModelError: a limit, a name or a number is invalid.
+        SolverError: no motion within the limits was found, or no motion gives a regressor of full
+            column rank.
     """
     require_system(system)
     _check(system, objective, starts, rounds)
@@ -554,13 +570,13 @@ def excitation(
 
 
 def _best(programme: Programme, rng: np.random.Generator, starts: int, reached: Watch) -> Array:
-    """Variables of the random motion that leads furthest in a short search.
+    """Return the variables of the random motion with the best result of a short optimisation.
 
     Args:
-        programme: to be solved.
-        rng: of the random motions.
-        starts: how many there are.
-        reached: is told the steps that are over.
+        programme: nonlinear programme.
+        rng: random number generator of the motions.
+        starts: number of random motions.
+        reached: callback; its argument is the number of completed iterations.
     """
     x = [programme.start(rng) for _ in range(starts)]
     if starts == 1:
@@ -580,7 +596,7 @@ def _within(
     rounds: int,
     watch: Watch,
 ) -> Trajectory:
-    """The motion at the minimum near x, efforts and planes kept between samples too."""
+    """Return the optimal motion near x, with limits of efforts and planes also between samples."""
     narrowed = np.zeros(len(programme.limits.of_models))
     fixed = len(programme.limits.of_rates)
     for _ in range(_TRIES):
@@ -602,7 +618,7 @@ def _within(
 def _measure(
     system: System, columns: tuple[Column, ...], programme: Programme, x: Array
 ) -> Trajectory:
-    """The motion with its condition numbers and margins, of the system as it is."""
+    """Return the motion with condition numbers and margins, computed without smoothing."""
     motion, limits = programme.series(x), programme.limits
     exact = instant(system, columns, limits)
     n = _FINE * programme.samples
@@ -653,7 +669,7 @@ def _columns(
 
 
 def _smooth(system: System, limits: MotionLimits, form: Series) -> System:
-    """The system with Coulomb friction that changes sign over a part of the largest velocity."""
+    """Return a copy of the system with the sign of Coulomb friction smoothed."""
     widths = {}
     rows = zip(system.active, limits.position, limits.velocity, strict=True)
     for k, position, velocity in rows:

@@ -1,4 +1,4 @@
-"""From a record to base parameters, and to bodies that explain it."""
+"""Identification from records: base parameters and physically consistent bodies."""
 
 from __future__ import annotations
 
@@ -35,30 +35,32 @@ from mbs.identification.regressors import INERTIAL, Joints, regressor
 from mbs.progress import progress
 from mbs.text import did_you_mean, quoted
 
-# A readable account of an identification.
+# Text report of an identification.
 
 
 POOR = 30.0
-"""Deviation of a parameter above which it is marked as not shown [%]: three of them reach zero, so
-that not even its sign is sure."""
+"""Relative standard deviation above which a parameter is marked as poorly identified [%]: three
+deviations then include zero, so that even the sign is uncertain."""
 _SURE = 3.0
-"""Deviations below zero from which a value is surely negative: 99.9 % of normal errors are less."""
+"""Standard deviations below zero from which a value counts as negative: 99.9 % of normal errors
+are smaller."""
 _UNFIT = 20.0
-"""Error of all efforts that noise and friction laws do not explain [%]."""
+"""Relative error of all efforts above which noise and friction laws are no explanation [%]."""
 
 _MODEL_DONE, _EQUATIONS_DONE, _BODIES_DONE, _SOLVED = 0.1, 0.3, 0.7, 0.85
-"""Parts of the time after which these are there, for a robot of six joints: shown as progress."""
+"""Completed fractions of the time after these steps, for a robot of six joints; used for the
+progress bar."""
 
 
 def report(estimate: Estimate, *tests: tuple[str, Residuals]) -> str:
-    """Parameters with their deviations, errors of every joint, and what the record shows.
+    """Return a text report of parameters, standard deviations, residuals and excitation.
 
     Args:
-        estimate: by any method.
-        *tests: further errors with a title each, such as ("last quarter", held_out(...)).
+        estimate: estimate of any method.
+        *tests: pairs (title, residuals) of further tests, such as ("last quarter", held_out(...)).
 
     Returns:
-        lines of text; a * marks parameters whose deviation is more than 30 %.
+        Lines of text. A * marks parameters with a standard deviation of more than 30 %.
     """
     observations = estimate.observations
     rows, m = observations.y.shape
@@ -86,13 +88,13 @@ def report(estimate: Estimate, *tests: tuple[str, Residuals]) -> str:
 def identification_report(
     estimate: Estimate, essential: Essential, bodies: Estimate | str, *tests: tuple[str, Residuals]
 ) -> str:
-    """The account of base parameters, the essential ones among them, and bodies.
+    """Return a text report of base parameters, essential parameters and bodies.
 
     Args:
-        estimate: of base parameters.
-        essential: the same in the parameters that the record needs.
-        bodies: a full set, or why there is none.
-        *tests: further errors of the base parameters with a title each.
+        estimate: estimate of base parameters.
+        essential: reduced estimate with the essential parameters.
+        bodies: estimate of the full parameter set, or the reason why there is none.
+        *tests: pairs (title, residuals) of further tests of the base parameters.
     """
     few = essential.estimate
     lines = [
@@ -138,7 +140,7 @@ def _residuals(title: str, residuals: Residuals) -> list[str]:
 
 
 def _fit(residuals: Residuals) -> list[str]:
-    """Errors that no noise explains."""
+    """Return a remark if the residuals are too large to be noise."""
     if not residuals.total_percent > _UNFIT:
         return []
     return [
@@ -158,7 +160,7 @@ def _drop(observations: Observations) -> list[str]:
 
 
 def _excitation(estimate: Estimate) -> list[str]:
-    """What the record does not show; of a full set, some parameters never can be told apart."""
+    """Return a remark on the excitation; none for a full set, which is never fully identifiable."""
     if _is_full(estimate):
         return []
     quality = excitation_quality(estimate.observations)
@@ -171,7 +173,7 @@ def _excitation(estimate: Estimate) -> list[str]:
 
 
 def _consistency(estimate: Estimate) -> list[str]:
-    """Whether bodies can have the parameters, where all ten of every link are there."""
+    """Return a remark on physical consistency, if all parameters of every link are estimated."""
     if not _is_full(estimate):
         return []
     links = {c.link for c in estimate.columns if c.kind in INERTIAL}
@@ -183,13 +185,13 @@ def _consistency(estimate: Estimate) -> list[str]:
 
 
 def _is_full(estimate: Estimate) -> bool:
-    """Whether all ten parameters of every link are there."""
+    """Whether all ten inertial parameters of every link are estimated."""
     inertial = [c for c in estimate.columns if c.kind in INERTIAL]
     return len(inertial) == len(INERTIAL) * len({c.link for c in inertial}) > 0
 
 
 def _signs(estimate: Estimate) -> list[str]:
-    """Friction and rotors that are surely negative, which no robot has."""
+    """Return a remark on friction and rotor inertias that are significantly negative."""
     rows = zip(estimate.columns, estimate.values, estimate.deviations, strict=True)
     kinds = ("Ia", "Iam", "Jm", "Fv", "Fvm", "Fs", "Fsm")
     bad = [c.name for c, x, s in rows if c.kind in kinds and x < -_SURE * s]
@@ -199,23 +201,25 @@ def _signs(estimate: Estimate) -> list[str]:
 
 
 TRAINED = 0.75
-"""Part of a record from which parameters are found that the rest tests."""
+"""Fraction of a record that is used for estimation. The remaining part is used for validation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Identification:
-    """What a record says of a system.
+    """Result of the identification of a system from records.
 
     Attributes:
-        system: as it was described.
-        base: its base parameters.
-        bandwidth: of the filters [Hz].
-        observations: the equations in the full set of parameters.
-        estimator: the method, a function of equations in base parameters.
-        estimate: of the base parameters.
-        bodies: the full set that bodies can have, or None where the search for it did not end.
-        bodies_reason: why there are none, else empty.
-        validation: errors in the last quarter of base parameters found from the rest.
+        system: system as described before the identification.
+        base: base parameters of the system.
+        bandwidth: bandwidth of the filters [Hz].
+        observations: equations in the full set of parameters.
+        estimator: estimation method, a function of equations in base parameters.
+        estimate: estimate of the base parameters.
+        bodies: physically consistent estimate of the full set, or None if its search did not
+            converge.
+        bodies_reason: reason why `bodies` is None, otherwise empty.
+        validation: residuals in the last quarter of base parameters estimated from the first three
+            quarters.
     """
 
     system: System
@@ -236,15 +240,15 @@ class Identification:
         )
 
     def essential(self, largest_percent: float = LARGEST_PERCENT) -> Essential:
-        """The base parameters that the record needs; see `essential`."""
+        """Return the essential base parameters; see `essential`."""
         return essential(self.estimate, largest_percent)
 
     def cross_validated(self, count: int = 4) -> Residuals:
-        """Errors of every part of the record, of parameters found from the other parts."""
+        """Return the residuals of each part of the record, with parameters from the other parts."""
         return cross_validated(self.estimator, self.estimate.observations, count)
 
     def identified_system(self) -> System:
-        """The system with the identified bodies, rotors and friction, as `simulate` takes it.
+        """Return the system with the identified bodies, rotors and friction, for use in `simulate`.
 
         Raises:
             ModelError: no bodies were found.
@@ -253,7 +257,7 @@ class Identification:
         return with_parameters(self.system, bodies.columns, SX(DM(bodies.values)))
 
     def bodies_table(self) -> str:
-        """Mass, centre of mass and inertia of every body in its own frame, in plain lines.
+        """Return mass, centre of mass and inertia of every body in its own frame, as a text table.
 
         Raises:
             ModelError: no bodies were found.
@@ -262,7 +266,7 @@ class Identification:
         return bodies_table(self.system, bodies.columns, bodies.values)
 
     def text(self) -> str:
-        """Both sets of parameters, their deviations and errors, in plain lines."""
+        """Return both parameter sets with standard deviations and residuals as text."""
         title = (
             f"{self.system.name}: {self.base.count} base parameters of {len(self.base.columns)},"
             f" bandwidth {self.bandwidth:g} Hz"
@@ -298,31 +302,34 @@ def identify(
     prior: Prior | None = None,
     quiet: bool = False,
 ) -> Identification:
-    """Identify a system from a record of its motion, or from several.
+    """Identify the parameters of a system from one or more records of its motion.
 
-    Each record is filtered by itself and loses its ends; the equations of all come together. A
-    search for bodies that does not end leaves `bodies` None, but for the method that needs them.
+    Each record is filtered separately and its ends are dropped; the equations of all records are
+    stacked. If the search for bodies does not converge, `bodies` is None, except for the method
+    "consistent", which requires them.
 
     Source: Khalil & Dombre 2002, chapter 12; Wensing, Kim & Slotine 2018 for bodies.
 
     Args:
-        system: geometry and friction law; its inertial parameters and friction are not used.
-        record: of all its joints, or of the independent ones of a closed system; or a list of
+        system: geometry and friction law. Its inertial and friction parameters are not used.
+        record: record of all joints, or of the independent joints of a closed system; or a list of
             records of the same joints.
-        bandwidth: of the filters [Hz]; five to ten times the highest frequency of the motion.
-        method: "least_squares", "weighted", "reweighted", "robust", "instrumental" or
-            "consistent", for the base parameters.
-        equations: "dynamic" (efforts), "filtered" or "energy"; the last two take no accelerations.
-        smoothing: `smoothed`, or `smoothed_with_velocity` for measured velocities.
-        rotors: see `columns_of`.
-        offsets: see `columns_of`.
-        couplings: see `columns_of`.
-        prior: what is known of the bodies; a guess is in the order of the columns.
-        quiet: no progress bar.
+        bandwidth: bandwidth of the filters [Hz], five to ten times the highest frequency of the
+            motion.
+        method: estimation method of the base parameters: "least_squares", "weighted", "reweighted",
+            "robust", "instrumental" or "consistent".
+        equations: identification model: "dynamic" (efforts), "filtered" or "energy". The last two
+            need no accelerations.
+        smoothing: `smoothed`, or `smoothed_with_velocity` to use measured velocities.
+        rotors: option of `columns_of`.
+        offsets: option of `columns_of`.
+        couplings: option of `columns_of`.
+        prior: prior knowledge of the bodies; its guess is in the order of the columns.
+        quiet: whether to hide the progress bar.
 
     Raises:
-        ModelError: the method is unknown, or the record does not show every base parameter.
-        SolverError: a search for the base parameters did not end.
+        ModelError: the method is unknown, or a base parameter is not identifiable from the record.
+        SolverError: the estimation of the base parameters did not converge.
     """
     _check(system, method, equations, smoothing)
     records = _records(system, record, bandwidth)
@@ -349,7 +356,7 @@ def identify(
 
 
 def _found_bodies(search: Callable[[], Estimate], method: str) -> tuple[Estimate | None, str]:
-    """The bodies, or None and why not where the method does without them."""
+    """Return the bodies and "", or None and the error text if the method does not require them."""
     try:
         return search(), ""
     except SolverError as error:
@@ -365,7 +372,7 @@ def _between(reached: Callable[[float], None], first: float, last: float, part: 
 def _records(
     system: System, record: Record | Sequence[Record], bandwidth: float
 ) -> tuple[Record, ...]:
-    """The records as a tuple."""
+    """Return the records as a tuple, after type checks."""
     given = tuple(record) if isinstance(record, list | tuple) else (record,)
     for one in given:
         if not isinstance(one, Record):

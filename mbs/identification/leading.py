@@ -1,4 +1,4 @@
-"""Models along a motion: of closed systems, how well the independent joints lead the others."""
+"""Models along a motion, and distance of closed systems from singular configurations."""
 
 from __future__ import annotations
 
@@ -19,24 +19,30 @@ from mbs.loops.velocity import determining_rows
 Array = npt.NDArray[np.float64]
 
 REGULAR = 2.5e-3
-"""Squared sine between rows of the passive joints, that of 3 degrees, below which configurations
-are taken as next to a singular one: the joints that follow magnify errors by 20 and more."""
+"""Squared sine between the rows of the passive joints in the closure Jacobian (3 degrees) below
+which a configuration counts as close to a singular one. Errors of the independent joints are
+then amplified by 20 or more in the passive joints."""
 
 CLEAR = 0.01
-"""The same that exciting motions keep."""
+"""Smallest squared sine of the same kind that exciting trajectories keep."""
 
 _LARGEST = 8
 
 
 def leads_of(system: System, q: Array) -> Array:
-    """(n,) `leads` of `mbs.loops.examine` at q (n, nq), negative beyond a singularity.
+    """Return `leads` of `mbs.loops.examine` at q (n, nq), negative beyond a singularity.
 
-    The sign is that of the determinant of the passive joints' rows by that of the assembled
-    configuration; it does not change where the rows are more than these joints.
+    Its magnitude measures how well the independent joints determine the passive joints: 1 is best,
+    0 is singular. Its sign is that of det(J_p) relative to the assembled configuration, where J_p
+    is the passive columns of the closure Jacobian. The value has no sign if the choice of rows
+    varies with the configuration.
 
     Args:
-        system: with loops, at the defaults of its parameters.
+        system: closed system, at the default values of its parameters.
         q: (n, nq) positions [rad or m].
+
+    Returns:
+        (n,) signed values.
     """
     n, p = len(q), DM(system.parameter_values())
     leads = np.asarray(configuration_health(system).map(n)(DM(q.T), p)[1]).ravel()
@@ -49,7 +55,10 @@ def leads_of(system: System, q: Array) -> Array:
 
 
 def signed_leads(system: System) -> Function:
-    """``leads(q)``: the same as a graph for a search, unsigned where many joints follow."""
+    """Return the Function ``leads(q)`` of `leads_of`, for use in an optimisation.
+
+    The value has no sign if there are more than 8 passive joints.
+    """
 
     def build() -> Function:
         q, p = SX.sym("q", system.nq), DM(system.parameter_values())
@@ -66,7 +75,10 @@ def signed_leads(system: System) -> Function:
 
 
 def regular(system: System, q: Array) -> npt.NDArray[np.bool_]:
-    """(n,) whether a configuration, and the step from and to it, keeps clear of singular ones."""
+    """Return a mask (n,) of the configurations that are not close to singular ones.
+
+    Both samples of a step that crosses a singularity are False.
+    """
     leads = leads_of(system, q)
     good = np.abs(leads) > REGULAR
     crossed = np.sign(leads[1:]) != np.sign(leads[:-1])
@@ -76,7 +88,7 @@ def regular(system: System, q: Array) -> npt.NDArray[np.bool_]:
 
 
 def _usual_sign(system: System) -> float:
-    """Of the determinant at the assembled configuration."""
+    """Return the sign of the determinant at the assembled configuration."""
     rows = np.asarray(
         _passive_rows(system)(DM(system.configuration), DM(system.parameter_values()))
     )
@@ -85,7 +97,7 @@ def _usual_sign(system: System) -> float:
 
 
 def _passive_rows(system: System) -> Function:
-    """(q, p) -> (r r, 1) the rows that determine the passive velocities, column by column."""
+    """Return (q, p) -> (r r, 1): passive columns of the closure Jacobian, stacked by columns."""
 
     def build() -> Function:
         q = SX.sym("q", system.nq)
@@ -98,7 +110,7 @@ def _passive_rows(system: System) -> Function:
 
 
 def _determinant(A: SX) -> SX:
-    """By traces, without divisions by elements: the method of Faddeev and Le Verrier."""
+    """Return det(A) by the method of Faddeev and Le Verrier, without division by elements."""
     n = A.shape[0]
     M, c = SX.eye(n), SX(1)
     for k in range(1, n + 1):
@@ -108,14 +120,14 @@ def _determinant(A: SX) -> SX:
     return SX((-1) ** n * c)
 
 
-# Configurations of all joints from the positions of the independent ones.
+# Configurations of all joints from the positions of the independent joints.
 
 
 def active_indices(system: System) -> list[int]:
-    """Places in q of the independent joints, in the order of `system.active`.
+    """Return the indices in q of the independent joints, in the order of `system.active`.
 
     Raises:
-        ModelError: an independent velocity is not the rate of one position.
+        ModelError: an independent velocity is not the derivative of one position.
     """
     links, indices = system.tree.links, []
     for k in system.active:
@@ -131,10 +143,10 @@ def active_indices(system: System) -> list[int]:
 
 
 def configuration_of(system: System, q_a: MX) -> MX:
-    """(nq, 1) positions that close the loops, by closed form or else by continuation.
+    """Return the positions (nq, 1) that close the loops, in closed form or by continuation.
 
     Args:
-        system: open or closed, at the defaults of its parameters.
+        system: open or closed, at the default values of its parameters.
         q_a: (m, 1) positions of the independent joints.
     """
     if not system.is_closed:
@@ -147,9 +159,9 @@ def configuration_of(system: System, q_a: MX) -> MX:
 
 
 def _near_configuration(system: System, q: MX) -> MX:
-    """The same configuration, angles that follow less than half a turn from the assembled ones.
+    """Shift passive angles by full turns to within half a turn of the assembled configuration.
 
-    Closed forms give angles between -pi and pi, which would jump within a motion.
+    Closed forms return angles between -pi and pi, which would jump within a motion.
     """
     indices, rows = active_indices(system), casadi.vertsplit(q)
     for k, coordinate in enumerate(system.coordinates):
@@ -160,13 +172,13 @@ def _near_configuration(system: System, q: MX) -> MX:
 
 
 def of_motion(model: Any) -> Function:
-    """A model of positions, velocities and accelerations alone, parameters at their defaults.
+    """Return a model as a Function of the motion only, with parameters at their default values.
 
     Args:
-        model: of a system, whose inputs are the motion and, behind it, z, u and p.
+        model: model of a system with the inputs q, v, a (or fewer), followed by z, u and p.
 
     Raises:
-        ModelError: it depends on states or inputs of components.
+        ModelError: the model depends on states or inputs of components.
     """
     system: System = model.system
     own = {name: model.name_in().index(name) for name in "zup" if name in model.name_in()}
@@ -186,7 +198,7 @@ def of_motion(model: Any) -> Function:
 
 
 def is_explicit(system: System) -> bool:
-    """Whether no iteration is needed to close the loops."""
+    """Whether the loops close without iteration."""
     if not system.is_closed:
         return True
     try:
@@ -197,7 +209,10 @@ def is_explicit(system: System) -> bool:
 
 
 def positions(system: System, q_a: Array) -> Array:
-    """(n, nq) positions of the tree for independent ones (n, m), NaN where loops cannot close."""
+    """Return the positions (n, nq) of the tree for independent positions q_a (n, m).
+
+    Rows are NaN if the loops cannot close.
+    """
     if not system.is_closed:
         return q_a
     x = MX.sym("q_a", len(system.active))

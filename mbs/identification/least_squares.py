@@ -1,4 +1,4 @@
-"""Least squares: ordinary, effort by effort, weighted, robust, with instruments."""
+"""Least squares: ordinary, weighted by effort, robust, and with instrumental variables."""
 
 from __future__ import annotations
 
@@ -22,24 +22,26 @@ from mbs.identification.observations import Observations, known_of, motion_of, r
 from mbs.identification.record import Samples
 from mbs.identification.triangle import triangle, triangle_solved
 
-# The equations of every effort by itself: least squares with a deviation for each of them.
+# Separate equations of each effort: least squares with one error deviation per effort.
 
 
 Array = npt.NDArray[np.float64]
 
 _ROUNDING = 1e-9
-"""Part of the largest effort below which a deviation is rounding of sums over a record, and weights
-of it would count nothing else; its square [N m or N] where all efforts are zero."""
+"""Smallest standard deviation of an error, as a fraction of the largest effort. Smaller
+deviations are rounding errors of sums over a record, and their weights would dominate. Its
+square [N m or N] is used if all efforts are zero."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """A weighted least-squares solution.
+    """Weighted least-squares solution.
 
     Attributes:
         values: (k,) parameters.
-        root: (k, k); root' root is the inverse of the matrix of the normal equations.
-        own: (m,) parameters that each effort pays for, the trace of its part of the projection.
+        root: (k, k) root of the inverse of the normal matrix: root' root = (A' A)^-1.
+        own: (m,) effective number of parameters of each effort: trace of its part of the projection
+            matrix.
     """
 
     values: Array
@@ -49,12 +51,13 @@ class Fit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EffortEquations:
-    """For each effort [W y] in as few rows as they have columns, and how its errors repeat.
+    """Equations [W y] of each effort, compressed by QR, and the autocorrelation of their errors.
 
     Attributes:
-        triangles: of each effort, (at most k + 1, k + 1).
-        rows: equations of each effort.
-        repeated: (m,) equations that say as much as one of independent error, one or more.
+        triangles: triangular factor of each effort, (at most k + 1, k + 1).
+        rows: number of equations of each effort.
+        repeated: (m,) number of correlated equations with the information of one independent
+            equation, at least 1.
     """
 
     triangles: tuple[Array, ...]
@@ -63,21 +66,21 @@ class EffortEquations:
 
     @classmethod
     def of(cls, observations: Observations) -> EffortEquations:
-        """Of observations, the errors taken as independent until `with_errors`."""
+        """Compress observations; the errors are assumed independent until `with_errors`."""
         W, y = observations.W, observations.y
         m = y.shape[1]
         parts = tuple(triangle(np.column_stack([W[:, j], y[:, j]])) for j in range(m))
         return cls(parts, len(y), np.ones(m))
 
     def with_errors(self, error: Array) -> EffortEquations:
-        """The same, errors (n, m) showing by how much each row repeats the one before."""
+        """Return a copy with the autocorrelation of the residuals `error` (n, m)."""
         return EffortEquations(self.triangles, self.rows, repetition(error))
 
     def solved(self, weights: Array) -> Fit:
-        """The parameters of least weighted squares, by QR of columns scaled to length one.
+        """Solve the weighted least-squares problem by QR of columns scaled to unit length.
 
         Args:
-            weights: (m,) of the efforts.
+            weights: (m,) weights of the efforts.
         """
         rows = np.vstack([w * T for w, T in zip(weights, self.triangles, strict=True)])
         A, b = rows[:, :-1], rows[:, -1]
@@ -89,25 +92,25 @@ class EffortEquations:
         return Fit(inverse @ T[:k, k], inverse.T, np.array(own))
 
     def squares(self, values: Array) -> Array:
-        """(m,) sums of the squared errors of each effort."""
+        """Return the sum of squared residuals (m,) of each effort."""
         with_effort = np.append(values, -1.0)
         return np.array([np.sum((T @ with_effort) ** 2) for T in self.triangles])
 
     def deviations(self, fit: Fit) -> Array:
-        """(m,) deviation of the error of each effort [N m or N].
+        """Return the standard deviation (m,) of the error of each effort [N m or N].
 
-        Every effort pays for its part of the parameters: sum of squares over rows less `own`.
+        It is the root of the sum of squares over the degrees of freedom, rows - `own`.
         """
         left = np.maximum(self.rows - fit.own, 1.0)
         efforts = [np.linalg.norm(T[:, -1]) / np.sqrt(self.rows) for T in self.triangles]
         return above_rounding(np.sqrt(self.squares(fit.values) / left), np.array(efforts))
 
     def covariance(self, fit: Fit, weights: Array, deviations: Array) -> Array:
-        """(k, k) covariance of the parameters when the efforts have these deviations.
+        """Return the covariance (k, k) of the parameters for given error deviations of the efforts.
 
-        Weights need not be those of the deviations. Rows that repeat others count as fewer.
+        The weights may differ from the inverse deviations. Correlated rows count less.
 
-        Source: White 1980 (deviations that differ).
+        Source: White 1980 (heteroscedastic errors).
         """
         scale = weights * deviations * np.sqrt(self.repeated)
         pairs = zip(weights * scale, self.triangles, strict=True)
@@ -116,10 +119,10 @@ class EffortEquations:
 
 
 def above_rounding(deviations: Array, efforts: Array) -> Array:
-    """(m,) deviations of errors, none so small that it is rounding.
+    """Return the deviations (m,) of errors, bounded from below by the rounding error.
 
     Args:
-        deviations: (m,).
+        deviations: (m,) standard deviations.
         efforts: (m,) root mean square of each effort.
     """
     least = max(_ROUNDING * float(efforts.max()), _ROUNDING**2)
@@ -127,18 +130,18 @@ def above_rounding(deviations: Array, efforts: Array) -> Array:
 
 
 def least_squares(observations: Observations) -> Estimate:
-    """The parameters that make the sum of squared errors of all efforts least.
+    """Estimate parameters by ordinary least squares of all efforts.
 
-    The standard deviations are those of errors that differ from effort to effort and repeat
-    themselves from row to row as the residuals do.
+    The standard deviations account for different error deviations of the efforts and for the
+    autocorrelation of the residuals.
 
     Source: Gautier & Khalil 1988; Khalil & Dombre 2002, chapter 12.
 
     Args:
-        observations: that show every parameter.
+        observations: observations in which every parameter is identifiable.
 
     Raises:
-        ModelError: the parameters that they do not show.
+        ModelError: some parameters are not identifiable; the message names them.
     """
     require_visible(observations)
     weights = np.ones(observations.y.shape[1])
@@ -153,10 +156,10 @@ def weighted_solution(
     method: str,
     rounds: int,
 ) -> Estimate:
-    """Least squares with given weights (m,) of the efforts.
+    """Solve least squares with given weights (m,) of the efforts.
 
-    What the errors are like is taken from least squares with the weights that they ask for, so
-    that an effort of small error does not get those of the others.
+    Error deviations are estimated from a second solution with optimal weights, so that large errors
+    of one effort do not affect the deviations of the other efforts.
     """
     fit = equations.solved(weights)
     better = equations.solved(1 / equations.deviations(fit))
@@ -167,19 +170,21 @@ def weighted_solution(
     )
 
 
-# Least squares with a weight for each joint.
+# Least squares with one weight per joint.
 
 
 def weighted(observations: Observations) -> Estimate:
-    """Every effort is divided by the deviation of its error that least squares left.
+    """Estimate parameters by least squares, with one weight for each effort.
+
+    A weight is the inverse standard deviation of the residuals of ordinary least squares.
 
     Source: Gautier 1997; Khalil & Dombre 2002, chapter 12.
 
     Args:
-        observations: that show every parameter.
+        observations: observations in which every parameter is identifiable.
 
     Raises:
-        ModelError: the parameters that they do not show.
+        ModelError: some parameters are not identifiable; the message names them.
     """
     require_visible(observations)
     equations = EffortEquations.of(observations)
@@ -189,21 +194,21 @@ def weighted(observations: Observations) -> Estimate:
 
 
 def reweighted(observations: Observations, tolerance: float = 1e-3, most: int = 50) -> Estimate:
-    """Weights and parameters in turn, until the weights stay as they are.
+    """Estimate parameters by iteratively reweighted least squares.
 
-    Its end is the most likely set of parameters for errors that are normal with a deviation of
-    each joint.
+    Weights and parameters are updated alternately until the weights converge. The result is the
+    maximum-likelihood estimate for normal errors with a separate deviation of each joint.
 
     Source: Gautier 1997.
 
     Args:
-        observations: that show every parameter.
-        tolerance: relative change of the weights at which it ends.
-        most: rounds before it is given up.
+        observations: observations in which every parameter is identifiable.
+        tolerance: relative change of the weights at convergence.
+        most: maximum number of iterations.
 
     Raises:
-        ModelError: the parameters that they do not show.
-        SolverError: the weights did not settle.
+        ModelError: some parameters are not identifiable; the message names them.
+        SolverError: the weights did not converge.
     """
     require_visible(observations)
     equations, change = EffortEquations.of(observations), np.inf
@@ -221,34 +226,36 @@ def reweighted(observations: Observations, tolerance: float = 1e-3, most: int = 
     )
 
 
-# Least squares that outliers do not move.
+# Least squares that is insensitive to outliers.
 
 
 HUBER = 1.345
-"""Bound at which 95 % of the efficiency of least squares is left for normal errors."""
+"""Bound of the Huber loss [standard deviations], which keeps 95 % of the efficiency of least
+squares for normal errors."""
 
 _MEDIAN_OF_NORMAL = 0.6745
-"""Median of the sizes of normal errors of deviation one."""
+"""Median absolute value of normal errors of unit standard deviation."""
 
 
 def robust(
     observations: Observations, bound: float = HUBER, tolerance: float = 1e-2, most: int = 100
 ) -> Estimate:
-    """Errors beyond some deviations count by their size, not by their square.
+    """Estimate parameters with the Huber loss, which is linear beyond `bound` standard deviations.
 
-    The deviation of each joint is taken from the median of its errors, which outliers hardly move.
+    The error deviation of each joint is estimated from the median absolute residual, which is
+    insensitive to outliers.
 
     Source: Huber 1964; Holland & Welsch 1977 (by re-weighted least squares).
 
     Args:
-        observations: that show every parameter.
-        bound: deviations beyond which an error counts less.
-        tolerance: change of the parameters, in standard deviations, at which it ends.
-        most: rounds before it is given up.
+        observations: observations in which every parameter is identifiable.
+        bound: standard deviations beyond which the loss is linear.
+        tolerance: change of the parameters at convergence, in standard deviations.
+        most: maximum number of iterations.
 
     Raises:
-        ModelError: the parameters that they do not show.
-        SolverError: the parameters did not settle.
+        ModelError: some parameters are not identifiable; the message names them.
+        SolverError: the parameters did not converge.
     """
     start = weighted(observations)
     equations, values = EffortEquations.of(observations), start.values
@@ -271,12 +278,12 @@ def robust(
 
 
 def _trust(size: Array, bound: float) -> Array:
-    """(n, m) weight of each error, given in deviations: one up to the bound, less beyond."""
+    """Return the Huber weight (n, m) of each error in standard deviations: 1 up to the bound."""
     return np.asarray(bound / np.maximum(np.abs(size), bound), dtype=float)
 
 
 def _solved(observations: Observations, rows: Array) -> Array:
-    """(k,) least squares with a weight for each row and effort, (n, m)."""
+    """Solve least squares (k,) with a weight for each row and effort, (n, m)."""
     W, y = observations.rows
     w = rows.reshape(-1)
     A, lengths = W * w[:, None], np.linalg.norm(W * w[:, None], axis=0)
@@ -286,9 +293,9 @@ def _solved(observations: Observations, rows: Array) -> Array:
 def _robust_covariance(
     observations: Observations, equations: EffortEquations, values: Array, bound: float
 ) -> Array:
-    """(k, k) covariance of the parameters, the part of trusted errors taken for each effort.
+    """Return the covariance (k, k) of the Huber estimate, with the inlier fraction of each effort.
 
-    Source: Huber 1964 (variance of his estimator); Street, Carroll & Ruppert 1988.
+    Source: Huber 1964 (variance of the estimator); Street, Carroll & Ruppert 1988.
     """
     error = observations.y - observations.W @ values
     scale = _deviations(error, observations.y)
@@ -302,29 +309,32 @@ def _robust_covariance(
 
 
 def _deviations(error: Array, efforts: Array) -> Array:
-    """(m,) deviation of each column by the median of its sizes."""
+    """Return the standard deviation (m,) of each column from its median absolute error."""
     size = np.median(np.abs(error), axis=0) / _MEDIAN_OF_NORMAL
     return above_rounding(size, np.sqrt(np.mean(efforts**2, axis=0)))
 
 
-# Instrumental variables: least squares that noise in the regressor does not bias.
+# Instrumental variables: least squares without bias from noise in the regressor.
 
 
 def instrumental(
     observations: Observations, instruments: Observations, weights: Array | None = None
 ) -> Estimate:
-    """The parameters whose errors are uncorrelated with the instruments: Z' (y - W K) = 0.
+    """Estimate parameters by instrumental variables: Z' (y - W K) = 0.
+
+    The residuals are uncorrelated with the instruments Z.
 
     Source: Janot, Vandanjon & Gautier 2014, section III (IDIM-IV).
 
     Args:
-        observations: y = W K, W made of measured motion.
-        instruments: of the same rows and columns, Z in place of W, made of a motion that is free
-            of the measurement's noise, such as `simulated_motion` or the motion that was ordered.
-        weights: (m,) of each effort [1/(N m) or 1/N]; ones when None.
+        observations: equations y = W K, with W from the measured motion.
+        instruments: equations of the same rows and columns with Z as W, from a motion without
+            measurement noise, such as `simulated_motion` or the reference motion.
+        weights: (m,) weight of each effort [1/(N m) or 1/N]; 1 if None.
 
     Raises:
-        ModelError: the instruments do not fit, or they do not show every parameter.
+        ModelError: the shape or the names of the instruments do not match, or a parameter is not
+            identifiable from the instruments or the observations.
     """
     if instruments.W.shape != observations.W.shape or instruments.names != observations.names:
         raise ModelError(
@@ -351,7 +361,7 @@ def instrumental(
 def _instrumental_covariance(
     instruments: Observations, inverse: Array, weights: Array, error: Array
 ) -> Array:
-    """(k, k) of the parameters (Z' W)^-1 Z' y, every effort with the deviation of its error."""
+    """Return the covariance (k, k) of (Z' W)^-1 Z' y, with separate error deviations of efforts."""
     n, m = error.shape
     left = max(n - inverse.shape[0] / m, 1.0)
     deviations = np.sqrt(np.sum(error**2, axis=0) * repetition(error) / left)
@@ -360,7 +370,7 @@ def _instrumental_covariance(
     return np.asarray(rows.T @ rows, dtype=float)
 
 
-# The motion of a robot with the parameters found so far, for instruments.
+# Simulated motion of a robot with given parameters, as source of instruments.
 
 
 _STEP_KINDS = ("Fs", "Fsm")
@@ -369,28 +379,31 @@ _STEP_KINDS = ("Fs", "Fsm")
 def simulated_motion(
     regressor: Any, values: npt.ArrayLike, samples: Samples, tracking: float | None = None
 ) -> Samples:
-    """The measured efforts drive the robot; a slow controller keeps it near the measured motion.
+    """Simulate the robot under the measured efforts and a slow tracking controller.
 
-    Noise of the measured positions passes the controller only below its bandwidth, and that of the
-    efforts is integrated twice. Runge-Kutta's method of fourth order, a step for each sample;
-    Coulomb friction changes its sign with the measured motion.
+    The controller keeps the simulation close to the measured motion. Noise of the measured
+    positions enters only below the bandwidth of the controller; noise of the efforts is integrated
+    twice. The integrator is the Runge-Kutta method of fourth order with one step per sample. The
+    sign of Coulomb friction is that of the measured velocity.
 
     Source: Janot, Vandanjon & Gautier 2014 (simulated instruments).
 
     Args:
         regressor: Function D(q, v, a) with `.columns` and `.system`, open or closed.
-        values: (k,) parameters of its columns; those of bodies, so that inertia is positive.
-        samples: in steps that are short for the motion.
-        tracking: bandwidth of the controller [Hz]; half of that of the samples by default, or a
-            hundredth of their rate where they were not filtered.
+        values: (k,) parameters of the columns, physically consistent, so that the inertia matrix is
+            positive definite.
+        samples: measured motion; its time step must be short compared with the motion.
+        tracking: bandwidth of the controller [Hz]. The default is half the bandwidth of the
+            samples, or 1/100 of their rate if they are not filtered.
 
     Returns:
-        The simulated q, v, a of the independent joints at the instants of the samples, with the
+        Simulated q, v, a of the independent joints at the instants of the samples, with the
         measured efforts.
 
     Raises:
-        ModelError: the values are not those of the columns, or the controller does not follow.
-        SolverError: the robot left the measured motion; its parameters have no sense.
+        ModelError: the number of values differs from the number of columns, or the bandwidth of the
+            controller is not positive.
+        SolverError: the simulation diverged; the parameters are not physically consistent.
     """
     K = np.asarray(values, dtype=float)
     if K.shape != (len(regressor.columns),):
@@ -424,7 +437,7 @@ def simulated_motion(
 
 
 def _acceleration(regressor: Any, K: Array, w: float) -> Function:
-    """(state, given) -> a, the robot driven by the measured efforts and the controller."""
+    """Return (state, given) -> a of the robot under the measured efforts and the controller."""
     m, kind = int(regressor.size1_in(1)), _kind(regressor)
     state, given, a = kind.sym("state", 2 * m), kind.sym("given", 3 * m), kind.sym("a", m)
     q, v = state[:m], state[m:]
@@ -440,7 +453,7 @@ def _acceleration(regressor: Any, K: Array, w: float) -> Function:
 
 
 def _efforts(regressor: Any, K: Array) -> Function:
-    """(q_a, v_a, a_a) -> D K of the independent joints."""
+    """Return (q_a, v_a, a_a) -> D K, the efforts of the independent joints."""
     m = int(regressor.size1_in(1))
     q, v, a = (MX.sym(name, m) for name in "qva")
     D = of_motion(regressor)(configuration_of(regressor.system, q), v, a)
@@ -449,7 +462,7 @@ def _efforts(regressor: Any, K: Array) -> Function:
 
 
 def _kind(regressor: Any) -> Any:
-    """SX where the loops close without iteration, else MX."""
+    """Return SX if the loops close without iteration, otherwise MX."""
     return SX if is_explicit(regressor.system) else MX
 
 

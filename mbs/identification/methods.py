@@ -1,4 +1,4 @@
-"""Every method of estimation by its name, and the parameters that a record really shows."""
+"""Estimation methods by name, and selection of essential parameters."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from mbs.identification.record import Samples
 from mbs.identification.regressors import Regressor
 from mbs.result import optional_module
 
-# Every method of estimation by its name, as one function of the equations in base parameters.
+# Estimation methods by name, each as a function of the equations in base parameters.
 
 
 Array = npt.NDArray[np.float64]
@@ -34,15 +34,16 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Setting:
-    """What methods need beside the equations in base parameters.
+    """Data that methods need in addition to the equations in base parameters.
 
     Attributes:
         model: regressor of the full set.
-        base: base parameters of its columns.
-        samples: of each record.
-        full: the equations in the full set.
-        bodies: that explain them, by `consistent_weighted`; None where none were found.
-        prior: of the bodies.
+        base: base parameters of the columns of the regressor.
+        samples: samples of each record.
+        full: equations in the full set.
+        bodies: physically consistent estimate of `consistent_weighted`; None if it did not
+            converge.
+        prior: prior knowledge of the bodies.
     """
 
     model: Regressor
@@ -53,16 +54,16 @@ class Setting:
     prior: Prior
 
     def bodies_of(self, part: Observations) -> Estimate:
-        """The bodies that explain these equations, all or some of the record's."""
+        """Return the physically consistent estimate of all or some equations of the record."""
         if self.bodies is not None and len(part.time) == len(self.full.time):
             return self.bodies
         return consistent_weighted(self.full.at(part.time), self.prior)
 
     def moving(self, part: Observations) -> Array:
-        """Values of the full set that move as these equations say.
+        """Return values (k,) of the full set for a simulation of the motion.
 
-        They are those of bodies; where none are found, the base parameters by weighted least
-        squares in their places, which have the same efforts.
+        They are the values of `bodies_of`. If these do not converge, they are base parameters by
+        weighted least squares at the kept columns, which give the same efforts, and zeros.
         """
         try:
             return self.bodies_of(part).values
@@ -73,7 +74,7 @@ class Setting:
 
 
 def _by_instruments(setting: Setting) -> Estimator:
-    """Instruments from the motion that bodies of these equations make under the efforts."""
+    """Return the instrumental-variable method, with instruments from a simulated motion."""
 
     def estimator(observations: Observations) -> Estimate:
         values = setting.moving(observations)
@@ -87,7 +88,7 @@ def _by_instruments(setting: Setting) -> Estimator:
 
 
 def _by_bodies(setting: Setting) -> Estimator:
-    """Base parameters of the bodies that explain the efforts best."""
+    """Return the method that computes base parameters from physically consistent bodies."""
 
     def estimator(observations: Observations) -> Estimate:
         bodies = setting.bodies_of(observations)
@@ -114,27 +115,27 @@ METHODS: Mapping[str, Callable[[Setting], Estimator]] = MappingProxyType(
         "consistent": _by_bodies,
     }
 )
-"""Methods for base parameters by name."""
+"""Estimation methods for base parameters, by name."""
 
 
-# The parameters that a record really shows: the others are set to zero, one by one.
+# Essential parameters: the remaining parameters are set to zero, one by one.
 
 
 LARGEST_PERCENT = 10.0
 """Standard deviation, in percent of the value, up to which a parameter is essential."""
 
 SIGNIFICANCE = 0.05
-"""Probability with which the test takes a parameter for needed that is not."""
+"""Significance level of the F-test: probability that it keeps a parameter that is zero."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Essential:
-    """An estimate in fewer parameters, and why the search for it ended.
+    """Estimate in fewer parameters, and the reason why the elimination ended.
 
     Attributes:
-        estimate: in the parameters that are left.
-        dropped: the others, in the order in which they went.
-        reason: why no more were dropped.
+        estimate: estimate in the remaining parameters.
+        dropped: eliminated parameters, in the order of elimination.
+        reason: reason why no further parameter was eliminated.
     """
 
     estimate: Estimate
@@ -147,22 +148,24 @@ def essential(
     largest_percent: float = LARGEST_PERCENT,
     significance: float = SIGNIFICANCE,
 ) -> Essential:
-    """Drop the parameter of largest relative deviation while the errors stay as good.
+    """Eliminate parameters of large relative deviation as long as the residuals do not grow.
 
-    The covariance of the whole set says whether all dropped parameters together may be zero, and
-    what the others are when they are; for errors that are alike these are the comparison of the
-    sums of squares and least squares without them. The method of the estimate does not matter.
+    In each step, the parameter with the largest relative deviation is set to zero, and an F-test of
+    all eliminated parameters is computed from the covariance of the complete estimate. The
+    remaining values follow from the same covariance. For equal error variances, this equals the
+    comparison of sums of squares and a least-squares fit without the eliminated parameters. The
+    estimation method is arbitrary.
 
     Source: Pham & Gautier 1991 (essential parameters); Draper & Smith 1998 (F-test of several
     parameters).
 
     Args:
-        estimate: by any method that gives a covariance.
-        largest_percent: relative standard deviation at which it ends.
-        significance: of the F-test, between 0 and 1.
+        estimate: estimate of any method that gives a covariance.
+        largest_percent: relative standard deviation at which the elimination ends.
+        significance: significance level of the F-test, between 0 and 1.
 
     Raises:
-        ModelError: the estimate has no deviations, or a bound makes no sense.
+        ModelError: the estimate has no covariance, or a bound is out of range.
     """
     if not (largest_percent > 0 and 0 < significance < 1):
         raise ModelError(
@@ -196,13 +199,13 @@ def essential(
 
 
 def _freedom(estimate: Estimate) -> float:
-    """Equations of independent error less the parameters, at least one."""
+    """Return the degrees of freedom: independent equations minus parameters, at least one."""
     error = estimate.residuals.error
     return max(float(np.sum(len(error) / repetition(error))) - len(estimate.values), 1.0)
 
 
 def _without(estimate: Estimate, dropped: Sequence[int]) -> tuple[list[int], Array, Array]:
-    """Numbers, values and covariance of the other parameters once some are known to be zero.
+    """Return indices, values and covariance of the kept parameters if `dropped` are zero.
 
     Source: Draper & Smith 1998 (restricted least squares, from the covariance).
     """
@@ -216,7 +219,7 @@ def _without(estimate: Estimate, dropped: Sequence[int]) -> tuple[list[int], Arr
 
 
 def _ratio(estimate: Estimate, dropped: Sequence[int]) -> float:
-    """Mean square of some parameters in deviations, F-distributed where they are zero."""
+    """Return the F statistic of the hypothesis that the `dropped` parameters are zero."""
     size = estimate.deviations[dropped]
     values = estimate.values[dropped] / size
     correlation = estimate.covariance[np.ix_(dropped, dropped)] / np.outer(size, size)

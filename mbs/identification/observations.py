@@ -1,4 +1,4 @@
-"""The equations that a record gives: dynamic, filtered, energy; how well they show what."""
+"""Identification equations of records (dynamic, filtered, energy) and their quality."""
 
 from __future__ import annotations
 
@@ -29,24 +29,25 @@ from mbs.numbers import NONZERO
 from mbs.result import optional_module
 from mbs.text import did_you_mean
 
-# Rows of a record of a closed system that are next to singular configurations.
+# Rows of a record of a closed-loop system that are close to singular configurations.
 
 
 Array = npt.NDArray[np.float64]
 Chosen = npt.NDArray[np.bool_]
 
 _FEWEST = 0.5
-"""Part of a record that must be away from singular configurations: the rest is taken out."""
+"""Smallest fraction of a record that must be away from singular configurations. The remaining
+rows are left out."""
 _ROUNDING = 1e-9
-"""Part of a span of time that is added to it, so that an instant at its end belongs to it however
-times are rounded; samples are a thousand times further apart."""
+"""Relative enlargement of a time interval, so that an instant at its end belongs to the
+interval in spite of rounding. Sampling periods are a thousand times larger."""
 
 
 def led_rows(system: System, q: Array) -> Chosen:
-    """(n,) which configurations q (n, nq) of a closed system are not next to singular ones.
+    """Return a mask (n,) of the configurations q (n, nq) that are not close to singular ones.
 
     Raises:
-        ModelError: they are less than half of all.
+        ModelError: more than half of the configurations are close to singular ones.
     """
     good = regular(system, q)
     if good.mean() < _FEWEST:
@@ -61,7 +62,7 @@ def led_rows(system: System, q: Array) -> Chosen:
 
 
 def on_lines(values: Array, good: Chosen) -> Array:
-    """(n, ...) values with straight lines between the rows that are good."""
+    """Replace the rows of values (n, ...) that are not good by linear interpolation."""
     if good.all():
         return values
     at, known = np.arange(len(good)), np.flatnonzero(good)
@@ -72,20 +73,20 @@ def on_lines(values: Array, good: Chosen) -> Array:
 
 
 def without(time: Array, bad: Array, ahead: float, back: float) -> Chosen:
-    """(n,) instants that have none of the bad ones from `back` before to `ahead` after them."""
+    """Return a mask (n,) of the instants without a bad instant in [time - back, time + ahead]."""
     first = np.searchsorted(bad, time - back * (1 + _ROUNDING), side="left")
     last = np.searchsorted(bad, time + ahead * (1 + _ROUNDING), side="right")
     return np.asarray(first == last, dtype=bool)
 
 
-# Models at the samples of a record: the motion that they take, and what they give.
+# Evaluation of models at the samples of a record.
 
 
 _BATCH = 500
 
 
 def known_of(regressor: Any, samples: Samples) -> Array:
-    """(n, m) efforts of springs and force elements, which have no column [N m or N]."""
+    """Return the efforts (n, m) of springs and force elements without a column [N m or N]."""
     system: System = regressor.system
     if not _has_elements(system):
         return np.zeros(samples.tau.shape)
@@ -98,17 +99,17 @@ def known_of(regressor: Any, samples: Samples) -> Array:
 
 
 def motion_of(model: Any, samples: Samples) -> tuple[Array, Array, Array]:
-    """Positions (n, nq), velocities and accelerations (n, m) that a model takes.
+    """Return positions (n, nq), velocities and accelerations (n, m) at which to evaluate a model.
 
-    The other joints of a closed system follow from the independent ones where the samples are of
-    those alone.
+    If the samples contain only the independent joints of a closed system, the positions of the
+    other joints are computed from them.
 
     Args:
-        model: of the independent or tree coordinates of `model.system`.
-        samples: of all joints, or of the independent ones.
+        model: model in the independent or tree coordinates of `model.system`.
+        samples: motion of all joints, or of the independent joints.
 
     Raises:
-        ModelError: the samples have not the coordinates of the model.
+        ModelError: the widths of the samples do not match the coordinates of the model.
     """
     system: System = model.system
     width, m = samples.q.shape[1], int(model.size1_in(1))
@@ -127,10 +128,12 @@ def motion_of(model: Any, samples: Samples) -> tuple[Array, Array, Array]:
 
 
 def led_samples(model: Any, samples: Samples) -> npt.NDArray[np.bool_]:
-    """(n,) instants at which the independent joints of a closed system lead the others.
+    """Return a mask (n,) of the samples that are not close to singular configurations.
+
+    There, the independent joints of a closed system determine the motion of the other joints.
 
     Raises:
-        ModelError: they are less than half of all.
+        ModelError: more than half of the samples are close to singular configurations.
     """
     if samples.regular is not None:
         return samples.regular
@@ -140,12 +143,12 @@ def led_samples(model: Any, samples: Samples) -> npt.NDArray[np.bool_]:
 
 
 def with_regular(model: Any, samples: Samples) -> Samples:
-    """The samples with `regular` found, so that other motions near them keep the same instants."""
+    """Return the samples with the mask `regular` set, so that variants of the motion reuse it."""
     return replace(samples, regular=led_samples(model, samples))
 
 
 def _is_reduced(model: Any) -> bool:
-    """Whether a model is in the independent velocities of a closed system."""
+    """Whether the model is in the independent velocities of a closed system."""
     return bool(model.system.is_closed and int(model.size1_in(1)) == len(model.system.active))
 
 
@@ -155,19 +158,22 @@ def _has_elements(system: System) -> bool:
 
 
 def evaluated(model: Any, samples: Samples) -> list[Array]:
-    """(n, rows, columns) every output of a model of (q, v) or (q, v, a) at every sample.
+    """Evaluate a model of (q, v) or (q, v, a) at every sample.
 
-    Next to singular configurations of closed systems, straight lines take the place of the model.
+    Close to singular configurations of closed systems, the values are interpolated linearly.
 
     Args:
-        model: of the independent or tree coordinates of `model.system`.
-        samples: of all joints, or of the independent ones.
+        model: model in the independent or tree coordinates of `model.system`.
+        samples: motion of all joints, or of the independent joints.
+
+    Returns:
+        One array (n, rows, columns) for each output of the model.
 
     Raises:
-        ModelError: the samples have not the coordinates of the model, or it depends on states or
-            inputs of components.
+        ModelError: the widths of the samples do not match the coordinates of the model, or the
+            model depends on states or inputs of components.
     """
-    along = of_motion(model)  # measured positions close no loop exactly
+    along = of_motion(model)  # # measured positions do not close the loops exactly
     states = motion_of(model, samples)[: along.n_in()]
     n = len(samples.time)
     size = min(_BATCH, n)
@@ -182,35 +188,35 @@ def evaluated(model: Any, samples: Samples) -> list[Array]:
     return [on_lines(whole, led_samples(model, samples)) for whole in found]
 
 
-# The equations that a record gives: as many for each instant as there are efforts.
+# Equations of a record: one row per instant and effort.
 
 
 KEPT_RATE = 1.8
-"""Rows that are kept in a period of the bandwidth, which makes filtered white noise white again.
+"""Rows that are kept per period of the bandwidth, so that filtered white noise is nearly white.
 
-The two passes of the filter halve the power of noise at 0.9 of the bandwidth, about which its
-spectrum folds; with more rows their errors depend on each other, with less the record is wasted.
+The two passes of the filter halve the power of noise at 0.9 of the bandwidth, which is the Nyquist
+frequency of the kept rows. More rows have correlated errors; fewer rows lose information.
 """
 
 _SETTLED = 1.0
 _SPREAD = 2.0
-"""Periods of the bandwidth in which the filter forgets what came before, and what comes after."""
+"""Periods of the bandwidth in which the filter response to earlier and later samples decays."""
 _PAUSE = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observations:
-    """y = W K + noise, for each instant and effort.
+    """Linear identification equations y = W K + noise, one row per instant and effort.
 
     Attributes:
-        time: (n,) [s].
-        W: (n, m, k) rows of the regressor, filtered as y.
-        y: (n, m) efforts [N m or N].
-        columns: the k parameters.
+        time: (n,) instants [s].
+        W: (n, m, k) observation matrix: rows of the regressor, filtered as y.
+        y: (n, m) measured efforts [N m or N].
+        columns: the k parameters of K.
         efforts: names of the m efforts.
-        effort_units: their units.
-        dropped: instants that were left out, the configuration of a closed system being next to a
-            singular one.
+        effort_units: units of the efforts.
+        dropped: number of instants that were left out because the configuration of a closed system
+            is close to a singular one.
     """
 
     time: Array
@@ -237,7 +243,7 @@ class Observations:
 
     @property
     def rows(self) -> tuple[Array, Array]:
-        """(n m, k) and (n m,) the equations one below the other."""
+        """W (n m, k) and y (n m,) with the rows of all instants stacked."""
         return self.W.reshape(-1, self.W.shape[2]), self.y.reshape(-1)
 
     def __repr__(self) -> str:
@@ -248,7 +254,7 @@ class Observations:
         return int(self.y.size)
 
     def select(self, names: Sequence[str]) -> Observations:
-        """The equations in these parameters alone, the others being zero.
+        """Return the equations with only the named columns; other parameters are assumed zero.
 
         Raises:
             ModelError: a name is unknown.
@@ -264,35 +270,35 @@ class Observations:
         return replace(self, W=self.W[:, :, chosen], columns=columns)
 
     def grouped(self, base: BaseParameters) -> Observations:
-        """The equations in base parameters: the columns of the eliminated ones are left out.
+        """Return the equations in base parameters, without the columns of eliminated parameters.
 
         Args:
-            base: of the same columns.
+            base: base parameters of the same columns.
 
         Raises:
-            ModelError: it keeps a parameter that these equations do not have.
+            ModelError: a kept base parameter has no column in these equations.
         """
         left = self.select([column.name for column in base.kept])
         named = zip(left.columns, base.names, strict=True)
         return replace(left, columns=tuple(replace(c, name=name) for c, name in named))
 
     def split(self, part: float) -> tuple[Observations, Observations]:
-        """The equations up to this part of the time and those after it.
+        """Split the equations in time into a first and a second set.
 
         Args:
-            part: between 0 and 1.
+            part: fraction of the duration in the first set, between 0 and 1.
         """
         first = self.time <= self.time[0] + part * (self.time[-1] - self.time[0])
         return self._rows_of(first), self._rows_of(~first)
 
     def parts(self, count: int) -> Iterator[tuple[Observations, Observations]]:
-        """For each of `count` equal parts of the record: the rest, and the part itself."""
+        """Yield, for each of `count` equal parts of the record, the other parts and that part."""
         number = np.arange(len(self.time)) * count // len(self.time)
         for k in range(count):
             yield self._rows_of(number != k), self._rows_of(number == k)
 
     def at(self, time: Array) -> Observations:
-        """The equations of these instants [s], which must be among those of `time`."""
+        """Return the equations at these instants [s], which must be elements of `self.time`."""
         return self._rows_of(np.isin(self.time, time))
 
     def _rows_of(self, keep: npt.NDArray[np.bool_]) -> Observations:
@@ -300,18 +306,19 @@ class Observations:
 
 
 def observe(regressor: Any, samples: Samples) -> Observations:
-    """The equations of the samples, none filtered.
+    """Return the identification equations of the samples, without further filtering.
 
-    What springs and force elements of the system take is subtracted from the efforts. Instants of
-    a closed system next to singular configurations are left out.
+    Efforts of springs and force elements without a column are subtracted from the measured efforts.
+    Instants at which a closed system is close to a singular configuration are left out.
 
     Args:
-        regressor: Function D(q, v, a) with `.columns` and `.system`, such as `regressor` gives.
-        samples: positions, rates and efforts.
+        regressor: Function D(q, v, a) with `.columns` and `.system`, such as the result of
+            `regressor`.
+        samples: positions, velocities, accelerations and efforts.
 
     Raises:
-        ModelError: the samples have not the coordinates of the regressor, or most are next to
-            singular configurations.
+        ModelError: the widths of the samples do not match the coordinates of the regressor, or more
+            than half of the samples are close to singular configurations.
     """
     keep = led_samples(regressor, samples)
     full = replace(_observe(regressor, samples), dropped=int(np.sum(~keep)))
@@ -319,7 +326,7 @@ def observe(regressor: Any, samples: Samples) -> Observations:
 
 
 def _observe(regressor: Any, samples: Samples) -> Observations:
-    """Every instant; next to singular configurations the regressor is on straight lines."""
+    """Return the equations of every instant, interpolated close to singular configurations."""
     return Observations(
         samples.time,
         evaluated(regressor, samples)[0],
@@ -333,24 +340,24 @@ def _observe(regressor: Any, samples: Samples) -> Observations:
 def observe_filtered(
     regressor: Any, samples: Samples, bandwidth: float | None = None, order: int = ORDER
 ) -> Observations:
-    """The equations of the samples with the same filter on every column as on the efforts.
+    """Return the identification equations, with the columns filtered as the efforts.
 
-    The columns pass the filter that the efforts of the samples have passed already: a filtered
-    product is not the product of filtered motions, least of all in Coulomb friction. A further
-    filter may be put on both sides. Rows that then say nothing new are dropped, so that the noise
-    of those that stay is nearly independent.
+    The columns pass the filter that was applied to the efforts of the samples: the filtered product
+    of signals differs from the product of filtered signals, in particular for Coulomb friction. A
+    further filter may be applied to both sides. The rows are then decimated, so that the noise of
+    the kept rows is nearly independent.
 
     Source: Gautier 1997 (parallel filtering and decimation).
 
     Args:
         regressor: Function D(q, v, a) with `.columns` and `.system`.
-        samples: positions, rates and efforts.
-        bandwidth: of a further filter on both sides [Hz], or None.
-        order: of one pass of the filters.
+        samples: positions, velocities, accelerations and efforts.
+        bandwidth: bandwidth of a further filter on both sides [Hz], or None.
+        order: order of one pass of the filters.
 
     Raises:
-        ModelError: the samples were not filtered and no bandwidth is given, or as for `observe`
-            and `zero_phase`.
+        ModelError: the samples are unfiltered and no bandwidth is given. Also the errors of
+            `observe` and `zero_phase`.
     """
     further = [] if bandwidth is None else [bandwidth]
     passed = [] if samples.bandwidth is None else [samples.bandwidth]
@@ -378,14 +385,14 @@ def observe_filtered(
 def clear_of_singular(
     found: Observations, model: Any, samples: Samples, before: float, after: float | None = None
 ) -> Observations:
-    """The equations without those that a filter or an interval mixes with singular configurations.
+    """Drop the equations whose filter or interval window contains near-singular samples.
 
     Args:
-        found: from the samples.
-        model: of the samples.
-        samples: whose time is that of `found`.
-        before: time that an equation looks ahead [s].
-        after: time that it looks back [s]; the same when left out.
+        found: equations of the samples.
+        model: model with which the singular configurations are found.
+        samples: the complete samples.
+        before: length of the time window after the instant of an equation [s].
+        after: length of the time window before it [s]. The default is the same length.
     """
     bad = samples.time[~led_samples(model, samples)]
     keep = without(found.time, bad, before, before if after is None else after)
@@ -393,15 +400,16 @@ def clear_of_singular(
 
 
 def stacked(parts: Sequence[Observations]) -> Observations:
-    """The equations of several records one after the other.
+    """Concatenate the equations of several records.
 
-    Times of a record go on where the one before ended, half a second later.
+    The times of each record are shifted to start half a second after the end of the previous
+    record.
 
     Args:
-        parts: one or more, of the same columns and efforts.
+        parts: one or more sets of equations with the same columns and efforts.
 
     Raises:
-        ModelError: their efforts or columns differ.
+        ModelError: the efforts or columns differ.
     """
     first = parts[0]
     if len(parts) == 1:
@@ -429,21 +437,21 @@ def stacked(parts: Sequence[Observations]) -> Observations:
 
 
 def observe_energy(energy: Any, power: Any, samples: Samples, interval: float) -> Observations:
-    """One equation for each interval: work of the efforts = change of h K + integral of P K.
+    """Return one equation per interval: work of the efforts = change of h K + integral of P K.
 
-    Integrals are taken by the trapezoidal rule. One equation in place of one for each joint and
-    instant: it is the weakest of the models in noise.
+    Integrals use the trapezoidal rule. The energy model has one equation per interval instead of
+    one per joint and instant, and is the model that is most sensitive to noise.
 
     Source: Khalil & Creusot 1997, eq. 47.
 
     Args:
         energy: ``energy_regressor``, (q, v) -> h with `.columns` and `.system`.
-        power: ``power_regressor`` of the same columns.
-        samples: positions, velocities and efforts; accelerations are not used.
-        interval: [s].
+        power: ``power_regressor`` with the same columns.
+        samples: positions, velocities and efforts. Accelerations are not used.
+        interval: length of an interval [s].
 
     Raises:
-        ModelError: the interval is shorter than a sample or longer than the record.
+        ModelError: the interval is shorter than a sampling period or longer than the record.
     """
     step = round(interval * samples.rate)
     if not 1 <= step < len(samples.time):
@@ -468,7 +476,7 @@ def observe_energy(energy: Any, power: Any, samples: Samples, interval: float) -
 
 
 def _integral(values: Array, rate: float) -> Array:
-    """From the first sample on, by the trapezoidal rule."""
+    """Return the cumulative integral from the first sample, by the trapezoidal rule."""
     parts = (values[1:] + values[:-1]) / (2 * rate)
     return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(parts, axis=0)])
 
@@ -479,27 +487,28 @@ def _integral(values: Array, rate: float) -> Array:
 
 
 _SETTLED_PERIODS = 15.0
-"""Time constants 1/a after which the filter has forgotten its start: 16 exp(-15), 5e-6 of it is
-left, less than the noise of any record."""
+"""Time constants 1/a after which the initial transient of the filter is dropped. It has then
+decayed to 16 exp(-15), or 5e-6 of its start, which is less than the noise of any record."""
 _ROWS = 2.0
-"""Time constants between rows, over which errors that the filter has passed are alike."""
+"""Time constants between kept rows. The errors of closer rows are strongly correlated."""
 
 
 def observe_momentum(filtered: Any, samples: Samples, corner: float) -> Observations:
-    """F tau = (F' D1 + F D2) K with F = a^2 / (s + a)^2 and F' = s F.
+    """Return the equations F tau = (F' D1 + F D2) K with F = a^2 / (s + a)^2 and F' = s F.
 
-    The time in which the filter forgets its start is left out, and rows that come sooner after
-    another than two of its time constants, since their errors are alike.
+    The initial transient of the filter is dropped. Of the remaining rows, one per two time
+    constants is kept, because the errors of closer rows are correlated.
 
-    Source: Khalil & Creusot 1997, eq. 44-46; the filter by the bilinear transform.
+    Source: Khalil & Creusot 1997, eq. 44-46. The filter is discretised by the bilinear transform.
 
     Args:
         filtered: ``filtered_regressor``, (q, v) -> D1, D2 with `.columns` and `.system`.
-        samples: positions, velocities and efforts; accelerations are not used.
-        corner: a [rad/s]; five to ten times the highest frequency of the motion.
+        samples: positions, velocities and efforts. Accelerations are not used.
+        corner: corner frequency a [rad/s], five to ten times the highest frequency of the motion.
 
     Raises:
-        ModelError: the corner does not suit the samples, or they have not the coordinates.
+        ModelError: the corner frequency is too high for the sampling rate or too low for the
+            record, or the samples do not match the coordinates of the model.
     """
     rate = samples.rate
     settled = int(np.ceil(_SETTLED_PERIODS * rate / corner)) if corner > 0 else len(samples.time)
@@ -533,25 +542,25 @@ def _filtered_signal(values: Array, numerator: list[float], corner: float, rate:
     return np.asarray(signal.lfilter(b, a, values, axis=0), dtype=float)
 
 
-# The equations of a record by the name of their model.
+# Equations of a record, by the name of the identification model.
 
 
 INTERVALS = 1.0
-"""Intervals of the energy model in a period of the bandwidth."""
+"""Number of intervals of the energy model per period of the bandwidth."""
 
 
 def _dynamic(system: System, samples: Samples, bandwidth: float, options: Any) -> Observations:
-    """Efforts, filtered once more on both sides."""
+    """Return the equations of the dynamic model, with the same filter on both sides."""
     return observe_filtered(regressor(system, **options), samples)
 
 
 def _filter(system: System, samples: Samples, bandwidth: float, options: Any) -> Observations:
-    """Momenta behind a filter whose corner is the bandwidth; no accelerations."""
+    """Return the equations of the filtered model with the bandwidth as corner frequency."""
     return observe_momentum(filtered_regressor(system, **options), samples, 2 * np.pi * bandwidth)
 
 
 def _energy(system: System, samples: Samples, bandwidth: float, options: Any) -> Observations:
-    """Work over intervals of a period of the bandwidth; no accelerations."""
+    """Return the equations of the energy model, with intervals of one period of the bandwidth."""
     models = energy_regressor(system, **options), power_regressor(system, **options)
     return observe_energy(*models, samples, 1 / (INTERVALS * bandwidth))
 
@@ -559,36 +568,37 @@ def _energy(system: System, samples: Samples, bandwidth: float, options: Any) ->
 EQUATIONS: Mapping[str, Callable[[System, Samples, float, Any], Observations]] = MappingProxyType(
     {"dynamic": _dynamic, "filtered": _filter, "energy": _energy}
 )
-"""Models by name: (system, samples, bandwidth, options of the columns) -> the equations."""
+"""Functions of the identification models: (system, samples, bandwidth, column options) ->
+equations."""
 
 
-# How well a record shows the parameters, and which it does not show.
+# Excitation quality of a record, and parameters that are not identifiable from it.
 
 
 _NOTHING = 1e-9
-"""Column below this part of the longest that the record does not show: rounding, 1e-15 of the
-largest motion, is below it, and what sensors tell, 1e-5, above."""
+"""Norm of a column, relative to the largest, below which its parameter counts as unobserved.
+Rounding errors are about 1e-15 and the resolution of sensors about 1e-5 of the largest motion."""
 _DEPENDENT = 1e-7
-"""Singular values of columns of length one below this part of the largest count as zero: rounding
-makes 1e-15 of it, and directions that a record shows by less than 1e-7 are lost in any noise."""
+"""Singular values of the normalised columns below this fraction of the largest count as zero.
+Rounding errors are about 1e-15, and directions below 1e-7 are lost in the noise of any record."""
 _SHARE = 0.05
-"""Part of a direction without effect from which on a parameter is named as one of those behind
-it."""
+"""Component in an unobservable direction (unit vector) above which a parameter is named as
+inseparable."""
 _LISTED = 8
-"""Names in a sentence; more are counted."""
+"""Maximum number of names in an error message. Further names are counted."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExcitationQuality:
-    """The singular values of the observations, and the parameters behind those that are zero.
+    """Singular values of the observation matrix, and the parameters that it does not determine.
 
     Attributes:
-        condition: largest over smallest singular value of W.
-        scaled_condition: the same with every column of length one, which no choice of units moves.
-        singular_values: (k,) of the scaled columns, those of unseen parameters zero.
-        unseen: parameters that no effort depends on.
-        inseparable: parameters of which only combinations can be found, more than those that the
-            combinations need.
+        condition: condition number of W.
+        scaled_condition: condition number of W with columns of unit length, which is independent of
+            the units.
+        singular_values: (k,) singular values of the scaled columns; zero for unobserved parameters.
+        unseen: names of the parameters on which no effort depends.
+        inseparable: names of the parameters that are identifiable only in linear combinations.
     """
 
     condition: float
@@ -599,7 +609,7 @@ class ExcitationQuality:
 
     @property
     def sentence(self) -> str:
-        """What is wrong with the record, or an empty text."""
+        """Description of the unidentifiable parameters, or an empty text."""
         parts = []
         if self.unseen:
             parts.append(f"{_list(self.unseen)} cannot be seen at all")
@@ -609,10 +619,10 @@ class ExcitationQuality:
 
 
 def excitation_quality(observations: Observations) -> ExcitationQuality:
-    """The condition number of the observations and the parameters that they do not show.
+    """Return the condition number of the observations and the parameters they do not determine.
 
-    Columns of zeros are taken out first, then every column is scaled to length one; otherwise
-    rounding would count as a column.
+    Zero columns are removed first. The other columns are scaled to unit length, since otherwise
+    rounding errors would count as independent columns.
 
     Source: Gautier 1991 (numerical rank); Presse & Gautier 1993 (condition number).
     """
@@ -637,10 +647,11 @@ def excitation_quality(observations: Observations) -> ExcitationQuality:
 
 
 def require_visible(observations: Observations) -> ExcitationQuality:
-    """The quality of observations that show every parameter.
+    """Return the excitation quality of observations that determine every parameter.
 
     Raises:
-        ModelError: names the parameters that cannot be seen or told apart.
+        ModelError: there are fewer equations than parameters, or some parameters are not
+            identifiable: their columns of W are zero or linearly dependent. The message names them.
     """
     count, rows = len(observations.columns), len(observations)
     if rows < count:

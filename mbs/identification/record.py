@@ -1,4 +1,4 @@
-"""A measured motion: its columns, what it may not be, and its filter."""
+"""Records of measured motions: columns, consistency checks and zero-phase filtering."""
 
 from __future__ import annotations
 
@@ -20,38 +20,41 @@ from mbs.identification.leading import active_indices
 from mbs.result import optional_module
 from mbs.text import did_you_mean, quoted
 
-# What a record may not be: out of order, with holes, in other units, too short.
+# Checks of a record: order of time, gaps, units and length.
 
 
 Array = npt.NDArray[np.float64]
 
 SHORTEST = 50
-"""Rows that a record needs at least."""
+"""Minimum number of rows of a record."""
 
 GAP = 20.0
-"""Usual steps of time that are bridged by default."""
+"""Longest gap that is bridged by default, as a multiple of the median time step."""
 
 FARTHEST_TURN = 4 * np.pi
-"""Positions beyond it are not taken for those of a revolute joint [rad]."""
+"""Largest position that is accepted for a revolute joint [rad]."""
 
 _RANGES = 3.0
-"""Half ranges from the middle of a joint's range that a position is not beyond: overshoot and a
-range that is given too narrow stay within, degrees (57) and positions before a gear do not."""
+"""Largest distance of a position from the middle of the joint range, in half ranges. Overshoot
+and a range that is specified too narrow are below it. Positions in degrees (factor 57) and
+positions on the motor side of a gear are above it."""
 _SAME_MOTION = 0.9
-"""Correlation of a position with the integral of its velocity below which columns are exchanged or
-of opposite sign: noise and a late filter leave more, another joint's less."""
+"""Correlation of a position with the integral of its velocity below which columns are
+considered swapped or of opposite sign. Noise and filter delay give higher correlations, the
+velocity of another joint a lower correlation."""
 _SAME_RATE = 0.3
-"""Relative difference of their sizes above which units differ, or sides of a gear: noise makes some
-percent, degrees a factor of 57 and gears of robots 3 and more."""
+"""Relative difference between the amplitudes of a position and of the integral of its velocity
+above which the units or the sides of a gear differ. Noise causes some percent, degrees a factor
+of 57, and gears of robots a factor of 3 or more."""
 _STILL = 1e-9
-"""Norm of all positions about their trend [rad or m] below which a joint does not move."""
+"""Norm of the detrended positions [rad or m] below which a joint counts as not moving."""
 
 
 def check_record(record: Record) -> None:
-    """Refuse what cannot be a record of joints in SI units.
+    """Raise if the data cannot be a record of joints in SI units.
 
     Raises:
-        ModelError: which column and row, what value, and what to do.
+        ModelError: the message names the column, the row, the value and a remedy.
     """
     _check_shapes(record)
     _check_names(record)
@@ -177,7 +180,7 @@ def _check_position(record: Record, k: int) -> None:
 
 
 def _check_rate(record: Record, k: int) -> None:
-    """Compare the change of a position with the integral of its velocity, both without trend."""
+    """Compare a position with the integral of its velocity, both detrended."""
     assert record.v is not None
     v, steps = record.v[:, k], np.diff(record.time)
     travelled = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * steps)])
@@ -201,7 +204,7 @@ def _check_rate(record: Record, k: int) -> None:
 
 
 def _detrend(time: Array, values: Array) -> Array:
-    """Without the straight line that fits best."""
+    """Subtract the least-squares line from the values."""
     basis = np.column_stack([np.ones_like(time), time - time.mean()])
     line = basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
     return np.asarray(values - line, dtype=float)
@@ -211,10 +214,11 @@ def _detrend(time: Array, values: Array) -> Array:
 
 
 def column(table: Any, name: str) -> Array:
-    """(n,) a column of a DataFrame, a `mbs.Result` or a dict.
+    """Return a column (n,) of a DataFrame, a `mbs.Result` or a dict.
 
     Raises:
-        ModelError: there is none of this name, or it holds what is no number.
+        ModelError: the table has no column of this name, or the column contains a value that is not
+            a number.
     """
     known = [str(key) for key in table.keys()] if hasattr(table, "keys") else list(table.names)  # noqa: SIM118
     if name not in known:
@@ -231,15 +235,15 @@ def column(table: Any, name: str) -> Array:
 
 
 def columns(table: Any, what: str, names: Sequence[str]) -> Array:
-    """(n, k) some columns of a table side by side.
+    """Return columns of a table as an array (n, k).
 
     Args:
-        table: as for `column`.
-        what: they are, for messages.
-        names: of the columns, one or more.
+        table: DataFrame, `mbs.Result` or dict, as for `column`.
+        what: kind of the columns, for error messages.
+        names: one or more column names.
 
     Raises:
-        ModelError: there are no names, or as for `column`.
+        ModelError: `names` is empty, or the errors of `column`.
     """
     if isinstance(names, str) or not len(names):
         raise ModelError(
@@ -249,14 +253,14 @@ def columns(table: Any, what: str, names: Sequence[str]) -> Array:
 
 
 def csv_table(path: str | os.PathLike[str]) -> dict[str, Array]:
-    """The columns of a text file by the names in its first row.
+    """Read the columns of a CSV file into a dict, by the names in its first row.
 
     Args:
-        path: file with commas between the columns.
+        path: path of a file with comma-separated columns.
 
     Raises:
-        ModelError: it cannot be read, a row has not the length of the header, or a field is no
-            number; the line is named.
+        ModelError: the file cannot be read, the number of fields of a row differs from the header,
+            or a field is not a number. The message names the row.
     """
     try:
         with open(path, newline="", encoding="utf-8-sig") as stream:
@@ -285,7 +289,7 @@ def csv_table(path: str | os.PathLike[str]) -> dict[str, Array]:
 
 
 def _check_header(path: str | os.PathLike[str], header: Sequence[str]) -> None:
-    """Refuse other separators than commas, and numbers in the place of names."""
+    """Raise if the separator is not a comma, or if the header contains numbers instead of names."""
     for mark in (";", "\t"):
         if len(header) == 1 and mark in header[0]:
             raise ModelError(
@@ -307,7 +311,7 @@ def _is_number(text: str) -> bool:
     return True
 
 
-# A measured motion: positions, efforts and perhaps velocities over time.
+# Measured motion: positions, efforts and optional velocities over time.
 
 
 Limits = tuple[float, float] | None
@@ -315,24 +319,24 @@ Limits = tuple[float, float] | None
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Record:
-    """What sensors gave during a motion, in SI units on the joint's side of the gears.
+    """Measured motion of a robot, in SI units on the joint side of the gears.
 
-    The constructor refuses what cannot be a record of a robot; see `check_record`. Positions are
-    those of all joints of the tree, or of the independent ones; efforts those of the independent
-    joints.
+    The constructor raises if the data are inconsistent; see `check_record`. Positions are of all
+    joints of the tree or of the independent joints; efforts are of the independent joints.
 
     Attributes:
-        time: (n,) [s], increasing, not necessarily in equal steps.
+        time: (n,) increasing instants [s]; the steps may vary.
         q: (n, nq) positions [rad or m].
-        tau: (n, m) efforts of the motors seen at the joints [N m or N].
+        tau: (n, m) motor efforts, converted to the joint side [N m or N].
         v: (n, nq) measured velocities [rad/s or m/s], or None.
-        names: of the positions; q1, q2, ... by default.
-        units: of the positions, "rad" or "m"; all "rad" by default.
-        limits: range of each position, or None where it is not known.
-        efforts: names of the efforts; those of the positions by default, or tau1, tau2, ... where
-            there are less of them.
-        effort_units: "N.m" or "N"; those that go with the positions by default.
-        longest_gap: largest step of time that is bridged [s]; 20 times the usual step by default.
+        names: names of the positions; q1, q2, ... by default.
+        units: units of the positions, "rad" or "m"; all "rad" by default.
+        limits: range of each position, or None if it is unknown.
+        efforts: names of the efforts. The defaults are the names of the positions, or tau1, tau2,
+            ... if the number of efforts differs from the number of positions.
+        effort_units: "N.m" or "N" for each effort; by default according to the units of the
+            positions.
+        longest_gap: longest time step that is bridged [s]; 20 times the median step by default.
     """
 
     time: Array
@@ -380,20 +384,20 @@ class Record:
     def of(
         cls, system: System, time: Any, q: Any, tau: Any, v: Any = None, **options: Any
     ) -> Record:
-        """A record of a system: names, units and ranges of the joints are those of the system.
+        """Return a record with the joint names, units and ranges of a system.
 
         Args:
-            system: open or closed, its measured joints of one degree of freedom.
-            time: (n,) [s].
-            q: (n, nq) positions, or (n, m) those of the independent joints of a closed system,
-                which the others follow.
-            tau: (n, m) efforts of the independent joints; where motors are others than these, what
-                `mbs.models.actuation_matrix` makes of theirs.
-            v: velocities of the same joints, or None.
+            system: open or closed; its measured joints have one degree of freedom.
+            time: (n,) instants [s].
+            q: (n, nq) positions of all joints, or (n, m) positions of the independent joints of a
+                closed system, from which the other positions are computed.
+            tau: (n, m) efforts of the independent joints. If other joints are actuated, convert
+                their efforts with `mbs.models.actuation_matrix`.
+            v: velocities of the same joints as q, or None.
             **options: other attributes of the record.
 
         Raises:
-            ModelError: the numbers are no record of this system.
+            ModelError: the data are not a valid record of this system.
         """
         require_system(system)
         width = np.shape(q)[1] if np.ndim(q) == 2 else system.nq
@@ -421,18 +425,19 @@ class Record:
         v: Sequence[str] | None = None,
         **options: Any,
     ) -> Record:
-        """A record from named columns.
+        """Return a record from named columns of a table.
 
         Args:
-            table: a pandas DataFrame, a `mbs.Result`, or a dict of columns; its time is the column
-                "time", or the index of a DataFrame.
-            q: names of the columns of positions.
-            tau: names of the columns of efforts.
-            v: names of the columns of velocities, or None.
-            **options: other attributes of the record, or system=System to take them from there.
+            table: pandas DataFrame, `mbs.Result` or dict of columns. The time is the column "time",
+                or the index of a DataFrame.
+            q: names of the position columns.
+            tau: names of the effort columns.
+            v: names of the velocity columns, or None.
+            **options: other attributes of the record, or system=System to use the attributes of the
+              system.
 
         Raises:
-            ModelError: a column is missing or not of numbers, or the numbers are no record.
+            ModelError: a column is missing or not numeric, or the data are not a valid record.
         """
         stamps = getattr(table, "time", None) if not hasattr(table, "keys") else None
         if stamps is None:
@@ -461,29 +466,31 @@ class Record:
         v: Sequence[str] | None = None,
         **options: Any,
     ) -> Record:
-        """A record from a text file: a header of names, one of them "time", then rows of numbers.
+        """Return a record from a CSV file with a header row of names, one of which is "time".
 
         Args:
-            path: the file; commas between the columns.
-            q: names of the columns of positions.
-            tau: names of the columns of efforts.
-            v: names of the columns of velocities, or None.
-            **options: as for `from_table`.
+            path: path of the file, with comma-separated columns.
+            q: names of the position columns.
+            tau: names of the effort columns.
+            v: names of the velocity columns, or None.
+            **options: options of `from_table`.
 
         Raises:
-            ModelError: the file cannot be read, or its numbers are no record.
+            ModelError: the file cannot be read, or the data are not a valid record.
         """
         return cls.from_table(csv_table(path), q, tau, v, **options)
 
     def between(self, start: float, stop: float) -> Record:
-        """The rows from one instant to another [s]."""
+        """Return the rows between two instants [s], both included."""
         return self._rows((self.time >= start) & (self.time <= stop))
 
     def pieces(self, longest: float | None = None) -> list[Record]:
-        """The records between the gaps, for `identify`; those of too few rows are left out.
+        """Split the record at its gaps, as input of `identify`.
+
+        Pieces of less than 50 rows are dropped.
 
         Args:
-            longest: step of time that is no gap [s]; 20 times the usual step when left out.
+            longest: longest time step that is not a gap [s]; 20 times the median step by default.
 
         Raises:
             ModelError: no piece is long enough.
@@ -508,20 +515,20 @@ class Record:
 
 
 def joint_side(N: Any, q_motor: Any, tau_motor: Any) -> tuple[Array, Array]:
-    """Positions and efforts of joints from those of motors: q = N^-1 q_m and tau = N' tau_m.
+    """Convert motor positions and efforts to joints: q = N^-1 q_m and tau = N' tau_m.
 
-    Source: Khalil & Dombre 2002 (transmissions); the gears lose no power.
+    Source: Khalil & Dombre 2002 (transmissions). The gears are assumed lossless.
 
     Args:
-        N: (n,) ratios, or (n, n) matrix of motors that drive several joints: q_m = N q.
-        q_motor: (rows, n) positions [rad].
-        tau_motor: (rows, n) efforts on the motors' shafts [N m].
+        N: (n,) gear ratios, or (n, n) matrix of a coupled transmission, with q_m = N q.
+        q_motor: (rows, n) motor positions [rad].
+        tau_motor: (rows, n) efforts on the motor shafts [N m].
 
     Returns:
-        (rows, n) positions and (rows, n) efforts of the joints.
+        Joint positions (rows, n) and joint efforts (rows, n).
 
     Raises:
-        ModelError: N does not fit, or it has no inverse.
+        ModelError: the shape of N does not match the data, or N is singular.
     """
     ratios = _numbers("N", N)
     matrix = np.diag(ratios) if ratios.ndim == 1 else ratios
@@ -566,7 +573,7 @@ def _check_motors(system: System) -> None:
 
 
 def _check_efforts(system: System, names: Sequence[str], tau: Any) -> None:
-    """Refuse efforts of more or less than the independent joints."""
+    """Raise if the number of efforts differs from the number of independent joints."""
     if np.ndim(tau) == 2 and np.shape(tau)[1] != len(names):
         raise ModelError(
             f"{system.name}: tau has {np.shape(tau)[1]} columns, the system has {len(names)}"
@@ -575,7 +582,7 @@ def _check_efforts(system: System, names: Sequence[str], tau: Any) -> None:
 
 
 def _check_order(what: str, given: Sequence[str], joints: Sequence[str]) -> None:
-    """Refuse columns such as "q2.tau" in the place of another joint."""
+    """Raise if a column such as "q2.tau" is assigned to another joint than q2."""
     for name, joint in zip(given, joints, strict=False):
         stem = name if name in joints else name.rpartition(".")[0]
         if stem in joints and stem != joint:
@@ -594,37 +601,37 @@ def _numbers(name: str, values: Any) -> Array:
     return array
 
 
-# From a record to samples in equal steps: the same zero-phase filter on positions and efforts.
+# Resampling of a record, with the same zero-phase filter on positions and efforts.
 
 
 ORDER = 4
-"""Order of the Butterworth filter, which runs once forwards and once backwards."""
+"""Order of the Butterworth filter, which is applied once forwards and once backwards."""
 
 WORKING_RATE = 20.0
-"""Samples in a period of the bandwidth that are kept for the regressor."""
+"""Samples that are kept for the regressor, per period of the bandwidth."""
 
 _SLOW = 10.0
-"""Records of less samples in a second may have time in another unit [Hz]."""
+"""Sampling rate [Hz] below which the error message suggests that the time unit may be wrong."""
 
 DROPPED = 5.0
-"""Periods of the bandwidth that are left out at both ends, where the filter settles."""
+"""Periods of the bandwidth that are dropped at both ends because of filter transients."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """Positions, their rates, and efforts at equal steps of time.
+    """Positions, velocities, accelerations and efforts at equal time steps.
 
     Attributes:
-        time: (n,) [s].
+        time: (n,) instants [s].
         q: (n, nq) positions [rad or m].
         v: (n, nq) velocities [rad/s or m/s].
         a: (n, nq) accelerations [rad/s2 or m/s2].
         tau: (n, m) efforts [N m or N].
         efforts: names of the efforts.
-        effort_units: their units.
-        bandwidth: of what was left by the filter [Hz], or None where nothing was filtered.
-        regular: (n,) whether a configuration of a closed system keeps clear of singular ones; None
-            where that is still to be found.
+        effort_units: units of the efforts.
+        bandwidth: bandwidth of the filter [Hz], or None if the samples are not filtered.
+        regular: (n,) mask of the samples at which a closed system is not close to a singular
+            configuration; None if not yet computed.
     """
 
     time: Array
@@ -648,25 +655,25 @@ class Samples:
 
     @property
     def rate(self) -> float:
-        """Samples in a second [Hz]."""
+        """Sampling rate [Hz]."""
         return (len(self.time) - 1) / float(self.time[-1] - self.time[0])
 
 
 def resampled(record: Record, rate: float | None = None) -> Record:
-    """The record at equal steps of time, on straight lines between its rows.
+    """Return the record at equal time steps, by linear interpolation between its rows.
 
-    Nothing is filtered: at a lower rate than that of the record, noise folds into the motion.
+    No filter is applied: a lower rate than that of the record causes aliasing of noise.
 
     Args:
-        record: at any steps.
-        rate: samples in a second [Hz]; that of the usual step of the record by default.
+        record: record with any time steps.
+        rate: sampling rate [Hz]; by default the inverse of the median time step of the record.
     """
     usual = 1.0 / float(np.median(np.diff(record.time)))
     wanted = usual if rate is None else rate
     span = float(record.time[-1] - record.time[0])
     if not wanted > 0:
         raise ModelError(f"resampling: the rate is {wanted:g} Hz; give more than zero")
-    # the last row belongs to it though span and rate are rounded
+    # keep the last row in spite of the rounding of span and rate
     time = record.time[0] + np.arange(int(span * wanted * (1 + 1e-12)) + 1) / wanted
 
     def at_times(values: Array) -> Array:
@@ -679,22 +686,22 @@ def resampled(record: Record, rate: float | None = None) -> Record:
 
 
 def zero_phase(values: Array, rate: float, bandwidth: float, order: int = ORDER) -> Array:
-    """Low-pass Butterworth filter run forwards and backwards, so that nothing is delayed.
+    """Apply a low-pass Butterworth filter forwards and backwards, without phase delay.
 
     Source: Gautier 1997 (filtering of positions and efforts); Gustafsson 1996 (two passes).
 
     Args:
-        values: (n, ...) samples in equal steps.
-        rate: of the samples [Hz].
-        bandwidth: at which each pass leaves 0.71 of a sine [Hz].
-        order: of one pass.
+        values: (n, ...) samples at equal time steps.
+        rate: sampling rate [Hz].
+        bandwidth: frequency at which the gain of each pass is 0.71 [Hz].
+        order: order of each pass.
 
     Returns:
-        (n, ...) the samples that are left.
+        (n, ...) filtered samples.
 
     Raises:
-        ModelError: the bandwidth is not between zero and half the rate, or there are too few
-            samples for the filter.
+        ModelError: the bandwidth is not between zero and half the sampling rate, or there are too
+            few samples for the filter.
     """
     if not 0 < bandwidth < rate / 2:
         hint = "; time is in s, is that of the record in ms?" if rate < _SLOW else ""
@@ -714,14 +721,14 @@ def zero_phase(values: Array, rate: float, bandwidth: float, order: int = ORDER)
 
 
 def central_difference(values: Array, rate: float) -> Array:
-    """Rate of change by central differences over five samples, of fourth order.
+    """Return time derivatives by five-point central differences of fourth order.
 
     Args:
-        values: (n, k) samples in equal steps; n is five or more.
-        rate: of the samples [Hz].
+        values: (n, k) samples at equal time steps, with n of five or more.
+        rate: sampling rate [Hz].
 
     Returns:
-        (n, k) rates; the two at each end are of second order.
+        (n, k) derivatives; the first two and last two rows are of second order.
     """
     slope = np.gradient(values, 1.0 / rate, axis=0, edge_order=2)
     wide = 8 * (values[3:-1] - values[1:-3]) - (values[4:] - values[:-4])
@@ -730,20 +737,21 @@ def central_difference(values: Array, rate: float) -> Array:
 
 
 def smoothed(record: Record, bandwidth: float, order: int = ORDER) -> Samples:
-    """Samples for a regressor: velocities and accelerations are differences of positions.
+    """Return samples for a regressor, with velocities and accelerations differentiated from q.
 
-    Positions and efforts go through the same filter; samples that the bandwidth does not need and
-    those at both ends, where the filter settles, are dropped.
+    Positions and efforts pass the same filter. The samples are decimated to the rate that the
+    bandwidth requires. The filter transients at both ends are dropped.
 
     Source: Gautier 1997; Khalil & Dombre 2002, chapter 12.
 
     Args:
-        record: at any steps of time.
-        bandwidth: of the filter [Hz]; five to ten times the highest frequency of the motion.
-        order: of one pass of the filter.
+        record: record with any time steps.
+        bandwidth: bandwidth of the filter [Hz], five to ten times the highest frequency of the
+            motion.
+        order: order of one pass of the filter.
 
     Raises:
-        ModelError: the bandwidth does not suit the rate, or nothing would be left.
+        ModelError: the bandwidth does not match the sampling rate, or the record is too short.
     """
     even = _without_gaps(record, bandwidth)
     rate = _rate(even)
@@ -752,15 +760,15 @@ def smoothed(record: Record, bandwidth: float, order: int = ORDER) -> Samples:
 
 
 def smoothed_with_velocity(record: Record, bandwidth: float, order: int = ORDER) -> Samples:
-    """As `smoothed`, with the measured velocities; accelerations are their differences.
+    """Return samples as `smoothed`, but with measured velocities and their differences as a.
 
     Args:
-        record: with velocities.
-        bandwidth: of the filter [Hz].
-        order: of one pass of the filter.
+        record: record with velocities.
+        bandwidth: bandwidth of the filter [Hz].
+        order: order of one pass of the filter.
 
     Raises:
-        ModelError: the record has no velocities, or as for `smoothed`.
+        ModelError: the record has no velocities. Also the errors of `smoothed`.
     """
     if record.v is None:
         raise ModelError("record: no velocities were measured; use smoothed(), or give v")
@@ -772,7 +780,10 @@ def smoothed_with_velocity(record: Record, bandwidth: float, order: int = ORDER)
 
 
 def _without_gaps(record: Record, bandwidth: float) -> Record:
-    """The record at equal steps; a straight line over a longer gap would be taken for motion."""
+    """Resample the record at equal time steps.
+
+    Raise if it has a gap in which linear interpolation would change the motion.
+    """
     steps = np.diff(record.time)
     longest = float(steps.max())
     usual = float(np.median(steps))
@@ -791,7 +802,7 @@ def _rate(record: Record) -> float:
 
 
 def _trim(even: Record, q: Array, v: Array, bandwidth: float, order: int) -> Samples:
-    """Accelerations, filtered efforts, and the rows that are worth keeping."""
+    """Compute accelerations, filter the efforts, drop the ends and decimate the rows."""
     rate = _rate(even)
     a = central_difference(v, rate)
     tau = zero_phase(even.tau, rate, bandwidth, order)

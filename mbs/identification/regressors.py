@@ -1,4 +1,4 @@
-"""The identification models: efforts, momenta and energy as matrices times parameters."""
+"""Identification models: efforts, momenta and energy as matrices times the dynamic parameters."""
 
 from __future__ import annotations
 
@@ -46,14 +46,15 @@ from mbs.recursions.velocities import Acceleration, Velocity, link_accelerations
 from mbs.spatial import zeros
 from mbs.text import did_you_mean, quoted
 
-# The parameters in which the equations of motion are linear: names, units and present values.
+# Parameters in which the equations of motion are linear: names, units and present values.
 
 
 INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
-"""Kinds of the inertial parameters of a link, about the origin of its frame and in its axes."""
+"""Kinds of the ten inertial parameters of a link, about the origin of its frame and in its axes."""
 
 COUPLED = ("Iam", "Fvm", "Fsm")
-"""Kinds of the parameters of a motor that turns with two joints: inertia and both frictions."""
+"""Kinds of the parameters of a motor that is coupled to two joints: inertia, viscous and
+Coulomb friction."""
 
 _INERTIAL_UNITS = ("kg.m2",) * 6 + ("kg.m",) * 3 + ("kg",)
 _TURNING = {
@@ -71,11 +72,11 @@ _SLIDING = {
 _LAW = "law "
 
 Joints = tuple[str | int, str | int]
-"""Two joints of the tree, by name or by the number of their link, from 1."""
+"""Two joints of the tree, by name or by link number (from 1)."""
 
 
 class ColumnChoice(TypedDict, total=False):
-    """Which parameters to take; see `columns_of`."""
+    """Options that select the columns; see `columns_of`."""
 
     rotors: bool
     friction: bool
@@ -86,16 +87,16 @@ class ColumnChoice(TypedDict, total=False):
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A parameter in which the equations of motion are linear.
+    """Parameter in which the equations of motion are linear: one column of a regressor.
 
     Attributes:
-        name: kind and number of the link, such as "XX3".
-        kind: XX XY XZ YY YZ ZZ MX MY MZ M; Ia, Fv, Fs, offset of the joint of the link; Jm, the
-            inertia of a rotor that spins with it; Iam, Fvm, Fsm of a motor of two joints; "law k"
-            of the symbol k of force elements and other components.
-        link: number of the link, from 1; 0 for a symbol of components.
-        unit: of the parameter.
-        other: number of the link of the second joint of a motor of two joints, else 0.
+        name: kind and link number, such as "XX3".
+        kind: XX XY XZ YY YZ ZZ MX MY MZ M of the link; Ia, Fv, Fs or offset of its joint; Jm, the
+            inertia of a rotor that is driven by the joint; Iam, Fvm or Fsm of a motor that is
+            coupled to two joints; "law k" for the symbol k of force elements and other components.
+        link: link number, from 1; 0 for a symbol of components.
+        unit: unit of the parameter.
+        other: link number of the second joint of a coupled motor, otherwise 0.
     """
 
     name: str
@@ -106,12 +107,12 @@ class Column:
 
     @property
     def key(self) -> tuple[str, int, int]:
-        """What it is the parameter of, whatever its name."""
+        """Identity of the parameter, independent of its name: (kind, link, other)."""
         return self.kind, self.link, self.other
 
     @property
     def symbol(self) -> str:
-        """The symbol of components that it is; empty for all others."""
+        """Name of the component symbol that is the parameter; empty for other parameters."""
         return self.kind.removeprefix(_LAW) if self.kind.startswith(_LAW) else ""
 
 
@@ -124,27 +125,28 @@ def columns_of(
     couplings: Sequence[Joints] = (),
     laws: Sequence[str] = (),
 ) -> tuple[Column, ...]:
-    """The parameters of a system, link by link, motors of two joints and laws last.
+    """Return the parameters of a system, link by link, then coupled motors and component laws.
 
-    A link has the ten inertial parameters, also where they are zero. Passive joints have Ia, and
-    free joints Ia and friction, only where the system gives them values that are not zero.
+    A link always has its ten inertial parameters, including those of value zero. Passive joints
+    have Ia, and free joints have Ia and friction, only if the system defines nonzero values for
+    them.
 
-    Source: Khalil & Creusot 1997, section 2.2; Gautier, Janot & Vandanjon 2013 for motors of two
-    joints.
+    Source: Khalil & Creusot 1997, section 2.2; Gautier, Janot & Vandanjon 2013 for coupled motors.
 
     Args:
         system: open or closed.
-        rotors: whether to take Ia of actuated joints, and Jm of rotors that spin with joints.
-        friction: whether to take Fv and Fs of every joint.
-        offsets: whether to take a constant effort of every joint of one degree of freedom.
-        couplings: for each motor of two joints the joint it belongs to and the other; it turns
-            with the sum of their velocities.
-        laws: symbols of the system in which force elements and other components are linear, such
-            as the stiffness of a spring.
+        rotors: whether to include Ia of actuated joints, and Jm of rotors that are driven by
+            joints.
+        friction: whether to include Fv and Fs of every joint.
+        offsets: whether to include a constant effort of every joint of one degree of freedom.
+        couplings: pairs of joints, one for each coupled motor: the joint of the motor and the
+            second joint. The motor velocity is the sum of the two joint velocities.
+        laws: symbols of the system in which force elements and other components are linear, such as
+            the stiffness of a spring.
 
     Raises:
-        ModelError: `system` is not a System, a law is no such symbol, or a coupling does not name
-            two joints of one degree of freedom and of one kind.
+        ModelError: `system` is not a System, a law is not such a symbol, or a coupling does not
+            name two joints of one degree of freedom that are both revolute or both prismatic.
     """
     require_system(system)
     columns: list[Column] = []
@@ -163,10 +165,11 @@ def columns_of(
 
 
 def _law_column(system: System, name: str, laws: Sequence[str]) -> Column:
-    """The column of a symbol of components, where all of `laws` are columns.
+    """Return the column of the component symbol `name`, if all of `laws` are columns.
 
     Raises:
-        ModelError: there is no such symbol, or the efforts are not linear in it alone.
+        ModelError: there is no such symbol, it also appears outside the component laws, or the
+            efforts are not linear in the symbols of `laws`.
     """
     symbols = system.symbol_table
     if name not in symbols:
@@ -197,23 +200,23 @@ def _law_column(system: System, name: str, laws: Sequence[str]) -> Column:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LawColumns:
-    """Columns of symbols in which force elements and other components are linear.
+    """Regressor columns of the symbols in which force elements and other components are linear.
 
     Attributes:
-        system: whose components they are.
-        s: its symbols.
+        system: system of the components.
+        s: symbols of positions and velocities of the system.
     """
 
     system: System
     s: ModelSymbols
 
     def effort(self, column: Column) -> SX:
-        """(nv, 1) efforts of the tree for a unit of the symbol."""
+        """Return the tree efforts (nv, 1) per unit of the symbol."""
         acting = element_efforts(PartsAt(self.system, self.s.q, self.s.v_tree), self.s.poses)
         return casadi.densify(casadi.jacobian(acting, self.system.symbol_table[column.symbol]))
 
     def energy(self, column: Column) -> SX:
-        """What the components store for a unit of it."""
+        """Return the energy that the components store per unit of the symbol."""
         stored, symbol = PartsAt(self.system, self.s.q).energy(), column.symbol
         slope = casadi.jacobian(stored, self.system.symbol_table[symbol])
         if casadi.depends_on(slope, self.system.symbol_table[symbol]):
@@ -224,7 +227,7 @@ class LawColumns:
         return SX(slope)
 
     def power(self, column: Column) -> SX:
-        """Power that they take and do not store."""
+        """Return the power that the components absorb and do not store, per unit of the symbol."""
         rate = position_rate(self.system.tree, self.s.q, self.s.v_tree)
         stored = casadi.jtimes(self.energy(column), self.s.q, rate)
         return SX(casadi.dot(self.s.v_tree, self.effort(column)) - stored)
@@ -233,15 +236,16 @@ class LawColumns:
 def chosen_columns(
     system: System, columns: Sequence[Column] | None, choice: ColumnChoice
 ) -> tuple[Column, ...]:
-    """The columns that are given, or those of `columns_of`.
+    """Return the given columns after a check, or the columns of `columns_of`.
 
     Args:
         system: open or closed.
-        columns: in the order wanted, under any names; None to choose by options.
+        columns: parameters in the requested order, with any names; None to select them by `choice`.
         choice: options of `columns_of`.
 
     Raises:
-        ModelError: both were given, or a column is no parameter of the system or given twice.
+        ModelError: both columns and options are given, or a column is not a parameter of the system
+            or occurs twice.
     """
     if columns is None:
         return columns_of(system, **choice)
@@ -260,10 +264,10 @@ def chosen_columns(
 
 
 def require_columns(system: System, columns: Sequence[Column]) -> None:
-    """Refuse names, and objects that hold columns, in place of Columns.
+    """Raise if `columns` contains anything other than Column objects.
 
     Raises:
-        ModelError: with what was given.
+        ModelError: an element is not a Column; the message quotes it.
     """
     rows = columns if isinstance(columns, list | tuple) else [columns]
     wrong = [row for row in rows if not isinstance(row, Column)]
@@ -275,7 +279,7 @@ def require_columns(system: System, columns: Sequence[Column]) -> None:
 
 
 def every_column(system: System, columns: Sequence[Column]) -> tuple[Column, ...]:
-    """All parameters of the system of the kinds of some columns, in the order of `columns_of`."""
+    """Return all system parameters of the kinds in `columns`, in the order of `columns_of`."""
     return columns_of(
         system,
         offsets=any(column.kind == "offset" for column in columns),
@@ -285,10 +289,10 @@ def every_column(system: System, columns: Sequence[Column]) -> tuple[Column, ...
 
 
 def numbers_among(system: System, every: Sequence[Column], columns: Sequence[Column]) -> list[int]:
-    """Where some columns stand among all of them.
+    """Return the indices of `columns` in `every`.
 
     Raises:
-        ModelError: a column is not among them.
+        ModelError: a column is not in `every`.
     """
     indices = {column.key: k for k, column in enumerate(every)}
     for column in columns:
@@ -301,9 +305,9 @@ def numbers_among(system: System, every: Sequence[Column], columns: Sequence[Col
 
 
 def values_of(system: System, columns: Iterable[Column]) -> SX:
-    """(n, 1) the parameters as the system has them: numbers, or expressions of its symbols.
+    """Return the parameter values (n, 1): numbers, or expressions of the symbols of the system.
 
-    Offsets and motors of two joints are zero, since a system has none.
+    Offsets and the parameters of coupled motors are zero, since a system does not contain them.
     """
     links = system.tree.links
     ten = [link.inertia.parameters for link in links]
@@ -323,15 +327,15 @@ def values_of(system: System, columns: Iterable[Column]) -> SX:
 def numbers_of(
     system: System, columns: Iterable[Column], values: Mapping[str, float] | None = None
 ) -> NDArray[np.float64]:
-    """(n,) the parameters as numbers.
+    """Return the parameter values (n,) as numbers.
 
     Args:
         system: open or closed.
         columns: the parameters.
-        values: of symbols by name, the others at their defaults.
+        values: values of symbols by name. Other symbols have their default values.
 
     Raises:
-        ModelError: a symbol has no value, or there is no symbol of that name.
+        ModelError: a symbol has no value, or the system has no symbol of that name.
     """
     K = Function("K", [system.p], [values_of(system, columns)])
     return np.asarray(K(DM(system.parameter_values(values))), dtype=float).ravel()
@@ -365,7 +369,7 @@ def _unit(link: Link, kind: str) -> str:
 
 
 def _couple(system: System, pair: Joints) -> list[Column]:
-    """The three parameters of a motor of two joints."""
+    """Return the three columns of a motor that is coupled to two joints."""
     if not isinstance(pair, (tuple, list)) or len(pair) != 2:
         raise ModelError(
             f"{system.name}: the coupling {quoted(pair)} does not name two joints; give a pair such"
@@ -383,7 +387,7 @@ def _couple(system: System, pair: Joints) -> list[Column]:
 
 
 def _joint(system: System, name: str | int) -> int:
-    """Number of the link of a joint of one degree of freedom."""
+    """Return the link number of a joint of one degree of freedom."""
     links = system.tree.links
     names = {link.name: k for k, link in enumerate(links, start=1) if link.motion.nv == 1}
     if isinstance(name, str) and name in names:
@@ -396,7 +400,7 @@ def _joint(system: System, name: str | int) -> int:
     )
 
 
-# What one parameter of a joint or of its motor adds to efforts, momenta and energy.
+# Contributions of one joint or motor parameter to efforts, momenta and energy.
 
 
 _INERTIAS = ("Ia", "Iam", "Jm")
@@ -404,14 +408,14 @@ _INERTIAS = ("Ia", "Iam", "Jm")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointColumns:
-    """Columns of joints for one state of the tree.
+    """Regressor columns of joint, rotor and motor parameters at one state of the tree.
 
     Attributes:
         tree: the links.
-        poses: each with respect to its antecedent.
+        poses: pose of each link relative to its antecedent.
         v: (nv, 1) joint velocities.
-        velocities: of the links.
-        base: velocity of the base; None at rest.
+        velocities: velocities of the links.
+        base: velocity of the base; None if the base is at rest.
     """
 
     tree: Tree
@@ -422,17 +426,17 @@ class JointColumns:
 
     @staticmethod
     def of(tree: Tree, poses: list[LinkPose], v: SX, base: Velocity | None = None) -> JointColumns:
-        """With the velocities of the links that follow."""
+        """Return the columns, with the link velocities computed from v."""
         return JointColumns(tree, poses, v, link_velocities(tree, poses, v, base), base)
 
     def effort(self, column: Column, a: SX, motions: list[Acceleration], base: Acceleration) -> SX:
-        """(nv, 1) efforts for a unit of a parameter.
+        """Return the joint efforts (nv, 1) per unit of a parameter.
 
         Args:
             column: the parameter.
             a: (nv, 1) joint accelerations.
-            motions: of the links.
-            base: its motion.
+            motions: accelerations of the links.
+            base: acceleration of the base.
         """
         if column.kind != "Jm":
             return self._own(column, self.v, a)
@@ -443,7 +447,7 @@ class JointColumns:
         return total
 
     def momentum(self, column: Column) -> SX:
-        """(nv, 1) derivative of kinetic energy in v for a unit of a parameter."""
+        """Return the derivative (nv, 1) of the kinetic energy in v per unit of a parameter."""
         if column.kind not in _INERTIAS:
             return zeros(self.tree.nv)
         if column.kind != "Jm":
@@ -457,7 +461,7 @@ class JointColumns:
         return total
 
     def rest(self, column: Column) -> SX:
-        """(nv, 1) what the efforts are beside the rate of the momentum."""
+        """Return efforts (nv, 1) minus the rate of the momentum, per unit of a parameter."""
         if column.kind != "Jm":
             return self._own(column, self.v, zeros(self.tree.nv))
         link, rotor = self._rotor(column)
@@ -467,19 +471,19 @@ class JointColumns:
         return -self._along(rates[rotor.carrier], rotor.momentum * self.v[link.v])
 
     def energy(self, column: Column) -> SX:
-        """Kinetic energy of a unit of a parameter; friction and offsets have none."""
+        """Return the kinetic energy per unit of a parameter; zero for friction and offsets."""
         if column.kind not in _INERTIAS:
             return SX(0)
         return SX(0.5 * casadi.dot(self.v, self.momentum(column)))
 
     def power(self, column: Column) -> SX:
-        """Power that a unit of a parameter takes and does not give back."""
+        """Return the power that friction or an offset absorbs per unit of the parameter."""
         if column.kind in _INERTIAS:
             return SX(0)
         return SX(casadi.dot(self.v, self.rest(column)))
 
     def _own(self, column: Column, v: SX, a: SX) -> SX:
-        """The law of the joints, with this parameter alone."""
+        """Return the joint efforts (nv, 1) of the joint law with this parameter equal to one."""
         link, total = self.tree.links[column.link - 1], zeros(self.tree.nv)
         if column.kind == "offset":
             total[link.v] = 1
@@ -503,13 +507,13 @@ class JointColumns:
         return Tree(tuple(links), self.tree.gravity)
 
     def _rotor(self, column: Column) -> tuple[Link, CarriedRotor]:
-        """The joint and its rotor with a unit of inertia."""
+        """Return the link of the joint and its rotor with unit inertia."""
         link = self.tree.links[column.link - 1]
         assert link.rotor is not None
         return link, replace(link.rotor, inertia=SX(1))
 
     def _spin(self, rotor: CarriedRotor) -> SX:
-        """Momentum that the turning of the carrier gives the rotor."""
+        """Return the generalised momentum at the joint of a rotor due to the carrier's rotation."""
         carrier = self.velocities[rotor.carrier] if rotor.carrier >= 0 else self.base
         return SX(0) if carrier is None else SX(casadi.dot(rotor.momentum, carrier.w))
 
@@ -517,7 +521,7 @@ class JointColumns:
         return path_twists(self.tree, self.poses)[carrier]
 
     def _along(self, twists: list[PathTwist], moment: SX) -> SX:
-        """(nv, 1) work of a moment in each of some velocities."""
+        """Return the work (nv, 1) of a moment on each of the path twists."""
         total = zeros(self.tree.nv)
         for twist in twists:
             total[twist.row] = work(twist, (None, moment))
@@ -529,14 +533,14 @@ def _law(link: Link, v: SX, a: SX) -> SX:
     return rotor_and_friction(Tree((alone,), zeros()), v, a)
 
 
-# The dynamic identification model: efforts as a matrix times the dynamic parameters.
+# Dynamic identification model: joint efforts as a matrix times the dynamic parameters.
 
 
 class Regressor(ModelFunction):
-    """A model whose outputs have a column for each parameter in which the equations are linear.
+    """Model whose outputs have one column for each dynamic parameter.
 
     Attributes:
-        columns: the parameters, in the order of the columns of every output.
+        columns: parameters, in the order of the columns of every output.
     """
 
     def __init__(self, model: ModelFunction, columns: tuple[Column, ...]) -> None:
@@ -552,7 +556,7 @@ class Regressor(ModelFunction):
 
     @property
     def effective(self) -> NDArray[np.bool_]:
-        """(n,) whether a column has an element that is not zero by structure."""
+        """Mask (n,) of the columns that have an element that is not structurally zero."""
         found = np.zeros(len(self.columns), dtype=bool)
         for output in self._outputs():
             pattern = casadi.sparsify(output).sparsity()
@@ -560,13 +564,16 @@ class Regressor(ModelFunction):
         return found
 
     def elements(self, name: str) -> list[tuple[str, str]]:
-        """Name and unit of every element of an input, or of every column of an output."""
+        """Return (name, unit) of the elements of an input, or of the columns of an output."""
         if name in self.name_out():
             return [(column.name, column.unit) for column in self.columns]
         return ModelFunction.elements(self, name)
 
     def like(self, function: Function) -> ModelFunction:
-        """Another Function with the inputs of this one and, where they are as many, its columns."""
+        """Return another Function as a model with the same inputs.
+
+        It is a Regressor with the same columns if its first output has the same size.
+        """
         same = function.size_out(0) == self.size_out(0)
         plain = ModelFunction(function, self.system, None, self._check_configuration)
         return Regressor(plain, self.columns) if same else ModelFunction.like(self, function)
@@ -584,27 +591,27 @@ def regressor(
     moving_base: bool = False,
     **choice: Unpack[ColumnChoice],
 ) -> Regressor:
-    """``regressor(q, v, a) -> D``: joint efforts as D K, with K the dynamic parameters.
+    """``regressor(q, v, a) -> D``: joint efforts tau = D K, linear in the dynamic parameters K.
 
-    Springs of the joints and force elements have no column; see `known_efforts`. A base that
-    floats is a free joint, with six rows of its own.
+    Joint springs and force elements have no column; see `known_efforts`. A floating base is a free
+    joint with six rows.
 
     Source: Khalil & Creusot 1997, eq. 39.
 
     Args:
         system: open or closed; q must close the loops.
-        columns: the parameters, such as `BaseParameters.columns_in_base`; left out, those of
+        columns: parameters, such as `BaseParameters.columns_in_base`. The default is the result of
             `columns_of`.
-        coordinates: of a closed system, "independent" for D(q, v_a, a_a) with D = G' D_tree, or
+        coordinates: for a closed system, "independent" for D(q, v_a, a_a) with D = G' D_tree, or
             "tree".
-        moving_base: add the inputs v_0, a_0 and R_0 of `mbs.models.inverse_dynamics`.
-        choice: rotors, friction, offsets, couplings, laws; see `columns_of`.
+        moving_base: whether to add the inputs v_0, a_0 and R_0 of `mbs.models.inverse_dynamics`.
+        choice: options rotors, friction, offsets, couplings and laws of `columns_of`.
 
     Returns:
         Function of q (nq, 1), v and a (m, 1), v_0, a_0, R_0; D (m, n) with `columns`.
 
     Raises:
-        ModelError: as `columns_of`, or a column is no parameter of the system.
+        ModelError: a column is not a parameter of the system. Also the errors of `columns_of`.
     """
     taken = chosen_columns(system, columns, choice)
 
@@ -632,14 +639,14 @@ def regressor(
 def known_efforts(
     system: System, coordinates: str = "independent", laws: Sequence[str] = ()
 ) -> Function:
-    """``known_efforts(q, v) -> tau``: what springs, stops and force elements ask of the joints.
+    """``known_efforts(q, v) -> tau``: joint efforts of springs, stops and force elements.
 
-    It is what the efforts of `mbs.models.inverse_dynamics` have beside D K.
+    They are the difference between the efforts of `mbs.models.inverse_dynamics` and D K.
 
     Args:
         system: open or closed; q must close the loops.
-        coordinates: as for `regressor`.
-        laws: symbols of components that are columns of the regressor.
+        coordinates: "independent" or "tree", as for `regressor`.
+        laws: symbols of components that are columns of the regressor. Their efforts are excluded.
 
     Returns:
         Function of q (nq, 1) and v (m, 1); tau (m, 1) [N m or N].
@@ -668,14 +675,14 @@ def regressor_function(
     columns: tuple[Column, ...],
     build: Callable[[ModelSymbols], tuple[Named, Named]],
 ) -> Regressor:
-    """The model with these columns, made the first time it is asked for.
+    """Return the model with these columns. It is built at the first call and cached.
 
     Args:
-        system: whose model it is.
-        key: name of the Function, whether the base moves, and the coordinates, of a closed
-            system "independent" or "tree".
-        columns: of its outputs.
-        build: gives the inputs that follow q and v, and the outputs.
+        system: system of the model.
+        key: name of the Function, whether the base moves, and the coordinates ("independent" or
+            "tree") of a closed system.
+        columns: columns of the outputs.
+        build: callable that returns the inputs after q and v, and the outputs.
     """
     coordinates = key[-1]
     check_coordinates(system, coordinates)
@@ -697,7 +704,10 @@ def regressor_function(
 def side_by_side(
     columns: tuple[Column, ...], blocks: list[SX], other: Callable[[Column], SX]
 ) -> SX:
-    """The columns of a matrix: of inertial parameters from the blocks of the links."""
+    """Assemble the columns of a matrix from the blocks of the links and from `other`.
+
+    The columns of inertial parameters come from the blocks, the other columns from `other`.
+    """
     picked = (
         blocks[column.link - 1][:, INERTIAL.index(column.kind)]
         if column.kind in INERTIAL
@@ -707,7 +717,7 @@ def side_by_side(
     return casadi.horzcat(*picked)
 
 
-# The energy identification model: one row, without accelerations.
+# Energy identification model: one row, without accelerations.
 
 
 def energy_regressor(
@@ -717,24 +727,24 @@ def energy_regressor(
     coordinates: str = "independent",
     **choice: Unpack[ColumnChoice],
 ) -> Regressor:
-    """``energy_regressor(q, v) -> h``: kinetic and potential energy as h K, the base at rest.
+    """``energy_regressor(q, v) -> h``: kinetic and potential energy E = h K, with the base at rest.
 
-    The work of the joint efforts over an interval is the change of h K and the integral of P K,
-    with P from `power_regressor`. Columns of friction and offsets are zero.
+    The work of the joint efforts over an interval equals the change of h K plus the integral of P
+    K, with P from `power_regressor`. The columns of friction and offsets are zero.
 
     Source: Gautier & Khalil 1988; Khalil & Creusot 1997, eq. 47-52.
 
     Args:
         system: open or closed; q must close the loops.
-        columns: as for `regressor`.
-        coordinates: of a closed system, "independent" or "tree".
-        choice: rotors, friction, offsets, couplings, laws; see `columns_of`.
+        columns: parameters, as for `regressor`.
+        coordinates: "independent" or "tree", for a closed system.
+        choice: options rotors, friction, offsets, couplings and laws of `columns_of`.
 
     Returns:
         Function of q (nq, 1) and v (m, 1); h (1, n) with `columns`.
 
     Raises:
-        ModelError: as `regressor`.
+        ModelError: the errors of `regressor`.
     """
     taken = chosen_columns(system, columns, choice)
 
@@ -755,22 +765,22 @@ def power_regressor(
     coordinates: str = "independent",
     **choice: Unpack[ColumnChoice],
 ) -> Regressor:
-    """``power_regressor(q, v) -> P``: what friction and offsets take of the power of the efforts.
+    """``power_regressor(q, v) -> P``: power P K that friction and offsets absorb.
 
-    It has the columns of `energy_regressor`; those that store energy are zero. Integrate P over
-    an interval for the columns of friction of the energy model.
+    It has the columns of `energy_regressor`; columns of parameters that store energy are zero. The
+    integral of P over an interval completes the energy model.
 
     Args:
-        system: as for `energy_regressor`, and so are the others.
-        columns: likewise.
-        coordinates: likewise.
-        choice: likewise.
+        system: open or closed; q must close the loops.
+        columns: parameters, as for `regressor`.
+        coordinates: "independent" or "tree", for a closed system.
+        choice: options rotors, friction, offsets, couplings and laws of `columns_of`.
 
     Returns:
         Function of q (nq, 1) and v (m, 1); P (1, n) with `columns`.
 
     Raises:
-        ModelError: as `regressor`.
+        ModelError: the errors of `regressor`.
     """
     taken = chosen_columns(system, columns, choice)
 
@@ -786,7 +796,7 @@ def power_regressor(
     return regressor_function(system, ("power_regressor", False, coordinates), taken, build)
 
 
-# The filtered identification model, which needs no accelerations.
+# Filtered identification model, which needs no accelerations.
 
 
 def filtered_regressor(
@@ -797,27 +807,27 @@ def filtered_regressor(
     moving_base: bool = False,
     **choice: Unpack[ColumnChoice],
 ) -> Regressor:
-    """``filtered_regressor(q, v) -> D1, D2``: joint efforts as d(D1 K)/dt + D2 K.
+    """``filtered_regressor(q, v) -> D1, D2``: joint efforts tau = d(D1 K)/dt + D2 K.
 
-    D1 K is the derivative of the kinetic energy in v, D2 K that of U - E in the positions, with
-    friction and offsets; in independent coordinates D1 = G' D1_tree and
-    D2 = G' D2_tree - dG'/dt D1_tree. One filter over both sides makes the derivative its own. Of
-    a base that moves no acceleration is needed.
+    D1 K is the derivative of the kinetic energy E in v. D2 K is the derivative of U - E in the
+    positions, plus friction and offsets. In independent coordinates, D1 = G' D1_tree and D2 = G'
+    D2_tree - dG'/dt D1_tree. A filter on both sides of the equation replaces the time derivative.
+    The acceleration of a moving base is not needed.
 
     Source: Khalil & Restrepo 1996; Khalil & Creusot 1997, eq. 41-44.
 
     Args:
         system: open or closed; q must close the loops.
-        columns: as for `regressor`.
-        coordinates: of a closed system, "independent" or "tree".
-        moving_base: add the inputs v_0 and R_0 of `mbs.models.inverse_dynamics`.
-        choice: rotors, friction, offsets, couplings, laws; see `columns_of`.
+        columns: parameters, as for `regressor`.
+        coordinates: "independent" or "tree", for a closed system.
+        moving_base: whether to add the inputs v_0 and R_0 of `mbs.models.inverse_dynamics`.
+        choice: options rotors, friction, offsets, couplings and laws of `columns_of`.
 
     Returns:
         Function of q (nq, 1), v (m, 1), v_0 and R_0; D1 and D2 (m, n) with `columns`.
 
     Raises:
-        ModelError: as `regressor`.
+        ModelError: the errors of `regressor`.
     """
     taken = chosen_columns(system, columns, choice)
 
@@ -842,7 +852,7 @@ def filtered_regressor(
 
 
 def _surroundings(system: System, moves: bool) -> tuple[Tree, Velocity | None, Named]:
-    """The tree with gravity in the axes of its base, velocity of the base, and their inputs."""
+    """Return the tree with gravity in base axes, the base velocity, and the inputs of both."""
     if not moves:
         return system.tree, None, []
     v_0, R_0 = SX.sym("v_0", 6), SX.sym("R_0", 3, 3)
@@ -851,6 +861,6 @@ def _surroundings(system: System, moves: bool) -> tuple[Tree, Velocity | None, N
 
 
 def _rate(system: System, s: ModelSymbols, G: SX) -> SX:
-    """The rate of a matrix of the positions."""
+    """Return the time derivative of a matrix that depends on the positions."""
     qdot = position_rate(system.tree, s.q, s.v_tree)
     return casadi.reshape(casadi.jtimes(casadi.vec(G), s.q, qdot), *G.shape)

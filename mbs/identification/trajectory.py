@@ -1,4 +1,4 @@
-"""An exciting motion: Fourier series of joints within limits of ranges, rates and efforts."""
+"""Exciting trajectories: Fourier series of joints within limits of positions, rates and efforts."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from mbs.numbers import has_boolean
 from mbs.result import Result
 from mbs.text import did_you_mean, quoted
 
-# Periodic motions of joints as finite Fourier series.
+# Periodic joint motions as finite Fourier series.
 
 
 Array = npt.NDArray[np.float64]
@@ -40,18 +40,18 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FourierSeries:
-    """q(t) = q0 + sum of a_k/(w k) sin(w k t) - b_k/(w k) cos(w k t), with w = 2 pi/period.
+    """Periodic motion: q(t) = q0 + sum of a_k/(w k) sin(w k t) - b_k/(w k) cos(w k t).
 
-    Velocities and accelerations follow without differences, and every period repeats the same
-    motion, so that measured periods can be averaged.
+    The angular frequency is w = 2 pi/period. Velocities and accelerations are exact derivatives.
+    The motion is periodic, so that measured periods can be averaged.
 
     Source: Swevers, Ganseman, Tukel, Schutter & Brussel 1997, eq. 5.
 
     Attributes:
-        period: [s].
-        middle: (m,) q0 of each joint [rad or m].
-        sine: (m, harmonics) a_k [rad/s or m/s].
-        cosine: (m, harmonics) b_k [rad/s or m/s].
+        period: period [s].
+        middle: (m,) constant terms q0 of the joints [rad or m].
+        sine: (m, harmonics) coefficients a_k [rad/s or m/s].
+        cosine: (m, harmonics) coefficients b_k [rad/s or m/s].
     """
 
     period: float
@@ -61,27 +61,28 @@ class FourierSeries:
 
     @property
     def harmonics(self) -> int:
-        """How many multiples of 1/period the motion has."""
+        """Number of multiples of 1/period in the motion."""
         return int(self.sine.shape[1])
 
     def q(self, t: npt.ArrayLike) -> Array:
-        """(n, m) positions [rad or m] at the instants t (n,) [s], or (m,) at one instant."""
+        """Return positions (n, m) [rad or m] at the instants t (n,) [s], or (m,) for a scalar t."""
         return self.middle + self._sum(t, 0)
 
     def v(self, t: npt.ArrayLike) -> Array:
-        """(n, m) or (m,) velocities [rad/s or m/s]; see `q`."""
+        """Return the velocities (n, m) or (m,) [rad/s or m/s]; see `q`."""
         return self._sum(t, 1)
 
     def a(self, t: npt.ArrayLike) -> Array:
-        """(n, m) or (m,) accelerations [rad/s2 or m/s2]; see `q`."""
+        """Return the accelerations (n, m) or (m,) [rad/s2 or m/s2]; see `q`."""
         return self._sum(t, 2)
 
     def law(self, t: SX | MX, order: int = 0) -> SX | MX:
-        """(m, 1) positions as an expression, for controllers and motions that are prescribed.
+        """Return the positions (m, 1) as an expression, for controllers and prescribed motions.
 
         Args:
             t: symbol of the time [s].
-            order: 0 for positions, 1 for velocities, 2 for accelerations.
+            order: order of the time derivative: 0 for positions, 1 for velocities, 2 for
+                accelerations.
         """
         w = 2 * np.pi / self.period * np.arange(1, self.harmonics + 1)
         turned = w ** (order - 1)
@@ -100,12 +101,12 @@ class FourierSeries:
 
 
 def harmonic_terms(t: Array, period: float, harmonics: int, order: int) -> Array:
-    """(n, 2 harmonics) what multiplies a_1 .. and b_1 .. in a derivative of the series.
+    """Return the factors (n, 2 harmonics) of a_1 .. and b_1 .. in a derivative of the series.
 
     Args:
         t: (n,) instants [s].
-        period: [s].
-        harmonics: how many.
+        period: period [s].
+        harmonics: number of harmonics.
         order: 0 for q - q0, 1 for the velocity, 2 for the acceleration.
     """
     w = 2 * np.pi / period * np.arange(1, harmonics + 1)
@@ -115,26 +116,27 @@ def harmonic_terms(t: Array, period: float, harmonics: int, order: int) -> Array
 
 
 def resting_coefficients(period: float, harmonics: int) -> Array:
-    """(2 harmonics, 2 harmonics - 2) orthonormal coefficients of motions that start at rest.
+    """Return an orthonormal basis (2 harmonics, 2 harmonics - 2) of motions that start at rest.
 
-    Velocity and acceleration are zero at the start and so at the end of every period.
+    The columns are coefficients a_k, b_k. Velocity and acceleration are zero at the start and at
+    the end of every period.
 
     Args:
-        period: [s].
-        harmonics: two or more.
+        period: period [s].
+        harmonics: number of harmonics, two or more.
     """
     w = np.asarray(2 * np.pi / period * np.arange(1, harmonics + 1), dtype=float)
-    # v(0) is the sum of a_k, a(0) that of w_k b_k: each half has one condition of its own
+    # v(0) is the sum of a_k and a(0) the sum of w_k b_k: one condition for each half
     halves = [_across(condition) for condition in (w**0, w)]
     none = np.zeros((harmonics, harmonics - 1))
     return np.block([[halves[0], none], [none, halves[1]]])
 
 
 def _across(direction: Array) -> Array:
-    """(n, n - 1) orthonormal columns across a direction (n,): a reflection of the axes.
+    """Return an orthonormal basis (n, n - 1) of the complement of a direction (n,).
 
-    It is written out, since the basis that a singular value decomposition gives differs from
-    processor to processor, and with it every motion that is drawn at random in it.
+    A Householder reflection is used because the basis from a singular value decomposition depends
+    on the processor, and so would random motions in it.
     """
     unit = direction / np.sqrt(np.sum(direction * direction))
     v = unit.copy()
@@ -145,39 +147,45 @@ def _across(direction: Array) -> Array:
 
 
 def between_samples(samples: int, harmonics: int) -> float:
-    """Part of a bound that samples must keep so that the series keeps it at every instant.
+    """Return the fraction of a limit that samples must keep so that it holds at every instant.
 
-    A trigonometric polynomial of degree n is nowhere larger than 1/cos(pi n/N) times its largest
-    value at N > 2 n equal steps of its period.
+    A trigonometric polynomial of degree n is at most 1/cos(pi n/N) times its largest value at N > 2
+    n equally spaced instants of its period.
 
     Source: Ehlich & Zeller 1964.
+
+    Args:
+        samples: number N of samples in one period.
+        harmonics: degree n.
     """
     return float(np.cos(np.pi * harmonics / samples))
 
 
-# What an exciting motion must keep: ranges of joints, their rates and efforts, and planes.
+# Limits of an exciting motion: ranges of joints, rates, efforts, and planes.
 
 
 _SHARE = 0.2
-"""Part of `leads` of the assembled configuration that motions keep at least."""
+"""Fraction of the distance from singularity (`leads`) of the assembled configuration that
+motions must keep."""
 
 Range = float | tuple[float, float] | None
-"""A number +-, (lower, upper), or None for no limit."""
+"""Symmetric limit +-x as a number, a range (lower, upper), or None for no limit."""
 
 Bound = float | Sequence[Range] | Mapping[str, Range] | None
-"""One number +- for all joints; or a range for each in turn; or ranges by name of the joint."""
+"""Limits of the joints: one number +- for all joints, a sequence of ranges, or ranges by joint
+name."""
 
 RATE_UNITS = {"rad": "rad/s", "m": "m/s"}
 
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """A point of the robot that must stay on one side of a plane: normal . x >= offset.
+    """Half-space constraint of a point of the robot: normal . x >= offset.
 
     Attributes:
-        frame: a body, a named frame, or the number of a link, which carries the point.
-        point: the point in this frame [m].
-        normal: of the plane in the base frame, towards the side that is allowed; of any length.
+        frame: frame of the point: a body, a named frame, or a link number.
+        point: coordinates of the point in this frame [m].
+        normal: normal of the plane in the base frame, of any length, towards the allowed side.
         offset: distance of the plane from the origin of the base along the normal [m].
     """
 
@@ -202,21 +210,22 @@ class Plane:
 
     @property
     def unit_normal(self) -> Array:
-        """(3,) the normal with length one."""
+        """Unit normal (3,)."""
         normal = np.array(self.normal, dtype=float)
         return np.asarray(normal / np.linalg.norm(normal), dtype=float)
 
 
 @dataclass(frozen=True, slots=True)
 class MotionLimit:
-    """The range of one quantity during the motion.
+    """Range of one quantity during the motion.
 
     Attributes:
-        quantity: position, velocity, acceleration, effort, plane or leading.
-        name: of the coordinate, or of the point's frame.
-        unit: of the quantity.
-        lower: -inf where there is none.
-        upper: inf where there is none.
+        quantity: position, velocity, acceleration, effort, plane or leading (distance from
+            singular configurations of a closed system).
+        name: name of the coordinate, or of the frame of the point.
+        unit: unit of the quantity.
+        lower: lower limit; -inf if there is no limit.
+        upper: upper limit; inf if there is no limit.
     """
 
     quantity: str
@@ -227,13 +236,13 @@ class MotionLimit:
 
     @property
     def is_finite(self) -> bool:
-        """Whether anything is limited."""
+        """Whether at least one end of the range is finite."""
         return bool(np.isfinite(self.lower) or np.isfinite(self.upper))
 
 
 @dataclass(frozen=True, slots=True)
 class Margin:
-    """How near a motion comes to a limit.
+    """Extreme values of a quantity during a motion, compared with its limit.
 
     Attributes:
         limit: the limit.
@@ -252,23 +261,24 @@ class Margin:
 
     @property
     def part(self) -> float:
-        """`worst` as part of the larger end of the range; of one open on a side, in its unit."""
+        """`worst` relative to the larger end of the range; absolute if one side is open."""
         ends = abs(self.limit.lower), abs(self.limit.upper)
         return self.worst / (max(ends) if np.isfinite(ends).all() else 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class MotionLimits:
-    """The limits of a motion.
+    """Limits of a motion.
 
     Attributes:
-        position: of the m independent joints, always finite.
-        velocity: of the same.
-        acceleration: of the same.
-        effort: of the same.
-        passive: positions of the other joints of a closed system, by number of the coordinate.
-        planes: of points.
-        leading: how well the independent joints of a closed system lead the others.
+        position: position limits of the m independent joints, always finite.
+        velocity: velocity limits of the independent joints.
+        acceleration: acceleration limits of the independent joints.
+        effort: effort limits of the independent joints.
+        passive: pairs of coordinate index and position limit, for passive joints of a closed
+            system.
+        planes: half-space constraints of points.
+        leading: lower limit of the distance of a closed system from singular configurations.
     """
 
     position: tuple[MotionLimit, ...]
@@ -281,12 +291,12 @@ class MotionLimits:
 
     @property
     def of_rates(self) -> tuple[MotionLimit, ...]:
-        """Of positions, velocities and accelerations, each in the order of the joints."""
+        """Limits of positions, velocities and accelerations, each in the order of the joints."""
         return (*self.position, *self.velocity, *self.acceleration)
 
     @property
     def of_models(self) -> tuple[MotionLimit, ...]:
-        """Of efforts, passive positions, planes and leading, in this order."""
+        """Limits of efforts, passive positions, planes and leading, in this order."""
         planes = (
             MotionLimit("plane", str(plane.frame), "m", plane.offset, np.inf)
             for plane in self.planes
@@ -303,11 +313,11 @@ def limits_of(
     effort: Bound = None,
     planes: Sequence[Plane] = (),
 ) -> MotionLimits:
-    """The limits of a motion of a system, those that its joints describe by default.
+    """Return the limits of a motion; by default the limits of the joints.
 
     Raises:
-        ModelError: a limit has not as many values as there are independent joints, it is empty or
-            of no joint, or an independent joint has no range of positions.
+        ModelError: the number of limits differs from the number of independent joints, a range is
+            empty, a name is not a joint, or an independent joint has no position range.
     """
     indices = active_indices(system)
     joints = [system.coordinates[k] for k in indices]
@@ -352,12 +362,15 @@ def limits_of(
 
 
 def _known(described: tuple[float, float] | None) -> Range:
-    """A range of a description; None where it has no end."""
+    """Return the range of a joint, or None if both ends are infinite."""
     return None if described is None or np.isinf(described).all() else described
 
 
 def _leading(system: System) -> tuple[MotionLimit, ...]:
-    """The distance from singular configurations; a robot assembled near one may come as near."""
+    """Return the limit of the distance from singular configurations.
+
+    It is reduced if the assembled configuration itself is close to a singular one.
+    """
     if not system.is_closed:
         return ()
     least = min(CLEAR, _SHARE * float(leads_of(system, np.array([system.configuration]))[0]))
@@ -367,7 +380,7 @@ def _leading(system: System) -> tuple[MotionLimit, ...]:
 def _positions(
     system: System, bound: Bound, indices: Sequence[int]
 ) -> tuple[Bound, tuple[tuple[int, MotionLimit], ...]]:
-    """Ranges of the independent joints, and limits of the others with their places in q."""
+    """Return the ranges of independent joints, and the limits of passive joints by index in q."""
     ranges: dict[str, Range] = {c.name: c.limits for c in system.coordinates}
     known = [c.name for c in system.coordinates if c.unit in RATE_UNITS]
     if isinstance(bound, Mapping):
@@ -402,7 +415,7 @@ def _join(
 def _pairs(
     system: System, quantity: str, bound: Bound, described: Mapping[str, Range]
 ) -> list[tuple[float, float]]:
-    """(lower, upper) of each joint, as its description has it where it is not given."""
+    """Return (lower, upper) of each joint; `described` contains the default ranges."""
     names = list(described)
     if bound is None or isinstance(bound, Mapping):
         given = bound or {}
@@ -443,18 +456,18 @@ def _pair(system: System, quantity: str, value: Range, name: str) -> tuple[float
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
-    """A motion of the independent joints that repeats itself and starts at rest.
+    """Periodic motion of the independent joints that starts at rest.
 
     Attributes:
-        system: that moves.
-        columns: parameters that it shows.
-        series: of the independent joints.
+        system: system that moves.
+        columns: parameters for which the motion was optimised.
+        series: Fourier series of the independent joints.
         condition: condition number of the regressor over one period, in SI units.
-        scaled_condition: the same with columns of length one.
-        margins: to every limit; of quantities without one, the range that they have.
-        objective: what was minimised.
-        status: how the search ended.
-        steps: of the last search.
+        scaled_condition: condition number with columns of unit length.
+        margins: margins to all limits, including quantities without a limit.
+        objective: criterion that was minimised.
+        status: return status of the solver.
+        steps: number of iterations of the last optimisation.
     """
 
     system: System
@@ -474,37 +487,37 @@ class Trajectory:
         )
 
     def q(self, t: npt.ArrayLike) -> Array:
-        """(n, m) positions of the independent joints [rad or m] at t (n,) [s], or (m,)."""
+        """Return positions (n, m) of the independent joints [rad or m] at t (n,) [s], or (m,)."""
         return self.series.q(t)
 
     def v(self, t: npt.ArrayLike) -> Array:
-        """(n, m) or (m,) velocities of the independent joints [rad/s or m/s]."""
+        """Return the velocities (n, m) or (m,) of the independent joints [rad/s or m/s]."""
         return self.series.v(t)
 
     def a(self, t: npt.ArrayLike) -> Array:
-        """(n, m) or (m,) accelerations of the independent joints [rad/s2 or m/s2]."""
+        """Return the accelerations (n, m) or (m,) of the independent joints [rad/s2 or m/s2]."""
         return self.series.a(t)
 
     def law(self, t: SX | MX, order: int = 0) -> SX | MX:
-        """(m, 1) positions of the independent joints as an expression; see `FourierSeries.law`."""
+        """Return positions (m, 1) of independent joints as expression; see `FourierSeries.law`."""
         return self.series.law(t, order)
 
     def configuration(self, t: npt.ArrayLike) -> Array:
-        """(n, nq) positions of all joints of the tree, which close the loops, or (nq,)."""
+        """Return the positions (n, nq) or (nq,) of all joints of the tree, with closed loops."""
         instants = np.asarray(t, dtype=float)
         q = positions(self.system, self.series.q(instants.ravel()))
         return np.asarray(q.reshape(*instants.shape, self.system.nq), dtype=float)
 
     def table(self, rate: float, periods: int = 1) -> Result:
-        """Positions, velocities and accelerations for a controller.
+        """Return a table of positions, velocities and accelerations for a controller.
 
         Args:
-            rate: rows in a second [1/s].
-            periods: how often the motion is repeated.
+            rate: number of rows per second [1/s].
+            periods: number of repetitions of the motion.
 
         Returns:
-            columns such as "j1.q", "j1.v" and "j1.a" of the independent joints; the last row is at
-            the end of the last period.
+            Result with columns such as "j1.q", "j1.v" and "j1.a" of the independent joints. The
+            last row is the end of the last period.
 
         Raises:
             ModelError: the rate or the number of periods is not positive.
@@ -527,10 +540,11 @@ class Trajectory:
         return Result(time, values, units, f"excitation of {self.system.name}")
 
     def worst(self, quantity: str) -> Margin:
-        """The margin of a kind of limit that is smallest as part of its limit.
+        """Return the smallest relative margin of a kind of limit.
 
         Args:
-            quantity: position, velocity, acceleration, effort, plane or leading.
+            quantity: position, velocity, acceleration, effort, plane or leading, as in
+                `MotionLimit`.
 
         Raises:
             ModelError: no such quantity is limited.
@@ -541,7 +555,7 @@ class Trajectory:
         return min(found, key=lambda margin: margin.part)
 
     def text(self) -> str:
-        """Conditions, how the search ended, and the range of every limited quantity."""
+        """Return condition numbers, solver status and the ranges of limited quantities as text."""
         lines = [
             f"{self.system.name}: {self.series.period:g} s, {self.series.harmonics} harmonics,"
             f" {len(self.columns)} columns",
@@ -563,26 +577,26 @@ def _line(margin: Margin) -> str:
     )
 
 
-# Observations and limited quantities of a system at one instant of a motion of its joints.
+# Observations and limited quantities of a system at one instant of a motion.
 
 
 def instant(system: System, columns: Sequence[Column], limits: MotionLimits) -> Function:
-    """``instant(q_a, v_a, a_a) -> D, bounded``: what one instant adds to the observations.
+    """``instant(q_a, v_a, a_a) -> D, bounded``: regressor and limited quantities at one instant.
 
-    Positions of the other joints of a closed system follow by its closed form, or by continuation
-    from the assembled configuration where it has none.
+    Positions of the passive joints of a closed system are computed in closed form if one exists,
+    otherwise by continuation from the assembled configuration.
 
     Args:
-        system: open or closed, at the defaults of its parameters.
-        columns: parameters of the system, under any names.
-        limits: of which `of_models` are computed.
+        system: open or closed, at the default values of its parameters.
+        columns: parameters of the system, with any names.
+        limits: limits of the motion; the quantities of `of_models` are computed.
 
     Returns:
-        Function of (m, 1) positions, velocities and accelerations of the independent joints;
-        D (k, m) the columns as rows, bounded (r, 1).
+        Function of positions, velocities and accelerations (m, 1) of the independent joints. D (k,
+        m) is the transposed regressor; bounded is (r, 1).
 
     Raises:
-        ModelError: a column is no parameter of the system, or a plane names no frame.
+        ModelError: a column is not a parameter of the system, or the frame of a plane is unknown.
     """
     m = len(system.active)
     q_a, v_a, a_a = (MX.sym(name, m) for name in ("q_a", "v_a", "a_a"))

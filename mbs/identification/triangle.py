@@ -1,4 +1,4 @@
-"""Equations without their redundant rows: what a sum of squares depends on."""
+"""Compression of least-squares equations by QR."""
 
 from __future__ import annotations
 
@@ -9,31 +9,31 @@ Array = npt.NDArray[np.float64]
 
 
 def triangle(A: Array) -> Array:
-    """(at most k, k) upper triangle R with R' R = A' A, by Householder reflections.
+    """Return R (at most k, k), upper triangular with R' R = A' A, by Householder reflections.
 
     Args:
-        A: (n, k).
+        A: (n, k) matrix.
     """
     return np.asarray(np.linalg.qr(A, mode="r"), dtype=float)
 
 
 def compressed(A: Array, b: Array) -> tuple[Array, Array]:
-    """R and r in at most k + 1 rows with |R x - r| = |A x - b| for every x.
+    """Return R and r with at most k + 1 rows and |R x - r| = |A x - b| for every x.
 
     Args:
-        A: (n, k).
-        b: (n,).
+        A: (n, k) matrix.
+        b: (n,) right-hand side.
     """
     T = triangle(np.column_stack([A, b]))
     return T[:, :-1], T[:, -1]
 
 
 def triangle_solved(A: Array, b: Array) -> Array:
-    """(k,) least squares by QR.
+    """Solve a least-squares problem (k,) by QR.
 
     Args:
-        A: (n, k) of full rank, its columns alike in length.
-        b: (n,).
+        A: (n, k) matrix of full rank, with columns of similar length.
+        b: (n,) right-hand side.
     """
     k = A.shape[1]
     T = triangle(np.column_stack([A, b]))

@@ -10,7 +10,7 @@ from mbs.loops.reduction import reduction_matrix
 from mbs.loops.velocity import closure_jacobian
 
 assembly_modes = modes
-"""The name of `modes` in the literature on parallel robots."""
+"""Alias of `modes`, the term in the literature on parallel robots."""
 
 __all__ = [
     "ConfigurationState",

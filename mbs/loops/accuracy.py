@@ -21,21 +21,21 @@ Array = NDArray[np.float64]
 Evaluate = Callable[[Mapping[str, DM]], Sequence[DM]]
 
 _ROUNDED = 2.5e-3
-"""Squared sine between rows of the passive joints, below which rounding of the closed configuration
-is tested. At a sine of 0.05 it changes second derivatives by 1e-11 of squared speeds."""
+"""Squared sine between rows of the passive joints below which the effect of rounding is tested: at
+a sine of 0.05, rounding changes second derivatives by 1e-11 of squared speeds."""
 _MOVE = 1e-12
-"""Move of a position for a test [rad, or m in sizes of the mechanism]: exact derivatives change by
-about this part."""
+"""Random move of a position for a test [rad, or sizes of the mechanism]: exact derivatives change
+by about this fraction."""
 _NO_SYMBOLS = DM(0, 1)
 _PLANE = 2
-"""Dimensions of an array with columns."""
+"""Number of dimensions of an array with columns."""
 _TRIALS, _SEED = 3, 20261128
 _NEWTON = 3
 """Newton steps onto the loops after a move: they converge quadratically."""
 _ROUNDING = 1e-5
-"""Largest effect of rounding on second derivatives, part of the largest element of a row."""
+"""Largest effect of rounding on second derivatives, as a fraction of the largest row element."""
 _ROUNDING_OF_SPEEDS = 1e-10
-"""The same as a part of squared speeds, for derivatives that are zero."""
+"""Largest effect of rounding as a fraction of squared speeds, for derivatives that are zero."""
 
 
 def require_accurate(
@@ -45,17 +45,18 @@ def require_accurate(
     inputs: Mapping[str, Any],
     outputs: Sequence[DM],
 ) -> None:
-    """Raise an error if second derivatives depend on the last digits of the positions.
+    """Raise if second derivatives depend on the last digits of the positions.
 
     Their rounding grows with the third power of the inverse sine between the rows of the passive
     joints and with squared speeds, so that no sine alone limits it. The derivatives are evaluated
     again at configurations that are as closed and differ by rounding.
 
     Args:
-        system: with closed loops.
-        names: names of the outputs; "A" and derivatives by positions, "_dq", are tested.
+        system: mechanism with closed loops.
+        names: names of the outputs. The outputs "A" and derivatives by positions ("_dq") are
+            tested.
         evaluate: returns the outputs at other inputs.
-        inputs: numeric values of the inputs, q and p as DM; one or several columns.
+        inputs: numeric values of the inputs; q and p as DM with one or several columns.
         outputs: values at these inputs.
 
     Raises:
@@ -98,7 +99,7 @@ def _refuse(system: System, leads: float) -> None:
 
 
 def _column(value: DM, k: int, count: int) -> Array:
-    """The part of an output that belongs to column k of the inputs."""
+    """Return the part of an output that belongs to column k of the inputs."""
     full = np.asarray(value.full(), dtype=float)
     width = full.shape[1] // count
     return full[:, k * width : (k + 1) * width]
@@ -111,14 +112,14 @@ def _floors(
     outputs: Sequence[DM],
     tested: Sequence[int],
 ) -> dict[int, list[Array]]:
-    """Effects of rounding that are allowed in each row of an output, for each column of inputs."""
+    """Return the allowed effects of rounding in each row of an output, for each input column."""
     units = scales(system).columns([system.speeds[k].unit for k in system.active])
     count = v.shape[1]
     squares = np.max((v / units[:, None]) ** 2, axis=0, initial=0.0)
     masses = [k for k, name in enumerate(names) if name.startswith("dtau") and "_da" in name]
 
     def rows(number: int, k: int) -> Array:
-        """Accelerations of size one, or efforts that belong to them."""
+        """Return accelerations of size one, or the efforts that belong to them."""
         found = np.zeros(outputs[number].shape[0])
         if names[number].startswith("dtau"):
             sizes = (float(np.max(np.abs(_column(outputs[i], k, count)))) for i in masses)
@@ -134,7 +135,7 @@ def _floors(
 
 
 def _point(system: System, inputs: Mapping[str, Any]) -> list[Array]:
-    """(nq, n), (m, n) and (np, n) values of q, v and p, as many columns of all."""
+    """Return values (nq, n), (m, n) and (np, n) of q, v and p, with the same number of columns."""
     sizes = {"q": system.nq, "v_a": len(system.active), "p": len(system.parameters)}
     found = [_columns(inputs.get(name, _NO_SYMBOLS), size) for name, size in sizes.items()]
     count = max(values.shape[1] for values in found)
@@ -145,7 +146,7 @@ def _point(system: System, inputs: Mapping[str, Any]) -> list[Array]:
 
 
 def _columns(value: Any, size: int) -> Array:
-    """(size, n) values of an input; one number stands for all elements."""
+    """Return the values (size, n) of an input; a scalar is repeated."""
     full = np.asarray(value.full() if isinstance(value, DM) else value, dtype=float)
     if full.ndim < _PLANE:
         return full.reshape(-1, 1)
@@ -153,7 +154,7 @@ def _columns(value: Any, size: int) -> Array:
 
 
 def _delicate(system: System, q: SX) -> SX:
-    """1 at configurations at which rounding is tested, else 0."""
+    """Return 1 at configurations at which rounding is tested, else 0."""
     return SX(configuration_health(system)(q, system.p)[1] < _ROUNDED)
 
 
@@ -163,4 +164,4 @@ DIFFERENTIABLE = ConfigurationCheck(
     require_accurate,
     _delicate,
 )
-"""Closed loops whose second derivatives are accurate."""
+"""Check that the loops are closed and that their second derivatives are accurate."""

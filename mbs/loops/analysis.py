@@ -1,7 +1,7 @@
-"""What the loops of a system leave free: mobility, independent rows, independent joints.
+"""Analysis of the loops of a system: mobility, independent rows, independent joints.
 
-Ranks are taken at several assembled configurations, never at one, since a loop may pass through a
-configuration where rows that are independent elsewhere coincide.
+Ranks are determined at several assembled configurations, because rows that are independent in
+general can be dependent at a single configuration.
 """
 
 from __future__ import annotations
@@ -38,43 +38,46 @@ from mbs.solvers.rank import dense, independent_rows, null_space_of, rank
 Matrix = NDArray[np.float64]
 
 _CONFIGURATIONS, _TRIES, _SEED = 5, 25, 20260102
-"""Closed configurations beside the assembled one that are compared, from so many random starts."""
+"""Number of closed configurations that are compared with the assembled one, number of random starts
+that search them, and seed of the random numbers."""
 _REACH = 0.5
-"""Of a random start from the assembled configuration [rad or m]."""
+"""Largest difference of a random start from the assembled configuration [rad or m]."""
 _GAP = 1e-5
-"""Singular values below this part of the largest count as zero: Gauss-Newton ends about the square
-root of its tolerance, 1e-6, away from a singular configuration, where they are not smaller. At
-regular configurations of the catalogue those that count are above 1e-2 and the others below 1e-13,
-in lengths of the size of the mechanism. A loop that holds a motion by less than 1e-5 of it counts
-as free."""
+"""Relative singular value below which a value counts as zero: Gauss-Newton ends at a distance of
+about the square root of its tolerance, 1e-6, from a singular configuration, and the small singular
+values have this size. At regular configurations of the catalogue nonzero values are above 1e-2 and
+zero values below 1e-13, in lengths of the size of the mechanism. A motion that loops hold by less
+than 1e-5 counts as free."""
 _FEWEST, _RIGID = 3, 1e-3
-"""Closed configurations from random starts that show whether there is a motion, and their distance
-[rad or m] without one: iterations end 1e-6 away from a singular configuration that is the only one,
-and motions lead 0.1 away."""
+"""Number of closed configurations from random starts that shows whether a motion exists, and their
+largest distance [rad or m] without motion: iterations end 1e-6 away from a singular configuration
+that is the only solution, and motions have distances of 0.1."""
 _BRANCH = 0.1
 """Distance of independent positions from a singular configuration [rad, or sizes of the mechanism]:
 models are accurate there, and branches differ by about as much."""
 _CLEAR = 1e-4
-"""Difference of distances that decides on which side of a singular configuration: it is accurate to
-1e-6."""
+"""Difference of distances that decides on which side of a singular configuration the result is:
+distances are accurate to 1e-6."""
 _MODES = 64
-"""Configurations of a search for branches; four-bars have two."""
+"""Largest number of configurations of a search for branches: four-bars have two."""
 _SAME_SHARE = 1e-6
-"""Difference of the shares that kept rows have in a dropped one, above which they change with the
-configuration: closing leaves 1e-12 in rows, and singular values of `_GAP` make 1e-7 of it."""
+"""Change of the coefficients of a dropped row, as a combination of the kept rows, above which they
+depend on the configuration: closing leaves 1e-12 in rows, which singular values of `_GAP` amplify
+to 1e-7."""
 
 
 def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] = ()) -> System:
-    """The system with its loops closed at a configuration, and what they constrain.
+    """Return the system with closed loops, and the constraints of the loops in `closure`.
 
     Args:
-        system: with open loops.
-        guess: approximate positions by coordinate name; where the configuration next to them is
-            singular, a regular one nearby is taken.
-        chosen: numbers of velocities that the user wants independent, beside those of motors.
+        system: system with open loops.
+        guess: approximate positions by coordinate name. If the nearest configuration is singular,
+            a regular configuration nearby is used.
+        chosen: indices of velocities that the user requires as independent, in addition to motors.
 
     Raises:
         Unclosable: no configuration closes the loops.
+        LoopError: the loops close in one singular configuration only, without motion.
     """
     p = closure_parameters(system)
     assembled = assembled_configuration(system, guess, p)
@@ -160,7 +163,7 @@ def _require_mobile(system: System, configurations: Sequence[Matrix]) -> None:
 
 
 def _target_near(system: System, guess: Mapping[str, float], q: Matrix, p: Matrix) -> GuessTarget:
-    """The target of a guess and, for other positions, of a configuration q (nq,)."""
+    """Return the target with positions of the guess, and of q (nq,) for all other joints."""
     names = [coordinate.name for coordinate in system.coordinates]
     start = np.array([guess.get(name, x) for name, x in zip(names, q, strict=True)])
     return GuessTarget.of(system, p, start, guess, _cut_values(system, q, p))
@@ -172,16 +175,16 @@ def _branches(
     active: Sequence[int],
     is_regular: Callable[[Matrix], bool],
 ) -> list[Matrix]:
-    """Regular configurations on the branches that meet at q, the nearest to a target first.
+    """Return regular configurations on the branches that meet at q, nearest to a target first.
 
     All of them have the same independent positions. The list is empty if none is found, or if
     independent velocities have no positions of their own.
 
     Args:
-        target: the guess, and q for other positions.
+        target: guessed positions, and those of q for joints without a guess.
         q: (nq,) singular configuration.
-        active: numbers of the independent velocities.
-        is_regular: whether a configuration has the general rank.
+        active: indices of the independent velocities.
+        is_regular: callable that returns whether the rank at a configuration is the general rank.
     """
     system = target.system
     names = {coordinate.name: k for k, coordinate in enumerate(system.coordinates)}
@@ -202,7 +205,7 @@ def _branches(
 
 
 def _is_clearly_nearer(closing: Closing, target: GuessTarget, q: Matrix, other: Matrix) -> bool:
-    """Whether q is nearer to a target than another configuration by more than rounding."""
+    """Whether q is nearer to a target than `other`, by more than rounding."""
     pairs = [(target.miss(closing, x), target.distances(closing, x)[1]) for x in (q, other)]
     for distance, least in zip(*pairs, strict=True):
         if abs(distance - least) > _CLEAR:
@@ -215,14 +218,14 @@ def _names(system: System) -> list[str]:
 
 
 def _cut_values(system: System, q: Matrix, p: Matrix) -> Matrix:
-    """Positions of the joints that are cut."""
+    """Return the positions of the cut joints at q."""
     return np.array(cut_positions(system)(q, p)).ravel()
 
 
 def _at_cut(
     system: System, guess: Mapping[str, float], q: Matrix, p: Matrix
 ) -> tuple[tuple[str, float], ...]:
-    """Positions of the guessed joints that are cut, by name."""
+    """Return the names and positions of the cut joints that have a guess."""
     names = [row.name for row in system.cut_coordinates]
     if not any(name in guess for name in names):
         return ()
@@ -231,7 +234,7 @@ def _at_cut(
 
 
 def _measures(system: System, p: Matrix) -> tuple[Matrix, Matrix]:
-    """What rows are divided by, (m, 1), and columns multiplied by, (nv,), to be free of units."""
+    """Return divisors of rows (m, 1) and factors of columns (nv,) that make J dimensionless."""
     at = Function("sizes", [system.p], [mechanism_size(system), constraint_sizes(system)])
     size, rows = at(p)
     slides = [speed.unit.startswith("m") for speed in system.speeds]
@@ -239,33 +242,33 @@ def _measures(system: System, p: Matrix) -> tuple[Matrix, Matrix]:
 
 
 def _ranks(jacobians: Sequence[Matrix]) -> list[int]:
-    """Rank of each, small values measured by the largest of all: a whole Jacobian may vanish."""
+    """Return the rank of each Jacobian, relative to the largest singular value of all of them."""
     values = [np.linalg.svd(_without_zeros(matrix), compute_uv=False) for matrix in jacobians]
     largest = max(float(np.max(row, initial=0.0)) for row in values)
     return [int(np.sum(row > _GAP * largest)) for row in values]
 
 
 def _without_zeros(matrix: Matrix) -> Matrix:
-    """The rows that hold something: of planar loops half of them, of which no rank depends."""
+    """Return the nonzero rows. About half the rows of planar loops are zero."""
     return matrix[matrix.any(axis=1)]
 
 
 @dataclass(frozen=True, slots=True)
 class _Kept:
-    """Numbers of independent rows: of positions, and of velocities alone, each from zero."""
+    """Indices of independent position rows, and of independent velocity rows, each from zero."""
 
     positions: tuple[int, ...]
     slips: tuple[int, ...]
 
 
 def _kept_rows(jacobians: Sequence[Matrix], positions: int, held: int, slips: int) -> _Kept:
-    """The independent rows at regular configurations, rows of positions before those of velocities.
+    """Return the independent rows at regular configurations, position rows before velocity rows.
 
     Args:
-        jacobians: (m, nv) each, the first rows those of positions.
-        positions: how many of them are.
-        held: rank of these.
-        slips: by how much the others raise it.
+        jacobians: Jacobians (m, nv), with position rows first.
+        positions: number of position rows.
+        held: rank of the position rows.
+        slips: rank that the velocity rows add.
     """
     rows = independent_rows([J[:positions] for J in jacobians], held)
     every = independent_rows(jacobians, held + slips, tuple(rows))
@@ -273,7 +276,7 @@ def _kept_rows(jacobians: Sequence[Matrix], positions: int, held: int, slips: in
 
 
 def _varies(jacobians: Sequence[Matrix], positions: int, kept: _Kept) -> bool:
-    """Whether dropped rows are other combinations of the kept ones at other configurations."""
+    """Whether the coefficients of dropped rows, in terms of kept rows, vary with configuration."""
     rows = [*kept.positions, *(positions + k for k in kept.slips)]
     dropped = [k for k in range(len(jacobians[0])) if k not in rows]
     if not dropped:
@@ -285,11 +288,11 @@ def _varies(jacobians: Sequence[Matrix], positions: int, kept: _Kept) -> bool:
 
 
 def rows_at(system: System, q: Matrix, p: Matrix) -> System:
-    """The same system with the rows that are most independent at one configuration.
+    """Return the system with the rows that are most independent at a given configuration.
 
     Args:
-        system: with closed loops.
-        q: (nq,) positions that close them.
+        system: mechanism with closed loops.
+        q: (nq,) positions that close the loops.
         p: (np,) parameters.
     """
     closure = system.closure
@@ -309,7 +312,7 @@ def rows_at(system: System, q: Matrix, p: Matrix) -> System:
 def _free_positions(
     jacobians: Sequence[Matrix], kept: _Kept, active: Sequence[int]
 ) -> tuple[int, ...]:
-    """Velocities whose positions may be chosen: the active ones, then what only slips hold."""
+    """Return velocities whose positions can be chosen: active, then those only slip rows hold."""
     if not kept.slips:
         return tuple(active)
     size = jacobians[0].shape[1] - len(kept.positions)
@@ -319,14 +322,14 @@ def _free_positions(
 
 @dataclass(frozen=True, slots=True)
 class _Drive:
-    """Numbers of velocities.
+    """Indices of independent and driven velocities.
 
     Attributes:
-        active: the independent ones.
-        motors: those whose efforts drive the mechanism.
-        named: names of those that the user named as active beyond the mobility.
+        active: independent velocities.
+        motors: velocities whose efforts drive the mechanism.
+        named: names of velocities that the user named as active beyond the mobility.
         leads: smallest singular value of the independent velocities in an orthonormal basis of all
-            velocities at the first configuration, 0 at a dead centre.
+            velocities at the first configuration; 0 at a dead centre.
     """
 
     active: tuple[int, ...]
@@ -338,10 +341,11 @@ class _Drive:
 def _drive(
     system: System, chosen: tuple[int, ...], jacobians: Sequence[Matrix], mobility: int
 ) -> _Drive:
-    """The chosen and the motors, then the velocities that see the remaining mobility best.
+    """Select independent velocities: chosen, motors, then those best conditioned for the rest.
 
-    Where the loops tie these to each other, the independent ones among them are found by the same
-    pivoting; all of them drive the mechanism, and what they leave free its own velocities.
+    If the loops make chosen velocities and motors dependent, pivoting selects independent ones
+    among them. All of these drive the mechanism, together with velocities for the remaining
+    mobility.
     """
     if mobility == 0:
         return _Drive((), tuple(k for k, speed in enumerate(system.speeds) if speed.actuated))
@@ -365,12 +369,12 @@ def _drive(
 
 
 def _hold(free: Matrix, active: Sequence[int]) -> float:
-    """Smallest singular value of the independent velocities in a basis of all velocities."""
+    """Return the smallest singular value of the independent rows of a basis of all velocities."""
     return float(np.min(np.linalg.svd(free[list(active)], compute_uv=False), initial=1.0))
 
 
 def _own_velocities(system: System) -> list[int]:
-    """All but those of frames that the motions of joints place, which no user knows."""
+    """Return all velocities except those of auxiliary frames of imposed motions (MotionJoint)."""
     placed = {f"{p.name}.free" for p in system.parts if isinstance(p.element, MotionJoint)}
     return [k for k, speed in enumerate(system.speeds) if speed.joint not in placed]
 
@@ -378,12 +382,12 @@ def _own_velocities(system: System) -> list[int]:
 def _independent(
     free: Sequence[Matrix], taken: Sequence[int], candidates: Sequence[int]
 ) -> tuple[int, ...]:
-    """Velocities already taken, and the candidates that are independent of them and each other.
+    """Return the given velocities, and the candidates that are independent of all before them.
 
     Args:
-        free: (nv, m) each, a basis of the velocities that the loops allow.
-        taken: numbers of velocities that are independent.
-        candidates: numbers of velocities.
+        free: bases (nv, m) of the velocities that the loops allow, one per configuration.
+        taken: indices of velocities that are independent.
+        candidates: indices of velocities.
     """
     every = tuple(dict.fromkeys([*taken, *candidates]))
     if not every:
@@ -396,12 +400,12 @@ def _independent(
 def _with_motors(
     coordinates: tuple[Coordinate, ...], names: Sequence[str]
 ) -> tuple[Coordinate, ...]:
-    """The same coordinates, those that are named driven by motors."""
+    """Return the same coordinates, with the named coordinates marked as driven by motors."""
     return tuple(replace(c, actuated=c.actuated or c.name in names) for c in coordinates)
 
 
 _Labels = list[tuple[list[str], tuple[str, ...]]]
-"""For each loop its rows of positions and its rows of velocities alone."""
+"""Labels of the position rows and of the velocity rows of each loop."""
 
 
 def _labels(system: System) -> _Labels:

@@ -1,4 +1,4 @@
-"""The whole way from a mechanism to a System, loops closed and analysed."""
+"""Assembly of a mechanism into a System with closed and analysed loops."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from mbs.text import did_you_mean, quoted
 def assemble(
     mechanism: Description, guess: Mapping[str, float], active: Sequence[str] = ()
 ) -> System:
-    """The frozen System of a mechanism.
+    """Return the immutable System of a mechanism.
 
     Args:
         mechanism: components and connections.
-        guess: approximate positions by coordinate name, where loops are closed near to. They
-            replace those of the mechanism.
-        active: velocities that are to be independent where there are loops.
+        guess: approximate positions by coordinate name. Loops are closed near them. They replace
+            the guesses of the mechanism.
+        active: names of velocities that must be independent in a mechanism with loops.
 
     Raises:
-        AssemblyError: the components do not form a mechanism, or a guess names no coordinate.
+        AssemblyError: the components form no mechanism, or `guess` or `active` has an invalid name.
         Unclosable: no configuration closes the loops.
     """
     guess = _laid_over(guesses_of_unknowns(mechanism), mechanism.guess, guess)
@@ -65,7 +65,7 @@ def _analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...
 
 
 def _choose(system: System, active: Sequence[str]) -> tuple[int, ...]:
-    """The numbers of the velocities that the user named."""
+    """Return the indices of the velocities that the user named."""
     names = [speed.name for speed in system.speeds]
     for name in active:
         if name in [coordinate.name for coordinate in system.cut_coordinates]:
@@ -82,7 +82,7 @@ def _choose(system: System, active: Sequence[str]) -> tuple[int, ...]:
 
 
 def _laid_over(*guesses: Mapping[str, float]) -> dict[str, float]:
-    """Return guesses in which a later one replaces earlier ones of the same coordinate."""
+    """Merge guesses. A later guess replaces earlier ones of the same coordinate."""
     found: dict[str, float] = {}
     for guess in guesses:
         later = {_base(name) for name in guess}

@@ -1,4 +1,4 @@
-"""The configuration at which the loops of a mechanism are assembled: the nearest to the guesses."""
+"""Configuration in which the loops of a mechanism are assembled: the nearest to the guesses."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from mbs.loops.nearest import (
 Vector = NDArray[np.float64]
 
 _FEW_GUESSES = 8
-"""Guessed positions up to which each one is left out in turn: a search for each."""
+"""Largest number of guesses for which each guess is left out once: each takes a search."""
 
 
 def assembled_configuration(system: System, guess: Mapping[str, float], p: Vector) -> Assembled:
@@ -46,10 +46,10 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
     by the size of the mechanism. Positions of joints that are cut count too. If two
     configurations are at the same distance, the first position that differs decides, in the order
     of the description: the larger value is taken.
-    Solved angles are within half a turn of their guess, or of zero.
+    Solved angles are within half a rotation of their guess, or of zero.
 
     Args:
-        system: its loops need not be closed yet.
+        system: mechanism whose loops may be open.
         guess: approximate positions by coordinate name [rad or m].
         p: (np,) parameters.
 
@@ -83,10 +83,7 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
 
 
 def rest_positions(system: System, p: Vector) -> dict[int, float]:
-    """Return positions at which springs of joints have no force [rad or m], by index in q.
-
-    Joints without a spring are left out.
-    """
+    """Return positions without spring force [rad or m] of joints with a spring, by index in q."""
     found = dict[int, float]()
     for link in system.tree.links:
         if link.motion in (Motion.FREE, Motion.SPHERICAL):
@@ -99,7 +96,7 @@ def rest_positions(system: System, p: Vector) -> dict[int, float]:
 
 
 def _unknowns(system: System) -> set[int]:
-    """Indices of the coordinates that are unknowns of components, or massless nodes."""
+    """Return indices of the coordinates that are unknowns of components, or massless nodes."""
     names = {
         f"{part.name}.{name}" for part in system.parts for name in part.element.names_of("unknown")
     }

@@ -40,20 +40,20 @@ from mbs.text import listed
 GROUP = "balance of forces"
 """Name of the rows of positions of massless nodes."""
 DAMPED = "balance of forces with dampers"
-"""Name of their rows of velocities."""
+"""Name of the velocity rows of massless nodes."""
 _DEPTH = 20
-"""Operations deep in which expressions are compared: laws of friction have few of them."""
+"""Depth to which two expressions are compared: friction laws have few operations."""
 _SEED, _REACH = 20261128, 0.3
-"""Random configurations at which the stiffness of nodes is examined, and their distance from the
-assembled one [rad or m]: springs are stretched there, also those that are relaxed as assembled."""
+"""Random seed, and largest distance from the assembled configuration [rad or m], of configurations
+at which the stiffness of nodes is evaluated: springs without load at assembly are loaded there."""
 
 
 def with_balance(system: System, mechanism: Description) -> System:
     """Return the system with rows for its massless nodes, if the forces on them determine them.
 
     Args:
-        system: open, or with loops that are not analysed yet.
-        mechanism: its description.
+        system: open system, or system with loops before their analysis.
+        mechanism: description of the system.
     """
     links, parts = system.tree.links, system.parts
     if not any(part.element.acts for part in parts) and all(k.stiffness.is_zero() for k in links):
@@ -114,7 +114,7 @@ def velocity_balance_rows(system: System, q: SX, v: SX) -> list[tuple[str, list[
 def _rows(
     system: System, q: SX, v: SX, *, is_damped: bool
 ) -> list[tuple[str, list[tuple[str, Row]]]]:
-    """Balances of positions, or of velocities, with their names."""
+    """Return the balances that constrain positions, or velocities, with their names."""
     own = [balance for balance in system.balances if balance.is_damped is is_damped]
     if not own:
         return []
@@ -142,15 +142,15 @@ def _rows(
 
 
 def require_no_drift(system: System, what: str, velocities: Iterable[int]) -> None:
-    """Refuse a matrix of the independent velocities where massless nodes move without them.
+    """Raise if massless nodes move without the given velocities, which a matrix belongs to.
 
     Args:
-        system: a system with or without massless nodes that dampers hold.
-        what: name of the matrix in the message.
-        velocities: indices in v of the velocities that belong to it.
+        system: mechanism with or without massless nodes with dampers.
+        what: name of the matrix in the error message.
+        velocities: indices in v of the velocities of the matrix.
 
     Raises:
-        ModelError: a node with a damper is among them.
+        ModelError: one of the velocities is that of a massless node, and a node has a damper.
     """
     nodes = {k for _, k in system.nodes} if any(b.is_damped for b in system.balances) else set()
     for velocity in velocities:
@@ -163,7 +163,7 @@ def require_no_drift(system: System, what: str, velocities: Iterable[int]) -> No
 
 
 def _limit(system: System, names: Sequence[str], q: SX) -> SX:
-    """(1, 1) the sum of the limits of dry frictions [N or N m]."""
+    """Return the sum of the limits of the named dry frictions (1, 1) [N or N m]."""
     at, total = PartsAt(system, q, SX.zeros(system.nv)), SX(0)
     for part in system.parts:
         if part.name in names:
@@ -174,16 +174,16 @@ def _limit(system: System, names: Sequence[str], q: SX) -> SX:
 def require_no_balance(
     system: System, what: str, *, links: Iterable[int] = (), velocities: Iterable[int] = ()
 ) -> None:
-    """Refuse a load on a massless node, whose balance has the forces of components only.
+    """Raise if a load acts on a massless node, whose balance has forces of components only.
 
     Args:
-        system: with or without massless nodes.
-        what: the load, for the message.
-        links: numbers of links on which the load acts.
-        velocities: indices of velocities along which the load acts.
+        system: mechanism with or without massless nodes.
+        what: description of the load for the error message.
+        links: indices of links on which the load acts.
+        velocities: indices in v of the velocities along which the load acts.
 
     Raises:
-        ModelError: a massless node moves one of the links, or along one of the velocities.
+        ModelError: a massless node moves one of the links, or moves along one of the velocities.
     """
     paths = [system.tree.links[j].v.start for link in links for j in system.tree.path(link)]
     for position, velocity in system.nodes:
@@ -195,7 +195,7 @@ def require_no_balance(
 
 
 def without_values(system: System) -> str:
-    """Return which parameters without value keep massless nodes from being found; else nothing."""
+    """Return text on parameters without value that prevent a search of massless nodes, or ""."""
     missing = [parameter.name for parameter in system.parameters if parameter.default is None]
     nodes = [system.speeds[system.tree.links[j].v.start].name for j in _massless_links(system)]
     if system.nodes or not nodes or not missing:
@@ -208,11 +208,11 @@ def without_values(system: System) -> str:
 
 
 def obstacles(system: System, velocity: int) -> str:
-    """Return the elements that keep the balance of forces from giving a coordinate, in words.
+    """Return text on the elements that prevent the force balance from determining a coordinate.
 
     Args:
-        system: a system in which the coordinate moves no inertia.
-        velocity: its index in v.
+        system: mechanism in which the coordinate moves no inertia.
+        velocity: index of the coordinate in v.
     """
     link = next(
         j for j, one in enumerate(system.tree.links) if one.v.start <= velocity < one.v.stop
@@ -242,7 +242,7 @@ def obstacles(system: System, velocity: int) -> str:
 
 
 def _obstacle(system: System, part: AttachedPart, velocity: int) -> str:
-    """Reason why the balance of forces on a node excludes a component; empty if there is none."""
+    """Return why a component excludes a force balance on a node; empty text if it does not."""
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     if part.element.has("stops"):
         return "which locks and releases"
@@ -262,13 +262,13 @@ def _obstacle(system: System, part: AttachedPart, velocity: int) -> str:
 
 
 def _joint(system: System, link: int) -> str:
-    """Name of the joint of a link."""
+    """Return the name of the joint of a link."""
     name: str = system.coordinates[system.tree.links[link].q.start].joint
     return name
 
 
 def _massless_links(system: System) -> list[int]:
-    """Numbers of the links of one freedom that move no mass and that no loop goes through."""
+    """Return indices of the one-freedom links without moved mass that are in no loop."""
     links = system.tree.links
     bound = {name for loop in system.loops for name in loop.joints}
     found = set(range(len(links)))
@@ -284,18 +284,18 @@ def _massless_links(system: System) -> list[int]:
 
 
 def _is_plain(link: Link) -> bool:
-    """Whether a link moves along one coordinate without a rotor."""
+    """Whether a link moves along one coordinate without rotor inertia."""
     is_one = link.motion in (Motion.REVOLUTE, Motion.PRISMATIC)
     return is_one and link.rotor is None and link.Ia.is_zero()
 
 
 def _has_mass(link: Link) -> bool:
-    """Whether a link has a mass or a first moment by its description."""
+    """Whether the mass or the first moment of a link is not identically zero."""
     return not (link.inertia.m.is_zero() and link.inertia.ms.is_zero())
 
 
 def _static_efforts(system: System, q: SX, v: SX) -> SX:
-    """(nv, 1) efforts that hold the tree at positions q with velocities v, without inertia."""
+    """Return the efforts (nv, 1) that hold the tree at q with velocities v, without inertia."""
     poses, rest = link_poses(system.tree, q), SX.zeros(system.nv)
     weight = newton_euler(system.tree, poses, rest, rest, resting_base(system.tree.gravity))
     own = joint_efforts(system.tree, q, v, rest)
@@ -303,7 +303,7 @@ def _static_efforts(system: System, q: SX, v: SX) -> SX:
 
 
 def _balances(system: System, nodes: Sequence[tuple[int, int]]) -> tuple[Balance, ...] | None:
-    """Balances of the forces on nodes; None if forces do not determine the nodes.
+    """Return the force balances of nodes; None if the forces do not determine the nodes.
 
     Forces on nodes must be linear in velocities, and may depend on positions and parameters.
     """
@@ -325,7 +325,7 @@ def _balances(system: System, nodes: Sequence[tuple[int, int]]) -> tuple[Balance
     sizes[sizes == 0] = 1.0
     whole = [M / sizes[:, None] for M in every]
     count = max((rank(M) if M.any() else 0 for M in whole), default=0)
-    damped = independent_rows([M[:, velocities] for M in every], count)  # the strongest first
+    damped = independent_rows([M[:, velocities] for M in every], count)  # the strongest rows first
     D = [M[:, velocities] for M in whole]
     if any(rank(M[np.ix_(damped, damped)]) < count for M in D if count):
         return None
@@ -348,11 +348,11 @@ def _balances(system: System, nodes: Sequence[tuple[int, int]]) -> tuple[Balance
 
 
 _Frictions = dict[int, list[tuple[str, Friction]]]
-"""For the number of each node with dry friction the components, and their laws."""
+"""Component name and friction law of each dry friction, by index of the node that it acts on."""
 
 
 def _frictions(system: System, nodes: Sequence[tuple[int, int]], q: SX, v: SX) -> _Frictions | None:
-    """Dry frictions on nodes; None if a node has another contact, or one with more than a node."""
+    """Return dry frictions on nodes; None for a stop or for a friction of more than one node."""
     at, found = PartsAt(system, q, v), _Frictions()
     own = casadi.vertcat(*(x for k, j in nodes for x in (q[k], v[j])))
     for part in system.parts:
@@ -372,29 +372,29 @@ def _frictions(system: System, nodes: Sequence[tuple[int, int]], q: SX, v: SX) -
 
 
 def _same(one: SX, other: SX) -> bool:
-    """Whether two expressions are equal by their operations."""
+    """Whether two expressions have equal operations."""
     return bool(casadi.is_equal(casadi.simplify(one), casadi.simplify(other), _DEPTH))
 
 
 def _motion(law: Friction | Stop | OneWay) -> list[SX]:
-    """The gap of a stop, or the velocity of another contact."""
+    """Return the gap of a stop, or the velocity of a friction or one-way element."""
     if isinstance(law, Stop):
         return [SX(law.gap)]
     return [SX(law.slip if isinstance(law, Friction) else law.velocity)]
 
 
 def _sticks_as_it_slides(law: Friction) -> bool:
-    """Whether no more friction acts at rest than while it slides."""
+    """Whether the friction at rest is equal to the friction while sliding."""
     return law.sticking is None or _same(SX(law.sticking), SX(law.limit))
 
 
 def _is_alone(damping: SX, velocities: Sequence[int], node: int) -> bool:
-    """Whether a node and the others have no damper in common.
+    """Whether no damper connects a node to another node.
 
     Args:
-        damping: (n, nv) slopes of the efforts on nodes.
+        damping: (n, nv) derivatives of the efforts on nodes by velocities.
         velocities: indices in v of the nodes.
-        node: number of the node.
+        node: index of the node.
     """
     row, column = SX(damping[node, :]), SX(damping[:, velocities[node]])
     row[velocities[node]], column[node] = 0, 0
@@ -402,13 +402,13 @@ def _is_alone(damping: SX, velocities: Sequence[int], node: int) -> bool:
 
 
 def _without_velocities(efforts: SX, D: SX, damped: Sequence[int], others: Sequence[int]) -> SX:
-    """Sums of efforts on which no velocity acts, one for each of the others.
+    """Return combinations of efforts that are independent of velocities, one per row of `others`.
 
     Args:
-        efforts: (n, 1) at rest.
-        D: (n, n) their slopes for velocities, of the rank of its damped rows.
-        damped: numbers of rows.
-        others: numbers of all other rows.
+        efforts: (n, 1) efforts at rest.
+        D: (n, n) derivatives of the efforts by velocities. The damped rows have its full rank.
+        damped: indices of the damped rows.
+        others: indices of all other rows.
     """
     left = efforts[list(others)]
     if damped and others and not D[list(others), list(damped)].is_zero():
@@ -418,7 +418,7 @@ def _without_velocities(efforts: SX, D: SX, damped: Sequence[int], others: Seque
 
 
 def _samples(system: System, q: SX, matrix: SX) -> list[NDArray[np.float64]]:
-    """Values of a matrix at random configurations, as far as they are finite."""
+    """Return the finite values of a matrix at eight random configurations."""
     function = Function("matrix", [q, system.p], [casadi.densify(matrix)])
     rng = np.random.default_rng(_SEED)
     at = np.array(system.configuration) + rng.uniform(-_REACH, _REACH, (8, system.nq))
@@ -427,7 +427,7 @@ def _samples(system: System, q: SX, matrix: SX) -> list[NDArray[np.float64]]:
 
 
 def _typical(matrices: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """(n,) typical sizes of the diagonal of (n, n) matrices; zeros without any matrix."""
+    """Return medians (n,) of the absolute diagonals of (n, n) matrices; zeros without matrices."""
     if not matrices:
         return np.zeros(1)
     found: NDArray[np.float64] = np.median([np.abs(np.diag(M)) for M in matrices], axis=0)

@@ -1,8 +1,8 @@
-"""Loops that have no closed form by themselves, solved in numbers: every configuration of a block.
+"""All configurations of loops without a closed form of their own, computed numerically in blocks.
 
-Where the plan of `mbs.loops.plan` ends, a block is looked for among the loops that are left: plane
-loops that share unknown joints, one loop of six revolute and prismatic joints, or a platform on six
-legs. Its roots stand for a stage then, and the plan goes on behind them.
+If the plan of `mbs.loops.plan` cannot continue, a block is searched among the unsolved loops: gear
+trains, plane loops that share unknown joints, one loop of up to six revolute and prismatic joints,
+or a platform on six legs. The block takes the position of a stage, and the plan continues after it.
 """
 
 from __future__ import annotations
@@ -62,18 +62,18 @@ Matrix = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _NEAR = 1e-5
-"""Difference of positions [rad or m] between a root and a configuration that it is: closed to
-1e-12, a configuration is known to the square root, 1e-6, where two roots meet."""
+"""Largest difference of positions [rad or m] between a root and its configuration: at 1e-12 of
+closure, a configuration where two roots meet is accurate to the square root, 1e-6."""
 
 
 def steps_of(system: System) -> tuple[Step, ...]:
-    """The plan of a system where there is one, else stages and blocks that solve its loops.
+    """Return the closed-form plan of a system, or else stages and blocks that solve its loops.
 
     Args:
-        system: the assembled mechanism.
+        system: assembled mechanism.
 
     Raises:
-        NoClosedForm: a loop has no closed form and belongs to no block known here.
+        NoClosedForm: a loop has no closed form and belongs to no supported block.
     """
 
     def build() -> tuple[Step, ...]:
@@ -89,7 +89,7 @@ def steps_of(system: System) -> tuple[Step, ...]:
 
 
 def _block(work: PlanWork, waiting: Sequence[int]) -> LoopBlock | None:
-    """The first block that gives the assembled configuration back."""
+    """Return the first block whose roots contain the assembled configuration, or None."""
     for find in (gear_trains, planar_blocks, single_loops, platforms):
         for block in find(work, waiting):
             if _gives_assembled(work, block):
@@ -99,7 +99,7 @@ def _block(work: PlanWork, waiting: Sequence[int]) -> LoopBlock | None:
 
 
 def _assembled(system: System) -> tuple[Vector, Vector]:
-    """All positions and p where a system was assembled."""
+    """Return all positions and the parameters p of the assembled configuration."""
     q = np.array(system.configuration)
     return started_at(system, q, range(system.nq)), closure_parameters(system)
 
@@ -112,7 +112,7 @@ def _gives_assembled(work: PlanWork, block: LoopBlock) -> bool:
         roots = block.solve(*_assembled(system))
     except NoClosedForm:
         return False
-    except LoopError:  # it moves by itself there, which is told where its roots are asked for
+    except LoopError:  # the loops move by themselves; `solve` raises this again when it is called
         return True
     indices = [k for k, index in enumerate(block.indices) if index < system.nq]
     for values in roots.values:
@@ -123,11 +123,11 @@ def _gives_assembled(work: PlanWork, block: LoopBlock) -> bool:
     return False
 
 
-# Rigid groups of links: those whose joints to each other are known.
+# Rigid groups: sets of links that known joints connect.
 
 
 class _Joined(NamedTuple):
-    """An unknown joint of the tree that leads from one rigid group to another."""
+    """Unknown tree joint `link` from the group `parent`; `at` is its frame in that group."""
 
     link: int
     parent: int
@@ -136,12 +136,12 @@ class _Joined(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _RigidGroups:
-    """The rigid groups of a tree, each named after its first link, -1 for that of the base.
+    """Rigid groups of a tree. The name of a group is the index of its first link, -1 for the base.
 
     Attributes:
-        group: of every link.
-        pose: of every link in the frame of the first link of its group.
-        joints: by the number of a group, the joint that leads to it.
+        group: group of each link.
+        pose: pose of each link in the frame of the first link of its group.
+        joints: unknown joint at the proximal end of each group, by group.
     """
 
     group: dict[int, int]
@@ -164,14 +164,14 @@ def _groups(work: PlanWork) -> _RigidGroups:
 
 
 def _unknown_links(work: PlanWork, number: int) -> set[int]:
-    """The links of the tree in a loop whose joints are unknown."""
+    """Return the indices of the tree links in the loop of a cut joint whose joints are unknown."""
     tree = work.system.tree
     back, out = loop_links(work.system, work.system.cuts[number])
     return {k for k in (*back, *out) if tree.links[k].q.start not in work.known}
 
 
 def _connected(links: dict[int, set[int]]) -> list[list[int]]:
-    """Loops, by their unknown links, that share some, in groups."""
+    """Partition loops (with their unknown links) into sets that are connected by shared links."""
     left, found = list(links), list[list[int]]()
     while left:
         own, before = [left.pop(0)], 0
@@ -188,7 +188,7 @@ def _connected(links: dict[int, set[int]]) -> list[list[int]]:
 
 
 def _free_groups(work: PlanWork, waiting: Sequence[int]) -> Iterator[tuple[list[int], list[int]]]:
-    """Loops that joints close and that share unknown links, in groups, with these links."""
+    """Yield each set of joint-closed loops connected by unknown links, and these links."""
     system = work.system
     links = {
         number: _unknown_links(work, number)
@@ -199,17 +199,18 @@ def _free_groups(work: PlanWork, waiting: Sequence[int]) -> Iterator[tuple[list[
         yield numbers, sorted(set().union(*(links[n] for n in numbers)))
 
 
-# Loops of revolute joints about one line, with gears between them: linear equations in angles.
+# Gear trains: loops of coaxial revolute joints and couplings, which are linear in the angles.
 
 
 _MOST_TURNS = 4
-"""Loops of a gear train at most: whole turns of all are tried together, some five of each."""
+"""Maximum number of loops of a gear train: combinations of full rotations of all loops are tried,
+about five per loop."""
 _SAME_ANGLE = 1e-9
-"""Angles [rad] that are equal: sums of a few leave 1e-15."""
+"""Largest difference of equal angles [rad]: rounding of sums of a few angles is 1e-15."""
 
 
 def gear_trains(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
-    """Blocks of coaxial loops and couplings that share unknown joints, such as a differential."""
+    """Yield blocks of coaxial loops and couplings that share unknown joints: differentials, ..."""
     system, first = work.system, len(work.system.cuts)
     rings = {
         number: work.ring(number)
@@ -238,7 +239,7 @@ def gear_trains(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
 
 
 def _is_coaxial(work: PlanWork, ring: Ring) -> bool:
-    """Whether all unknown joints rotate about one line."""
+    """Whether all unknown joints of a loop are revolute joints about one line."""
     if any(joint.motion is not Motion.REVOLUTE for joint in ring.joints):
         return False
     across = [casadi.vertcat(gap.pose.R[0:2, 2], gap.pose.p[0:2]) for gap in ring.gaps]
@@ -250,18 +251,18 @@ def _is_linear(work: PlanWork, coupling: CoordinateCoupling) -> bool:
 
 
 _LINEAR = 2
-"""Coefficients of a polynomial of degree one."""
+"""Largest number of coefficients of a polynomial of degree one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _GearTrain:
-    """Equations A x = b of angles, those of loops up to whole turns.
+    """Linear equations A x = b of joint positions. Rows of loops hold up to full rotations.
 
     Attributes:
-        indices: of the unknown positions x.
-        looped: which of them are of joints in loops.
-        count: of the loops, whose equations come first.
-        equations: Function of all positions and p: [A, b].
+        indices: indices in q of the unknown positions x.
+        looped: indices in x of the joints that are in loops.
+        count: number of loops. Their rows come first in A.
+        equations: Function (all positions, p) -> (A, b).
     """
 
     indices: tuple[int, ...]
@@ -273,7 +274,7 @@ class _GearTrain:
     def of(
         work: PlanWork, rings: list[Ring], couplings: list[CoordinateCoupling]
     ) -> _GearTrain | None:
-        """None where there are not as many equations as unknown positions, or too many loops."""
+        """Return the equations; None with fewer equations than unknowns, or too many loops."""
         looped = {_index(joint) for ring in rings for joint in ring.joints}
         coupled = {number for coupling in couplings for number in coupling.coordinates}
         indices = tuple(sorted(looped | (coupled - work.known)))
@@ -291,7 +292,7 @@ class _GearTrain:
         return _GearTrain(indices, places, len(rings), equations)
 
     def roots(self, q: Vector, p: Vector) -> Roots:
-        """All angles with those of joints in loops within half a turn."""
+        """Return all solutions, with angles of loop joints within half a rotation of zero."""
         A, b = (np.array(value) for value in self.equations(q, p))
         if rank(A, _LOCKED) < len(self.indices):
             raise NoClosedForm("gears leave joints a motion while all that is known stays")
@@ -303,11 +304,11 @@ class _GearTrain:
             right = b[:, 0] + 2 * np.pi * np.array([*turns, *[0] * (len(b) - self.count)])
             x: Vector = np.asarray(np.linalg.lstsq(A, right, rcond=None)[0], float)
             within = np.max(np.abs(x[self.looped])) < np.pi + _SAME_ANGLE
-            # half a turn forth and back is one
+            # angles +pi and -pi are the same solution
             new = all(np.max(np.abs(np.exp(1j * x) - np.exp(1j * y))) > _SAME_ANGLE for y in found)
             if within and new and np.max(np.abs(A @ x - right)) < _SAME_ANGLE:
                 found.append(x)
-        # after a whole turn of a joint in a loop a gear stands elsewhere unless its ratio is whole
+        # a full rotation of a loop joint restores a gear's angle only if the ratio is an integer
         ratios = A[self.count :]
         whole = bool(np.all(np.abs(ratios - np.round(ratios)) < _SAME_ANGLE))
         proof = "linear equations of angles"
@@ -317,7 +318,7 @@ class _GearTrain:
 
 
 def _coaxial_row(ring: Ring, q: SX) -> SX:
-    """The angle by which the joints of a loop about one line miss its closure."""
+    """Return the closure error of a loop of coaxial revolute joints: angle [rad] as expression."""
     angle, turned, sense = SX(0), SX.eye(3), SX(1)
     for joint, gap in zip(ring.joints, [*ring.gaps[1:], ring.gaps[0]], strict=True):
         angle += sense * joint.sign * q[_index(joint)]
@@ -329,14 +330,14 @@ def _coaxial_row(ring: Ring, q: SX) -> SX:
 
 
 _PARALLEL = 1e-9
-"""Cosine between what must be perpendicular: products of a few transforms leave 1e-15."""
+"""Largest cosine between perpendicular directions: products of a few transforms leave 1e-15."""
 _SAMPLES, _SEED = 3, 20260301
-"""Positions and parameters at which the loops of a block must be plane: what holds at all of them
-holds by structure."""
+"""Number of random positions and parameters at which a property of a block must hold to count as
+structural, and seed of the random numbers."""
 
 
 def planar_blocks(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
-    """Blocks of plane loops: all that share unknown joints, then ever fewer of them."""
+    """Yield blocks of plane loops: all loops that share unknown joints, then smaller subsets."""
     links = {
         number: _unknown_links(work, number)
         for number in waiting
@@ -352,11 +353,11 @@ def planar_blocks(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]
 
 
 _MOST = 6
-"""Loops of which every choice is tried, 63 at most; of more all together alone."""
+"""Largest number of loops whose subsets are tried, 63 at most. Larger sets are tried as a whole."""
 
 
 def _some(numbers: list[int], links: dict[int, set[int]]) -> Iterator[list[int]]:
-    """All of some loops, then every choice of fewer that share unknown joints."""
+    """Yield the whole set of loops, then each smaller subset connected by unknown joints."""
     yield numbers
     for count in range(len(numbers) - 1, 0, -1) if len(numbers) <= _MOST else ():
         for chosen in combinations(numbers, count):
@@ -365,7 +366,7 @@ def _some(numbers: list[int], links: dict[int, set[int]]) -> Iterator[list[int]]
 
 
 def _is_flat_kind(work: PlanWork, number: int) -> bool:
-    """Whether a loop has revolute and prismatic joints alone, but for the one that closes it."""
+    """Whether all unknown tree joints of a loop are revolute or prismatic, and no rod closes it."""
     if is_bound(work.system, number) or isinstance(work.system.cuts[number].edge.joint, Rod):
         return False
     links = work.system.tree.links
@@ -377,13 +378,13 @@ class _Plane:
     """Plane loops of a system.
 
     Attributes:
-        system: whose loops they are.
-        cuts: that close them.
-        links: that unknown joints lead to, antecedents first.
-        parents: the groups from which these joints lead.
-        ends: the groups of both frames of every cut.
-        frames: Function of all positions and p: the frames of the joints, of both ends of the cuts,
-            each (4, 4) in the frame of its group, side by side.
+        system: mechanism with the loops.
+        cuts: cut joints that close the loops.
+        links: child links of the unknown joints, in the order of the tree.
+        parents: rigid group that is the parent of each of these joints.
+        ends: the two rigid groups of each cut joint.
+        frames: Function (all positions, p) -> (4, 4) frames of the joints, then of both ends of
+            each cut joint, in one row of blocks. Each frame is given in the frame of its group.
     """
 
     system: System
@@ -395,7 +396,7 @@ class _Plane:
 
     @staticmethod
     def of(work: PlanWork, numbers: list[int], links: list[int]) -> _Plane | None:
-        """None where the loops are not plane, or not in one plane."""
+        """Return the loops of cut joints `numbers`; None unless they are plane, in one plane."""
         groups, system = _groups(work), work.system
         cuts = [system.cuts[number] for number in numbers]
         poses = [groups.joints[k].at for k in links]
@@ -418,11 +419,11 @@ class _Plane:
         return plane
 
     def drawing(self, q: Vector, p: Vector) -> _Drawing | None:
-        """The loops in their plane at given positions; None where they do not lie in one."""
+        """Return the loops in their plane at given positions; None if they are not in one plane."""
         return _draw(self, _side_by_side(self.frames, q, p))
 
     def roots(self, q: Vector, p: Vector) -> Roots:
-        """Every way to close the loops."""
+        """Return all solutions of the loops at known positions q and parameters p."""
         drawing = self.drawing(q, p)
         if drawing is None:
             raise NoClosedForm(
@@ -436,7 +437,7 @@ class _Plane:
 
 @dataclass(slots=True)
 class _Turn:
-    """How a group is rotated: with a class of groups, and by how much more [rad]."""
+    """Rotation of a group: that of group `number`, plus a constant `offset` [rad]."""
 
     number: int
     offset: float
@@ -444,13 +445,13 @@ class _Turn:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Drawing:
-    """Plane loops as equations.
+    """Plane loops as equations, and the relation of their unknowns to joint positions.
 
     Attributes:
-        loops: in parts of their size.
-        size: the longest length in them [m].
-        joints: for every joint of the tree how its position follows: the sign of its axis and the
-            rotations of both groups where it is revolute, the number of its displacement else.
+        loops: equations with lengths as fractions of `size`.
+        size: longest length in the loops [m].
+        joints: for each revolute joint of the tree, the sign of its axis and the rotations of its
+            two groups; for each prismatic joint, the index of its displacement.
     """
 
     loops: PlanarLoops
@@ -458,7 +459,7 @@ class _Drawing:
     joints: list[tuple[int, _Turn, _Turn] | int]
 
     def positions(self, theta: Vector, s: Vector) -> Vector:
-        """(r, k) positions of the joints of the tree [rad or m]."""
+        """Return (r, k) joint positions [rad or m] of r roots: angles theta, displacements s."""
         whole = np.concatenate([theta, np.zeros((len(theta), 1))], axis=1)
         values = np.empty((len(theta), len(self.joints)))
         for k, joint in enumerate(self.joints):
@@ -473,22 +474,22 @@ class _Drawing:
 
 @dataclass(slots=True)
 class _Point:
-    """A point of a group: by the numbers of rotations, and of displacements, what multiplies."""
+    """Point of a group: complex coefficients by index of rotation and by index of displacement."""
 
     turned: dict[int, complex]
     slid: dict[int, complex]
 
     def plus(self, number: int, value: complex) -> _Point:
-        """Moved by a vector that rotates with a class of groups."""
+        """Return the point plus a vector that rotates with group `number`."""
         return _Point({**self.turned, number: self.turned.get(number, 0) + value}, self.slid)
 
     def slides(self, number: int, value: complex) -> _Point:
-        """Moved by a displacement."""
+        """Return the point plus displacement `number` along a vector."""
         return _Point(self.turned, {**self.slid, number: value})
 
 
 class _Bent(Exception):
-    """The loops do not lie in one plane."""
+    """The loops are not in one plane."""
 
 
 def _draw(plane: _Plane, frames: Matrix) -> _Drawing | None:
@@ -499,7 +500,7 @@ def _draw(plane: _Plane, frames: Matrix) -> _Drawing | None:
 
 
 class _Draughtsman:
-    """Reads the equations of plane loops off their frames where all unknown joints are at zero."""
+    """Builder of the equations of plane loops from their frames with all unknown joints at zero."""
 
     def __init__(self, plane: _Plane, frames: Matrix) -> None:
         self.plane = plane
@@ -529,11 +530,11 @@ class _Draughtsman:
         raise _Bent
 
     def vector(self, value: Vector) -> complex:
-        """A vector of the plane as a complex number."""
+        """Return a vector of the plane as a complex number."""
         return complex(self.x @ value, self.y @ value)
 
     def drawing(self) -> _Drawing:
-        """The equations."""
+        """Return the equations of all loops."""
         joints = [
             self._pass(k, parent)
             for k, parent in zip(self.plane.links, self.plane.parents, strict=True)
@@ -544,7 +545,7 @@ class _Draughtsman:
         return self._equations(rows, joints, merged)
 
     def _pass(self, k: int, parent: int) -> tuple[int, int] | int:
-        """Through a joint of the tree: the sign of its axis and its groups, or its displacement."""
+        """Pass a tree joint; return (sign of its axis, parent group) or its displacement index."""
         axis = self.zero[k][:3, 2]
         cosine = float(self.normal @ axis)
         before = self.turns[parent]
@@ -571,7 +572,7 @@ class _Draughtsman:
         return self.points[group].plus(turn.number, step * np.exp(1j * turn.offset))
 
     def _close(self, number: int, welds: list[tuple[int, int, float]]) -> _Point:
-        """What must vanish for a cut joint; rotations that it ties are added to the welds."""
+        """Return the closure vector of a cut joint; append rotations that it couples to welds."""
         cut, (group_a, group_b) = self.plane.cuts[number], self.plane.ends[number]
         frame_a, frame_b = self.a[number], self.b[number]
         a, b = self._end(group_a, frame_a), self._end(group_b, frame_b)
@@ -591,7 +592,7 @@ class _Draughtsman:
         return _Point(turned, slid)
 
     def _freedoms(self, cut: Cut, frame: Matrix) -> tuple[bool, list[Vector]]:
-        """Whether a cut joint rotates in the plane, and along what it slides in it."""
+        """Return whether a cut joint rotates in the plane, and its axes of translation."""
         joint = cut.edge.joint
         if cut.welded or isinstance(joint, Fixed):
             return False, []
@@ -615,7 +616,7 @@ class _Draughtsman:
         return turning, axes
 
     def _merge(self, welds: list[tuple[int, int, float]]) -> dict[int, _Turn]:
-        """By the number of each rotation the one that it is, with what welds tie to each other."""
+        """Return each group's rotation after the welds: independent group and constant offset."""
         merged = {k: _Turn(k, 0.0) for k in [KNOWN, *self.plane.links]}
 
         def resolved(turn: _Turn) -> _Turn:
@@ -668,21 +669,21 @@ class _Draughtsman:
         return _Drawing(loops, size, told)
 
 
-# One loop of six unknown revolute and prismatic joints: an arm that reaches a known pose. One of
-# fewer joints, such as Bricard's, gets revolute joints that must be at zero.
+# One loop of six unknown revolute and prismatic joints: a serial arm whose end pose is known. For a
+# loop of fewer joints, such as Bricard's, revolute joints are added, whose angles must be zero.
 
 
 _JOINTS, _LEAST_JOINTS = 6, 3
 _AT_ZERO = 1e-6
-"""Angle [rad] below which an added joint is at zero: at a fold a root is known to 1e-7, and joints
-added at random are elsewhere by more."""
+"""Largest angle [rad] of an added joint in a valid root: a root at a fold is accurate to 1e-7, and
+wrong roots have larger angles at the randomly placed added joints."""
 _LOCKED = 1e-6
-"""Relative singular value below which a loop of fewer joints moves by itself: its roots are exact
-to 1e-12, whose root that is."""
+"""Relative singular value below which the matrix of a loop or gear train is rank-deficient, so that
+joints move by themselves: the roots are accurate to 1e-12, and 1e-6 is its square root."""
 
 
 def single_loops(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
-    """Blocks of one loop, by the general inverse geometric model."""
+    """Yield blocks of one loop of 3 to 6 joints, solved as the inverse kinematics of an arm."""
     for number in waiting:
         if number >= len(work.system.cuts) or is_bound(work.system, number):
             continue
@@ -703,14 +704,14 @@ def _index(joint: ChainJoint) -> int:
 
 @dataclass(slots=True, eq=False)
 class _SingleLoop:
-    """A loop of six unknown joints, begun where what is known moves it.
+    """Loop of at most six unknown joints, which starts after its first variable transform.
 
     Attributes:
-        system: whose loop it is.
-        joints: in their order.
-        gaps: Function of all positions and p: the transforms before the joints, side by side.
-        arm: the loop without the first of them, and what the solver made of it, as of the last
-            call; other positions or parameters may change it.
+        system: mechanism with the loop.
+        joints: joints of the loop in their order.
+        gaps: Function (all positions, p) -> transforms before the joints, in one row of blocks.
+        arm: key and solver data of the arm (the loop without its first transform) of the last call.
+            Other positions or parameters may change the arm.
     """
 
     system: System
@@ -728,7 +729,7 @@ class _SingleLoop:
         )
 
     def roots(self, q: Vector, p: Vector) -> Roots:
-        """Every way to close the loop."""
+        """Return all solutions of the loop at known positions q and parameters p."""
         gaps = _side_by_side(self.gaps, q, p)
         signs = np.array([joint.sign for joint in self.joints])
         n = len(self.joints)
@@ -737,7 +738,7 @@ class _SingleLoop:
         return Roots(q * signs, found.proof, found.complete)
 
     def is_locked(self, q: Vector, p: Vector) -> bool:
-        """Whether its roots are known, and no joint can move while all that is known stays."""
+        """Whether all roots are found and regular: no joint moves while known ones are fixed."""
         try:
             roots = self.roots(q, p)
         except NoClosedForm:
@@ -762,7 +763,7 @@ class _SingleLoop:
 
 
 def _added_gaps(count: int, size: float) -> Matrix:
-    """(count + 1, 4, 4) random gaps before added joints, and the one that leads back."""
+    """Return (count + 1, 4, 4) random transforms before added joints, and their inverse product."""
     rng = np.random.default_rng(_SEED)
     gaps, back = list[Matrix](), np.eye(4)
     for _ in range(count):
@@ -775,12 +776,12 @@ def _added_gaps(count: int, size: float) -> Matrix:
     return np.array([*gaps, back])
 
 
-# A platform on six legs: between two points, one on the ground and one on the platform, each keeps
-# its length.
+# Platform on six legs. Each leg keeps the distance of two points: one on the ground and one on the
+# platform.
 
 
 def platforms(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
-    """The block of a platform on six legs, with all loops that share its unknown joints."""
+    """Yield the block of a platform on six legs, with all loops that share its unknown joints."""
     system = work.system
     for numbers, links in _free_groups(work, waiting):
         hexapod = _Hexapod.of(work, numbers, links)
@@ -790,13 +791,13 @@ def platforms(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
 
 
 class _Edge(NamedTuple):
-    """A joint, or a cut one, between two groups.
+    """Tree joint or cut joint between two rigid groups.
 
     Attributes:
-        ends: the groups.
-        freedoms: of the joint, in its frame.
-        frames: numbers of the frames of the joint in both groups, of those that are computed; they
-            agree where the joint is at zero.
+        ends: the two groups.
+        freedoms: freedoms of the joint, in its frame.
+        frames: indices of the joint frame in each group, among all computed frames. The two frames
+            coincide at joint position zero.
     """
 
     ends: tuple[int, int]
@@ -808,7 +809,7 @@ _BALL = Freedom(Motion.SPHERICAL)
 
 
 def _edges(work: PlanWork, numbers: list[int], links: list[int]) -> tuple[list[_Edge], Function]:
-    """The joints of a block, and Function of all positions and p: their frames, side by side."""
+    """Return a block's joints and a Function (all positions, p) -> their frames in one row."""
     groups, system = _groups(work), work.system
     edges, placed = list[_Edge](), [Pose.identity()]
 
@@ -827,7 +828,7 @@ def _edges(work: PlanWork, numbers: list[int], links: list[int]) -> tuple[list[_
         a = frame(groups.pose[cut.link_a] @ cut.pose_a)
         b = frame(groups.pose[cut.link_b] @ cut.pose_b)
         if isinstance(joint, Rod) and not cut.welded:
-            # a group of its own, between two spherical joints
+            # the rod is a rigid group of its own, between two spherical joints
             own = len(system.tree.links) + number
             along = Pose.translation(vector([to_sx(joint.length, system.symbol_table), 0, 0]))
             edges.append(_Edge((ends[0], own), (_BALL,), (a, 0)))
@@ -842,13 +843,13 @@ def _edges(work: PlanWork, numbers: list[int], links: list[int]) -> tuple[list[_
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Leg:
-    """The joints from the ground to the platform: each with whether it is passed forwards."""
+    """Joints of a leg, ground to platform, each with whether its groups are in this order."""
 
     edges: list[tuple[_Edge, bool]]
 
 
 def _legs(edges: Sequence[_Edge]) -> tuple[int, list[_Leg]] | None:
-    """The group of the platform, and its legs; None where there are not six between two groups."""
+    """Return the platform's group and its legs; None unless six legs join it to the ground."""
     at = dict[int, list[_Edge]]()
     for edge in edges:
         for group in edge.ends:
@@ -876,17 +877,17 @@ def _legs(edges: Sequence[_Edge]) -> tuple[int, list[_Leg]] | None:
 
 _GROUND = -1
 _PASSED = 2
-"""Joints of a group in the middle of a leg: one before it and one behind it."""
+"""Number of joints of a group inside a leg: one on each side."""
 _MEETING = 1e-9
-"""Distance of a centre from an axis, as a part of the lengths of a leg: products of some transforms
-leave 1e-15."""
+"""Largest distance of a centre from an axis, relative to the size of a leg: rounding of products of
+a few transforms is 1e-15."""
 _FREEDOMS = {Motion.REVOLUTE: 1, Motion.SPHERICAL: 3}
 _LEAST = 5
-"""Freedoms of a leg that binds nothing but a distance; a sixth is its spin."""
+"""Smallest number of freedoms of a leg that constrains a distance only. A sixth is its spin."""
 
 
 class _Axis(NamedTuple):
-    """A passive joint of a leg with all of them at zero: a centre, or an axis through a point."""
+    """Passive joint of a leg at position zero: spherical centre, or axis through a point."""
 
     motion: Motion
     point: Vector
@@ -894,7 +895,7 @@ class _Axis(NamedTuple):
 
 
 class _Distance(NamedTuple):
-    """What a leg keeps: the distance of a point of the ground from one of the platform."""
+    """Distance that a leg keeps: points a of the ground, b of the platform (in its own frame)."""
 
     a: Vector
     b: Vector
@@ -902,12 +903,12 @@ class _Distance(NamedTuple):
 
 
 def _distance(leg: _Leg, frames: Matrix, *, slides: bool = False) -> _Distance | None:
-    """The two centres of a leg; None where it is no such leg.
+    """Return the two centres of a leg and their distance; None if the joints have no two centres.
 
     Args:
-        leg: with its passive joints.
-        frames: that it runs over.
-        slides: whether it may have prismatic joints, at zero here.
+        leg: passive joints of the leg.
+        frames: frames of the joints, indexed by its edges.
+        slides: whether the leg may have prismatic joints, which are taken at zero.
     """
     here, axes = np.eye(4), list[_Axis]()
     for edge, forwards in leg.edges:
@@ -935,7 +936,7 @@ def _distance(leg: _Leg, frames: Matrix, *, slides: bool = False) -> _Distance |
 
 
 def _centre(axes: Sequence[_Axis], size: float) -> Vector | None:
-    """The only point that consecutive joints leave where it is."""
+    """Return the point that all consecutive joints keep fixed; None if it is not unique."""
     balls = [axis.point for axis in axes if axis.motion is Motion.SPHERICAL]
     lines = [axis for axis in axes if axis.motion is Motion.REVOLUTE]
     if balls:
@@ -955,15 +956,15 @@ def _centre(axes: Sequence[_Axis], size: float) -> Vector | None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Hexapod:
-    """A platform on six legs, and how its joints follow once its pose is known.
+    """Platform on six legs, and the stages that compute its joints from its pose.
 
     Attributes:
-        system: whose loops they are.
-        legs: of the platform.
-        frames: Function of all positions and p: the frames that the legs run over.
-        stages: that give the joints, from all positions with those of the pose behind them.
-        extent: how many positions these are.
-        chosen: the branch of each stage in which the system was assembled.
+        system: mechanism with the loops.
+        legs: legs of the platform.
+        frames: Function (all positions, p) -> frames of the joints of the legs.
+        stages: stages that compute the joints from all positions, the pose as the last seven.
+        extent: number of these positions.
+        chosen: branch of each stage in which the system was assembled.
     """
 
     system: System
@@ -975,10 +976,10 @@ class _Hexapod:
 
     @staticmethod
     def of(work: PlanWork, numbers: list[int], links: list[int]) -> _Hexapod | None:
-        """None where the loops are not those of such a platform."""
+        """Return the platform of some loops; None unless they form a platform on six legs."""
         system = work.system
         edges, frames = _edges(work, numbers, links)
-        # a free joint that places the platform binds nothing
+        # a free joint between ground and platform only defines the pose and constrains nothing
         free = [edge for edge in edges if any(f.motion is Motion.FREE for f in edge.freedoms)]
         found = _legs([edge for edge in edges if edge not in free])
         if found is None or any(edge.ends != (_GROUND, found[0]) for edge in free):
@@ -997,12 +998,12 @@ class _Hexapod:
 
     @property
     def indices(self) -> tuple[int, ...]:
-        """Of the joints in q."""
+        """Indices of the solved joints in q."""
         every = {index for stage in self.stages for index in stage.indices}
         return tuple(sorted(index for index in every if index < self.system.nq))
 
     def roots(self, q: Vector, p: Vector) -> Roots:
-        """Every pose of the platform, with each joint on the side on which it was assembled."""
+        """Return all poses of the platform, with each joint on its assembled branch."""
         frames = _side_by_side(self.frames, q, p)
         kept = [_distance(leg, frames) for leg in self.legs]
         legs = [leg for leg in kept if leg is not None]
@@ -1034,10 +1035,10 @@ class _Hexapod:
 
 
 def _require_held(work: PlanWork, waiting: Sequence[int]) -> None:
-    """Refuse a platform that no lengths of its legs hold.
+    """Raise if the leg lengths of a platform hold it at no pose.
 
     Raises:
-        NoClosedForm: says so.
+        NoClosedForm: the legs of a platform are singular at all poses.
     """
     system = work.system
     for numbers, links in _free_groups(work, waiting):
@@ -1056,6 +1057,6 @@ def _require_held(work: PlanWork, waiting: Sequence[int]) -> None:
 
 
 def _side_by_side(frames: Function, q: Vector, p: Vector) -> Matrix:
-    """(k, 4, 4) frames that a Function gives in one row of blocks."""
+    """Return (k, 4, 4) frames from a Function that returns them in one row of blocks."""
     values = np.array(frames(q, p))
     return values.T.reshape(-1, 4, 4).transpose(0, 2, 1)

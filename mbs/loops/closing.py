@@ -1,4 +1,4 @@
-"""The numbers of a closure: its residual, the nearest configuration that closes, and sizes."""
+"""Numeric closure of loops: residuals, nearest closed configuration, continuation, row scales."""
 
 from __future__ import annotations
 
@@ -21,23 +21,25 @@ from mbs.loops.cut_positions import cut_positions
 from mbs.numbers import OnArrays, on_arrays
 from mbs.solvers.least_squares import MANY, NewtonEquations
 
-# What rows of a closure are measured by: lengths by the size of the mechanism, cosines as such.
+# Units of closure rows: the size of the mechanism for lengths, 1 for cosines.
 #
-# How far a loop is open says nothing by itself: 1e-6 m is nothing for a crane, and 1 % of a link
-# of 100 um.
+# The opening of a loop has no meaning without a size: 1e-6 m is negligible for a crane, and 1 % of
+# a link of 100 um.
 
 
 _ROUNDING = 1e-9
-"""Length [m] below which levers are rounding, which is 1e-13 of a mechanism of 1 km."""
+"""Length [m] below which moment arms are rounding: 1e-12 of a mechanism of 1 km."""
 _SAMPLES, _SEED = 3, 20260201
-"""Configurations at which levers are measured, the zero configuration among them."""
+"""Number of configurations at which moment arms are evaluated, with the zero configuration as the
+first, and seed of the random numbers."""
 
 
 def mechanism_size(system: System) -> SX:
-    """The longest lever by which an angle moves the ends of a loop, or their largest distance [m].
+    """Return the size of a mechanism [m], the unit of lengths in its closure rows.
 
-    It is taken at some configurations, always the same and open as a rule, so that it is known
-    before a loop is closed; 1 m where nothing tells a small mechanism from a large one.
+    It is the longest moment arm of an angle on the closure rows, or the largest closure distance.
+    The configurations of this evaluation are fixed and in general open, so that the size is known
+    before a loop is closed. It is 1 m if the mechanism has no length.
 
     Returns:
         (1, 1) expression of the parameters p.
@@ -57,7 +59,7 @@ def mechanism_size(system: System) -> SX:
             *(found(configuration, system.p) for configuration in _configurations(system))
         )
         size = SX(casadi.mmax(casadi.fabs(every)))
-        # around the centre of a sphere levers are rounding
+        # moment arms about the centre of a sphere are zero, up to rounding
         return SX(casadi.if_else(size > _ROUNDING, size, 1))
 
     size: SX = system.cached("mechanism size", build)
@@ -65,40 +67,40 @@ def mechanism_size(system: System) -> SX:
 
 
 def row_sizes(system: System) -> SX:
-    """(m, 1) what each closure row is measured by [m or 1], as a function of p."""
+    """Return the unit of each closure row (m, 1) [m or 1], as an expression of p."""
     size = mechanism_size(system)
     return casadi.vertcat(SX(0, 1), *(size if own else SX(1) for own in _lengths(system)))
 
 
 def distance_units(units: Iterable[str], size: float) -> Vector:
-    """(n,) what distances of positions are divided by: 1, of lengths the size of the mechanism [m].
+    """Return divisors (n,) of position differences: 1, or for lengths the mechanism's size [m].
 
     Args:
-        units: of the positions.
-        size: of the mechanism [m].
+        units: units of the positions.
+        size: size of the mechanism [m].
     """
     return np.array([size if unit.startswith("m") else 1.0 for unit in units])
 
 
 def constraint_sizes(system: System) -> SX:
-    """(m, 1) the same of the rows of J: those of the closure, then slips of discs [m or 1]."""
+    """Return the unit of each row of J (m, 1): closure rows, then velocity rows [m or 1]."""
     slips = velocity_row_units(system)
     size = mechanism_size(system)
     return casadi.vertcat(row_sizes(system), *(size if u == "m" else SX(1) for u in slips))
 
 
 def relative_rows(system: System, q: SX) -> SX:
-    """(m + k, 1) closure rows as parts of what they are measured by, then norms of quaternions."""
+    """Return closure rows divided by their units, then quaternion norm rows, (m + k, 1)."""
     return casadi.vertcat(closure_rows(system, q) / row_sizes(system), norm_rows(system.tree, q))
 
 
 def _lengths(system: System) -> list[bool]:
-    """Whether each closure row is a length."""
+    """Return whether each closure row is a length."""
     return [unit == "m" for *_, unit in position_rows(system)]
 
 
 def _configurations(system: System) -> list[list[float]]:
-    """The zero configuration and random ones; displacements zero, quaternions of unit length."""
+    """Return the zero configuration and random ones, with zero displacements, unit quaternions."""
     rng, configurations = np.random.default_rng(_SEED), list[list[float]]()
     for number in range(_SAMPLES):
         reach = np.pi if number else 0.0
@@ -115,33 +117,33 @@ def _configurations(system: System) -> list[list[float]]:
 Vector = NDArray[np.float64]
 
 TOLERANCE = 1e-12
-"""Largest closure row where an iteration ends, in parts of the size of the mechanism: rounding of
-sums of some tens of terms of size one stays below it, what Newton's method leaves before its last
-step, 1e-8 or more, does not."""
+"""Largest closure row at the end of an iteration, in sizes of the mechanism: rounding of sums of
+some tens of terms of size one is below it; the error before the last Newton step, 1e-8 or more, is
+not."""
 
 CLOSED = 1e-10
-"""The same of configurations that formulas or others give: hundreds of roundings, no missing
-step."""
+"""Largest row of a closed configuration from formulas or other sources, in sizes of the mechanism:
+it allows hundreds of rounding errors, but no missing iteration step."""
 
 _DEPENDENT = 1e-9
-"""Part of the largest singular value below which a row of the loops is redundant."""
+"""Relative singular value below which a row of the loops is redundant."""
 
 OPEN = 1e-6
-"""The same of configurations that a user gives, with seven digits; forces are wrong by as
-little."""
+"""Largest row of a closed configuration from the user, in sizes of the mechanism: seven digits.
+Forces have errors of the same relative size."""
 
 
 _KEPT = 8
-"""Values of parameters of which sizes are kept: a line between two has as many steps."""
+"""Number of parameter sets whose row units are cached: continuation visits about as many."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Closed:
-    """Where an attempt to close the loops ended.
+    """Result of an attempt to close the loops.
 
     Attributes:
         q: (nq,) positions.
-        residual: Euclidean norm of all rows there.
+        residual: Euclidean norm of all rows at q.
         is_closed: whether every row is closed and no axis is opposed.
     """
 
@@ -152,15 +154,15 @@ class Closed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Closing:
-    """The closure rows and quaternion norms of a system, some positions locked.
+    """Closure rows and quaternion norms of a system, with some positions locked.
 
     Attributes:
-        system: with loops, not necessarily analysed.
-        p: (np,) values of its parameters.
-        locked: positions that must not change.
+        system: mechanism with loops, with or without their analysis.
+        p: (np,) values of the parameters.
+        locked: indices in q of positions that must not change.
         kept: indices of the rows that count; None for all rows.
-        axes: indices of the cosines that count; None for all.
-        aims: indices in `system.cut_coordinates` of positions that must have a value. Each adds a
+        axes: indices of the facing cosines that count; None for all.
+        aims: indices in `system.cut_coordinates` of positions with a required value. Each adds a
             row.
         cut: (c,) values of `system.cut_coordinates`. Only the values of the aims count.
     """
@@ -175,12 +177,12 @@ class Closing:
 
     @property
     def free(self) -> list[int]:
-        """The positions that may change."""
+        """Indices in q of the positions that may change."""
         locked = set(self.locked)
         return [k for k in range(self.system.nq) if k not in locked]
 
     def rows(self, q: Vector) -> tuple[Vector, Vector]:
-        """Residual (m,) and its derivative by the free positions (m, n)."""
+        """Return the residual (m,) and its derivative by the free positions (m, n)."""
         r, J = self._functions().equations(q, self._given)
         if self.kept is not None:
             r, J = r[list(self.kept)], J[list(self.kept)]
@@ -193,7 +195,7 @@ class Closing:
 
     @property
     def sizes(self) -> Vector:
-        """(m,) what the rows are measured by: the size of the mechanism for lengths [m], or 1."""
+        """(m,) units of the rows: the size of the mechanism for lengths [m], or 1."""
         sizes = self._sizes[1].ravel()
         return sizes if self.kept is None else sizes[list(self.kept)]
 
@@ -204,7 +206,7 @@ class Closing:
 
     @property
     def _sizes(self) -> list[Vector]:
-        """The size of the mechanism and those of the rows; starts have the same p as a rule."""
+        """Size of the mechanism and units of the rows, cached for the last values of p."""
 
         def build() -> list[Vector]:
             return self._functions().sizes(self._given)
@@ -214,17 +216,17 @@ class Closing:
         return found
 
     def openness(self, q: Vector) -> float:
-        """The largest row at q, (nq,), in parts of the size of the mechanism."""
+        """Return the largest row at q (nq,), in sizes of the mechanism."""
         return float(np.max(np.abs(self.rows(q)[0]) / self.sizes, initial=0.0))
 
     def nearest(self, q: Vector) -> Closed:
-        """The configuration that Gauss-Newton reaches from q (nq,)."""
+        """Return the result of Gauss-Newton from q (nq,)."""
         tolerance = TOLERANCE * self.sizes
         found, root = self._newton().near(q, self._given, self.free, tolerance)
         return Closed(found, root.residual, root.converged and self.faces(found))
 
     def polished(self, q: Vector, steps: int) -> Vector:
-        """The configuration (nq,) after the least Newton steps onto the loops, closed to rounding.
+        """Return q (nq,) after `steps` minimum-norm Newton steps, closed to rounding.
 
         `nearest` ends at `TOLERANCE`, above the rounding of the rows.
         """
@@ -238,13 +240,13 @@ class Closing:
         return found
 
     def nearby(self, q: Vector, reach: float, tries: int, seed: int) -> Iterator[Vector]:
-        """Closed configurations that Gauss-Newton reaches from random ones around q (nq,).
+        """Yield closed configurations that Gauss-Newton reaches from random starts around q (nq,).
 
         Args:
-            q: around which they are taken.
+            q: centre of the starts.
             reach: largest difference of a position at the start [rad or m].
-            tries: how many starts are taken at most.
-            seed: of the random numbers.
+            tries: largest number of starts.
+            seed: seed of the random numbers.
         """
         rng = np.random.default_rng(seed)
         for _ in range(tries):
@@ -253,10 +255,10 @@ class Closing:
                 yield closed.q
 
     def acting(self, *, norms: bool) -> NDArray[np.bool_]:
-        """(nq,) whether a closure row depends on each position.
+        """Return whether a closure row depends on each position (nq,).
 
         Args:
-            norms: whether rows that keep the norms of quaternions count; they are no loops.
+            norms: whether the norm rows of quaternions, which are no loops, count.
         """
         acting = np.zeros(self.system.nq, dtype=bool)
         rows, columns = self._functions().places
@@ -269,7 +271,7 @@ class Closing:
         return bool(np.all((cosines if self.axes is None else cosines[list(self.axes)]) > 0))
 
     def gap(self, q: Vector) -> str:
-        """Which joint stays open most at q, in words and figures."""
+        """Return text with the joint of the largest opening at q, and its size."""
         units = [(name, unit) for name, _, unit in position_rows(self.system)]
         gaps: dict[str, list[float]] = {}
         for (name, unit), value in zip(units, self.rows(q)[0], strict=False):
@@ -281,12 +283,12 @@ class Closing:
         return f"{name} open by {distance:.3g} m and {other:.3g} in direction cosines"
 
     def locked_positions(self, q: Vector) -> str:
-        """The locked positions at q in words; empty when none is locked."""
+        """Return the locked positions at q as text; empty if no position is locked."""
         names = [coordinate.name for coordinate in self.system.coordinates]
         return ", ".join(f"{names[k]} = {q[k]:.4g}" for k in self.locked)
 
     def _newton(self) -> NewtonEquations:
-        """The rows that count, as equations for the free positions."""
+        """Return the rows that count as equations for the free positions."""
         kept = self.kept
         if kept is None:
             return self._functions().newton
@@ -310,14 +312,14 @@ class Closing:
 
 
 class ClosingFunctions(NamedTuple):
-    """What is computed of the closure of a system.
+    """Compiled functions of the closure of a system.
 
     Attributes:
-        equations: ``(q, p) -> r, J``: all rows, then differences of positions of cut joints that
-            have aims, and their derivative by q.
-        places: rows and columns of the elements of the derivative that need not be zero.
-        facing: ``(q, p)``, positive where no axis is opposed.
-        sizes: ``(p)``, the size of the mechanism and what each row is measured by.
+        equations: ``(q, p) -> r, J``: all rows, then position errors of cut joints that have aims;
+            derivative of the rows by q.
+        places: row and column indices of the structurally nonzero elements of J.
+        facing: ``(q, p) -> c``: cosines, positive if no axis is opposed.
+        sizes: ``(p) -> s, u``: size of the mechanism, and unit of each row.
         newton: all rows, as equations for the free positions.
     """
 
@@ -329,10 +331,10 @@ class ClosingFunctions(NamedTuple):
 
 
 def closure_parameters(system: System, values: Mapping[str, float] | None = None) -> Vector:
-    """Values of the parameters; NaN for one without value that has no part in the closure.
+    """Return values (np,) of the parameters; NaN if one has no value and is not in the closure.
 
     Raises:
-        ModelError: a name is unknown, or a symbol of the closure has no value.
+        ModelError: a name is unknown, or a parameter of the closure has no value.
     """
 
     def names() -> set[str]:
@@ -344,7 +346,7 @@ def closure_parameters(system: System, values: Mapping[str, float] | None = None
 
 
 def _symbolic_rows(system: System, aims: tuple[int, ...]) -> tuple[SX, SX, SX, SX]:
-    """Positions q, given values p, all rows, and the sizes that rows are measured by."""
+    """Return the symbols q and p (with cut targets), all rows, and the units of the rows."""
     q, p = SX.sym("q", system.nq), system.p
     norms = norm_rows(system.tree, q)
     sizes = casadi.vertcat(row_sizes(system), SX.ones(norms.shape))
@@ -360,7 +362,7 @@ def _symbolic_rows(system: System, aims: tuple[int, ...]) -> tuple[SX, SX, SX, S
 
 
 def _equations_of(system: System, aims: tuple[int, ...], kept: Sequence[int]) -> NewtonEquations:
-    """Some of the rows, as equations for positions."""
+    """Return the rows `kept` as equations for the positions."""
     q, p, r, _ = _symbolic_rows(system, aims)
     r = r[list(kept)]
     equations = Function("equations", [q, p], [r, casadi.jacobian(r, q)])
@@ -385,7 +387,7 @@ def _functions(system: System, aims: tuple[int, ...]) -> ClosingFunctions:
 
 
 def _cut_moves(system: System, q: SX, target: SX) -> SX:
-    """(c, 1) differences of positions of cut joints from a target, as `row_difference`."""
+    """Return differences (c, 1) of cut positions from a target, as in `row_difference`."""
     found, rows = cut_positions(system)(q, system.p), system.cut_coordinates
     for first in [k for k, row in enumerate(rows) if row.kind == "quaternion"][::4]:
         part = slice(first, first + 4)
@@ -403,16 +405,16 @@ def _replace(q: Vector, indices: Sequence[int], values: Vector) -> Vector:
     return result
 
 
-# When two configurations are the same: up to whole turns, and to the sign of quaternions.
+# Equality of two configurations: up to full rotations, and up to the sign of quaternions.
 
 
 def difference(system: System, q: Vector, other: Vector) -> Vector:
-    """(nq,) difference of two configurations: angles up to whole turns, quaternions up to sign."""
+    """Return q - other (nq,), angles within half a rotation, quaternions up to their sign."""
     return row_difference(system.coordinates, q, other)
 
 
 def row_difference(rows: Sequence[Coordinate], q: Vector, other: Vector) -> Vector:
-    """(n,) the same of positions of any coordinates, in the tree or at a cut."""
+    """Return q - other (n,) as `difference`, for any coordinates of the tree or of a cut."""
     gap = _within_half_turn(rows, q - other)
     for first in [k for k, row in enumerate(rows) if row.kind == "quaternion"][::4]:
         part = slice(first, first + 4)
@@ -422,7 +424,7 @@ def row_difference(rows: Sequence[Coordinate], q: Vector, other: Vector) -> Vect
 
 
 def within_half_turn(system: System, q: Vector) -> Vector:
-    """(nq,) the positions, or differences of them, with angles within half a turn of zero."""
+    """Return positions (nq,), or their differences, with angles within half a rotation of zero."""
     return _within_half_turn(system.coordinates, q)
 
 
@@ -430,7 +432,7 @@ def _within_half_turn(rows: Sequence[Coordinate], q: Vector) -> Vector:
     turned = np.array(q, dtype=float)
     turns = np.array([row.unit == "rad" for row in rows], dtype=bool)
     turned[turns] = np.remainder(turned[turns] + np.pi, 2 * np.pi) - np.pi
-    turned[turns & (turned < _HALF_TURN - np.pi)] += 2 * np.pi  # rounding decides no sign
+    turned[turns & (turned < _HALF_TURN - np.pi)] += 2 * np.pi  # no sign from rounding
     return turned
 
 
@@ -440,51 +442,52 @@ def _within_half_turn(rows: Sequence[Coordinate], q: Vector) -> Vector:
 _LARGEST_STEP = 0.5
 """Largest change of a locked position in one step [rad, or sizes of the mechanism]."""
 LARGEST_MOVE = 0.3
-"""Largest distance of a free position from its prediction [rad, or sizes of the mechanism]: more
-may be another branch."""
+"""Largest distance of a free position from its prediction [rad, or sizes of the mechanism]: a
+larger distance may mean another branch."""
 _CURVED = 0.002
-"""Largest difference between a step and the mean of the slopes at its two ends, as a part of the
+"""Largest difference between a step and the mean of the slopes at its two ends, relative to the
 largest change in the step: smooth branches give 1e-4 to 1e-3, a change of branch gives about 1."""
 _CROSSING = 1e-3
 """Longest step through a configuration at which the determinant of the loops changes its sign
-[rad or sizes]: a branch that goes on is smooth at this length, a branch that turns is not."""
+[rad or sizes]: a branch that continues is smooth at this length, a branch that turns is not."""
 _OFFSET = 1e-7
-"""Change of locked positions for a slope [rad or sizes]: closed configurations are accurate to
-1e-12, so that a slope is accurate to 1e-5."""
+"""Change of locked positions for a finite-difference slope [rad or sizes]: closed configurations
+are accurate to 1e-12, so that a slope is accurate to 1e-5."""
 _POLISHINGS = 2
-"""Steps after which a configuration is accurate to rounding: it is closed to 1e-12 before."""
+"""Newton steps that make a configuration accurate to rounding: it is closed to 1e-12 before."""
 _STEEP = 1e4
-"""Slope beyond which the free positions do not follow from the locked ones: the branch turns."""
+"""Slope above which the locked positions do not determine the free ones: the branch turns."""
 _LONGEST_LINE = 400.0
-"""Largest change of a locked position in all [rad or m]: some sixty revolutions."""
+"""Largest change of a locked position in total [rad or m]: about sixty revolutions."""
 _SMALLEST_STEP = 1e-6
-"""Shortest step [rad or sizes], ten times the offset of slopes."""
+"""Shortest step [rad or sizes]: ten times the offset of slopes."""
 _SINGULAR = 1e-7
-"""Smallest singular value, as a part of the largest, below which a start has no slope: rounding
-leaves 1e-8 of a value that vanishes with the square root, regular mechanisms have 1e-4 or more."""
+"""Relative singular value below which a configuration is singular and has no slope: rounding leaves
+1e-8 of a value that vanishes with the square root, regular mechanisms have 1e-4 or more."""
 _BEFORE_END = 1e-3
 """Distance between the configurations from which a singular end is extrapolated [rad or sizes]:
 rounding is 1e-13 there, and the fifth power of the distance is below it."""
 _EXTRAPOLATION = np.array([5.0, -10.0, 10.0, -5.0, 1.0])
-"""Weights of five equidistant configurations that give the next one to the fourth order."""
+"""Weights of five equidistant configurations that extrapolate the next one to the fourth order."""
 _ROOT_OF_ROUNDING = 1e-6
-"""Largest correction of a singular end [rad or sizes]: closing rows give it to 1e-9 to 1e-7."""
+"""Largest correction of a singular end [rad or sizes]: closing rows determine it to 1e-9 to
+1e-7."""
 _CANDIDATES, _TRIES = 6, 60
-"""Most configurations in an error message, and starts of the search for them."""
+"""Largest number of configurations in an error message, and number of starts of their search."""
 _REACHES = 1.0, 0.3
-"""Parts of half a turn, and of the size, within which random starts are taken in turn."""
+"""Fractions of half a rotation, and of the size, for alternating ranges of random starts."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Line:
-    """Locked positions and parameters on a straight line, a function of the distance s.
+    """Straight line of locked positions and parameters, as a function of its length s.
 
     Attributes:
-        system: with loops.
-        locked: indices in q.
-        ends: (nq,) configurations at the start and at the end, of which locked positions count.
+        system: mechanism with loops.
+        locked: indices in q of the locked positions.
+        ends: (nq,) configurations at the start and at the end. Only locked positions count.
         parameters: (np,) values at the start and at the end.
-        length: of the line [rad or sizes of the mechanism].
+        length: length of the line [rad or sizes of the mechanism].
         scales: (nq,) unit of each position: 1 rad, or the size of the mechanism [m].
     """
 
@@ -496,13 +499,13 @@ class _Line:
     scales: Vector
 
     def closing(self, s: float) -> Closing:
-        """Closure rows with the parameters at s."""
+        """Return the closure rows with the parameters at s."""
         first, last = self.parameters
         p = last if s == self.length else first + s / self.length * (last - first)
         return Closing(self.system, p, self.locked)
 
     def placed(self, q: Vector, s: float) -> Vector:
-        """The configuration q with the locked positions at s."""
+        """Return the configuration q with the locked positions at s."""
         (first, last), indices = self.ends, list(self.locked)
         if s == self.length:
             at = last
@@ -514,7 +517,7 @@ class _Line:
         return _replace(q, indices, at[indices])
 
     def slope(self, q: Vector, s: float) -> Vector | None:
-        """(nq,) dq/ds of the branch through the closed q; None if the branch turns there."""
+        """Return dq/ds (nq,) of the branch through the closed q; None if the branch turns there."""
         if 0 < len(self.closing(s).free) < MANY:
             return self._exact_slope(q, s)
         ahead = s + _OFFSET if s + _OFFSET <= self.length else s - _OFFSET
@@ -525,7 +528,7 @@ class _Line:
         return slope if np.max(np.abs(slope / self.scales), initial=0.0) < _STEEP else None
 
     def _exact_slope(self, q: Vector, s: float) -> Vector | None:
-        """The same by the derivatives of the rows, which are accurate near singular branches."""
+        """Return dq/ds from derivatives of the rows, which is accurate near singular branches."""
         low, high = max(s - _OFFSET, 0.0), min(s + _OFFSET, self.length)
         before, after = self.placed(q, low), self.placed(q, high)
         rows = replace(self.closing(s), locked=()).rows(q)[1] @ (after - before)
@@ -538,7 +541,7 @@ class _Line:
         return slope if np.max(np.abs(slope / self.scales), initial=0.0) < _STEEP else None
 
     def _shortest(self, q: Vector, s: float, rows: Vector) -> Vector | None:
-        """(nq,) the smallest move of free positions by which the rows change; None if singular."""
+        """Return the smallest move (nq,) of free positions that gives a change of rows, or None."""
         closing = self.closing(s)
         scales = self.scales[closing.free]
         J = closing.rows(q)[1] / closing.sizes[:, None] * scales
@@ -552,14 +555,14 @@ class _Line:
         return move
 
     def _rank(self, rows: int, most: int) -> int:
-        """Rank of the derivative of the rows by the free positions where it is regular."""
+        """Return the rank of the rows by the free positions at regular configurations."""
         closure = self.system.closure
         return (
             most if closure is None else min(len(closure.rows) + len(self._free_norms(rows)), most)
         )
 
     def polished(self, q: Vector) -> Vector:
-        """The configuration at the end, to rounding if the loops are nearly singular there."""
+        """Return the end configuration, polished to rounding if the loops are nearly singular."""
         closing = self.closing(self.length)
         if not 0 < len(closing.free) < MANY:
             return q
@@ -571,7 +574,7 @@ class _Line:
         return q
 
     def side(self, q: Vector, s: float) -> float:
-        """Sign of the determinant of the loops by the free positions; 0 if it is not defined."""
+        """Return the sign of the determinant of the loops by free positions; 0 if undefined."""
         closure, closing = self.system.closure, self.closing(s)
         free = closing.free
         if closure is None or closure.varies or not 0 < len(free) < MANY:
@@ -581,13 +584,13 @@ class _Line:
         return float(np.linalg.slogdet(J[kept])[0]) if len(kept) == len(free) else 0.0
 
     def _free_norms(self, count: int) -> list[int]:
-        """Indices, among all rows, of norms of quaternions that are not locked as a whole."""
+        """Return the row indices of quaternion norms whose quaternion is not locked as a whole."""
         parts = [range(turn.start, turn.stop) for turn in quaternion_slices(self.system.tree)]
         first, locked = count - len(parts), set(self.locked)
         return [first + k for k, part in enumerate(parts) if not locked >= set(part)]
 
     def is_singular(self, q: Vector, s: float) -> bool:
-        """Whether the loops leave the free positions undetermined at q to first order."""
+        """Whether the loops do not determine the free positions at q to first order."""
         closing = self.closing(s)
         if not 0 < len(closing.free) < MANY:
             return False
@@ -606,21 +609,21 @@ def follow_configuration(
 ) -> Vector:
     """Return the configuration that is reached while locked positions, and p, move to a target.
 
-    Locked positions move on a straight line. The free ones follow on the constraint manifold, in
-    steps that are accepted if the step agrees with the slopes at both its ends: a jump to another
-    branch does not. The branch continues straight through a configuration in which it crosses
-    another one. If the branch does not lead to the target, but the loops are closed there with the
-    free positions of the start, these positions stay.
+    Locked positions move on a straight line. The free ones follow on the constraint manifold. A
+    step is accepted if it agrees with the slopes at both its ends, which excludes jumps to another
+    branch. At a crossing with another branch, the branch continues straight. If the branch does not
+    reach the target, but the loops are closed there with the free positions of the start, these
+    positions are returned.
 
     Source: Allgower and Georg 1990, chapters 2 and 8, for prediction, correction and crossings.
 
     Args:
-        system: with loops.
-        target: (nq,) configuration, of which the locked positions count.
-        locked: indices in q.
+        system: mechanism with loops.
+        target: (nq,) configuration. Only the locked positions count.
+        locked: indices in q of the locked positions.
         p: (np,) values of the parameters at the end of the line.
-        origin: closed configuration at which the line starts, and the parameters there; the
-            assembled configuration and default parameters if left out.
+        origin: closed configuration at which the line starts, and the parameters there. The default
+            is the assembled configuration with default parameters.
 
     Returns:
         q (nq,), its locked positions equal to the target's.
@@ -645,7 +648,7 @@ def follow_configuration(
 
 
 def _end_of_branch(line: _Line, start: Vector) -> Vector:
-    """The configuration (nq,) at the end of a line, on the branch of a start.
+    """Return the configuration (nq,) at the end of a line, on the branch of a start.
 
     Raises:
         Unclosable: the branch turns or the start is singular.
@@ -675,7 +678,7 @@ def _end_of_branch(line: _Line, start: Vector) -> Vector:
 
 
 def _singular_end(line: _Line, q: Vector) -> Vector:
-    """The configuration (nq,) at a singular end, extrapolated from configurations on the branch.
+    """Return the configuration (nq,) at a singular end, extrapolated from its branch.
 
     The closing rows determine a singular configuration to the square root of rounding only.
     """
@@ -695,7 +698,7 @@ def _singular_end(line: _Line, q: Vector) -> Vector:
 def _with_whole_quaternions(
     system: System, start: Vector, target: Vector, locked: tuple[int, ...]
 ) -> tuple[Vector, tuple[int, ...]]:
-    """The start with quaternions on the side of the target, and the locked positions.
+    """Return the start with quaternion signs nearest to the target, and the locked positions.
 
     A quaternion is locked as a whole if some of its elements are locked and the target has unit
     length: the norm changes along a line of single elements.
@@ -715,7 +718,7 @@ def _line(
     locked: tuple[int, ...],
     parameters: tuple[Vector, Vector],
 ) -> _Line:
-    """The line of locked positions, and of parameters, from a start to a target.
+    """Return the line of locked positions and of parameters from a start to a target.
 
     Positions that no loop depends on are at the target from the start.
 
@@ -749,7 +752,7 @@ _Point = tuple[Vector, Vector, float]
 
 
 def _step(line: _Line, point: _Point, s: float, to: float) -> _Point | None:
-    """One step on a branch from s; None if it may have left the branch."""
+    """Return the result of one step on a branch from s to `to`; None if it may leave the branch."""
     (q, slope, side), h = point, to - s
     predicted = line.placed(q + h * slope, to)
     found = line.closing(to).nearest(predicted)
@@ -774,7 +777,7 @@ def _step(line: _Line, point: _Point, s: float, to: float) -> _Point | None:
 
 
 def _ended(line: _Line, q: Vector, s: float, what: str) -> str:
-    """Message of a branch that ends or meets others, with the configurations at the target."""
+    """Return the error message for the end of a branch (`what`), with other configurations."""
     system, closing, target = line.system, line.closing(line.length), line.ends[1]
     where = closing.locked_positions(q) or "it"
     text = (
@@ -796,10 +799,10 @@ def _ended(line: _Line, q: Vector, s: float, what: str) -> str:
 
 
 def unwound(closing: Closing, q: Vector, start: Vector) -> Vector:
-    """The configuration with angles within half a turn of the start, if that closes the loops.
+    """Return q with angles within half a rotation of the start, if that closes the loops; else q.
 
-    Of a quaternion and its negative, which are the same orientation, the one nearer to the start is
-    taken; of two that are equally near, the one whose first element is positive.
+    A quaternion gets the sign nearer to the start. If both signs are equally near, its first
+    nonzero element is positive.
     """
     near: Vector = start + difference(closing.system, q, start)
     for part in quaternion_slices(closing.system.tree):
@@ -809,7 +812,7 @@ def unwound(closing: Closing, q: Vector, start: Vector) -> Vector:
 
 
 def _sign(quaternion: Vector, start: Vector) -> float:
-    """1, or -1 where the negative of a quaternion is nearer to the start."""
+    """Return -1 if the negative of a quaternion is nearer to the start, else 1."""
     for value in (float(quaternion @ start), *quaternion):
         if abs(value) > _HALF_TURN:
             return float(np.sign(value))
@@ -817,7 +820,7 @@ def _sign(quaternion: Vector, start: Vector) -> float:
 
 
 def candidates(closing: Closing, start: Vector, most: int = _CANDIDATES) -> list[Vector]:
-    """Closed configurations with the locked positions of the start, nearest first.
+    """Return closed configurations with the locked positions of the start, nearest first.
 
     Positions that no loop depends on stay at the start.
 
@@ -858,7 +861,7 @@ def candidates(closing: Closing, start: Vector, most: int = _CANDIDATES) -> list
 
 
 _HALF_TURN = 1e-6
-"""Elements and scalar products of unit quaternions that decide no sign, and differences from half a
-turn [rad] that do not: rounding is below. Bars in one line have angles of half a turn."""
+"""Size below which elements and scalar products of unit quaternions, and differences from half a
+rotation [rad], are rounding and decide no sign: bars in one line have angles of half a rotation."""
 _OTHER = 1e-4
-"""Smallest difference of two listed configurations [rad or m]; iterations leave 1e-10."""
+"""Smallest difference between two listed configurations [rad or m]: iterations leave 1e-10."""

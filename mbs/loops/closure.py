@@ -1,7 +1,7 @@
-"""The equations that close the loops: rows of each cut joint, and couplings of coordinates.
+"""Closure equations of loops: constraint rows of each cut joint, and couplings of coordinates.
 
-Each closing joint allows some motion between its two frames; the rows say that nothing else
-moves. Lengths are in metres, directions are cosines, so that a row is zero when closed.
+A closing joint allows some relative motions of its two frames. Its rows are zero if the frames
+differ by such a motion only. Lengths are in metres; directions are cosines.
 
 Source: Khalil & Creusot 1997, section 3.4; rows by joint type as in Haug 1989, chapter 9.
 """
@@ -27,20 +27,20 @@ from mbs.recursions.parts import PartsAt, part_rows
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose, cross
 
-# How frames of cut joints move: velocities from the rates of their poses.
+# Relative velocities of the frames of cut joints, from the rates of their poses.
 
 
 def cut_twist(system: System, pose: Pose, q: SX, v: SX) -> tuple[SX, SX]:
-    """Velocity (3, 1) of the origin and angular velocity (3, 1) of a frame seen from another one.
+    """Return velocity (3, 1) of the origin and angular velocity (3, 1) of a frame, relative.
 
     Args:
-        system: with closed loops.
-        pose: of the frame at the positions q, such as that of frame_b seen from frame_a.
+        system: mechanism with closed loops.
+        pose: pose of the frame at the positions q, such as frame_b relative to frame_a.
         q: (nq, 1) symbols of positions.
         v: (nv, 1) velocities of the tree.
 
     Returns:
-        both in the axes from which the frame is seen [m/s, rad/s].
+        Both vectors in the axes of the reference frame of `pose` [m/s, rad/s].
     """
     rate = position_rate(system.tree, q, v)
     R_dot = casadi.reshape(casadi.jtimes(casadi.vec(pose.R), q, rate), 3, 3)
@@ -48,11 +48,11 @@ def cut_twist(system: System, pose: Pose, q: SX, v: SX) -> tuple[SX, SX]:
     return casadi.jtimes(pose.p, q, rate), casadi.vertcat(spin[2, 1], spin[0, 2], spin[1, 0])
 
 
-# Rolling discs, which bind velocities too.
+# Rolling discs, which also constrain velocities.
 
 
 def slip_rows(system: System, q: SX) -> list[tuple[str, SX]]:
-    """By name, the rows (k, nv) on velocities of every rolling disc and component that has some."""
+    """Return name and velocity rows (k, nv) of each rolling disc, component and damped node."""
     v = SX.sym("v", system.nv)
     result = []
     for cut, disc in rolling_discs(system):
@@ -71,13 +71,13 @@ def slip_rows(system: System, q: SX) -> list[tuple[str, SX]]:
 
 
 def drift_rows(system: System, q: SX) -> SX | None:
-    """Values of the rows of damped massless nodes at rest. None without such rows."""
+    """Return the values of the velocity rows of damped massless nodes at v = 0, or None."""
     rows = velocity_balance_rows(system, q, SX.zeros(system.nv))
     return casadi.vertcat(*(row.value for _, row in rows[0][1])) if rows else None
 
 
 def least_upright(system: System) -> Function:
-    """``upright(q, p)``: the smallest sine between a rolling disc and its plane."""
+    """Return ``upright(q, p)``: the smallest sine between a rolling disc and its plane."""
 
     def build() -> Function:
         q = SX.sym("q", system.nq)
@@ -92,19 +92,19 @@ def least_upright(system: System) -> Function:
 
 
 def rolling_discs(system: System) -> Iterator[tuple[Cut, RollingDisc]]:
-    """The rolling discs of a system and where they are."""
+    """Yield the cut joint and the component of each rolling disc."""
     for cut in system.cuts:
         if isinstance(cut.edge.joint, RollingDisc):
             yield cut, cut.edge.joint
 
 
 def pose_on_plane(system: System, q: SX, cut: Cut, disc: RollingDisc) -> Pose:
-    """Frame_b of a rolling disc in axes at frame_a whose z is the normal of the plane."""
+    """Return frame_b of a rolling disc relative to axes at frame_a with z normal to the plane."""
     return disc.on_plane(relative_pose(system.tree, q, *cut.frames))
 
 
 def closure(system: System) -> Function:
-    """``closure(q) -> phi``: zero when every loop is closed.
+    """Return ``closure(q) -> phi``: the closure residual, zero if all loops are closed.
 
     Returns:
         Function of q (nq, 1); phi (m, 1) [m or 1], one element for each label of
@@ -119,29 +119,29 @@ def closure(system: System) -> Function:
 
 
 def closure_rows(system: System, q: SX) -> SX:
-    """(m, 1) all closure rows at the positions q, (nq, 1)."""
+    """Return all closure rows (m, 1) at the positions q (nq, 1)."""
     found = _equations(system)
     return casadi.substitute(found.rows, found.q, q)
 
 
 def independent_closure(system: System, q: SX) -> SX:
-    """(r, 1) the closure rows that the analysis kept, at the symbols q."""
+    """Return the independent closure rows (r, 1), found by the analysis, at the symbols q."""
     if system.closure is None:
         raise ModelError(f"{system.name}: an open chain has no closure; use the open-chain models")
     return closure_rows(system, q)[list(system.closure.rows)]
 
 
 def square_closure(system: System, q: SX, passive: Sequence[int], ties: SX | None = None) -> SX:
-    """As many equations as passive positions that are zero where the loops are closed.
+    """Return as many equations as passive positions, which are zero if the loops are closed.
 
-    They are the independent rows; where no choice of rows is independent everywhere, the slopes
-    of the sum of the squares of all rows.
+    They are the independent rows. If no selection of rows is independent in all configurations,
+    they are the gradient of half the sum of squares of all rows.
 
     Args:
-        system: with closed loops.
+        system: mechanism with closed loops.
         q: (nq, 1) symbols.
-        passive: numbers of the positions to be solved for.
-        ties: (k, 1) further equations, where a quaternion is solved for that may turn.
+        passive: indices in q of the unknowns.
+        ties: (k, 1) further equations for the independent rotation of an unknown quaternion.
     """
     norms = [norm for part, norm in norms_of(system.tree, q) if part.start in passive]
     more = casadi.vertcat(SX(0, 1), *norms, SX(0, 1) if ties is None else ties)
@@ -154,12 +154,12 @@ def square_closure(system: System, q: SX, passive: Sequence[int], ties: SX | Non
 
 @dataclass(frozen=True, slots=True)
 class RowGroup:
-    """The rows of a loop, a coupling or a component.
+    """Constraint rows of a loop, a coupling or a component.
 
     Attributes:
-        name: of the cut joint, the coupling or the component.
-        positions: label and unit of each row that binds positions.
-        velocities: likewise of those that bind velocities alone.
+        name: name of the cut joint, the coupling or the component.
+        positions: label and unit of each row that constrains positions.
+        velocities: label and unit of each row that constrains velocities only.
     """
 
     name: str
@@ -168,7 +168,7 @@ class RowGroup:
 
 
 def row_groups(system: System) -> tuple[RowGroup, ...]:
-    """The rows of all loops, couplings and components, in their order."""
+    """Return the rows of all loops, couplings and components, in their order."""
 
     def build() -> tuple[RowGroup, ...]:
         slips = {
@@ -190,24 +190,24 @@ def row_groups(system: System) -> tuple[RowGroup, ...]:
 
 
 def position_rows(system: System) -> list[tuple[str, str, str]]:
-    """Name of the group, label and unit of every row that binds positions."""
+    """Return group name, label and unit of each row that constrains positions."""
     return [(g.name, label, unit) for g in row_groups(system) for label, unit in g.positions]
 
 
 def velocity_row_units(system: System) -> list[str]:
-    """The unit of every row that binds velocities alone, as if it were integrated."""
+    """Return the unit of each velocity row, integrated over time: "m" for m/s."""
     return [unit for group in row_groups(system) for _, unit in group.velocities]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Equations:
-    """What closes the loops, written once for a system.
+    """Closure equations of a system.
 
     Attributes:
-        q: (nq, 1) the symbols.
-        labels: of the rows, each with its unit, by loop.
-        rows: (m, 1) all of them.
-        cosines: (k, 1) that must be positive.
+        q: (nq, 1) symbols of positions.
+        labels: label and unit of each row, by loop.
+        rows: (m, 1) all rows.
+        cosines: (k, 1) expressions that must be positive.
     """
 
     q: SX
@@ -247,15 +247,15 @@ def _equations(system: System) -> _Equations:
 
 
 def _unit(label: str) -> str:
-    """The unit of a row of a cut joint: forces act along lengths, moments along cosines."""
+    """Return the unit of a row of a cut joint: 1 (cosine) for moments, m for forces."""
     return "1" if label.startswith("moment") else "m"
 
 
 def facing(system: System, q: SX) -> SX:
-    """(k, 1) cosines that must be positive: axes that are aligned and not opposed.
+    """Return cosines (k, 1) that must be positive for axes to be aligned and not opposed.
 
-    The rows of a joint with an axis are zero for opposed axes as well; a configuration is only
-    right when these are positive.
+    The rows of a joint with an axis are zero for opposed axes too. Only a configuration with
+    positive cosines is correct.
     """
     found = _equations(system)
     return casadi.substitute(found.cosines, found.q, q)

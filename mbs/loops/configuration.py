@@ -1,4 +1,4 @@
-"""Configurations that close the loops, and the start of a motion."""
+"""Configurations that close the loops, and initial positions and velocities of a motion."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ from mbs.solvers.rank import RELATIVE_GAP, null_space
 from mbs.text import did_you_mean, quoted
 
 Values = Mapping[str, float] | Sequence[float] | None
-"""Positions or velocities by name, or all of them in their order."""
+"""Positions or velocities by name, or all of them in order."""
 
 Start = Values | State | Result
-"""Positions or velocities, or those of a state; the state of a `Result` is its last one."""
+"""Positions or velocities, or a state. For a `Result`, the last state is used."""
 
 Guess = Mapping[str, float] | State | Result | None
-"""Approximate positions by name, or those of a state."""
+"""Approximate positions by name, or a state with positions."""
 
 _RESTARTS = 60
 _SEED = 20260101
@@ -56,35 +56,35 @@ def solve(
     branch: str | Sequence[str] | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Vector:
-    """A configuration with the given positions that closes the loops.
+    """Return a configuration that closes the loops and has the given positions.
 
-    All positions by name are accepted as they are if they close the loops. Without a guess the
-    given positions move on a straight line from the assembled configuration, and the others follow
-    on the constraint manifold, in steps that keep the branch. With a guess the nearest
-    configuration is returned; a guess of all positions that closes the loops is the start of the
-    branch. With a branch the loops are closed by closed forms (`mbs.loops.function`).
+    If all positions are given by name and close the loops, they are returned unchanged. Without a
+    guess, the given positions move on a straight line from the assembled configuration, and the
+    others follow on the constraint manifold, in steps that keep the branch. With a guess, the
+    nearest configuration is returned. If the guess contains all positions and closes the loops, the
+    path starts from it. With a branch, closed forms are used (`mbs.loops.function`).
 
     Args:
-        system: the assembled mechanism.
-        q_active: positions of the independent joints in the order of `system.free`, those left
-            out staying as in the assembled configuration; or positions of any joints by name; or a
-            `State`. Beside all independent joints, positions of others choose the branch and are
-            checked.
-        guess: approximate positions of other joints, which choose the branch; also of joints that
-            are cut. They keep their values if the loops leave a motion for that.
-        branch: labels of `mbs.loops.modes` instead, such as "j3:+"; a loop that no label names
-            stays as it was assembled. Positions are then those of independent joints.
-        parameters: values of symbols, the others at their defaults.
+        system: assembled mechanism.
+        q_active: positions of the independent joints in the order of `system.free`, or positions of
+            any joints by name, or a `State`. Missing independent joints keep their assembled
+            positions. If all independent joints are given, further joints select the branch and
+            are checked.
+        guess: approximate positions of other joints, cut joints included, which select the branch.
+            The joints keep these values if the loops leave a motion for that.
+        branch: labels from `mbs.loops.modes`, such as "j3:+", as an alternative to a guess. A loop
+            without a label keeps its assembled branch. Only independent joints can be given then.
+        parameters: values of symbols by name. Missing symbols have their default values.
 
     Returns:
         q (nq,) [rad or m].
 
     Raises:
-        Unclosable: no configuration was found, or the branch ends before the given positions; the
+        Unclosable: no configuration was found, or the branch ends before the given positions. The
             message lists the configurations that have these positions.
         LoopError: all positions are given and leave the loops open.
-        NoClosedForm: a branch was named, but a loop is solved by iteration only.
-        ModelError: a name is unknown, or a value is not finite; or guess and branch are given.
+        NoClosedForm: a branch is given, but a loop can be solved by iteration only.
+        ModelError: a name is unknown, a value is not finite, or guess and branch are both given.
     """
     require_system(system)
     given: Values = system.plain_names(positions_of(q_active), POSITIONS)
@@ -112,7 +112,7 @@ def _closed(
     guess: Mapping[str, float],
     parameters: Mapping[str, float] | None,
 ) -> Vector:
-    """The configuration (nq,) of `solve` with positions by name."""
+    """Return the configuration (nq,) of `solve` for positions by name."""
     p = closure_parameters(system, parameters)
     at_cut = system.positions_at_cuts(guess)
     own = {name: value for name, value in guess.items() if name not in at_cut}
@@ -149,7 +149,7 @@ def _coordinate_names(system: System) -> list[str]:
 
 
 def _indices(system: System, names: Collection[str]) -> list[int]:
-    """Indices in q of named coordinates."""
+    """Return the indices in q of named coordinates."""
     return [k for k, c in enumerate(system.coordinates) if c.name in names]
 
 
@@ -191,16 +191,16 @@ def _with_dependent_positions(
 
 
 def _with_positions(q: Vector, target: Vector, indices: Sequence[int]) -> Vector:
-    """The configuration q with some positions of the target."""
+    """Return q with the positions at `indices` replaced by the target's positions."""
     result = q.copy()
     result[list(indices)] = target[list(indices)]
     return result
 
 
 def _guessed_configuration(closing: Closing, start: Vector, guess: Mapping[str, float]) -> Vector:
-    """The configuration whose guessed positions are nearest to their guesses, (nq,).
+    """Return the configuration (nq,) whose guessed positions are nearest to their guesses.
 
-    The search is that of `mbs.loops.assembled`. The target of a cut joint without a guess
+    The search method is that of `mbs.loops.assembled`. The target of a cut joint without a guess
     is its position in the assembled configuration.
     """
     system, p = closing.system, closing.p
@@ -212,15 +212,15 @@ def _guessed_configuration(closing: Closing, start: Vector, guess: Mapping[str, 
 
 
 def closed_configuration(closing: Closing, start: Vector, restarts: int = _RESTARTS) -> Vector:
-    """The configuration near `start`, (nq,), that Gauss-Newton finds, with restarts.
+    """Return a configuration near `start` (nq,), found by Gauss-Newton with restarts.
 
     Args:
-        closing: the rows, and the positions that must not change.
-        start: first guess.
-        restarts: how many other starts to try.
+        closing: closure rows and the locked positions.
+        start: (nq,) first guess.
+        restarts: number of further starts.
 
     Raises:
-        Unclosable: none was found; the message says by how much the loops stay open.
+        Unclosable: no configuration was found. The message contains the smallest closure error.
     """
     best: Closed | None = None
     for q in starts(start, closing.free, restarts):
@@ -238,7 +238,7 @@ def closed_configuration(closing: Closing, start: Vector, restarts: int = _RESTA
 
 
 def starts(first: Vector, free: list[int], restarts: int = _RESTARTS) -> Iterator[Vector]:
-    """The guess, then guesses ever further away from it."""
+    """Yield the guess, then random starts at increasing distances from it, always the same."""
     rng = np.random.default_rng(_SEED)
     yield first
     for k in range(restarts):
@@ -251,10 +251,10 @@ def starts(first: Vector, free: list[int], restarts: int = _RESTARTS) -> Iterato
 def require_closed(
     system: System, q: Vector, parameters: Mapping[str, float] | None = None
 ) -> None:
-    """Refuse a configuration that does not close the loops.
+    """Raise if a configuration does not close the loops.
 
     Raises:
-        LoopError: says how far it is open.
+        LoopError: the loops are open. The message contains the closure error.
     """
     _require_joined(Closing(system, closure_parameters(system, parameters)), q)
 
@@ -286,14 +286,14 @@ def _require_joined(closing: Closing, q: Vector) -> None:
         )
 
 
-# The start of a motion: positions that close the loops, and velocities that keep them closed.
+# Initial state of a motion: positions that close the loops, and velocities that keep them closed.
 
 
 _FITS, _SLOW = 1e-6, 1e-9
-"""Part of velocities, and a velocity [rad/s or m/s], by which they may differ from those asked for:
-what does not fit differs by about its own size, what fits by rounding."""
+"""Relative and absolute [rad/s or m/s] error of velocities that satisfy the request: velocities
+that the loops forbid have errors of their own size, others have rounding errors."""
 _REFINEMENTS = 3
-"""Solutions added up: the second takes the error of the first away, the third shows no change."""
+"""Number of summed solutions: the second one corrects the first, the third one changes nothing."""
 
 
 def start(
@@ -303,21 +303,21 @@ def start(
     parameters: Mapping[str, float] | None,
     guess: Guess = None,
 ) -> tuple[Vector, Vector]:
-    """Positions (nq,) that close the loops and velocities (nv,) that fit them.
+    """Return initial positions (nq,) that close the loops and velocities (nv,) that fit them.
 
     Args:
-        system: open or closed.
-        q0: positions by coordinate name [rad or m], the others as in the assembled configuration;
-            in a closed system the loops are closed with the independent ones as given; or a
-            `State`.
-        v0: velocities by name [rad/s or m/s], the others zero; in a closed system they may be of
-            any joints, and the others follow; those of the state if left out.
-        parameters: values of symbols, the others at their defaults.
-        guess: approximate positions of other joints, which choose the branch.
+        system: open or closed mechanism.
+        q0: positions by coordinate name [rad or m], or a `State`. Missing positions are those of
+            the assembled configuration. A closed system is closed with the given independent
+            positions.
+        v0: velocities by name [rad/s or m/s]. Missing velocities are zero. In a closed system any
+            joints may be given, and the others follow. The default is the velocity of the state.
+        parameters: values of symbols by name. Missing symbols have their default values.
+        guess: approximate positions of other joints, which select the branch.
 
     Raises:
         Unclosable: the loops cannot be closed at these positions.
-        LoopError: q0 holds all positions and leaves the loops open.
+        LoopError: q0 contains all positions and leaves the loops open.
         ModelError: a name is unknown, a quaternion is not of unit length, or the loops allow no
             motion with these velocities.
     """
@@ -334,7 +334,7 @@ def start_position(
     parameters: Mapping[str, float] | None,
     guess: Guess = None,
 ) -> Vector:
-    """(nq,) the positions of `start`."""
+    """Return the initial positions (nq,) of `start`."""
     given: Values = system.plain_names(positions_of(q0), POSITIONS)
     if guess is not None and not isinstance(given, Mapping | None):
         raise ModelError(
@@ -356,13 +356,13 @@ def start_position(
 def start_velocity(
     system: System, q: Vector, v0: Values, parameters: Mapping[str, float] | None
 ) -> Vector:
-    """(nv,) the velocities of `start` at its positions q.
+    """Return the initial velocities (nv,) of `start` at its positions q.
 
-    They are the smallest that keep the loops closed and give the joints named in v0 theirs. Springs
-    of joints stay at rest if the loops allow it.
+    They are the smallest velocities that keep the loops closed and agree with v0. Joints with
+    springs stay at rest if the loops allow it.
 
     Raises:
-        ModelError: no motion of the loops has these velocities.
+        ModelError: the loops allow no motion with these velocities.
     """
     v0 = system.plain_names(v0, VELOCITIES)
     if not system.is_closed:
@@ -388,7 +388,7 @@ def start_velocity(
 
 
 def _spring_speeds(system: System) -> list[str]:
-    """Names of the velocities of joints with springs."""
+    """Return the names of the velocities of joints with springs."""
     return [
         system.speeds[link.v.start].name
         for link in system.tree.links
@@ -404,8 +404,8 @@ def node_velocities(system: System, J: Vector, q: Vector, p: Vector) -> Vector |
     They solve J v + g = 0. None if the system has no such nodes.
 
     Args:
-        system: any.
-        J: (m, nv) every row of the constraints.
+        system: open or closed mechanism.
+        J: (m, nv) all constraint rows.
         q: (nq,) positions.
         p: (np,) parameters.
     """
@@ -420,16 +420,16 @@ def node_velocities(system: System, J: Vector, q: Vector, p: Vector) -> Vector |
 def smallest_velocity(
     system: System, J: Vector, v0: Values, own: Vector | None = None
 ) -> tuple[Vector, str]:
-    """The smallest velocities with J v = 0 that give the joints named in v0 theirs.
+    """Return the smallest velocities with J v = 0 that agree with v0.
 
     Args:
-        system: any.
-        J: (m, nv) rows, dependent ones included.
+        system: open or closed mechanism.
+        J: (m, nv) constraint rows, dependent rows included.
         v0: velocities by name [rad/s or m/s], or all of them.
-        own: (nv,) velocities to which these are added, of which v0 has the sum.
+        own: (nv,) offset: v - own satisfies J (v - own) = 0 and is the smallest.
 
     Returns:
-        v (nv,); the velocities of v0 as text where no v has them, else an empty one.
+        v (nv,), and the velocities of v0 as text if no v agrees with them, else an empty text.
     """
     target = np.array(system.velocity(v0))
     if own is not None:
@@ -442,7 +442,7 @@ def smallest_velocity(
     closed = np.all(np.abs(J @ v) <= _FITS * np.linalg.norm(J, axis=1) * np.linalg.norm(v))
     if closed and _fit(v[rows], target[rows]):
         return v, ""
-    # rows that are nearly dependent: what they leave free decides
+    # for nearly dependent rows, test the velocities in the null space of J
     free = null_space(J)
     near: Vector = free @ np.linalg.lstsq(free[rows], target[rows], rcond=None)[0]
     if _fit(near[rows], target[rows]):
@@ -451,7 +451,7 @@ def smallest_velocity(
 
 
 def _less(system: System, v0: Values, own: Vector) -> Values:
-    """Return velocities as they are given, less others (nv,)."""
+    """Return the velocities v0 minus the velocities `own` (nv,), in the format of v0."""
     less = np.array(system.velocity(v0)) - own
     if v0 is None:
         return None
@@ -461,14 +461,15 @@ def _less(system: System, v0: Values, own: Vector) -> Values:
 
 
 def _fit(v: Vector, target: Vector) -> bool:
-    """Whether velocities are those asked for."""
+    """Whether velocities agree with the required ones, up to `_FITS` and `_SLOW`."""
     return bool(np.all(np.abs(v - target) <= _SLOW + _FITS * np.abs(target)))
 
 
 def _refine(J: Vector, rows: list[int], target: Vector) -> Vector:
-    """The smallest v (nv,) with J v = 0 and v[rows] = target, where there is one, to the last bit.
+    """Return the smallest v (nv,) with J v = 0 and v[rows] = target, if one exists, bit by bit.
 
-    A basis of what J leaves free carries 1e-14 of noise, which differs from processor to processor.
+    The result is the same on all processors. A solution by a basis of the null space of J has noise
+    of 1e-14, which depends on the processor.
     """
     K = np.vstack([J, np.eye(J.shape[1])[rows]])
     goal = np.concatenate([np.zeros(len(J)), target])

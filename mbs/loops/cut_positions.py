@@ -1,4 +1,4 @@
-"""Positions of the joints that are cut to open loops, read from the frames at the cut."""
+"""Positions of cut joints, computed from the two frames at each cut."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from mbs.spatial import Pose, cross
 
 
 def cut_positions(system: System) -> Function:
-    """``cut_positions(q, p) -> c``: positions of `system.cut_coordinates` [rad, m, quaternion].
+    """Return ``cut_positions(q, p) -> c``: positions of cut joints [rad, m, quaternion].
 
-    Angles are between -pi and pi. The first element of a quaternion is not negative.
+    The order is that of `system.cut_coordinates`. Angles are between -pi and pi. The first element
+    of a quaternion is not negative.
     """
 
     def build() -> Function:
@@ -45,7 +46,7 @@ def cut_positions(system: System) -> Function:
 
 
 def cut_positions_and_slopes(system: System) -> OnArrays:
-    """``(q, p) -> c, s``: positions of `system.cut_coordinates`, and their derivative (c, nq)."""
+    """Return ``(q, p) -> c, s``: positions (c,) of cut joints, and their derivative (c, nq)."""
 
     def build() -> OnArrays:
         q, p = SX.sym("q", system.nq), SX.sym("p", system.p.numel())
@@ -58,12 +59,12 @@ def cut_positions_and_slopes(system: System) -> OnArrays:
 
 
 def cut_position(cut: Cut, number: int, pose: Pose) -> SX:
-    """Position of one freedom of a cut joint [rad or m].
+    """Return the position of one freedom of a cut joint [rad or m].
 
     Args:
-        cut: the joint.
+        cut: cut joint.
         number: index of the freedom in the joint.
-        pose: frame_b of the joint in frame_a.
+        pose: pose of frame_b of the joint relative to frame_a.
     """
     joint = cut.edge.joint
     freedom = joint.freedoms[number]
@@ -80,5 +81,5 @@ def cut_position(cut: Cut, number: int, pose: Pose) -> SX:
 
 
 def _angle(axis: SX, start: SX, end: SX) -> SX:
-    """The rotation about an axis that brings `start` to `end` [rad]; both are orthogonal to it."""
+    """Return the rotation about `axis` from `start` to `end` [rad]; both are orthogonal to it."""
     return casadi.atan2(casadi.dot(cross(axis, start), end), casadi.dot(start, end))

@@ -1,4 +1,4 @@
-"""What a configuration is worth: whether it closes the loops, and how freely it moves there."""
+"""Check of a configuration: closure of the loops, and distance from a singular configuration."""
 
 from __future__ import annotations
 
@@ -28,23 +28,24 @@ from mbs.solvers.rank import rank
 Vector = NDArray[np.float64]
 
 _DETERMINED = 1e-14
-"""Squared sine between rows of the passive joints below which these follow no longer."""
+"""Squared sine between rows of the passive joints below which the independent joints no longer
+determine the passive ones."""
 LEAST_SINE = 2.5e-5
-"""The same for second derivatives, which magnify the rounding of a closed configuration by the
-third power of the inverse sine and by squared speeds: 1e-16 becomes 1e-8 at a sine of 5e-3 and
-speeds of one. `mbs.loops.accuracy` tests what large speeds leave of it."""
+"""Squared sine that second derivatives need. They multiply the rounding of a closed configuration
+by the third power of the inverse sine and by squared speeds: 1e-16 becomes 1e-8 at a sine of 5e-3
+and speeds of one. `mbs.loops.accuracy` checks the accuracy at large speeds."""
 
 
 @dataclass(frozen=True, slots=True)
 class ConfigurationState:
-    """A configuration of a system with loops.
+    """Closure and singularity of a configuration of a system with loops.
 
     Attributes:
-        residual: largest closure row [m or 1].
-        opening: the same with lengths as parts of the size of the mechanism.
+        residual: largest absolute closure row [m or 1].
+        opening: largest absolute closure row, with lengths divided by the size of the mechanism.
         mobility: number of independent velocities at this configuration.
-        generic: the same at configurations that are not singular.
-        leads: 1 where the independent joints lead the others well, 0 where they cannot: the
+        generic: number of independent velocities at configurations that are not singular.
+        leads: measure from 0 to 1 of how well the independent joints determine the passive ones:
             smallest squared sine between a row of the passive joints and the rows before it.
     """
 
@@ -61,27 +62,27 @@ class ConfigurationState:
 
     @property
     def is_singular(self) -> bool:
-        """Whether the mechanism can move in more ways here, as where two branches meet."""
+        """Whether the mobility is larger here than in general, as where two branches meet."""
         return self.mobility > self.generic
 
     @property
     def is_led(self) -> bool:
-        """Whether the independent joints determine how the others move."""
+        """Whether the independent joints determine the motion of the passive joints."""
         return self.leads > _DETERMINED
 
 
 def examine(
     system: System, q: Sequence[float], *, parameters: Mapping[str, float] | None = None
 ) -> ConfigurationState:
-    """How a configuration closes the loops of a system, and whether it is singular.
+    """Return the closure error of a configuration, its mobility and its distance from singularity.
 
     Args:
-        system: with closed loops.
+        system: mechanism with closed loops.
         q: (nq,) positions [rad or m].
-        parameters: values of symbols, the others at their defaults.
+        parameters: values of symbols by name. Missing symbols have their default values.
 
     Raises:
-        ModelError: the system is an open chain, or q does not fit it.
+        ModelError: the system is an open chain, or q has a wrong size.
     """
     require_system(system)
     if system.closure is None:
@@ -98,18 +99,18 @@ def examine(
 
 
 def require_determined(system: System, q: Vector, p: Vector, least: float = _DETERMINED) -> None:
-    """Raise an error at a configuration at which a model in independent joints has no meaning.
+    """Raise if a model in independent joints is undefined or inaccurate at a configuration.
 
     Args:
-        system: with closed loops.
+        system: mechanism with closed loops.
         q: (nq,) positions.
         p: (np,) parameters.
-        least: squared sine between rows of the passive joints that the model needs.
+        least: smallest squared sine between rows of the passive joints that the model accepts.
 
     Raises:
         Unclosable: the configuration leaves the loops open.
-        SingularPosture: the independent joints do not determine how the others move, or not well
-            enough for the model.
+        SingularPosture: the independent joints do not determine the motion of the other joints, or
+            not accurately enough for the model.
     """
     residual, leads, opening = (float(x) for x in configuration_health(system)(q, p))
     if opening > OPEN:
@@ -139,9 +140,9 @@ def loop_rows(system: System, q: SX, least: float = _DETERMINED) -> list[Validit
     """Return the conditions on a configuration of closed loops for models in independent joints.
 
     Args:
-        system: with closed loops.
+        system: mechanism with closed loops.
         q: (nq, 1) positions.
-        least: squared sine between rows of the passive joints that the model needs.
+        least: smallest squared sine between rows of the passive joints that the model accepts.
     """
     _, leads, opening = configuration_health(system)(q, system.p)
     return [
@@ -157,11 +158,11 @@ def loop_rows(system: System, q: SX, least: float = _DETERMINED) -> list[Validit
 
 
 DETERMINED = ConfigurationCheck(loop_rows, require_determined)
-"""Closed loops whose independent joints lead the others."""
+"""Check that the loops are closed and that the independent joints determine the other joints."""
 
 
 def configuration_health(system: System) -> Function:
-    """``health(q, p) -> residual, leads, opening``; see `ConfigurationState`."""
+    """Return ``health(q, p) -> residual, leads, opening``; see `ConfigurationState`."""
 
     def build() -> Function:
         q = SX.sym("q", system.nq)
@@ -181,10 +182,10 @@ def configuration_health(system: System) -> Function:
 
 
 def row_independence(system: System) -> Function:
-    """``independence(q, p)``: how independent the kept rows are, 1 well and 0 not at all.
+    """Return ``independence(q, p)``: independence of the kept rows, from 0 (dependent) to 1.
 
-    It is the smallest squared sine between a row and the rows before it, passive and active
-    joints together.
+    It is the smallest squared sine between a row and the rows before it, with the columns of
+    passive and active joints.
     """
 
     def build() -> Function:
@@ -197,7 +198,7 @@ def row_independence(system: System) -> Function:
 
 
 def _scale(system: System, J: SX) -> SX:
-    """The kept rows, or all of them, in sizes that do not depend on units."""
+    """Return J, with the kept rows or all rows, scaled to be independent of units."""
     found, kept = scales(system), kept_rows(system)
     rows = found.rows[kept] if J.shape[0] == len(kept) else found.rows
     columns = DM(found.columns([speed.unit for speed in system.speeds]))
@@ -205,9 +206,9 @@ def _scale(system: System, J: SX) -> SX:
 
 
 def _independence(J: SX) -> SX:
-    """The smallest squared sine of the angle between a row of J and the rows before it.
+    """Return the smallest squared sine of the angle between a row of J and the rows before it.
 
-    A row that is shorter than one counts as one long: it may also vanish by itself.
+    A row with a norm below 1 counts with norm 1, so that a vanishing row also gives zero.
     """
     if J.shape[0] == 0:
         return SX(1)

@@ -1,4 +1,4 @@
-"""Positions of the whole tree from the independent ones, on one branch: in closed form, or not."""
+"""Functions from independent positions to all tree positions, in closed form or by Newton steps."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ from mbs.loops.plan import Stage, plan
 from mbs.numbers import has_boolean
 from mbs.text import did_you_mean, quoted
 
-# Positions as a user gives them: by name, or in the order of the independent joints.
+# Independent positions as user input: by name, or in the order of the independent joints.
 
 
 Given = Mapping[str, float] | Sequence[float] | None
 
 
 def independent_names(system: System) -> list[str]:
-    """The independent joints in the order of `system.free`."""
+    """Return the names of the independent joints, in the order of `system.free`."""
     return [system.speeds[k].name for k in system.free]
 
 
 def fixed_positions(system: System, values: Given) -> dict[str, float]:
-    """The given positions by name.
+    """Return the given positions as a dict by name.
 
     Raises:
         ModelError: a sequence does not fit the independent joints.
@@ -68,10 +68,10 @@ def _numbers(values: Any) -> list[float] | None:
 
 
 def independent_positions(system: System, values: Given) -> list[float]:
-    """The positions of the independent joints, those left out as in the assembled configuration.
+    """Return positions of all independent joints; missing ones from the assembled configuration.
 
     Raises:
-        ModelError: another joint is named, or a value is not finite.
+        ModelError: a joint is not independent, or a value is not finite.
     """
     fixed, names = fixed_positions(system, values), independent_names(system)
     indices = dict(zip(names, independent_indices(system), strict=True))
@@ -95,7 +95,7 @@ def independent_positions(system: System, values: Given) -> list[float]:
     ]
 
 
-# What positions an independent joint can reach on a branch, the others locked.
+# Ranges of positions that an independent joint can reach on a branch with other joints locked.
 
 
 _POINTS = 721
@@ -105,11 +105,11 @@ _DOUBLINGS = 10
 
 
 def reachable(system: System, loops: Function, q_a: Vector, p: Vector) -> str:
-    """The reachable ranges of the independent joints, each with the others as given, in words.
+    """Return text on the reachable range of each independent joint for fixed values of the others.
 
     Args:
-        system: of the loops.
-        loops: a closed form, q from q_a and p.
+        system: mechanism with the loops.
+        loops: closed form (q_a, p) -> q, NaN if q_a is unreachable.
         q_a: (m,) positions that cannot be reached.
         p: (np,) parameters.
     """
@@ -141,7 +141,7 @@ def _test(loops: Function, q_a: Vector, p: Vector, number: int) -> Callable[[flo
 def _span(
     system: System, k: int, value: float, is_reached: Callable[[float], bool]
 ) -> tuple[float, float]:
-    """Where to look: a whole turn, or a stroke about the assembled position that ends outside."""
+    """Return the range of the search: a full rotation, or a stroke around the assembled value."""
     if system.coordinates[k].unit == "rad":
         return -np.pi, np.pi
     middle = system.configuration[k]
@@ -156,7 +156,7 @@ def _span(
 def _intervals(
     is_reached: Callable[[float], bool], low: float, high: float
 ) -> list[tuple[float, float]]:
-    """The intervals between low and high in which positions are reached."""
+    """Return the intervals of reachable positions between `low` and `high`."""
     points = np.linspace(low, high, _POINTS)
     inside = np.array([is_reached(float(x)) for x in points])
     changes = np.flatnonzero(inside[1:] != inside[:-1])
@@ -166,7 +166,7 @@ def _intervals(
 
 
 def _edge(is_reached: Callable[[float], bool], low: float, high: float) -> float:
-    """Where reaching begins or ends between two positions."""
+    """Return the limit of the reachable range between two positions, by bisection."""
     first = is_reached(low)
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
@@ -178,18 +178,18 @@ def _edge(is_reached: Callable[[float], bool], low: float, high: float) -> float
 
 
 Branch = str | Sequence[str] | None
-"""Labels such as "j3:+", in one text with commas or as a sequence; None for the assembled one."""
+"""Labels such as "j3:+", as comma-separated text or a sequence; None for the assembled branch."""
 
 
 class LoopFunction(ModelFunction):
-    """A closed form; where it gives no configuration a call says what the joints can reach."""
+    """Closed form of the loops. A call without a solution raises with the reachable ranges."""
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        """Evaluate it as any model.
+        """Evaluate the closed form.
 
         Raises:
-            Unclosable: no configuration has these positions on this branch.
-            ModelError: an argument does not fit.
+            Unclosable: no configuration on this branch has these positions.
+            ModelError: an argument is invalid.
         """
         try:
             return super().__call__(*args, **kwargs)
@@ -202,7 +202,7 @@ class LoopFunction(ModelFunction):
     def _numbers(
         self, args: tuple[Any, ...], kwargs: dict[str, Any]
     ) -> tuple[Vector, Vector] | None:
-        """q_a and p where they are finite numbers of the right size for which there is no q."""
+        """Return finite numeric q_a and p of the right size; None for any other arguments."""
         try:
             given = self._given(args, kwargs)
             q_a = np.array(DM(given["q_a"]), dtype=float).ravel()
@@ -222,24 +222,24 @@ class LoopFunction(ModelFunction):
 
 
 def function(system: System, branch: Branch = None) -> Function:
-    """``loops(q_a) -> q``: the configuration for independent positions, without iteration.
+    """Return ``loops(q_a) -> q``: the configuration for independent positions, in closed form.
 
-    It can be differentiated as often as one likes. Angles that a loop gives are
-    within half a turn of zero.
+    The Function can be differentiated any number of times. Angles that a loop determines are within
+    half a rotation of zero.
 
     Args:
-        system: the assembled mechanism.
-        branch: labels of `mbs.loops.modes`, such as "j3:+"; a loop that no label names stays as
-            it was assembled.
+        system: assembled mechanism.
+        branch: labels from `mbs.loops.modes`, such as "j3:+". A loop without a label keeps its
+            assembled branch.
 
     Returns:
-        Function of q_a (m, 1) and the parameters p where there are any; q (nq, 1) [rad or m].
-        Called with numbers that no configuration of the branch has, it raises Unclosable and says
-        what can be reached; within symbols and maps q is NaN there.
+        Function of q_a (m, 1) and, if the system has parameters, p; q (nq, 1) [rad or m]. A numeric
+        call without a solution on the branch raises Unclosable with the reachable ranges. In
+        symbolic graphs and maps, q is NaN instead.
 
     Raises:
-        NoClosedForm: a loop is solved by iteration only.
-        ModelError: there is no such branch.
+        NoClosedForm: a loop can be solved by iteration only.
+        ModelError: the branch does not exist.
     """
     stages = plan(system)
     ways = _ways(system, stages, branch)
@@ -258,11 +258,11 @@ def function(system: System, branch: Branch = None) -> Function:
 def configuration_on(
     system: System, q_active: Given, branch: Branch, parameters: Mapping[str, float] | None
 ) -> Vector:
-    """The configuration (nq,) of a branch, from positions as a user gives them.
+    """Return the configuration (nq,) on a branch for independent positions from the user.
 
     Raises:
-        Unclosable: no configuration of the branch has these positions.
-        NoClosedForm: a loop is solved by iteration only.
+        Unclosable: no configuration on the branch has these positions.
+        NoClosedForm: a loop can be solved by iteration only.
         ModelError: a name is unknown, or a value is not finite.
     """
     loops = function(system, branch)
@@ -281,7 +281,7 @@ def _configuration(system: System, stages: Sequence[Stage], ways: Sequence[int],
 
 
 def _ways(system: System, stages: Sequence[Stage], branch: Branch) -> tuple[int, ...]:
-    """The number of the way in which each loop closes."""
+    """Return the branch index of each stage from the labels of `branch`."""
     labels = _labels(system, branch)
     known = [label for stage in stages for label in stage.labels if label]
     for label in labels:
@@ -315,29 +315,29 @@ def _way(system: System, stage: Stage, labels: Sequence[str]) -> int:
     return named[0] if named else stage.chosen
 
 
-# Positions of the whole tree from those of the independent joints, as a CasADi graph.
+# All tree positions from the independent positions, as a CasADi graph.
 
 
 _STAGES = 128
 _OPEN = 1e-9
-"""Sum of all rows, in parts of the size of the mechanism, where Newton's method ended: it leaves
-1e-13, or has missed by far."""
+"""Sum of all absolute rows, in sizes of the mechanism, above which Newton's method has failed: it
+leaves 1e-13 if it converges, and much more if it does not."""
 
 
 def follow_active(system: System) -> Function:
-    """``follow(q_a, p) -> q``: the configuration reached along a straight line of q_a.
+    """Return ``follow(q_a, p) -> q``: the configuration at the end of a straight line of q_a.
 
-    The independent positions, and the parameters from their defaults, are moved in small equal
-    stages, each closed by Newton's method from where the slope led: the branch of the assembled
-    configuration is kept, and the Function is differentiable (implicit function theorem). Where the
-    line leaves what the mechanism can reach, q is NaN.
+    The independent positions and the parameters move from their assembled and default values in
+    small equal stages. Newton's method closes each stage from a linear prediction, so that the
+    branch of the assembled configuration is kept. The Function is differentiable (implicit function
+    theorem). q is NaN if the line leaves the reachable positions.
 
     Returns:
         Function of q_a (m, 1) and p (np, 1); q (nq, 1).
 
     Raises:
-        NoClosedForm: an independent velocity belongs to a quaternion, so that no position of q
-            stands for it.
+        NoClosedForm: an independent velocity belongs to a quaternion, so that no element of q is
+            its position.
     """
 
     def build() -> Function:
@@ -386,14 +386,14 @@ def _newton(system: System, active: list[int], passive: list[int]) -> Function:
         rows = casadi.vertcat(rows[: own.numel(), 0] / own, rows[own.numel() :, 0])
     residual = casadi.substitute(rows, q, merged)
     equations = Function("phi", [z, q_a, system.p], [residual])
-    # rows in parts of the size of the mechanism: a tenth of what other iterations end with, since
-    # here nothing is lost by trying; a prediction from which thirty do not do leads nowhere
+    # Tolerance in sizes of the mechanism: a tenth of that of other iterations, at no extra cost.
+    # A prediction that needs more than 30 iterations does not converge.
     options = {"abstol": 1e-13, "max_iter": 30, "error_on_fail": False}
     return casadi.rootfinder("newton", "fast_newton", equations, options)
 
 
 def _stage(system: System, active: list[int], passive: list[int]) -> Function:
-    """``stage(led, q_a, p) -> z, good``: closed by Newton's method from the prediction."""
+    """Return ``stage(led, q_a, p) -> z, good``: passive positions by Newton from a prediction."""
     led, q_a = MX.sym("led", len(passive)), MX.sym("q_a", len(active))
     p = MX.sym("p", system.p.numel())
     z = _newton(system, active, passive)(led, q_a, p)
@@ -407,7 +407,7 @@ def _stage(system: System, active: list[int], passive: list[int]) -> Function:
 
 
 def _closed(system: System) -> Function:
-    """1 where every row is closed and no axis is opposed, else 0; NaN counts as open."""
+    """Return Function: 1 if all rows are closed and no axis is opposed, else 0; NaN is open."""
     q = SX.sym("q", system.nq)
     openness = casadi.sum1(casadi.fabs(relative_rows(system, q)))  # a maximum would drop NaN
     cosines = facing(system, q)

@@ -1,4 +1,4 @@
-"""Distance of configurations from a guess, also of the positions of joints that are cut."""
+"""Distance of configurations from a guess, which may contain positions of cut joints."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from mbs.loops.cut_positions import cut_positions_and_slopes
 Vector = NDArray[np.float64]
 
 EQUAL = 1e-6
-"""Difference of distances that are equal: configurations are closed to 1e-12, and branches of
+"""Difference below which distances are equal: configurations are closed to 1e-12, and branches of
 symmetric mechanisms are equally near up to rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GuessTarget:
-    """Positions of all joints that an assembled configuration is to be near to.
+    """Target positions of all joints for the search of the nearest closed configuration.
 
-    All positions are q, then the positions of joints that are cut. Therefore the comparison does
-    not depend on the joint of a loop that is cut.
+    All positions are q, then the positions of cut joints. Therefore the comparison does not depend
+    on which joint of a loop is cut.
 
     Attributes:
-        system: its loops need not be closed yet.
+        system: mechanism whose loops may be open.
         p: (np,) parameters.
         start: (nq,) positions.
         cut: (c,) positions of `system.cut_coordinates`; None if they do not count.
@@ -43,9 +43,9 @@ class GuessTarget:
 
     @staticmethod
     def at(closing: Closing, start: Vector, guessed: Sequence[int]) -> GuessTarget:
-        """The target of a start, and indices in q of its guessed positions.
+        """Return the target of a start, with indices in q of its guessed positions.
 
-        Positions of joints that are cut do not count.
+        Positions of cut joints do not count.
         """
         return GuessTarget(closing.system, closing.p, start, None, tuple(guessed))
 
@@ -57,14 +57,14 @@ class GuessTarget:
         guess: Mapping[str, float],
         cut: Vector | None = None,
     ) -> GuessTarget:
-        """The target of a start and a guess by coordinate name.
+        """Return the target of a start and a guess by coordinate name.
 
         Args:
-            system: its loops need not be closed yet.
+            system: mechanism whose loops may be open.
             p: (np,) parameters.
             start: (nq,) positions.
-            guess: guessed positions by name, also of joints that are cut.
-            cut: (c,) positions of joints that are cut, if they are not guessed. Zero if left out.
+            guess: guessed positions by name, cut joints included.
+            cut: (c,) positions of cut joints without a guess. The default is zero.
         """
         rows = system.cut_coordinates
         if cut is None:
@@ -75,7 +75,7 @@ class GuessTarget:
         return GuessTarget(system, p, start, np.array(at_cut, dtype=float), guessed)
 
     def closing(self, held: set[int]) -> Closing:
-        """The closure rows with some of all positions held at the target."""
+        """Return the closure rows with the positions of indices `held` fixed at the target."""
         nq = self.system.nq
         locked = tuple(sorted(k for k in held if k < nq))
         aims = () if self.cut is None else tuple(sorted(k - nq for k in held if k >= nq))
@@ -88,7 +88,7 @@ class GuessTarget:
         return own if self.cut is None else (*own, *self.system.cut_coordinates)
 
     def moves(self, q: Vector) -> Vector:
-        """Differences of all positions at q (nq,) from the target [rad, m or 1]."""
+        """Return differences of all positions at q (nq,) from the target [rad, m or 1]."""
         own = difference(self.system, q, self.start)
         if self.cut is None or not len(self.cut):
             return own
@@ -96,7 +96,7 @@ class GuessTarget:
         return np.concatenate([own, row_difference(cut, self._at_cut(q), self.cut)])
 
     def moves_between(self, q: Vector, other: Vector) -> Vector:
-        """Differences of all positions of two configurations (nq,) [rad, m or 1]."""
+        """Return differences of all positions of two configurations (nq,) [rad, m or 1]."""
         own = difference(self.system, q, other)
         if self.cut is None or not len(self.cut):
             return own
@@ -104,30 +104,30 @@ class GuessTarget:
         return np.concatenate([own, row_difference(cut, self._at_cut(q), self._at_cut(other))])
 
     def _at_cut(self, q: Vector) -> Vector:
-        """(c,) positions of the joints that are cut [rad, m or 1]."""
+        """Return the positions (c,) of the cut joints [rad, m or 1]."""
         return cut_positions_and_slopes(self.system)(q, self.p)[0].ravel()
 
     def units(self, closing: Closing) -> Vector:
-        """Divisors of differences of all positions: 1 for angles, else the mechanism's size [m]."""
+        """Return divisors of position differences: 1 for angles, else the mechanism's size [m]."""
         return distance_units((row.unit for row in self.rows), closing.size)
 
     def miss(self, closing: Closing, q: Vector) -> float:
-        """Root of the sum of squares of the differences from guessed positions [rad, or sizes]."""
+        """Return the Euclidean distance from the guessed positions [rad, or sizes]."""
         moves = self.moves(q) / self.units(closing)
         return float(np.linalg.norm(moves[list(self.guessed)]))
 
     def distances(
         self, closing: Closing, q: Vector, own: Sequence[int] | None = None
     ) -> tuple[float, float, float]:
-        """Largest move of a guessed position, of any, and of a massless node.
+        """Return the largest moves of guessed positions, of all positions, and of massless nodes.
 
         They are in rad, or in sizes of the mechanism.
 
         Args:
-            closing: the loops.
+            closing: closure rows of the loops.
             q: (nq,) configuration.
-            own: indices in q of the positions that count; all positions, also of joints that are
-                cut, if left out.
+            own: indices in q of the positions that count. The default is all positions, cut joints
+                included.
         """
         if own is None:
             moves = np.abs(self.moves(q)) / self.units(closing)

@@ -1,4 +1,4 @@
-"""The configuration on the manifold of closed ones that is nearest to guessed positions."""
+"""Closed configuration that is nearest to guessed positions, by Newton's method on a manifold."""
 
 from __future__ import annotations
 
@@ -21,17 +21,18 @@ from mbs.numbers import OnArrays, on_arrays
 Vector = NDArray[np.float64]
 
 MET = 1e-9
-"""Difference from a guess that is met [rad, or sizes of the mechanism]: iterations leave 1e-12."""
+"""Largest difference from a guess that counts as met [rad, or sizes of the mechanism]: iterations
+leave 1e-12."""
 _FLAT = 1e-6
-"""Singular values, of the largest, that count as zero: configurations are closed to 1e-12."""
+"""Relative singular value that counts as zero: configurations are closed to 1e-12."""
 _LEVEL = 1e-7
 """Second derivatives of half the square of the distance, in rad or sizes, that count as zero:
-rounding leaves 1e-13 of one, and a guess out of reach by 1e-5 about 1e-5 of one."""
+rounding leaves 1e-13, and a guess out of reach by 1e-5 leaves about 1e-5."""
 _ROUNDING = 1e-11
-"""Slope of half the square of the distance that counts as zero where its curvature vanishes:
-rounding leaves 1e-14."""
+"""Slope of half the square of the distance that counts as zero if its curvature vanishes: rounding
+leaves 1e-14."""
 _LONGEST = 0.5
-"""Longest step [rad, or sizes of the mechanism]: the first order holds the loops for about that."""
+"""Longest step [rad, or sizes of the mechanism]: range of the linear approximation of the loops."""
 _SHORT = 1e-3
 """Step below which the gradient decides instead of the distance, whose square changes by less than
 the rounding of 1e-16 for steps of 1e-8."""
@@ -41,16 +42,16 @@ _BASIN = 1e-3
 """Distance from a known minimum at which a search ends [rad or m]: branches that are nearer to each
 other meet there."""
 _STEPS, _ROUNDS = 60, 60
-"""Most steps, of which six to ten are usual, and most steps along positions with equal distance:
-these converge linearly."""
+"""Largest number of steps, of which six to ten are usual, and largest number of steps along
+positions of equal distance, which converge linearly."""
 _VISIBLE = 1e-13
-"""Decrease of the objective that is measured: rounding is 1e-16."""
+"""Smallest decrease of the objective that can be measured: rounding is 1e-16."""
 _GAIN = 1e-4
-"""Part of the predicted decrease that a step must have: the usual value of Armijo's rule."""
+"""Smallest ratio of actual to predicted decrease: the usual value of Armijo's rule."""
 
 
 def is_movable(closing: Closing, q: Vector) -> bool:
-    """Whether the loops leave motions at the closed configuration q (nq,)."""
+    """Whether the loops allow a motion at the closed configuration q (nq,)."""
     return len(closing.free) > 0 and _null_space(closing, q)[1].shape[1] > 0
 
 
@@ -66,8 +67,8 @@ def least_distance(closing: Closing, target: GuessTarget, starts: Iterable[Vecto
     Source: Absil, Mahony and Sepulchre 2008, chapter 6, Newton's method on manifolds.
 
     Args:
-        closing: the rows, and the positions that must not change.
-        target: the guess.
+        closing: closure rows and the locked positions.
+        target: guessed positions.
         starts: (nq,) closed configurations.
     """
     objective, minima = _objective(closing, target, target.guessed), list[Vector]()
@@ -88,12 +89,12 @@ def least_distance(closing: Closing, target: GuessTarget, starts: Iterable[Vecto
 
 
 def _is_listed(closing: Closing, q: Vector, found: Iterable[Vector], reach: float) -> bool:
-    """Whether a configuration is in a list, up to a difference of its positions [rad or m]."""
+    """Whether a configuration is in a list, within `reach` of all its positions [rad or m]."""
     return any(np.max(np.abs(difference(closing.system, q, x))) < reach for x in found)
 
 
 def _with_met_guesses(closing: Closing, target: GuessTarget, q: Vector) -> Vector:
-    """The configuration q with exact values of the guessed positions that it has up to rounding."""
+    """Return q with exact values of the guessed positions that it meets up to rounding."""
     moves = target.moves(q) / target.units(closing)
     met = {k for k in target.guessed if abs(moves[k]) < MET}
     locked = tuple(sorted({*closing.locked, *(k for k in met if k < closing.system.nq)}))
@@ -112,9 +113,9 @@ class _Objective:
     """Half the sum of squares of the differences of some positions from a target.
 
     Attributes:
-        closing: the rows, and the positions that must not change.
-        target: the guess.
-        counted: (n,) 1 for the positions that count, among all positions, 0 for the others.
+        closing: closure rows and the locked positions.
+        target: guessed positions.
+        counted: (n,) weight of each position: 1 if it counts, else 0.
         units: (n,) divisors of differences of all positions [1 or m].
     """
 
@@ -124,12 +125,12 @@ class _Objective:
     units: Vector
 
     def value(self, q: Vector) -> float:
-        """The objective at q (nq,) [rad^2, or square of sizes]."""
+        """Return the objective at q (nq,) [rad^2, or squared sizes]."""
         moves = self.counted * self.target.moves(q) / self.units
         return float(moves @ moves) / 2
 
     def point(self, q: Vector) -> _ManifoldPoint:
-        """The objective and its derivatives on the manifold at the closed q (nq,)."""
+        """Return the objective and its derivatives on the manifold at the closed q (nq,)."""
         closing, nq, units = self.closing, self.closing.system.nq, self.units
         counted, free = self.counted, closing.free
         U, N, values, V = _null_space(closing, q)
@@ -155,7 +156,7 @@ class _Objective:
         return _ManifoldPoint(value, N.T @ gradient, N.T @ hessian @ N, N, units[free])
 
     def moved(self, q: Vector, point: _ManifoldPoint, step: Vector) -> Vector | None:
-        """The closed configuration after a step on the manifold; None if none is near."""
+        """Return the closed configuration after a step on the manifold; None if none is near."""
         free, predicted = self.closing.free, q.copy()
         predicted[free] += point.units * (point.basis @ step)
         found = self.closing.nearest(predicted)
@@ -164,7 +165,7 @@ class _Objective:
 
 
 def _objective(closing: Closing, target: GuessTarget, indices: Iterable[int]) -> _Objective:
-    """The objective of some positions, by their indices among all positions."""
+    """Return the objective of some positions, by their indices among all positions."""
     units = target.units(closing)
     counted = np.zeros(len(units))
     counted[list(indices)] = 1.0
@@ -173,7 +174,7 @@ def _objective(closing: Closing, target: GuessTarget, indices: Iterable[int]) ->
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _ManifoldPoint:
-    """An objective on the manifold.
+    """Value and derivatives of an objective at a point of the manifold.
 
     Attributes:
         value: value of the objective.
@@ -191,9 +192,9 @@ class _ManifoldPoint:
 
 
 def _descended(objective: _Objective, start: Vector, known: Sequence[Vector] = ()) -> Vector | None:
-    """The minimum (nq,) of an objective that Newton's method reaches from a closed start.
+    """Return the minimum (nq,) of an objective reached by Newton's method from a closed start.
 
-    None if a configuration next to a known minimum is reached.
+    The result is None if the iteration comes close to a known minimum.
     """
     q, longest = start, _LONGEST
     point = objective.point(q)
@@ -216,14 +217,14 @@ def _descended(objective: _Objective, start: Vector, known: Sequence[Vector] = (
 def _is_better(
     after: _ManifoldPoint, before: _ManifoldPoint, size: float, predicted: float
 ) -> bool:
-    """Whether a step to a point leads down, by its distance or for short steps its gradient."""
+    """Whether a step decreases the objective, or for a short step the norm of its gradient."""
     if predicted > _VISIBLE and after.value <= before.value - _GAIN * predicted:
         return True
     return size < _SHORT and bool(np.linalg.norm(after.gradient) < np.linalg.norm(before.gradient))
 
 
 def _newton_step(gradient: Vector, hessian: Vector, longest: float) -> Vector:
-    """Step (m,) to the minimum of the second order, away from maxima and saddles."""
+    """Return the Newton step (m,) with absolute curvatures, which avoids maxima and saddles."""
     if not len(gradient):
         return np.zeros(0)
     values, vectors = np.linalg.eigh(hessian)
@@ -238,8 +239,8 @@ def nearest_in_all(closing: Closing, target: GuessTarget, q: Vector) -> Vector:
     """Return the minimum of the distance of all positions at a constant distance of the guess.
 
     Args:
-        closing: the rows, and the positions that must not change.
-        target: the guess, and the start for other positions.
+        closing: closure rows and the locked positions.
+        target: guessed positions, and start values of all other positions.
         q: (nq,) configuration with the least distance from the guess.
     """
     own = _objective(closing, target, target.guessed)
@@ -266,11 +267,11 @@ def nearest_in_all(closing: Closing, target: GuessTarget, q: Vector) -> Vector:
 
 
 def _null_space(closing: Closing, q: Vector) -> tuple[Vector, Vector, Vector, Vector]:
-    """Singular value decomposition of the rows at q without and with the vanishing values.
+    """Return the singular value decomposition of the rows at q, split at its rank r.
 
     Returns:
         Left vectors (m, r), basis of the null space (n, n - r), singular values (r,), right
-        vectors (r, n), of free positions in rad or sizes.
+        vectors (r, n), for free positions in rad or sizes.
     """
     units = closing.position_units[closing.free]
     J = closing.rows(q)[1] / closing.sizes[:, None] * units
@@ -280,7 +281,7 @@ def _null_space(closing: Closing, q: Vector) -> tuple[Vector, Vector, Vector, Ve
 
 
 def _curvature(system: System) -> OnArrays:
-    """``(q, p, l, m) -> H`` (nq, nq): Hessian of l' rows + m' positions of cut joints."""
+    """Return ``(q, p, l, m) -> H`` (nq, nq): Hessian of l' rows + m' positions of cut joints."""
 
     def build() -> OnArrays:
         q, p = SX.sym("q", system.nq), system.p

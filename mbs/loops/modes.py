@@ -1,4 +1,4 @@
-"""Every configuration that closes the loops, and every one that brings a frame to a pose."""
+"""All configurations that close the loops, and those that also move a frame to a given pose."""
 
 from __future__ import annotations
 
@@ -33,22 +33,22 @@ from mbs.solvers.rank import rank
 from mbs.text import quoted
 
 _SAME = 1e-9
-"""Difference of positions [rad or m] below which two modes are one: a formula gives the same mode
-again to some roundings, and modes that differ by less are one for every use."""
+"""Difference of positions [rad or m] below which two modes are the same: a formula reproduces a
+mode up to rounding, and a smaller difference has no effect in use."""
 _MOST = 4096
-"""Branches that are listed at most: each is evaluated and kept."""
+"""Largest number of branches of a list: each branch is evaluated and stored."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mode:
-    """One way to assemble a mechanism.
+    """One assembly mode of a mechanism.
 
     Attributes:
-        q: (nq) the configuration [rad or m], angles that a loop gives are within half a turn
+        q: (nq,) configuration [rad or m]. Angles that a loop determines are within half a rotation
             of zero.
-        branch: what tells it from the others, such as ("j3:+",); one label for each loop that
-            closes in two ways.
-        residual: largest closure row there.
+        branch: labels that distinguish the mode, such as ("j3:+",); one label for each loop with
+            two solutions.
+        residual: largest absolute closure row at q.
     """
 
     q: tuple[float, ...]
@@ -57,11 +57,11 @@ class Mode:
 
 
 class ModeList(list[Mode]):
-    """Modes, and what is known of whether they are all.
+    """List of assembly modes, with a statement on its completeness.
 
     Attributes:
-        complete: whether these are all modes that there are.
-        proof: why, in words: "closed forms", or what was solved in numbers.
+        complete: whether the list is proved to contain all modes.
+        proof: text with the reason: "closed forms", or the numerical methods.
     """
 
     def __init__(
@@ -78,26 +78,26 @@ def modes(
     *,
     parameters: Mapping[str, float] | None = None,
 ) -> ModeList:
-    """All configurations with these positions of the independent joints.
+    """Return all configurations (assembly modes) for given positions of the independent joints.
 
-    By closed forms where the loops have them; else loops that depend on each other, such as those
-    of a platform on three or six legs, are solved together in numbers, and the modes have no
-    labels. Each mode is checked with every closure row and for joints that face the right way. The
-    list is empty where the mechanism cannot be assembled; two modes that meet are listed once.
+    Loops with a closed form are solved by it. Coupled loops, such as those of a platform on three
+    or six legs, are solved together numerically. Their modes have no labels. Each mode satisfies
+    all closure rows and orientations of axes. The list is empty if the mechanism cannot be
+    assembled. Two modes that coincide appear once.
 
     Args:
-        system: the assembled mechanism.
-        q_active: positions of the independent joints, by name or in the order of
-            `system.free`; those left out stay as in the assembled configuration.
-        parameters: values of symbols, the others at their defaults.
+        system: assembled mechanism.
+        q_active: positions of the independent joints, by name or in the order of `system.free`.
+            Missing positions keep their values of the assembled configuration.
+        parameters: values of symbols by name. Missing symbols have their default values.
 
     Returns:
-        The modes; `complete` and `proof` tell whether they are all.
+        Modes, with the attributes `complete` and `proof`.
 
     Raises:
-        NoClosedForm: a loop is solved by iteration only.
-        LoopError: there are more than 4096 branches; or joints can move while the independent ones
-            stay, so that modes cannot be counted.
+        NoClosedForm: a loop can be solved by iteration only.
+        LoopError: more than 4096 branches; or joints can move while the independent joints are
+            fixed, so that the number of modes is infinite.
         ModelError: a joint is unknown or not independent, or a value is not finite.
     """
     require_system(system)
@@ -142,18 +142,18 @@ def _same(mode: Mode, other: Mode) -> bool:
     return bool(np.max(np.abs(np.subtract(mode.q, other.q)), initial=0.0) < _SAME)
 
 
-# Modes of loops that are solved in numbers, one step after the other.
+# Modes of loops that are solved numerically, step by step.
 
 
 _REFINED = 1e-4
-"""Distance [rad or m] over which a root is refined with all rows: at a fold roots of polynomials
-are known to 1e-6, and other modes are farther away."""
+"""Largest correction [rad or m] of a root by Newton steps on all closure rows: a polynomial root at
+a fold is accurate to 1e-6, and other modes are farther away."""
 _SINGULAR = 1e-6
-"""Singular value, as a part of the largest, below which a mode may move while the independent
-joints stay, or lies at a fold: modes are closed to 1e-12, whose root that is."""
+"""Relative singular value below which a mode may move with fixed independent joints, or is at a
+fold: modes are closed to 1e-12, and 1e-6 is its square root."""
 _PUSH = 0.01
-"""By how much such a mode is pushed along that motion [rad, or sizes of the mechanism]: from a fold
-it comes back, to 1e-6."""
+"""Displacement along that motion [rad, or sizes of the mechanism] that distinguishes the two: from
+a fold, the closing iteration returns to the mode, to 1e-6."""
 
 
 def _of_blocks(system: System, steps: Sequence[Step], start: Vector, p: Vector) -> ModeList:
@@ -173,7 +173,7 @@ def _of_blocks(system: System, steps: Sequence[Step], start: Vector, p: Vector) 
     proofs = list(dict.fromkeys(roots.proof for roots in told))
     if not complete:
         more = list[Mode | None]()
-        # one that can move ends the search, which would find ever others
+        # a mode that can move raises here; otherwise the search would find infinitely many
         for q in _closed_configurations(closing, start[: system.nq]):
             if not any(_near(system, q, mode) for mode in found):
                 _require_locked(closing, q)
@@ -189,7 +189,7 @@ def _near(system: System, q: Vector, mode: Mode) -> bool:
 
 
 def _every(steps: Sequence[Step], q: Vector, p: Vector, told: list[Roots]) -> Iterator[Vector]:
-    """All positions, one step after the other; what blocks tell is added to a list."""
+    """Yield all positions of all branches; append the result of each block to the list `told`."""
     if not steps:
         yield q
         return
@@ -221,10 +221,10 @@ _REMEDY = (
 
 
 def _require_locked(closing: Closing, q: Vector) -> None:
-    """Refuse a mode that can move while the independent joints stay.
+    """Raise if a mode can move while the independent joints are fixed.
 
     Raises:
-        LoopError: names the joints that move most.
+        LoopError: the mode moves. The message contains the joints that move most.
     """
     system, free = closing.system, closing.free
     spins = spin_indices(system)
@@ -233,7 +233,7 @@ def _require_locked(closing: Closing, q: Vector) -> None:
     count = len(free) - int(np.sum(values > _SINGULAR * values[0]))
     if count <= len(spins):
         return
-    # the motion that turns rods about their lines least
+    # motion with the least rotation of rods about their own axes
     spinning = {index + k for index in spins for k in range(Motion.SPHERICAL.nq)}
     others = [k for k, index in enumerate(free) if index not in spinning]
     loose = V[-count:].T
@@ -255,28 +255,28 @@ def _require_locked(closing: Closing, q: Vector) -> None:
     )
 
 
-# The configurations that bring a frame to one pose, as far as random starts lead to them.
+# Configurations that move a frame to a given pose, found from random starts.
 
 
 _TRIES, _LEAST, _SEED = 500, 60, 20260103
 _SAME_WORKING_MODE = 1e-6
-"""Difference of positions [rad or m] below which two ends of the search are one mode: closed to
-1e-12, they agree to that away from singular configurations and to its square root near them."""
+"""Difference of positions [rad or m] below which two results of the search are the same: closed to
+1e-12, they agree to 1e-12 at regular configurations and to its square root at singular ones."""
 _LOOSE = 1e-5
-"""Singular values below this part of the largest let the joints move: closed to 1e-12, a mode that
-can move is found with an error of the square root, 1e-6, and its slope is as large."""
+"""Relative singular value below which joints can move: closed to 1e-12, a mode that can move has an
+error of the square root, 1e-6, and its singular value has the same size."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorkingMode:
-    """A configuration that closes the loops and brings a frame to a pose.
+    """Configuration that closes the loops and moves a frame to a given pose.
 
     Attributes:
-        q: (nq) the configuration [rad or m], angles within half a turn of zero, the first element
-            of a quaternion not negative.
-        residual: largest row of the loops and of the pose there.
-        hits: how many starts ended there; where some mode has one alone, others are likely
-            missing.
+        q: (nq,) configuration [rad or m]. Angles are within half a rotation of zero; the first
+            element of a quaternion is not negative.
+        residual: largest absolute row of the loops and of the pose at q.
+        hits: number of starts that converged to q. If a mode has one hit only, other modes are
+            probably missing.
     """
 
     q: tuple[float, ...]
@@ -295,30 +295,30 @@ def working_modes(
     tries: int = _TRIES,
     parameters: Mapping[str, float] | None = None,
 ) -> list[WorkingMode]:
-    """The configurations with closed loops and this pose of a frame to which random starts lead.
+    """Return configurations (working modes) with closed loops and a given pose of a frame.
 
-    Nothing proves that the list is complete; `hits` tells how well it was searched. The starts are
-    the same at every call. The search ends early after at least 60 of them, once the last three
-    quarters found nothing new and every mode was met twice.
+    They are found by Gauss-Newton from random starts, the same at each call. Completeness is not
+    proved; `hits` indicates how thorough the search was. The search ends early after at least 60
+    starts, if the last three quarters found no new mode and every mode was found twice.
 
     Args:
-        system: as for `solve_pose`, and so are frame, T, rows and parameters.
-        frame: likewise.
-        T: likewise.
-        rows: likewise.
-        guess: about which configuration the starts are taken, the assembled one when left out.
-        reach: largest difference of a position between a start and the guess [rad or m]; smaller
-            than half a turn, configurations near the guess are looked for.
+        system: open or closed mechanism, as for `solve_pose`.
+        frame: name of a body, name of a frame, or index of a link.
+        T: (4, 4) target pose of the frame in the base [m].
+        rows: names of the rows of the pose that must agree, as for `solve_pose`.
+        guess: configuration around which the starts are chosen. The default is the assembled one.
+        reach: largest difference of a position between a start and the guess [rad or m]. Below half
+            a rotation, the search is limited to configurations near the guess.
         tries: largest number of starts.
-        parameters: likewise.
+        parameters: values of symbols by name. Missing symbols have their default values.
 
     Returns:
-        The configurations found, those near the guess first; empty when none was found.
+        Configurations, sorted by distance from the guess; empty if none was found.
 
     Raises:
-        LoopError: in a configuration found the joints can move while the frame stays, so that
-            there may be configurations without number.
-        ModelError: as for `solve_pose`; or reach or tries is not above zero.
+        LoopError: joints can move at a found configuration while the frame is at rest, so that the
+            number of configurations may be infinite.
+        ModelError: an input is invalid, as for `solve_pose`; or reach or tries is not positive.
     """
     target = goal(system, frame, T, rows, parameters)
     if not (isinstance(tries, int) and tries >= 1 and isinstance(reach, int | float) and reach > 0):
@@ -364,7 +364,7 @@ def _distance(system: System, q: Vector, other: Vector) -> float:
 
 
 def _tidy(target: Goal, q: Vector) -> Vector:
-    """The configuration with small angles where that is the same one: not so across a gear."""
+    """Return q with angles within half a rotation of zero, if that still closes; else q (gears)."""
     system = target.closing.system
     tidy = within_half_turn(system, q)
     for part in quaternion_slices(system.tree):
@@ -373,10 +373,10 @@ def _tidy(target: Goal, q: Vector) -> Vector:
 
 
 def _require_isolated(target: Goal, q: Vector) -> None:
-    """Refuse a configuration that can move, at least to first order, while the frame stays.
+    """Raise if the joints can move, to first order, while the frame is at rest.
 
     Raises:
-        LoopError: names the joints that move most.
+        LoopError: the joints can move. The message contains the joints that move most.
     """
     system = target.closing.system
     slope = target.residual(q)[1]
@@ -391,36 +391,37 @@ def _require_isolated(target: Goal, q: Vector) -> None:
     )
 
 
-# Configurations that close the loops with some positions locked, as far as random starts lead
-# there.
+# Configurations that close the loops with some positions locked, found from random starts.
 
 
 _START_TRIES, _LEAST_STARTS, _START_SEED = 300, 40, 20260107
 _REACH = np.pi
-"""Of a random start from the given positions: all angles, and as many metres."""
+"""Largest difference of a random start from the given positions [rad or m]: half a rotation covers
+all angles."""
 _SAME_START = 1e-6
-"""As `_SAME_WORKING_MODE`, with positions locked in place of a pose."""
+"""Difference of positions [rad or m] below which two results are the same, as for
+`_SAME_WORKING_MODE`."""
 
 
 def closed_configurations(closing: Closing, start: Vector) -> list[Vector]:
-    """Configurations found by Gauss-Newton from random starts, always the same ones.
+    """Return configurations found by Gauss-Newton from random starts, the same at each call.
 
-    The search ends early after at least 40 starts, once the last three quarters found
-    nothing new and every configuration was met twice.
+    The search ends early after at least 40 starts, if the last three quarters found no new
+    configuration and every configuration was found twice. Completeness is not proved.
 
     Args:
-        closing: the rows, and the positions that are locked.
-        start: (nq,) of which the locked positions count; the starts are taken about the others.
+        closing: closure rows and the indices of the locked positions.
+        start: (nq,) configuration. Its locked positions are kept, and random starts are around its
+            other positions.
 
     Returns:
-        Configurations (nq,) with angles within half a turn of zero; nothing proves that these are
-        all.
+        Configurations (nq,) with angles within half a rotation of zero.
     """
     return list(_closed_configurations(closing, start))
 
 
 def _closed_configurations(closing: Closing, start: Vector) -> Iterator[Vector]:
-    """Each as soon as it is found."""
+    """Yield each new configuration as soon as it is found."""
     rng = np.random.default_rng(_START_SEED)
     found, hits, newest = list[Vector](), list[int](), 0
     for number in range(1, _START_TRIES + 1):
@@ -450,7 +451,7 @@ def _moved(closing: Closing, start: Vector, rng: np.random.Generator) -> Vector:
 
 
 def _tidy_start(closing: Closing, q: Vector) -> Vector:
-    """The configuration with small angles where that is the same one: not so across a gear."""
+    """Return q with angles within half a rotation of zero, if that still closes; else q (gears)."""
     tidy = within_half_turn(closing.system, q)
     tidy[list(closing.locked)] = q[list(closing.locked)]
     return tidy if closing.openness(tidy) < OPEN else q

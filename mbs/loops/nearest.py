@@ -21,17 +21,17 @@ from mbs.solvers.rank import rank
 Vector = NDArray[np.float64]
 
 _FEW = 24
-"""Free positions up to which other configurations of all loops together are searched: a search
-takes sixty starts. Larger mechanisms are searched block by block."""
+"""Number of free positions up to which all loops are searched together: a search takes sixty
+starts. Larger mechanisms are searched block by block."""
 _NEAR = 0.1
 """Distance of a configuration from its start below which no other one is searched [rad, or sizes of
 the mechanism]: branches that are nearer to each other meet there."""
-_MODES = 64  # configurations of a search, of which the nearest is taken
-_LOOPS = 3  # that one block may have
+_MODES = 64  # largest number of configurations of a search, of which the nearest is selected
+_LOOPS = 3  # largest number of loops in a block
 _MOST = 400
-"""Configurations of blocks that are tried: some ten blocks of which each has several."""
+"""Largest number of block configurations that are tried: about ten blocks with several each."""
 _FLAT = 1e-6
-"""Singular values, of the largest, that count as zero: configurations are closed to 1e-12."""
+"""Relative singular value that counts as zero: configurations are closed to 1e-12."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,8 +61,8 @@ def nearest_configuration(closing: Closing, target: GuessTarget) -> Assembled | 
     joints that are cut do not count.
 
     Args:
-        closing: the rows, and the positions that must not change.
-        target: first guess of all positions.
+        closing: closure rows and the locked positions.
+        target: guess of all positions.
     """
     start = target.start
     if not closing.free:
@@ -104,11 +104,11 @@ def moved_to_guess(closing: Closing, target: GuessTarget, starts: list[Vector]) 
 
 
 def _met(closing: Closing, target: GuessTarget, found: list[Vector]) -> Vector:
-    """The first configuration, or one nearer to guessed positions that it does not meet.
+    """Return the first configuration, or one that is nearer to guesses that it does not meet.
 
     Args:
-        closing: the rows, and the positions that must not change.
-        target: first guess.
+        closing: closure rows and the locked positions.
+        target: guess of all positions.
         found: (nq,) closed configurations. The nearest configuration is first.
     """
     q = found[0]
@@ -117,7 +117,7 @@ def _met(closing: Closing, target: GuessTarget, found: list[Vector]) -> Vector:
     if len(closing.free) < MANY:
         found = [*found, *candidates(closing, target.start, _MODES)]
     best = nearest_of(closing, moved_to_guess(closing, target, found), target)[0]
-    # random starts have other branches of loops that the guess does not depend on
+    # random starts may change the branch of loops that do not affect guessed positions
     reached = _by_blocks(closing, target, best)
     if reached is None or target.miss(closing, reached) > target.miss(closing, best) + EQUAL:
         return best
@@ -125,12 +125,12 @@ def _met(closing: Closing, target: GuessTarget, found: list[Vector]) -> Vector:
 
 
 def _modes(closing: Closing, target: GuessTarget, q: Vector | None) -> list[Vector]:
-    """The configuration q, and others with the same independent positions.
+    """Return the configuration q, and others with the same independent positions.
 
     Args:
-        closing: the rows, and the positions that must not change.
-        target: first guess.
-        q: (nq,) a closed configuration; None if Newton's method found none.
+        closing: closure rows and the locked positions.
+        target: guess of all positions.
+        q: (nq,) closed configuration; None if Newton's method found none.
     """
     held, at = _held(closing, target, q)
     found = [] if q is None else [q]
@@ -141,12 +141,13 @@ def _modes(closing: Closing, target: GuessTarget, q: Vector | None) -> list[Vect
 
 
 def _held(closing: Closing, target: GuessTarget, q: Vector | None) -> tuple[Closing, Vector]:
-    """The loops with independent positions locked as at q, and the start with these positions.
+    """Return the loops with independent positions locked as at q, and the start with these values.
 
     Args:
-        closing: the rows, and the positions that must not change.
-        target: first guess.
-        q: (nq,) a closed configuration; None if Newton's method found none: nothing is locked then.
+        closing: closure rows and the locked positions.
+        target: guess of all positions.
+        q: (nq,) closed configuration. If it is None (Newton's method found none), no position is
+            locked.
     """
     if q is None:
         return closing, target.start
@@ -160,12 +161,12 @@ def _held(closing: Closing, target: GuessTarget, q: Vector | None) -> tuple[Clos
 
 
 def _others(closing: Closing, best: Vector, found: list[Vector]) -> tuple[Vector, ...]:
-    """Configurations that differ from the best configuration and from each other."""
+    """Return the configurations that differ from the best configuration and from each other."""
     turning = np.zeros(closing.system.nq, dtype=bool)
     for part in quaternion_slices(closing.system.tree):
         turning[part] = True
     others = list[Vector]()
-    for x in found:  # a rod that spins about its line is no other configuration
+    for x in found:  # a rod that spins about its axis is not another configuration
         apart = (np.abs(difference(closing.system, x, one))[~turning] for one in (best, *others))
         if all(np.max(moves, initial=0.0) > EQUAL for moves in apart):
             others.append(x)
@@ -173,7 +174,7 @@ def _others(closing: Closing, best: Vector, found: list[Vector]) -> tuple[Vector
 
 
 def closes(closing: Closing, q: Vector) -> bool:
-    """Whether a configuration closes the loops as it is."""
+    """Whether a configuration closes the loops without correction."""
     return closing.openness(q) <= CLOSED and closing.faces(q)
 
 
@@ -183,10 +184,10 @@ def nearest_of(
     """Return configurations in the order of their distance from the target.
 
     Args:
-        closing: the loops.
+        closing: closure rows of the loops.
         found: (nq,) configurations.
-        target: the positions that configurations are compared with.
-        own: see `GuessTarget.distances`.
+        target: positions with which configurations are compared.
+        own: indices in q of the positions that count, as in `GuessTarget.distances`.
     """
     left, ordered = list(found), list[Vector]()
     while left:
@@ -204,9 +205,9 @@ def _is_nearer(
 ) -> bool:
     """Whether the configuration q is nearer to the target than the configuration `other`.
 
-    Guessed positions are compared first, then all positions, then those of massless nodes, which
-    move less than the others. If both are equally near, the first position that differs decides, in
-    the order of the description: the larger value is nearer.
+    Guessed positions are compared first, then all positions, then massless nodes, which move less.
+    If both are equally near, the first position that differs decides, in the order of the
+    description: the larger value is nearer.
     """
     distances, others = (target.distances(closing, one, own) for one in (q, other))
     for distance, least in zip(distances, others, strict=True):
@@ -224,12 +225,12 @@ def _is_nearer(
 
 
 def _by_blocks(closing: Closing, target: GuessTarget, q: Vector | None) -> Vector | None:
-    """The closed configuration that is nearest to a target in one block after the other.
+    """Return the closed configuration from solving blocks in order, each nearest to a target.
 
     Args:
-        closing: the rows, and the positions that must not change.
-        target: first guess.
-        q: (nq,) a closed configuration; None if Newton's method found none.
+        closing: closure rows and the locked positions.
+        target: guess of all positions.
+        q: (nq,) closed configuration; None if Newton's method found none.
     """
     start = target.start
     held, at = _held(closing, target, q)
@@ -254,7 +255,7 @@ def _by_blocks(closing: Closing, target: GuessTarget, q: Vector | None) -> Vecto
 
 
 def _options(block: Closing, start: Vector) -> list[Vector]:
-    """Configurations that close a block; the first is near enough, or others are searched too."""
+    """Return configurations that close a block: one if it is near the start, or else several."""
     first = block.nearest(start)
     found = [unwound(block, first.q, start)] if first.is_closed else []
     near = GuessTarget.at(block, start, ())
@@ -267,7 +268,7 @@ def _options(block: Closing, start: Vector) -> list[Vector]:
 
 
 def _independent(closing: Closing, q: Vector, guessed: set[int]) -> list[int]:
-    """Free positions that determine the others at q: guessed ones before others, where possible."""
+    """Return free positions that determine the others at q, with guessed positions preferred."""
     J = closing.rows(q)[1] / closing.sizes[:, None]
     J = J * distance_units((closing.system.coordinates[k].unit for k in closing.free), closing.size)
     left = list(range(len(closing.free)))
@@ -283,11 +284,11 @@ def _independent(closing: Closing, q: Vector, guessed: set[int]) -> list[int]:
 
 
 def _blocks(closing: Closing, q: Vector) -> list[Closing] | None:
-    """The loops in blocks that determine their positions in turn; None if there is one block only.
+    """Return the loops in blocks, each solvable after the blocks before it; None for one block.
 
     Args:
-        closing: the rows, and the positions that must not change.
-        q: (nq,) configuration at which ranks are measured.
+        closing: closure rows and the locked positions.
+        q: (nq,) configuration at which ranks are evaluated.
     """
     groups = _row_groups(closing.system)
     J = replace(closing, locked=()).rows(q)[1] / closing.sizes[:, None]
@@ -311,7 +312,7 @@ def _blocks(closing: Closing, q: Vector) -> list[Closing] | None:
 
 
 def _row_groups(system: System) -> dict[str, list[int]]:
-    """Indices of the rows of each loop, coupling and component, and of each quaternion's norm."""
+    """Return row indices of each loop, coupling and component, and of each quaternion norm."""
     groups = dict[str, list[int]]()
     rows = position_rows(system)
     for k, (name, *_) in enumerate(rows):
@@ -328,7 +329,7 @@ def _next_block(
     known: set[int],
     waiting: list[str],
 ) -> list[str]:
-    """The least connected groups of rows that determine their unknown positions; else all left."""
+    """Return the smallest connected set of row groups that determine their unknowns, or all."""
     paths = [[name] for name in waiting]
     for _ in range(_LOOPS):
         for names in paths:
@@ -347,7 +348,7 @@ def _next_block(
 
 
 def _connected(depends: dict[str, set[int]], known: set[int], waiting: list[str]) -> Iterator[str]:
-    """The groups of rows that share unknown positions with the first one."""
+    """Yield the waiting row groups that are connected to the first one by unknown positions."""
     reached, names = set(depends[waiting[0]]) - known, {waiting[0]}
     grown = True
     while grown:
@@ -361,7 +362,7 @@ def _connected(depends: dict[str, set[int]], known: set[int], waiting: list[str]
 
 
 def _axes_of(system: System, known: set[int], free: set[int]) -> tuple[int, ...]:
-    """The cosines that must be positive and that depend on positions of a block and known ones."""
+    """Return indices of facing cosines that depend on a block and known positions only."""
 
     def build() -> list[set[int]]:
         q = SX.sym("q", system.nq)

@@ -1,9 +1,9 @@
-"""Loops solved joint by joint without iteration: stages in the order in which they can be solved.
+"""Plan that solves the loops of a mechanism joint by joint without iteration, stage by stage.
 
-Of every loop that is left the ring of its unknown joints is taken, with what is known by then in
-its gaps; `mbs.closed_forms.kernels` says whether it has a closed form. `verify` holds a plan
-against configurations, `complete` says which joints may be known together, and a `Posed` plan
-begins at a frame whose pose is known.
+For each unsolved loop, `order_steps` forms the cyclic chain of its unknown joints, with the known
+joints inside the fixed transforms between them. `mbs.closed_forms.kernels` finds a closed form if
+one exists. `verify` tests a plan at configurations. `complete` returns joints that determine the
+others. A `Posed` plan starts from the known pose of a frame.
 """
 
 from __future__ import annotations
@@ -50,27 +50,27 @@ from mbs.recursions.route import relative_pose
 from mbs.solvers.rank import null_space, rank
 from mbs.spatial import Pose
 
-# One step of a plan, and which of its branches lead to a configuration.
+# Steps of a plan, and the branches of a plan that result in a given configuration.
 
 
 _NEAR = 1e-5
-"""Difference of positions [rad or m] between a branch and a configuration that it leads to: closed
-to 1e-12, a configuration is known to the square root, 1e-6, where two branches meet."""
+"""Largest difference of positions [rad or m] between a branch and its configuration: at 1e-12 of
+closure, a configuration where two branches meet is accurate to the square root, 1e-6."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stage:
-    """One loop, or one coupling, solved for some of its unknown positions.
+    """One loop or one coupling, solved in closed form for some of its unknown positions.
 
     Attributes:
-        name: of the cut joint or of the coupling.
-        indices: indices in q of what it gives; beyond the end of q those of cut joints.
-        labels: of the branches; one empty label where there is a single one.
-        values: Function of q with the positions of cut joints, of which known ones are used, and
-            p; one row an index, one column a branch.
-        spin: place of the spin on which these depend, and Function of the same arguments that
-            gives it where the quaternion is known; None where there is none.
-        chosen: number of the branch in which the system was assembled.
+        name: name of the cut joint or of the coupling.
+        indices: indices in q of the solved positions. Indices from nq on belong to cut joints.
+        labels: labels of the branches; one empty label for a single branch.
+        values: Function of q (with the positions of cut joints) and p. Its output has one row per
+            index and one column per branch. It uses only known positions.
+        spin: index of the rod spin on which the branches depend, and the Function of q and p that
+            computes it from a known quaternion. None if there is no such spin.
+        chosen: index of the branch in which the system was assembled.
     """
 
     name: str
@@ -83,12 +83,12 @@ class Stage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Roots:
-    """Every way to close the loops of a block, at one place.
+    """All solutions of the loops of a block for given known positions.
 
     Attributes:
-        values: (r, k) positions of the block, one row a root.
-        proof: how they were found, as part of a sentence.
-        complete: whether that proves that they are all.
+        values: (r, k) positions of the block, one row per solution.
+        proof: text on the solution method, for use within a sentence.
+        complete: whether the method proves that no solution is missing.
     """
 
     values: Vector
@@ -98,12 +98,12 @@ class Roots:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoopBlock:
-    """Loops that only numbers solve, mostly several that share unknown joints.
+    """Loops that only a numerical method solves, mostly several loops that share unknown joints.
 
     Attributes:
-        name: of the cut joints.
-        indices: indices in q of what it gives.
-        solve: all roots, from all positions, of which known ones are used, and p.
+        name: names of the cut joints.
+        indices: indices in q of the solved positions.
+        solve: callable (all positions, p) -> all solutions. It uses only the known positions.
     """
 
     name: str
@@ -112,20 +112,21 @@ class LoopBlock:
 
 
 def branches_at(system: System, stages: Sequence[Stage], q: Vector, p: Vector) -> tuple[int, ...]:
-    """The branches of all stages that lead to the closed configuration q; as far as they do.
+    """Return the branch of each stage that results in the closed configuration q.
 
-    What a stage gives of cut joints is not in q: whether it fits is seen in later stages.
+    The tuple is shorter than `stages` if no sequence of branches results in q. The positions of cut
+    joints are not in q. Later stages show whether these positions fit.
     """
     return branches_from(system, stages, started_at(system, q), q, p)
 
 
 def started_at(system: System, q: Vector, known: Collection[int] | None = None) -> Vector:
-    """All positions, the known ones as in the configuration q and the others zero.
+    """Return all positions: the known ones from the configuration q, the others zero.
 
     Args:
-        system: whose positions they are.
-        q: (nq,) the configuration.
-        known: their places, those of the independent joints when left out.
+        system: mechanism with the positions.
+        q: (nq,) configuration.
+        known: indices of the known positions. The default is the independent joints.
     """
     start = np.zeros(extent(system))
     given = independent_indices(system) if known is None else known
@@ -137,13 +138,13 @@ def started_at(system: System, q: Vector, known: Collection[int] | None = None) 
 def branches_from(
     system: System, stages: Sequence[Stage], start: Vector, q: Vector, p: Vector
 ) -> tuple[int, ...]:
-    """The branches of all stages that lead to the closed configuration q; as far as they do.
+    """Return the branch of each stage that results in q, as far as branches agree with q.
 
     Args:
-        system: whose loops they are.
-        stages: in their order.
-        start: all positions, the known ones as in q; spins are written into it.
-        q: (nq,) the configuration.
+        system: mechanism with the loops.
+        stages: stages in their order of solution.
+        start: all positions. The known ones are equal to those of q. Spins are written into it.
+        q: (nq,) closed configuration.
         p: (np,) parameters.
     """
     if not stages:
@@ -167,13 +168,13 @@ def branches_from(
 def every_configuration(
     stages: Sequence[Stage], q: Vector, p: Vector, branch: tuple[str, ...] = ()
 ) -> Iterator[tuple[Vector, tuple[str, ...]]]:
-    """All positions and the labels of the branch, one loop after the other; NaN ends a branch.
+    """Yield all positions and the branch labels of each configuration; skip branches with NaN.
 
     Args:
-        stages: in their order.
-        q: all positions, of which the known ones count.
+        stages: stages in their order of solution.
+        q: all positions. Only the known ones are used.
         p: (np,) parameters.
-        branch: labels so far.
+        branch: labels of the branches of earlier stages.
     """
     if not stages:
         yield q, branch
@@ -188,41 +189,43 @@ def every_configuration(
 
 
 def _agree(system: System, indices: Sequence[int], reached: Vector, q: Vector) -> bool:
-    """Whether the positions of the tree are those of q, up to whole turns and signs."""
+    """Whether tree positions agree with q, up to full rotations and signs of quaternions."""
     gap = difference(system, reached[: system.nq], q)
     return bool(np.all(np.abs(gap[[k for k in indices if k < system.nq]]) < _NEAR))
 
 
-# A plan compared with configurations: it must give them back, and none of its branches may leave
-# loops open.
+# Test of a plan at configurations: the plan must reproduce them, and its branches must close all
+# loops.
 #
-# Kernels use what must hold where a loop closes. In loops that move by their special measures
-# alone that may not be enough: such a plan is refused, and a branch that never closes is left out.
+# Kernels use necessary conditions of closure. In loops that move only because of special dimensions
+# these may not suffice. Then the plan is rejected, or a branch that never closes is dropped.
 
 
 _MOVE = 0.2
-"""Of a random start from the assembled configuration [rad or m]: off alignments that it may have by
-accident, and mostly not across to another branch."""
+"""Largest difference of a random start from the assembled configuration [rad or m]: enough to leave
+accidental alignments, and in most cases not enough to reach another branch."""
 _CHECKS, _TRIES, _SEED = 3, 8, 20260104
-"""Configurations beside the assembled one that are compared, from so many random starts."""
+"""Number of tested configurations in addition to the assembled one, number of random starts to find
+them, and seed of the random numbers."""
 
 
 Start = Callable[[Vector], Vector]
-"""All positions from a configuration (nq,), of which the known ones count."""
+"""Callable: configuration (nq,) -> all positions, of which a plan uses only the known ones."""
 
 
 def verify(
     system: System, stages: Sequence[Stage], started: Start | None = None
 ) -> tuple[Stage, ...]:
-    """The stages with the branches of the assembled configuration, which hold at others as well.
+    """Return the stages with the branches of the assembled configuration, tested at others too.
 
     Args:
-        system: whose loops they are.
-        stages: in their order.
-        started: where the stages start from; from the independent joints when left out.
+        system: mechanism with the loops.
+        stages: stages in their order of solution.
+        started: callable from a configuration to the positions that the first stage starts from.
+            The default uses the independent joints.
 
     Raises:
-        NoClosedForm: a loop does not close so.
+        NoClosedForm: the stages do not reproduce a closed configuration.
     """
     start = started or (lambda configuration: started_at(system, configuration))
     p = closure_parameters(system)
@@ -261,7 +264,7 @@ def _without_open_branches(
 def _may_close(
     system: System, stages: Sequence[Stage], number: int, branch: int, start: Vector, p: Vector
 ) -> bool:
-    """Whether another branch of one stage closes the loops or ends, the others as chosen."""
+    """Whether the loops close, or a value is NaN, if one stage takes `branch`, others `chosen`."""
     reached = start.copy()
     for k, stage in enumerate(stages):
         values = np.array(stage.values(reached, p))
@@ -272,24 +275,24 @@ def _may_close(
 
 
 def _only(stage: Stage, kept: Sequence[int]) -> Stage:
-    """The stage with these branches alone."""
+    """Return the stage with the branches of the indices `kept` only."""
     q, p = (casadi.SX.sym(name, stage.values.size1_in(k)) for k, name in enumerate("qp"))
     values = Function("ways", [q, p], [stage.values(q, p)[:, list(kept)]])
     labels = tuple(stage.labels[branch] for branch in kept)
     return replace(stage, labels=labels, values=values, chosen=kept.index(stage.chosen))
 
 
-# The loops of a system in the order in which they can be solved, and how each of them closes.
+# Order in which the loops of a system can be solved, and the closed form of each loop.
 #
-# A loop that shares unknown joints with others waits until these have been solved: their
-# positions are known then.
+# A loop that shares unknown joints with other loops is solved after them, when these joints are
+# known.
 
 
 def plan(system: System) -> tuple[Stage, ...]:
-    """The loops and couplings of a system in an order in which each follows from those before.
+    """Return the loops and couplings of a system in an order of solution from independent joints.
 
     Raises:
-        NoClosedForm: says which loop has none, and why.
+        NoClosedForm: a loop has no closed form. The message contains its name and the reason.
         ModelError: `system` is not a System.
     """
     require_system(system)
@@ -302,14 +305,14 @@ def plan(system: System) -> tuple[Stage, ...]:
 
 
 def plan_from(system: System, known: Collection[int]) -> tuple[Stage, ...]:
-    """The loops and couplings in an order in which each follows from what is known.
+    """Return the loops and couplings in an order of solution from given known positions.
 
     Args:
-        system: the assembled mechanism, with loops.
-        known: places of the positions that are known.
+        system: assembled mechanism with loops.
+        known: indices of the known positions.
 
     Raises:
-        NoClosedForm: says which loop has none, and why.
+        NoClosedForm: a loop has no closed form. The message contains its name and the reason.
     """
 
     def build() -> tuple[Stage, ...]:
@@ -325,14 +328,14 @@ def plan_from(system: System, known: Collection[int]) -> tuple[Stage, ...]:
 
 @dataclass(slots=True)
 class PlanWork:
-    """What of a plan is solved so far.
+    """State of a plan during its construction.
 
     Attributes:
-        system: whose loops they are.
+        system: mechanism with the loops.
         q: symbols of all positions.
-        values: the same, with numbers for positions that turned out not to change.
-        known: places of what is known.
-        steps: in their order.
+        values: same symbols, with a number for each position that turned out to be constant.
+        known: indices of the known positions.
+        steps: stages and blocks found so far, in their order of solution.
     """
 
     system: System
@@ -342,7 +345,7 @@ class PlanWork:
     steps: list[Stage | LoopBlock] = field(default_factory=list)
 
     def take(self, stage: Stage | LoopBlock) -> None:
-        """Count what a step gives as known."""
+        """Append a step and mark its positions as known."""
         self.steps.append(stage)
         self.known |= set(stage.indices)
         if isinstance(stage, Stage) and len(stage.labels) == 1:
@@ -353,42 +356,43 @@ class PlanWork:
                     self.values[index] = number
 
     def ring(self, number: int) -> Ring:
-        """The loop of a cut joint."""
+        """Return the cyclic chain of the unknown joints in the loop of cut joint `number`."""
         return ring_of(self.system, number, self.known, self.values)
 
 
 def order_stages(system: System, known: Collection[int], q: SX) -> list[Stage]:
-    """The stages in their order, not yet compared with configurations.
+    """Return the stages in their order of solution, without a test at configurations.
 
     Args:
-        system: whose loops they are.
-        known: places of the positions that are known.
+        system: mechanism with the loops.
+        known: indices of the known positions.
         q: symbols of all positions.
 
     Raises:
-        NoClosedForm: a loop cannot be solved, or no loop gives a position.
+        NoClosedForm: a loop has no closed form, or no loop determines a position.
     """
     steps = order_steps(system, known, q, lambda work, waiting: None)
     return [step for step in steps if isinstance(step, Stage)]
 
 
 Blocks = Callable[["PlanWork", Sequence[int]], LoopBlock | None]
-"""A block among the loops that wait, by their numbers; None where there is none."""
+"""Callable: (state of the plan, indices of unsolved loops) -> block of some of them, or None."""
 
 
 def order_steps(
     system: System, known: Collection[int], q: SX, blocks: Blocks
 ) -> list[Stage | LoopBlock]:
-    """Stages, and blocks where none of the loops that are left can be solved by itself.
+    """Return the stages in order, and a block whenever no remaining loop can be solved by itself.
 
     Args:
-        system: whose loops they are.
-        known: places of the positions that are known.
+        system: mechanism with the loops.
+        known: indices of the known positions.
         q: symbols of all positions.
-        blocks: finds a block.
+        blocks: callable that finds a block among the unsolved loops.
 
     Raises:
-        NoClosedForm: a loop cannot be solved, or no loop gives a position.
+        NoClosedForm: a loop can be solved neither alone nor in a block, or no loop determines a
+            position.
     """
     work = PlanWork(system, q, SX(q), set(known))
     binding = [part for part in system.parts if part.element.has("rows")]
@@ -415,7 +419,7 @@ def order_steps(
 
 
 def _attempt(work: PlanWork, number: int) -> Stage | str | None:
-    """A loop, or a coupling, solved with what is known; why not; None where nothing is unknown."""
+    """Return the stage of a loop or coupling, the reason for failure, or None if all is known."""
     system = work.system
     if number >= len(system.cuts) + len(system.couplings):
         return _bound_by_part(work, number - len(system.cuts) - len(system.couplings))
@@ -433,7 +437,7 @@ def _attempt(work: PlanWork, number: int) -> Stage | str | None:
 
 
 def _point_stage(work: PlanWork, waiting: Sequence[int]) -> Stage | None:
-    """Slides that several loops share and the rigid links in these hold, if there are such."""
+    """Return a stage of prismatic joints that rigid links of several loops determine, or None."""
     system, groups = work.system, dict[frozenset[int], dict[int, Span]]()
     for number in waiting:
         if number < len(system.cuts) and not is_bound(system, number):
@@ -450,13 +454,13 @@ def _point_stage(work: PlanWork, waiting: Sequence[int]) -> Stage | None:
 
 
 def is_bound(system: System, number: int) -> bool:
-    """Whether a loop has joints other than revolute, prismatic and spherical."""
+    """Whether a constraint other than a rod or a point on a line closes the loop of a cut joint."""
     joint = system.cuts[number].edge.joint
     return isinstance(joint, Constraint) and not isinstance(joint, (PointOnLine, Rod))
 
 
 def _bound_by_part(work: PlanWork, number: int) -> str | None:
-    """Why the rows of a component have no closed form; None where nothing in them is unknown."""
+    """Return why the constraint rows of a component have no closed form; None if all is known."""
     binding = [part for part in work.system.parts if part.element.has("rows")]
     part = binding[number]
     q = SX.sym("q", work.system.nq)
@@ -505,24 +509,24 @@ def _require_all(system: System, known: set[int]) -> None:
             )
 
 
-# Joints whose positions may be known together, and those that complete them.
+# Sets of joints that determine all other positions.
 
 
 _LOOSE = 1e-6
-"""Rows of orthonormal directions of motion with singular values below this part of the largest do
-not move by themselves: closing leaves 1e-12 times the condition of the loops in them."""
+"""Relative singular value below which rows of an orthonormal basis of motions are dependent:
+closing to 1e-12 leaves an error of 1e-12 times the condition number of the loops in the rows."""
 _KNOWN_TRIES, _KNOWN_SEED = 8, 20260106
-"""Random starts of `regular_configuration`, each `_MOVE` from the assembled one at most."""
+"""Number of random starts of `regular_configuration`, at most `_MOVE` from assembly, and seed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """Positions from which all others follow.
+    """Positions that determine all other positions.
 
     Attributes:
-        independent: those of the given joints that do not depend on each other.
-        dependent: the others of them.
-        undetermined: independent joints that nothing given determines.
+        independent: given joints that are independent of each other.
+        dependent: given joints that depend on the independent ones.
+        undetermined: further independent joints that the given joints do not determine.
     """
 
     independent: tuple[int, ...]
@@ -531,19 +535,19 @@ class Known:
 
     @property
     def indices(self) -> tuple[int, ...]:
-        """What is known of q at the start."""
+        """Indices in q of the positions that are known at the start."""
         return self.independent + self.undetermined
 
 
 def complete(system: System, given: Sequence[int]) -> Known:
-    """The given joints, and independent joints that the loops leave free beside them.
+    """Split given joints into independent and dependent joints, and add the missing joints.
 
     Args:
-        system: the assembled mechanism.
+        system: assembled mechanism.
         given: indices in q of revolute and prismatic joints.
 
     Raises:
-        NoClosedForm: spherical joints or free bodies beside them move in some of their ways only.
+        NoClosedForm: a spherical joint or a free body keeps some, but not all of its freedoms.
     """
     free = null_space(
         Closing(system, closure_parameters(system)).rows(regular_configuration(system))[1]
@@ -554,15 +558,17 @@ def complete(system: System, given: Sequence[int]) -> Known:
 
 
 def undetermined_beside(system: System, free: Vector, first: tuple[int, ...]) -> tuple[int, ...]:
-    """Joints that determine the rest: motors, other revolute and prismatic, then spherical ones.
+    """Return indices in q of joints that, with the known ones, determine all positions.
+
+    Motors are preferred, then other revolute and prismatic joints, then joints of several freedoms.
 
     Args:
-        system: the assembled mechanism.
-        free: (nq, m) directions in which the positions can move.
-        first: indices in q of what is known, independent.
+        system: assembled mechanism.
+        free: (nq, m) basis of the directions in which the positions can move.
+        first: indices in q of independent known positions.
 
     Raises:
-        NoClosedForm: spherical joints or free bodies move in some of their ways only.
+        NoClosedForm: a spherical joint or a free body keeps some, but not all of its freedoms.
     """
     simple = [link for link in system.tree.links if link.motion.nq == 1]
     motors = [link.q.start for link in simple if link.v.start in system.free]
@@ -584,21 +590,21 @@ def undetermined_beside(system: System, free: Vector, first: tuple[int, ...]) ->
 
 
 def _gain(free: Vector, taken: tuple[int, ...], indices: tuple[int, ...]) -> int:
-    """How many more directions the positions tell."""
+    """Return the increase of the rank of the rows of `free` if rows `indices` join rows `taken`."""
     return rank(free[[*taken, *indices]], _LOOSE) - (
         rank(free[list(taken)], _LOOSE) if taken else 0
     )
 
 
 def regular_configuration(system: System) -> Vector:
-    """A closed configuration near the assembled one, where nothing is aligned by accident."""
+    """Return a closed configuration near the assembled one, without accidental alignments."""
     configuration = np.array(system.configuration)
     closing = Closing(system, closure_parameters(system))
     return next(closing.nearby(configuration, _MOVE, _KNOWN_TRIES, _KNOWN_SEED), configuration)
 
 
 def _raising(free: Vector, candidates: Sequence[int], first: tuple[int, ...]) -> tuple[int, ...]:
-    """Of the candidates, in their order, those that are independent of what is there already."""
+    """Return the candidates, in their order, that are independent of `first` and each other."""
     taken = list(first)
     for k in candidates:
         if k not in taken and _gain(free, tuple(taken), (k,)):
@@ -606,9 +612,9 @@ def _raising(free: Vector, candidates: Sequence[int], first: tuple[int, ...]) ->
     return tuple(taken[len(first) :])
 
 
-# The loops of a system solved where the pose of one frame is known.
+# Closed forms from the known pose of one frame.
 #
-# From the base through the tree to the frame, and back by its pose, leads one more loop.
+# The path from the base through the tree to the frame, and back by its pose, is one more loop.
 
 
 _POSE = 7
@@ -616,11 +622,11 @@ _POSE = 7
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Posed:
-    """A plan that starts from the pose of a frame.
+    """Plan that starts from the pose of a frame.
 
     Attributes:
-        stages: in their order.
-        size: how many positions there are, seven of the pose at their end.
+        stages: stages in their order of solution.
+        size: number of positions, with the seven of the pose (p, quaternion) as the last ones.
         undetermined: indices in q of independent joints that the pose does not determine.
     """
 
@@ -629,7 +635,7 @@ class Posed:
     undetermined: tuple[int, ...]
 
     def started(self, T: Vector, q: Vector) -> Vector:
-        """All positions, with those of the pose T (4, 4) and, as in q (nq,), the undetermined."""
+        """Return all positions at the start: pose T (4, 4), undetermined joints from q (nq,)."""
         start = np.zeros(self.size)
         start[list(self.undetermined)] = q[list(self.undetermined)]
         start[-_POSE:-4] = T[:3, 3]
@@ -638,15 +644,15 @@ class Posed:
 
 
 def plan_to(system: System, frame: str | int) -> Posed:
-    """The plan for a frame whose pose is known.
+    """Return the plan that computes all positions from the pose of a frame.
 
     Args:
-        system: the assembled mechanism, with loops.
-        frame: a body, a named frame, or the number of a link.
+        system: assembled mechanism with loops.
+        frame: name of a body, name of a frame, or index of a link.
 
     Raises:
-        NoClosedForm: says which loop has none, and why.
-        ModelError: there is no such frame.
+        NoClosedForm: a loop has no closed form. The message contains its name and the reason.
+        ModelError: the system has no such frame.
     """
     made: Posed = system.cached(("closed form to", frame), lambda: _plan_to(system, frame))
     return made
@@ -674,12 +680,12 @@ def _plan_to(system: System, frame: str | int) -> Posed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosedStages:
-    """Stages that give the rest from some positions and the pose of a link.
+    """Stages that compute all positions from known positions and the pose of a link.
 
     Attributes:
-        stages: in their order.
-        extent: how many positions there are, seven of the pose at their end.
-        chosen: the branch of each stage in which the system was assembled.
+        stages: stages in their order of solution.
+        extent: number of positions, with the seven of the pose (p, quaternion) as the last ones.
+        chosen: branch of each stage in which the system was assembled.
     """
 
     stages: list[Stage]
@@ -688,12 +694,12 @@ class PosedStages:
 
 
 def posed_stages(system: System, link: int, known: Collection[int]) -> PosedStages | None:
-    """How the loops follow from known positions and the pose of a link; None where they do not.
+    """Return stages from known positions and the pose of a link; None if the loops have none.
 
     Args:
-        system: the assembled mechanism, with loops.
-        link: whose pose in the base link's frame is known.
-        known: indices in q.
+        system: assembled mechanism with loops.
+        link: index of the link whose pose in the frame of the base link is known.
+        known: indices in q of the known positions.
     """
     weld = _weld(link, Pose.identity(), Pose.identity())
     first = extent(replace(system, cuts=(*system.cuts, weld), _cache={}))
@@ -724,7 +730,7 @@ def _weld(link: int, pose: Pose, goal: Pose) -> Cut:
 
 
 def _pose_locked(system: System, at: Function, p: Vector) -> tuple[int, ...]:
-    """Independent joints that move while the frame stays."""
+    """Return indices in q of independent joints that can move while the frame is at rest."""
     q = regular_configuration(system)
     rows = np.vstack([Closing(system, p).rows(q)[1], np.array(at(q, p)[1])])
     return undetermined_beside(system, null_space(rows), ())

@@ -1,4 +1,4 @@
-"""The inverse geometric model by iteration: a configuration that brings a frame to a pose."""
+"""Iterative inverse kinematics: a configuration that moves a frame to a given pose."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from mbs.solvers.least_squares import gauss_newton, levenberg_marquardt
 from mbs.spatial import Pose
 from mbs.text import did_you_mean, quoted
 
-# A pose as a user gives it: a rigid transform, or the row or axis that keeps it from being one.
+# Target pose of the user: a rigid transform, or an error message for the row or axis that is wrong.
 
 
 Array = NDArray[np.float64]
 
 SKEWED = 1e-6
-"""By how much an element may miss a rigid transform and is still rounded to one."""
+"""Largest error of an element of a transform that is still rounded to a rigid transform."""
 
 _ROUNDINGS = 2
 _LAST = np.array([0.0, 0.0, 0.0, 1.0])
@@ -39,18 +39,18 @@ _WANTED = (
 
 
 def target_pose(system: System, T: Any) -> Array:
-    """The target pose, its orientation exactly orthonormal.
+    """Return the target pose with an exactly orthonormal orientation.
 
     Args:
-        system: named in messages.
-        T: (4, 4) homogeneous transform [m], as an array, nested lists, a casadi matrix of numbers
-            or a Pose; where it is orthonormal but for 1e-6 it is rounded to the nearest rotation.
+        system: system whose name appears in error messages.
+        T: (4, 4) homogeneous transform [m], as an array, nested lists, a numeric CasADi matrix or a
+            Pose. Orientations within 1e-6 of orthonormal are rounded to the nearest rotation.
 
     Returns:
-        (4, 4) numbers.
+        (4, 4) numeric transform.
 
     Raises:
-        ModelError: T is no rigid transform; the message names the row or the axis.
+        ModelError: T is not a rigid transform. The message contains the wrong row or axis.
     """
     matrix = pose_numbers(T)
     if matrix is None or matrix.shape != (4, 4):
@@ -63,7 +63,7 @@ def target_pose(system: System, T: Any) -> Array:
 
 
 def pose_numbers(T: Any) -> Array | None:
-    """T as an array of numbers of any shape; None where it is none."""
+    """Return T as a numeric array of any shape; None if T is not numeric."""
     try:
         if isinstance(T, Pose):
             T = T.matrix
@@ -76,7 +76,7 @@ def pose_numbers(T: Any) -> Array | None:
 
 
 def rounded(T: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """(..., 4, 4) rigid transforms nearest to T, and (...) whether T is one but for 1e-6.
+    """Return (..., 4, 4) nearest rigid transforms, and whether each T is within 1e-6 of it (...).
 
     Source: Higham 2008, chapter 8, the Newton-Schulz iteration for the polar factor.
     """
@@ -93,7 +93,7 @@ def rounded(T: Array) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def defect(T: Array, name: str = "T") -> str:
-    """What keeps a matrix (4, 4) from being a rigid transform."""
+    """Return the text that describes why a matrix (4, 4) is not a rigid transform."""
     open_places = np.argwhere(~np.isfinite(T))
     if len(open_places):
         r, c = (int(k) for k in open_places[0])
@@ -104,7 +104,7 @@ def defect(T: Array, name: str = "T") -> str:
 
 
 def _skewed_axes(R: Array, name: str) -> str:
-    """The axis that misses a unit length most, or the two that miss a right angle most."""
+    """Return text on the axis with the worst length or on the two axes with the worst angle."""
     with np.errstate(over="ignore"):
         lengths = np.linalg.norm(R, axis=0)
     faults = {
@@ -124,30 +124,30 @@ def _skewed_axes(R: Array, name: str) -> str:
     return faults[worst]
 
 
-# What is asked of a frame: its pose, or some rows of it, beside the closure of the loops.
+# Requirements on a frame: its pose, or some rows of the pose, in addition to the loop closure.
 
 
 ROWS = {"x": (0,), "y": (1,), "z": (2,), "orientation": tuple(range(3, 12)), "axis": (9, 10, 11)}
-"""The rows of a pose by name, and their elements among [origin; x axis; y axis; z axis]."""
+"""Elements of each named row of a pose, as indices in [origin; x axis; y axis; z axis]."""
 
 WHOLE = ("x", "y", "z", "orientation")
 _CLOSURE_WEIGHT = 1e2
-"""What closure rows count beside a pose that is not reached: loops open by less than 1e-4 of what
-the pose is missed by, near enough to be closed afterwards; more would slow the iteration."""
+"""Weight of closure rows against an unreachable pose: the loops are then open by less than 1e-4 of
+the pose error, near enough to be closed afterwards. Larger weights slow down the iteration."""
 _ITERATIONS = 50
-"""Of Gauss-Newton from one start: it squares its error near a root, and one that wanders for so
-long is better replaced by the next start."""
+"""Maximum Gauss-Newton iterations from one start: convergence is quadratic near a root, so that
+after 50 iterations the next start is more promising."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Goal:
-    """A pose that a frame is to have while the loops are closed.
+    """Pose that a frame must reach while the loops are closed.
 
     Attributes:
-        closing: the closure rows; no position is held.
-        frame: that is to be there.
-        rows: names of the rows of the pose that count.
-        target: (12,) origin [m], then the axes x, y, z of the frame, in the base.
+        closing: closure rows of the loops, without locked positions.
+        frame: name of a body or frame, or index of a link.
+        rows: names of the rows of the pose that must agree, keys of `ROWS`.
+        target: (12,) target origin [m] and axes x, y, z of the frame, in the base.
     """
 
     closing: Closing
@@ -157,15 +157,15 @@ class Goal:
 
     @property
     def elements(self) -> list[int]:
-        """The elements of the pose that count."""
+        """Sorted indices of the elements of the pose (12,) that must agree."""
         return sorted({k for name in self.rows for k in ROWS[name]})
 
     def at(self, T: Vector) -> Goal:
-        """The same goal at another pose (4, 4)."""
+        """Return the same goal for another target pose (4, 4)."""
         return replace(self, target=_elements(T))
 
     def gap(self, q: Vector) -> tuple[float, float]:
-        """How far the frame is away at q, (nq,): distance [m] and angle [rad] of what counts."""
+        """Return the errors of the required rows at q (nq,): distance [m] and angle [rad]."""
         index = self.pose(q)[0] - self.target
         own = [k for k in self.elements if k < 3]
         axes = np.where(np.isin(range(12), self.elements), index, 0.0)[3:].reshape(3, 3)
@@ -173,7 +173,7 @@ class Goal:
         return float(np.linalg.norm(index[own])), 2 * float(np.arcsin(min(1.0, chord / 2)))
 
     def residual(self, q: Vector, weight: float = 1.0) -> tuple[Vector, Vector]:
-        """Closure rows times a weight, then those of the pose, and the slope by q, (m, nq)."""
+        """Return the residual (m,): weighted closure rows, then pose errors; its slope (m, nq)."""
         r, J = self.closing.rows(q)
         pose, slope = self.pose(q)
         e = self.elements
@@ -184,27 +184,27 @@ class Goal:
 
     @property
     def sizes(self) -> Vector:
-        """(m,) what the rows of `residual` are measured by: lengths by the size of the loops."""
+        """(m,) divisors of the rows of `residual`: size of the mechanism for lengths, else 1."""
         pose = [self.closing.size if k < 3 else 1.0 for k in self.elements]
         return np.concatenate([self.closing.sizes, pose])
 
     def openness(self, q: Vector) -> float:
-        """The largest row at q, (nq,), in parts of the size of the mechanism."""
+        """Return the largest row of the residual at q (nq,), divided by `sizes`."""
         return float(np.max(np.abs(self.residual(q)[0]) / self.sizes, initial=0.0))
 
     def nearest(self, q: Vector) -> Closed:
-        """The configuration that Gauss-Newton reaches from q, (nq,), loops and pose together."""
+        """Return the result of Gauss-Newton from q (nq,) on the loops and the pose together."""
         tolerance = TOLERANCE * self.sizes
         root = gauss_newton(self.residual, q, tolerance=tolerance, iterations=_ITERATIONS)
         return Closed(root.x, root.residual, root.converged and self.closing.faces(root.x))
 
     def approach(self, q: Vector) -> Closed:
-        """The configuration next to q with closed loops that is nearest to the pose."""
+        """Return a configuration with closed loops as close to the pose as possible, from q."""
         root = levenberg_marquardt(lambda x: self.residual(x, _CLOSURE_WEIGHT), q)
         return self.closing.nearest(root.x)
 
     def pose(self, q: Vector) -> tuple[Vector, Vector]:
-        """The elements of the pose of the frame, (12,), and their slope by q, (12, nq)."""
+        """Return the elements of the frame's pose (12,), and their derivative by q (12, nq)."""
         system = self.closing.system
         function: OnArrays = system.cached(
             ("pose and slope", self.frame), lambda: on_arrays(_pose_and_slope(system, self.frame))
@@ -220,10 +220,10 @@ def goal(
     rows: Sequence[str] | None,
     parameters: Mapping[str, float] | None,
 ) -> Goal:
-    """A goal from what a user gives.
+    """Return the goal for inputs of the user.
 
     Raises:
-        ModelError: there is no such frame or row, or T is no pose.
+        ModelError: the frame or a row does not exist, or T is not a rigid transform.
     """
     require_system(system)
     system.frame(frame)
@@ -258,7 +258,8 @@ def _pose_and_slope(system: System, frame: str | int) -> Function:
 
 
 _FEWEST = 3
-"""Attempts that are brought as near to an unreachable pose as they can."""
+"""Number of best attempts from which the nearest configuration to an unreachable pose is
+computed."""
 
 
 def solve_pose(
@@ -270,30 +271,32 @@ def solve_pose(
     guess: Mapping[str, float] | Sequence[float] | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Vector:
-    """A configuration that closes the loops and brings a frame to a pose.
+    """Return a configuration that closes the loops and moves a frame to a given pose.
 
-    Gauss-Newton on the closure rows and those of the pose together, every position of the tree
-    free, from the guess and then from starts ever further away, always the same ones. Which of
-    several configurations is found depends on the guess; `working_modes` looks for the others.
+    Gauss-Newton solves the closure rows and the pose rows together, with all tree positions free.
+    It starts from the guess, then from random starts at increasing distances, the same at each
+    call. The guess decides which of several configurations is found. `working_modes` finds the
+    others.
 
     Args:
-        system: open or closed.
-        frame: a body, a named frame, or the number of a link.
-        T: (4, 4) target pose in the base, homogeneous [m]; an orientation that is orthonormal but
-            for 1e-6 is rounded to the nearest one.
-        rows: what of the pose counts: "x", "y", "z", "orientation", and "axis" for the z axis of
-            the frame alone; the whole pose when left out. A robot of fewer than six freedoms needs
-            a pose that it can take, or names, such as ["x", "y"] in a plane.
-        guess: approximate positions, by name or all of them; the others as in the assembled
-            configuration.
-        parameters: values of symbols, the others at their defaults.
+        system: open or closed mechanism.
+        frame: name of a body, name of a frame, or index of a link.
+        T: (4, 4) homogeneous target pose in the base [m]. An orientation within 1e-6 of orthonormal
+            is rounded to the nearest rotation.
+        rows: names of the rows of the pose that must agree: "x", "y", "z", "orientation", and
+            "axis" for the direction of the z axis only. The default is the whole pose. A robot with
+            less than six freedoms needs a reachable pose, or names such as ["x", "y"] in a plane.
+        guess: approximate positions, by name or all of them. Missing positions have their values of
+            the assembled configuration.
+        parameters: values of symbols by name. Missing symbols have their default values.
 
     Returns:
-        q (nq,) [rad or m]. The rows of the loops and of the pose are below 1e-12.
+        q (nq,) [rad or m]. The rows of the loops and of the pose are below 1e-12 in it, with
+        lengths divided by the size of the mechanism.
 
     Raises:
-        Unclosable: no configuration was found; the message says how near the frame comes.
-        ModelError: there is no such frame, row or coordinate, or T is no pose.
+        Unclosable: no configuration was found. The message contains the smallest pose error.
+        ModelError: the frame, a row or a coordinate does not exist, or T is not a rigid transform.
     """
     target = goal(system, frame, T, rows, parameters)
     start = np.array(system.position(guess))
@@ -307,7 +310,7 @@ def solve_pose(
 
 
 def _refusal(target: Goal, start: Vector, tried: Sequence[Closed]) -> str:
-    """Why no configuration was found: the loops stay open, or the pose is out of reach."""
+    """Return the error message: either the loops remain open, or the pose is out of reach."""
     closing = target.closing
     best = sorted(tried, key=lambda found: found.residual)[:_FEWEST]
     near = [target.approach(q) for q in (*(found.q for found in best), start)]

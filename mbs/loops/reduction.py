@@ -33,13 +33,13 @@ class Reduction:
     drift: SX | None = None
 
     def velocities(self, v_a: SX) -> SX:
-        """(nv, 1) velocities of the tree for the independent ones, (m, 1)."""
+        """Return the velocities (nv, 1) of the tree for independent velocities (m, 1)."""
         v = casadi.mtimes(self.G, v_a)
         return casadi.densify(v if self.drift is None else v + self.drift)
 
 
 def reduction_matrix(system: System) -> Function:
-    """``reduction_matrix(q) -> G``: velocities of the tree from the independent ones, v = G v_a.
+    """Return ``reduction_matrix(q) -> G``: map from independent to tree velocities, v = G v_a.
 
     With massless nodes that dampers hold, v = G v_a + g; the function returns G.
 
@@ -58,12 +58,12 @@ def reduction_matrix(system: System) -> Function:
 
 
 def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
-    """G, and gamma for the independent velocities v_a, at the symbols q.
+    """Return G, and gamma for the independent velocities v_a, at the symbols q.
 
     Args:
-        system: with closed loops.
+        system: mechanism with closed loops.
         q: (nq, 1) symbols of positions that close the loops.
-        v_a: (m, 1) independent velocities, or None when gamma is not target.
+        v_a: (m, 1) independent velocities; None if gamma is not needed.
     """
     closure = system.closure
     assert closure is not None
@@ -85,7 +85,7 @@ def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
 
 
 def tree_rows(system: System, passive: SX, active: SX) -> SX:
-    """(nv, m) rows in the order of the velocities, from those of the passive and active ones."""
+    """Merge passive and active rows into (nv, m) rows in the order of the velocities."""
     closure = system.closure
     assert closure is not None
     rows = zeros(system.nv, active.shape[1])

@@ -1,6 +1,6 @@
-"""Velocities and accelerations that loops allow: J(q) v = 0 and J a + psi = 0; their wrenches.
+"""Constraints of loops on velocities and accelerations, J(q) v + g = 0, and constraint wrenches.
 
-The rows of J are those of the closure, then those of rolling discs, which bind velocities alone.
+The rows of J are the closure rows, then velocity rows, such as the no-slip rows of rolling discs.
 
 Source: Khalil & Creusot 1997, eq. 11 and 14.
 """
@@ -36,7 +36,7 @@ from mbs.spatial import Pose, Wrench, add_wrenches, cross, skew, transform_wrenc
 
 
 def closure_jacobian(system: System) -> Function:
-    """``closure_jacobian(q) -> J``: the rows of J, (m, nv), act on v.
+    """Return ``closure_jacobian(q) -> J``: all constraint rows J (m, nv), which act on v.
 
     Returns:
         Function of q (nq, 1); J (m, nv) [m/rad, 1 or 1/m].
@@ -50,13 +50,13 @@ def closure_jacobian(system: System) -> Function:
 
 
 def constraint_rows(system: System, q: SX) -> SX:
-    """J (m, nv), every row, at the symbols q."""
+    """Return J (m, nv), all constraint rows, as expressions of the symbols q."""
     slips = [rows for _, rows in slip_rows(system, q)]
     return casadi.vertcat(velocity_rows(system, q, closure_rows(system, q)), *slips)
 
 
 def constraint_drift(system: System, q: SX) -> SX | None:
-    """Drift g (m, 1) of every row J v + g = 0 at the symbols q; None if all rows are J v = 0."""
+    """Return the drift g (m, 1) of all rows J v + g = 0, or None if all rows are J v = 0."""
     drift = drift_rows(system, q)
     if drift is None:
         return None
@@ -65,7 +65,7 @@ def constraint_drift(system: System, q: SX) -> SX | None:
 
 
 def constraint_drift_at(system: System) -> Function | None:
-    """``drift(q, p) -> g``: drift of every row; None if all rows are J v = 0."""
+    """Return ``drift(q, p) -> g``, the drift of all rows; None if all rows are J v = 0."""
 
     def build() -> Function | None:
         q = SX.sym("q", system.nq)
@@ -77,13 +77,13 @@ def constraint_drift_at(system: System) -> Function | None:
 
 
 def independent_drift(system: System, q: SX) -> SX | None:
-    """Drift g (r, 1) of the rows that the analysis kept; None if all rows are J v = 0."""
+    """Return the drift g (r, 1) of the independent rows; None if all rows are J v = 0."""
     drift = constraint_drift(system, q)
     return None if drift is None else drift[kept_rows(system)]
 
 
 def independent_constraint_rows(system: System, q: SX) -> SX:
-    """J (r, nv), the rows that the analysis kept, at the symbols q."""
+    """Return J (r, nv), the independent rows found by the analysis, at the symbols q."""
     J = velocity_rows(system, q, independent_closure(system, q))
     assert system.closure is not None
     if not system.closure.slips:
@@ -93,7 +93,7 @@ def independent_constraint_rows(system: System, q: SX) -> SX:
 
 
 def constraint_jacobian(system: System) -> Function:
-    """``constraint_jacobian(q, p) -> J``: every row, also where parameters have no value."""
+    """Return ``constraint_jacobian(q, p) -> J``: all rows, with parameters p as an input."""
 
     def build() -> Function:
         q = SX.sym("q", system.nq)
@@ -104,7 +104,7 @@ def constraint_jacobian(system: System) -> Function:
 
 
 def kept_rows(system: System) -> list[int]:
-    """The numbers of the independent rows among all; none in an open chain."""
+    """Return the indices of the independent rows among all rows; empty for an open chain."""
     if system.closure is None:
         return []
     positions = len(position_rows(system))
@@ -113,15 +113,16 @@ def kept_rows(system: System) -> list[int]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DeterminingRows:
-    """Rows from which the passive velocities follow in every configuration that leads them.
+    """Constraint rows that determine the passive velocities from the independent ones.
 
-    These are the kept rows; all of them, by least squares, where no choice of rows is independent
-    everywhere: as rows agree with each other on closed loops, the solution is the same.
+    They are the independent rows if one selection of rows is independent in all configurations.
+    Otherwise they are all rows, solved by least squares. On closed loops all rows are consistent,
+    so that both solutions are equal.
 
     Attributes:
-        J: (m, nv).
-        mixed: (r, m) combinations of the rows, as many as there are passive velocities.
-        square: (r, r) their columns of the passive velocities.
+        J: (m, nv) constraint rows.
+        mixed: (r, m) combinations of the rows; r is the number of passive velocities.
+        square: (r, r) matrix `mixed` times the columns of J of the passive velocities.
         drift: (m, 1) drift g of the rows J v + g = 0; None if all rows are J v = 0.
     """
 
@@ -132,7 +133,7 @@ class DeterminingRows:
 
 
 def determining_rows(system: System, q: SX) -> DeterminingRows:
-    """The rows of a system with loops at the symbols q."""
+    """Return the determining rows of a system with loops at the symbols q."""
     closure = system.closure
     assert closure is not None
     J = constraint_rows(system, q) if closure.varies else independent_constraint_rows(system, q)
@@ -143,35 +144,35 @@ def determining_rows(system: System, q: SX) -> DeterminingRows:
 
 
 def velocity_rows(system: System, q: SX, phi: SX) -> SX:
-    """J (m, nv), with d phi / dt = J v, for rows phi that depend on the symbols q."""
+    """Return J (m, nv), with d phi / dt = J v, for rows phi that depend on the symbols q."""
     v = SX.sym("v", system.nv)
     return casadi.jacobian(casadi.jtimes(phi, q, position_rate(system.tree, q, v)), v)
 
 
 def acceleration_bias(system: System, q: SX, v: SX, J: SX, drift: SX | None = None) -> SX:
-    """Psi = dJ/dt v + dg/dt, (m, 1), for J and the drift g that depend on the symbols q."""
+    """Return psi = dJ/dt v + dg/dt (m, 1) for J and the drift g that depend on the symbols q."""
     speeds = casadi.mtimes(J, v)
     if drift is not None:
         speeds += drift
     return casadi.jtimes(speeds, q, position_rate(system.tree, q, v))
 
 
-# The wrenches of cut joints: what the efforts of their closure rows are between two bodies.
+# Wrenches of cut joints, from the efforts (Lagrange multipliers) of their closure rows.
 #
-# A small displacement of frame_b that the tree does not make, by x and by the turn y in its own
-# axes, opens the rows by d phi; the rows do the work lam' d phi = F' x + M' y, whatever they are
-# made of.
+# A small displacement of frame_b relative to the tree, by a translation x and a rotation y in its
+# own axes, changes the rows by d phi. The efforts of the rows do the work lam' d phi = F' x + M' y,
+# for rows of any form.
 #
 # Source: Haug 1989, for reactions from the efforts of rows.
 
 
 def cut_wrenches(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
-    """For every cut joint the wrench on the body of frame_b, about and in frame_b.
+    """Return the wrench of each cut joint on the body of frame_b, at its origin, in its axes.
 
     Args:
-        system: with closed loops.
+        system: mechanism with closed loops.
         q: (nq, 1) symbols of positions that close the loops.
-        lam: (m, 1) efforts of all rows, those of rolling discs last.
+        lam: (m, 1) efforts of all rows, with the rows of rolling discs last.
     """
     if not system.cuts:
         return {}
@@ -196,12 +197,12 @@ def cut_wrenches(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
 
 
 def on_links(system: System, q: SX, wrenches: dict[str, Wrench]) -> dict[int, Wrench]:
-    """For some links the wrench that they exert on cut joints, about and in their frames.
+    """Return the wrenches that links exert on cut joints, at the origins and in the link frames.
 
     Args:
-        system: with closed loops.
+        system: mechanism with closed loops.
         q: (nq, 1) positions.
-        wrenches: as `cut_wrenches` gives them.
+        wrenches: wrenches of the cut joints by name, from `cut_wrenches`.
     """
     exerted: list[dict[int, Wrench]] = []
     for cut in system.cuts:
@@ -214,12 +215,12 @@ def on_links(system: System, q: SX, wrenches: dict[str, Wrench]) -> dict[int, Wr
 
 
 def part_wrenches(system: System, q: SX, lam: SX) -> dict[int, Wrench]:
-    """For some links the wrench that they exert on components with rows, in their frames.
+    """Return the wrenches that links exert on components with constraint rows, in link frames.
 
     Args:
-        system: with components that have rows, or without any.
+        system: mechanism, with or without components that have constraint rows.
         q: (nq, 1) symbols of positions that close the loops.
-        lam: (m, 1) efforts of all rows, those of velocities last.
+        lam: (m, 1) efforts of all rows, with the velocity rows last.
     """
     parts = {part.name: part for part in system.parts if part.element.binds}
     if not parts:
@@ -241,12 +242,12 @@ def part_wrenches(system: System, q: SX, lam: SX) -> dict[int, Wrench]:
 
 
 def _displace(d: SX) -> Pose:
-    """A frame moved by d[:3] and turned by d[3:], both small."""
+    """Return a small displacement: translation d[:3] and rotation d[3:]."""
     return Pose(SX(DM.eye(3)) + skew(d[3:]), d[:3])
 
 
 def _against_slip(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
-    """What the rows of rolling discs, which bind velocities alone, do to the disc."""
+    """Return the wrench that the no-slip rows of each rolling disc exert on it, by name."""
     result: dict[str, Wrench] = {}
     for number, (cut, disc) in enumerate(rolling_discs(system)):
         along = [lam[2 * number], lam[2 * number + 1]]
@@ -257,39 +258,40 @@ def _against_slip(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
     return result
 
 
-# Sizes of the rows and columns of the constraints, so that nothing depends on units.
+# Scales of the rows and columns of the constraints, which make results independent of units.
 #
-# Rows are lengths or cosines, columns belong to angles or displacements. A displacement is
-# measured by the length that an angle moves the rows of positions, and a row by its own size at
-# the assembled configuration.
+# Rows are lengths or cosines. Columns belong to angles or displacements. The unit of a displacement
+# is the largest moment arm of an angle on the position rows. The unit of a row is its norm at the
+# assembled configuration.
 
 
 _VANISHING = 1e-9
-"""Rows below this part of the usual one vanish as assembled, and are measured by the usual one:
-assembling leaves 1e-12, and nobody builds levers a thousand million times shorter than others."""
+"""Norm of a row, relative to the median norm, below which the row is zero at assembly and is scaled
+by the median: assembling leaves 1e-12, and moment arms do not differ by a factor of 1e9."""
 _NO_LEVER = 1e-9
-"""Levers below this part of the size of the mechanism are rounding: they make no unit of length."""
+"""Moment arm, relative to the size of the mechanism, below which it is rounding and gives no unit
+of length."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scales:
-    """What rows are multiplied by, and columns: D J E has rows of about unit length.
+    """Scale factors of constraint rows (D) and columns (E): D J E has rows of about unit norm.
 
     Attributes:
-        rows: (m,) for every constraint row, rows of positions first [1/m or 1].
-        length: for displacements [m]; angles count as they are.
+        rows: (m,) factors of all constraint rows, position rows first [1/m or 1].
+        length: unit of displacements [m]. Angles have the unit 1.
     """
 
     rows: NDArray[np.float64]
     length: float
 
     def columns(self, units: list[str]) -> NDArray[np.float64]:
-        """For coordinates of these units."""
+        """Return the factors of coordinates with these units: `length` for lengths, else 1."""
         return np.array([self.length if unit.startswith("m") else 1.0 for unit in units])
 
 
 def scales(system: System) -> Scales:
-    """The scales of a system; ones where a symbol has no value, and no rows in an open chain."""
+    """Return the scales of a system. They are 1 if a parameter of the rows has no value."""
 
     def build() -> Scales:
         J = np.array(constraint_jacobian(system)(list(system.configuration), system.p_default))
@@ -298,7 +300,7 @@ def scales(system: System) -> Scales:
         units = [speed.unit for speed in system.speeds]
         lever = _largest_lever(J, [unit for *_, unit in position_rows(system)], units)
         size = Function("size", [system.p], [mechanism_size(system)])(system.p_default)
-        # levers of a dwell of a cam, or at a dead centre, are rounding, or zero
+        # moment arms at a dwell of a cam or at a dead centre are zero, up to rounding
         length = 1.0 if lever is None else lever
         if lever is not None and lever <= _NO_LEVER * float(size):
             length = float(size)
@@ -311,7 +313,7 @@ def scales(system: System) -> Scales:
 
 
 def _largest_lever(J: NDArray[np.float64], rows: list[str], units: list[str]) -> float | None:
-    """How far an angle moves the rows of positions, the largest of them; None without angles."""
+    """Return the largest moment arm of an angle on the position rows [m]; None without angles."""
     turns = [k for k, unit in enumerate(units) if unit.startswith("rad")]
     places = [k for k, unit in enumerate(rows) if unit == "m"]
     moved = np.abs(J[np.ix_(places, turns)])

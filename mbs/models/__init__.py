@@ -1,4 +1,4 @@
-"""Model builders: a System in, a casadi.Function with named inputs and outputs out."""
+"""Model builders: functions of a System that return a casadi.Function with named arguments."""
 
 from typing import NoReturn
 
@@ -112,5 +112,5 @@ __all__ = [
 
 
 def __getattr__(name: str) -> NoReturn:
-    """Raise AttributeError with the nearest names."""
+    """Raise AttributeError; the message suggests similar names."""
     raise AttributeError(f"mbs.models has no {name!r}; {did_you_mean(name, __all__)}")

@@ -1,8 +1,8 @@
-"""Motors of a closed system: what their efforts do, and how they share what a motion takes.
+"""Motors of closed systems: actuation matrix, its null space, and distribution of motor efforts.
 
-The efforts tau_m of the motors do the work of tau_a = B tau_m at the independent joints, where the
-actuation matrix B has a column for each motor. Where there are more motors than independent joints,
-B has a null space: efforts that only strain the mechanism.
+Motor efforts tau_m are equivalent to efforts tau_a = B tau_m of the independent joints; the
+actuation matrix B has one column per motor. With more motors than independent joints, B has a null
+space: efforts that only preload the mechanism.
 
 Source: Nakamura & Ghodoussi 1989.
 """
@@ -24,19 +24,20 @@ from mbs.spatial import zeros
 
 
 def actuation_matrix(system: System) -> Function:
-    """``actuation(q) -> B``: efforts at the independent joints from those of the motors.
+    """Actuation matrix: ``actuation(q) -> B`` with tau_a = B tau_m.
 
-    The power of the motors, tau_m' v_m, is that of tau_a = B tau_m, which is tau_a' v_a. Efforts of
-    `bias`, `gravity_effort` and `lagrange`, and the derivatives of the dynamic models, are tau_a.
+    B maps efforts tau_m of the motors to efforts tau_a of the independent joints with equal power:
+    tau_m' v_m = tau_a' v_a. `bias`, `gravity_effort`, `lagrange` and the derivatives of the dynamic
+    models use tau_a.
 
     Source: Nakamura & Ghodoussi 1989.
 
     Args:
-        system: open or closed; q must close the loops.
+        system: open or closed mechanism; q must close the loops.
 
     Returns:
-        Function of q (nq, 1); B (m, k) for k motors, `system.motors`, the identity where they are
-        the independent joints.
+        Function of q (nq, 1); B (m, k) for the k motors of `system.motors`. B is the identity if
+        the motors are on the independent joints.
     """
 
     def build() -> tuple[Named, Named]:
@@ -48,20 +49,20 @@ def actuation_matrix(system: System) -> Function:
 
 
 def actuation_null_space(system: System) -> Function:
-    """``actuation_null_space(q) -> N``: efforts of motors that move nothing, B N = 0.
+    """Null space of the actuation matrix: ``actuation_null_space(q) -> N`` with B N = 0.
 
-    Any tau_m + N z drives the same motion: z loads the mechanism against itself, to take up
-    backlash or to keep efforts within limits. Column j is a unit effort of a motor beyond the
-    mobility, and what it takes of m motors that are independent, the same at all configurations.
+    All motor efforts tau_m + N z produce the same motion. z is an internal load that may remove
+    backlash or keep efforts within limits. Column j is a unit effort of one redundant motor and the
+    balancing efforts of m independent motors. The choice of motors is the same at all q.
 
     Source: Nakamura & Ghodoussi 1989.
 
     Args:
-        system: open or closed; q must close the loops.
+        system: open or closed mechanism; q must close the loops.
 
     Returns:
-        Function of q (nq, 1); N (k, k - m), without columns where motors are not more than the
-        independent joints.
+        Function of q (nq, 1); N (k, k - m) for k motors and m independent joints; no columns if
+        k = m.
     """
 
     def build() -> tuple[Named, Named]:
@@ -81,15 +82,16 @@ def actuation_null_space(system: System) -> Function:
 
 
 def motors_apart(system: System, s: ModelSymbols) -> bool:
-    """Whether efforts of motors are others than those at the velocities that a model takes."""
+    """Whether motor efforts differ from efforts at the input velocities of a model."""
     return s.reduction is not None and system.motors != system.active
 
 
 def effort_input(system: System, s: ModelSymbols) -> tuple[str, SX, SX]:
-    """An input of efforts, and what it is at the velocities that a model takes.
+    """Input of efforts for a model.
 
     Returns:
-        its name, tau, tau_a or tau_m; its symbol; the efforts (m, 1).
+        name of the input ("tau", "tau_a" or "tau_m"), its symbol, and the equivalent efforts (m, 1)
+        at the input velocities.
     """
     if not motors_apart(system, s):
         name, tau = s.input("tau")
@@ -99,13 +101,17 @@ def effort_input(system: System, s: ModelSymbols) -> tuple[str, SX, SX]:
 
 
 def effort_output(system: System, s: ModelSymbols, tau: SX) -> tuple[str, SX]:
-    """An output of efforts (m, 1) at the velocities that a model takes, shared by motors.
+    """Output of efforts of a model, distributed over the motors.
 
-    Of all efforts of motors that do the same those of the least sum of squares:
-    tau_m = B' (B B')^-1 tau_a.
+    Redundant motors get the efforts of smallest norm: tau_m = B' (B B')^-1 tau_a.
+
+    Args:
+        system: open or closed mechanism.
+        s: symbols of the model.
+        tau: (m, 1) efforts at the input velocities of the model.
 
     Returns:
-        its name, tau, tau_a or tau_m, and its value.
+        name of the output ("tau", "tau_a" or "tau_m") and its value.
     """
     if not motors_apart(system, s):
         return "tau" + s.suffix, tau
@@ -115,21 +121,21 @@ def effort_output(system: System, s: ModelSymbols, tau: SX) -> tuple[str, SX]:
 
 
 def shared_efforts(system: System, s: ModelSymbols, needed: SX) -> SX:
-    """(nv, 1) efforts of the tree that motors give where it takes `needed` (nv, 1)."""
+    """(nv, 1) joint efforts of the motors that produce the same motion as `needed` (nv, 1)."""
     tau = zeros(system.nv)
     tau[list(system.motors)] = effort_output(system, s, s.reduced_effort(needed))[1]
     return tau
 
 
 def _velocities(system: System, s: ModelSymbols) -> SX:
-    """(k, m) velocities of the motors from the independent ones, B'."""
+    """(k, m) matrix B' that maps independent velocities to motor velocities."""
     if s.reduction is None:
         return SX.eye(s.size)
     return s.reduction.G[list(system.motors), :]
 
 
 def _independent_motors(system: System) -> list[int]:
-    """Among the motors, by their place, as many as drive the mechanism; the active ones first."""
+    """Indices into `system.motors` of m independent motors; motors on active joints first."""
     if system.closure is None:
         return list(range(system.nv))
     J = np.array(constraint_jacobian(system)(system.configuration, closure_parameters(system)))

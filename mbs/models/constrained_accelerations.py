@@ -1,4 +1,4 @@
-"""Accelerations of the tree where loops, and motions that are prescribed, constrain them."""
+"""Accelerations of the tree under constraints by loops and prescribed motions."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from mbs.recursions.composite_body import inertia_matrix
 from mbs.solvers.linear import solve_saddle
 
 _ROUNDING = 1e-9
-"""A moment of inertia negative by this part of the largest counts as zero: that of a thin rod, from
-parameters with nine digits and more."""
+"""Negative moment of inertia, relative to the largest, that counts as zero: rounding of the moment
+about a thin rod, from parameters with nine digits or more."""
 
 
 def constrained_accelerations(
@@ -36,19 +36,19 @@ def constrained_accelerations(
     a_p: SX | None = None,
     acting: SX | None = None,
 ) -> tuple[SX, SX, SX]:
-    """Accelerations of the tree, and the efforts of what constrains them; links may be massless.
+    """Accelerations of the tree and efforts of its constraints; links may be massless.
 
-    A a + H = tau + J' lam + E' tau_p with J a + psi = 0 and E a = a_p.
+    Solves A a + H = tau + J' lam + E' tau_p with J a + psi = 0 and E a = a_p.
 
     Args:
-        system: open or closed.
-        s: its symbols, in tree coordinates.
+        system: open or closed mechanism.
+        s: symbols of the system, in tree coordinates.
         tau: (nv, 1) joint efforts.
-        around: what acts from outside.
-        prescribed: indices of the velocities whose accelerations are given, or the rows E (k, nv).
-        a_p: (k, 1) these accelerations.
-        acting: (k, 1) 1 where an acceleration is given, 0 where it is free after all and the
-            effort is zero; all are given when left out.
+        around: base motion and external wrenches.
+        prescribed: indices of the velocities with prescribed acceleration, or the rows E (k, nv).
+        a_p: (k, 1) prescribed accelerations.
+        acting: (k, 1) 1 if a row of E acts, 0 if it is released and its effort is zero. By default
+            all rows act.
 
     Returns:
         a (nv, 1), lam (r, 1) of the independent closure rows, and tau_p (k, 1).
@@ -62,7 +62,7 @@ def constrained_accelerations(
 
 
 def unit_rows(system: System, numbers: Sequence[int]) -> SX:
-    """(k, nv) rows of the unit matrix, by indices of velocities."""
+    """(k, nv) rows of the identity matrix for the given velocity indices."""
     return SX(DM.eye(system.nv))[list(numbers), :]
 
 
@@ -73,14 +73,15 @@ def constrained(
     right: tuple[SX, SX, SX],
     acting: SX | None,
 ) -> tuple[SX, SX, SX]:
-    """The x, y and z of A x = b + J' y + E' z, J x = d, E x = e where it acts.
+    """Solve A x = b + J' y + E' z, J x = d, E x = e for x, y and z.
 
     Args:
-        system: open or closed.
-        s: its symbols.
-        left: A (nv, nv) inertia matrix of the tree, J (r, nv) independent rows, E (k, nv) rows.
-        right: b, d and e.
-        acting: as of `constrained_accelerations`.
+        system: open or closed mechanism.
+        s: symbols of the system.
+        left: mass matrix A (nv, nv) of the tree, independent rows J (r, nv), rows E (k, nv).
+        right: b (nv, 1), d (r, 1) and e (k, 1).
+        acting: (k, 1) 1 if a row of E acts, 0 if it is released and its z is zero. None if all rows
+            act.
     """
     (A, J, E), (b, d, e) = left, right
     size, r = inertia_size(system, A, s), J.shape[0]
@@ -95,7 +96,7 @@ def constrained(
 
 
 def loop_rows(system: System, s: ModelSymbols) -> tuple[SX, SX]:
-    """J (r, nv) and psi (r, 1) of the independent rows."""
+    """Jacobian J (r, nv) and bias psi (r, 1) of the independent closure rows J a + psi = 0."""
     if not system.is_closed:
         return SX(0, system.nv), SX(0, 1)
     J = independent_constraint_rows(system, s.q)
@@ -103,7 +104,7 @@ def loop_rows(system: System, s: ModelSymbols) -> tuple[SX, SX]:
 
 
 def inertia_size(system: System, A: SX, s: ModelSymbols) -> float:
-    """The mean diagonal element of A as assembled; 1 where symbols have no value."""
+    """Mean diagonal element of A in the assembled configuration; 1 if a symbol has no default."""
     if any(p.default is None for p in system.parameters):
         return 1.0
     trace = casadi.Function("trace", [s.q, system.p], [casadi.trace(A)])
@@ -112,17 +113,17 @@ def inertia_size(system: System, A: SX, s: ModelSymbols) -> float:
 
 
 def every_velocity_moves_its_link(system: System) -> bool:
-    """Whether the inertia matrix of the tree is known to be positive definite everywhere.
+    """Whether the mass matrix of the tree is known to be positive definite everywhere.
 
-    It is where every link is a body, not one of grouped parameters, with inertia of its own
-    against the velocity of its joint: what the links behind it add to a pivot is never negative.
+    Sufficient condition: each link has a physical inertia (not grouped base parameters) and its own
+    positive inertia against the velocity of its joint. Descendants only increase the pivots.
     """
 
     def check() -> bool:
         own = [casadi.vertcat(*_own_inertia(link)) for link in system.tree.links]
         tensors = [link.inertia.J for link in system.tree.links]
         if casadi.depends_on(casadi.vertcat(*own), system.p):
-            return False  # a parameter may be set to zero
+            return False  # the user may set a parameter to zero
         values = casadi.Function("own", [system.p], [casadi.vertcat(*own), *tensors])
         least, *matrices = (np.array(x) for x in values.call([system.p_default]))
         bodies = all(np.all(np.isfinite(J)) and _is_tensor(J) for J in matrices)
@@ -138,7 +139,10 @@ def _is_tensor(J: NDArray[np.float64]) -> bool:
 
 
 def _own_inertia(link: Link) -> list[SX]:
-    """What a link has against each of its velocities, itself alone."""
+    """Inertia of a link alone, without descendants, against each velocity of its joint.
+
+    For a spherical joint: leading principal minors of the inertia tensor. Zero for a free joint.
+    """
     J, m = link.inertia.J, link.inertia.m
     rotor = SX(0) if link.rotor is None else link.rotor.seen_at_joint
     match link.motion:

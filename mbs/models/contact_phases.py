@@ -1,7 +1,7 @@
-"""Phases of motion in which points of a mechanism stand on planes, slide on them or are free.
+"""Contact phases: points of a mechanism are fixed on planes, slide on planes or are free.
 
-Every phase has the same inputs and outputs: what a point that is free gives is zero. So a phase
-is chosen by the Function that is called, never by a state.
+Each phase has its own Function. The inputs and outputs are the same in all phases; the outputs of a
+free point are zero.
 
 Source: Featherstone 2008, sections 8.2 and 11.7; Pfeiffer and Glocker 1996, section 6.2.
 """
@@ -42,16 +42,16 @@ from mbs.solvers.linear import solve_saddle
 
 @dataclass(frozen=True, slots=True)
 class ContactPhases:
-    """The equations of a mechanism in each of its phases.
+    """Equations of motion of a mechanism in each contact phase.
 
-    All Functions are in tree coordinates. Forces f (3, n) [N] are those that the planes exert on
-    the points, in the axes of the planes: a column for each point, the third of a column the one
-    that presses. A point that is "fixed" keeps its velocity in its plane at zero, one that is
-    "sliding" that along z alone and meets no friction.
+    All Functions use tree coordinates. Forces f (3, n) [N] are exerted by the planes on the n
+    points, one column per point, in the axes of the planes; the third row is the normal force. A
+    "fixed" point has no velocity relative to its plane. A "sliding" point has no normal velocity,
+    and no friction acts on it.
 
     Attributes:
-        system: open or closed.
-        points: what may touch.
+        system: open or closed mechanism.
+        points: contact points that may touch their planes.
     """
 
     system: System
@@ -59,25 +59,26 @@ class ContactPhases:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the points."""
+        """Names of the points."""
         return tuple(point.name for point in self.points)
 
     def accelerations(self, touching: Touching = ()) -> Function:
-        """``phase(q, v, tau) -> a, f, lam``: accelerations, forces of planes, efforts of loops.
+        """Forward dynamics in a phase: ``phase(q, v, tau) -> a, f, lam``.
 
-        A a + H = tau + J_f' f + J' lam, and the points that touch have no acceleration where they
-        are constrained. Nothing pulls back what has drifted. Points that constrain each other, such
-        as four corners of one foot, share their forces.
+        Solves A a + H = tau + J_f' f + J' lam, with zero acceleration of the touching points in
+        their constrained directions. Drift is not corrected. Redundant points, for instance at
+        the four corners of a foot, share their forces.
 
         Args:
-            touching: the points that do.
+            touching: names of the touching points, or a dict from name to "fixed" or "sliding".
 
         Returns:
-            Function of q (nq, 1), v and tau (nv, 1); a (nv, 1), f (3, n), and of a closed system
-            lam (r, 1), as of `direct_dynamics(system, coordinates="tree")`.
+            Function of q (nq, 1), v and tau (nv, 1); accelerations a (nv, 1), plane forces f (3, n)
+            and, for a closed system, loop efforts lam (r, 1), as in
+            `direct_dynamics(system, coordinates="tree")`.
 
         Raises:
-            ModelError: there is no such point, or a point touches in no known mode.
+            ModelError: a point or its mode is unknown.
         """
         modes = self._modes(touching)
 
@@ -93,20 +94,22 @@ class ContactPhases:
         return model_function(self.system, ("phase", self.points, modes), build)
 
     def residuals(self, touching: Touching = ()) -> Function:
-        """``phase_residuals(q, v, a, tau, f, lam) -> motion, contact, loops``: zero in the phase.
+        """Implicit equations: ``phase_residuals(q, v, a, tau, f, lam) -> motion, contact, loops``.
 
-        The equations of `accelerations`, nothing solved: as many as a, f and lam have elements.
+        The residuals are zero in the phase. They are the equations of `accelerations`, unsolved,
+        with as many rows as a, f and lam have elements.
 
         Args:
-            touching: the points that do.
+            touching: names of the touching points, or a dict from name to "fixed" or "sliding".
 
         Returns:
-            Function of q, v, a, tau, f and, of a closed system, lam; motion (nv, 1) efforts that
-            are missing [N m or N]; contact (3, n), the acceleration of a point where it is
-            constrained [m/s^2], its force where it is free [N]; loops (r, 1), J a + dJ/dt v.
+            Function of q, v, a, tau, f and, for a closed system, lam. Outputs: motion (nv, 1),
+            residual joint efforts [N m or N]; contact (3, n), point acceleration in constrained
+            directions [m/s^2] and force in free directions [N]; for a closed system also loops
+            (r, 1), J a + dJ/dt v.
 
         Raises:
-            ModelError: as of `accelerations`.
+            ModelError: a point or its mode is unknown.
         """
         modes = self._modes(touching)
 
@@ -131,21 +134,22 @@ class ContactPhases:
         return model_function(self.system, ("phase_residuals", self.points, modes), build)
 
     def impact(self, touching: Touching) -> Function:
-        """``touchdown(q, v) -> v_plus, P``: velocities after the points have landed for good.
+        """Velocities after an inelastic impact: ``touchdown(q, v) -> v_plus, P``.
 
-        A (v_plus - v) = J_f' P + J' Lambda: the points that touch then have no velocity where they
-        are constrained, loops stay closed, and nothing rebounds. A point that touched before and is
-        to leave without being pulled is not among those that touch.
+        Solves A (v_plus - v) = J_f' P + J' Lambda. After the impact the touching points have no
+        velocity in their constrained directions (no rebound), and loops stay closed. Leave out
+        of `touching` each point that lifts off in this impact, so that no impulse pulls it.
 
         Args:
-            touching: the points that do after it.
+            touching: names of the points that touch after the impact, or a dict from name to
+                "fixed" or "sliding".
 
         Returns:
-            Function of q (nq, 1) and v (nv, 1) before; v_plus (nv, 1), and impulses P (3, n) of the
-            planes on the points [N s].
+            Function of q (nq, 1) and v (nv, 1) before the impact; v_plus (nv, 1), and impulses P
+            (3, n) of the planes on the points [N s].
 
         Raises:
-            ModelError: as of `accelerations`.
+            ModelError: a point or its mode is unknown.
         """
         modes = self._modes(touching)
 
@@ -159,12 +163,12 @@ class ContactPhases:
         return model_function(self.system, ("touchdown", self.points, modes), build)
 
     def motion(self) -> Function:
-        """``points(q, v) -> r, V``: where the points are and how they move, in every phase alike.
+        """Positions and velocities of the points, in any phase: ``points(q, v) -> r, V``.
 
         Returns:
-            Function of q (nq, 1) and v (nv, 1); positions r (3, n) in the frames of the planes, the
-            third row the distances from them [m], and their rates V (3, n) [m/s]. These are what a
-            phase must start with: r[2] = 0 and V = 0 of the points that stand.
+            Function of q (nq, 1) and v (nv, 1); positions r (3, n) in the frames of the planes [m]
+            (third row: distance from the plane) and their rates V (3, n) [m/s]. A phase must start
+            with r[2] = 0 and V = 0 at its fixed points.
         """
 
         def build() -> tuple[Named, Named]:
@@ -176,15 +180,16 @@ class ContactPhases:
         return model_function(self.system, ("points", self.points), build)
 
     def friction(self, sides: int | None = None) -> Function:
-        """``cone(f) -> margin``: elements of zero or more where nothing pulls and nothing slips.
+        """Friction cone margins: ``cone(f) -> margin``.
 
-        For each point f_z, then, where it has a coefficient mu, mu^2 f_z^2 - f_x^2 - f_y^2. That
-        is smooth at f = 0, where the slope of the cone itself is not determined. It serves for
-        impulses too.
+        All elements are zero or positive if no contact force pulls and no point slips. For each
+        point: f_z and, if the point has a friction coefficient mu, mu^2 f_z^2 - f_x^2 - f_y^2. This
+        square is smooth at f = 0. Impulses may replace forces.
 
         Args:
-            sides: of a pyramid within the cone, three or more: instead of the square, for each side
-                c mu f_z - (f_x cos + f_y sin), linear in f, with c = cos(pi / sides).
+            sides: number of sides (at least 3) of a friction pyramid inside the cone. It replaces
+                the square by one margin per side, linear in f: c mu f_z - (f_x cos + f_y sin), with
+                c = cos(pi / sides). None for the cone.
 
         Returns:
             Function of f (3, n); margin (m, 1).
@@ -204,49 +209,51 @@ class ContactPhases:
         tau0: Values = None,
         parameters: Mapping[str, float] | None = None,
     ) -> PhaseDae:
-        """The phase as differential-algebraic equations; points that touch are rows like loops.
+        """Differential-algebraic equations of a phase, with rows for contacts and loops.
 
-        x = [q; v] in every form. "reduced" is `accelerations`, without z; the others are those of
-        `mbs.models.dae`: lam has the forces of the rows. A point that touches binds its distance
-        from the plane, one that is "fixed" its velocity along the plane too, as a rolling disc
-        does: where it stands is not asked for, so that the equations are those of every place.
-        Rows that depend on others are left out, and have no force.
+        x = [q; v] in every form. "reduced" solves for the accelerations and has no z. The other
+        forms are as in `mbs.models.dae`, with contact forces in lam. The distance of a touching
+        point from its plane is a position constraint. A "fixed" point also has two velocity
+        constraints along the plane, like a rolling disc, so that its location on the plane is free.
+        Dependent rows are dropped, and their force is zero.
 
         Args:
-            touching: the points that do.
-            form: one of the five words of `mbs.models.dae`.
-            q0: positions at the start by name, which are kept; the others move from the assembled
-                configuration as little as the points and the loops need.
-            v0: velocities at the start by name, or all of them; the others are the smallest.
-            tau0: efforts of motors at the start by name, the others zero.
-            parameters: values of symbols at the start, the others at their defaults.
+            touching: names of the touching points, or a dict from name to "fixed" or "sliding".
+            form: "reduced", "index1", "index2", "index3" or "ggl", see `mbs.models.dae`.
+            q0: start positions by name, kept exactly. Other positions are moved from the assembled
+                configuration until the points touch and the loops close.
+            v0: start velocities by name, or all of them; other velocities are minimised.
+            tau0: start efforts of motors by name; zero by default.
+            parameters: values of symbols at the start; other symbols have their defaults.
 
         Raises:
-            ModelError: as of `accelerations` and `mbs.models.dae`; or the points allow no motion
-                with the velocities v0.
-            Unclosable: no configuration with the positions q0 lets all of them touch.
+            ModelError: a point, mode, form or name is unknown, or the contacts and loops allow no
+                motion with the velocities v0.
+            Unclosable: no configuration with the positions q0 lets all touching points touch.
         """
         modes, begin = self._modes(touching), PhaseStart(q0, v0, tau0, parameters)
         explicit = self.accelerations(touching)
         return phase_dae(Standing(self.system, self.points, modes), explicit, form, begin)
 
     def _loops(self, name: str, value: SX) -> Named:
-        """An input or output that only closed systems have."""
+        """Named input or output for a closed system; empty list for an open system."""
         return [(name, value)] if self.system.is_closed else []
 
     def _modes(self, touching: Touching) -> tuple[str, ...]:
-        """Of each point how it touches."""
+        """Mode of each point: "fixed", "sliding" or "" if it is free."""
         return modes_of(self.system.name, self.points, touching)
 
     def _solve_constrained(
         self, s: ModelSymbols, rows: PointRows, modes: tuple[str, ...], right: tuple[SX, SX, SX]
     ) -> tuple[SX, SX, SX]:
-        """The x, y and z of A x = b + J_f' y + J' z, J_f x = d, J x = e.
+        """Solve A x = b + J_f' y + J' z, J_f x = d, J x = e for x, y and z.
+
+        A is the mass matrix, J_f the constrained rows of the points, J the closure Jacobian.
 
         Args:
             s: symbols of the tree.
-            rows: of the points.
-            modes: of each point how it touches; the other rows have no part.
+            rows: motion of the points.
+            modes: mode of each point; only rows constrained by it are used, other y are zero.
             right: b, d and e.
 
         Returns:
@@ -272,18 +279,20 @@ class ContactPhases:
 
 
 def contact_phases(system: System, points: Iterable[ContactPoint]) -> ContactPhases:
-    """The equations of a mechanism whose points touch planes in some phases and not in others.
+    """Return the equations of a mechanism with intermittent contacts of points with planes.
 
-    Frames that `Mechanism.add_frame` names serve as points and as planes, on links and on the
-    world. Loops of the mechanism stay closed in all phases.
+    Named frames of `Mechanism.add_frame`, on links or on the world, define points and planes. Loops
+    of the mechanism stay closed in all phases.
+
+    Source: Featherstone 2008, sections 8.2 and 11.7.
 
     Args:
-        system: open or closed.
-        points: each with a name of its own.
+        system: open or closed mechanism.
+        points: contact points with distinct names.
 
     Raises:
-        ModelError: there is no such frame, two points have one name, something is no point, or a
-            point and its plane are on the same link.
+        ModelError: a frame is unknown, two points have the same name, an element is not a
+            ContactPoint, or a point and its plane are on the same link.
     """
     require_system(system)
     require_no_contacts(system, "contact_phases")

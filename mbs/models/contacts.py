@@ -1,8 +1,7 @@
-"""Coordinates with rigid stops and Coulomb friction: modes, accelerations, impacts.
+"""Rigid stops and Coulomb friction as contacts: modes, accelerations, impacts.
 
-A mode is constant between events. Every such coordinate has two: the limit that it is at, -1 for
-the lower one, 1 for the upper one, 0 between them; and the direction in which it slides, 0 where it
-sticks.
+Modes are constant between events. Every contact has two modes: its limit (-1 at the lower limit, 1
+at the upper limit, 0 between) and its direction of sliding (-1 or 1, 0 for sticking).
 
 Source: Pfeiffer and Glocker 1996, chapters 4 and 5, for the laws of contact.
 """
@@ -40,27 +39,27 @@ from mbs.recursions.parts import PartsAt
 Array = NDArray[np.float64]
 
 CREEP = 1e-10
-"""Velocity below which a coordinate does not move [rad/s or m/s]."""
+"""Velocity below which a contact counts as being at rest [rad/s or m/s]."""
 _BEYOND = 1e-9
-"""How far beyond a limit a start may be by rounding, relative to the limit where it is large."""
+"""Rounding tolerance on a start beyond a limit [rad or m]; relative if the limit exceeds 1."""
 _ADHESION = 1e-9
-"""Acceleration that a contact may pull with before it opens [rad/s^2 or m/s^2]."""
+"""Tolerance on the acceleration by which a contact pulls before it opens [rad/s^2 or m/s^2]."""
 _CONFIGURATIONS, _SEED = 4, 20261124
-"""Where the typical levers of a row are looked for: one that vanishes here does not elsewhere."""
+"""Number and seed of random configurations at which typical moment arms of a row are sampled: an
+arm that vanishes at one configuration is found at another."""
 KINDS = ("lower", "upper", "pulled", "pushed", "stopped")
-"""Indicators of a coordinate: it meets a limit; the effort that constrains it is too far below
-zero, or above; it stops sliding."""
+"""Event indicators of a contact: it reaches its lower or upper limit, the effort that holds it is
+too negative or too positive, or sliding stops."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Modes:
-    """What the contacts do.
+    """Contact modes of the k rows of `Contacts`.
 
     Attributes:
-        limit: (k, 1) -1 at the lower limit, 1 at the upper one, 0 between.
-        slide: (k, 1) direction of sliding against Coulomb friction, 0 for none.
-        stuck: (k, 1) 1 where the coordinate is at rest, at a limit or by friction; 0 where it
-            moves.
+        limit: (k, 1) -1 at the lower limit, 1 at the upper limit, 0 between.
+        slide: (k, 1) direction of sliding against Coulomb friction (-1 or 1), 0 for no sliding.
+        stuck: (k, 1) 1 if the row is held, at a limit or by friction; 0 if it moves freely.
     """
 
     limit: SX
@@ -70,13 +69,13 @@ class Modes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactElement:
-    """A friction or a stop of a component.
+    """Dry friction, rigid stop or freewheel of a component.
 
     Attributes:
-        part: the component.
-        label: of the friction or stop in it.
-        law: what the component says of it.
-        unit: of its effort.
+        part: component that has the element.
+        label: name of the element within the component, or an empty text.
+        law: contact law.
+        unit: unit of the contact effort.
     """
 
     part: AttachedPart
@@ -86,12 +85,12 @@ class ContactElement:
 
     @property
     def name(self) -> str:
-        """The name of the component, with the label where there is one."""
+        """Name of the component, followed by the label if it is not empty."""
         return f"{self.part.name}.{self.label}" if self.label else self.part.name
 
     @property
     def sides(self) -> tuple[bool, bool]:
-        """Whether a stop has a lower and an upper limit."""
+        """Whether the element has a lower limit, and whether it has an upper limit."""
         if isinstance(self.law, Stop):
             return self.law.lower is not None, self.law.upper is not None
         return isinstance(self.law, OneWay), False
@@ -99,14 +98,16 @@ class ContactElement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactState:
-    """The contacts at positions q and velocities v; see `Contacts` for k.
+    """Kinematics and friction limits of the k contact rows at positions q and velocities v.
 
     Attributes:
-        rows: (k, nv) E, how the velocities of the contacts follow from v.
-        velocity: (k, 1) velocities of slip and of gaps, w = E v + what it is at rest.
-        bias: (k, 1) dw/dt = E a + bias.
-        measure: (k, 1) gaps, and velocities of what holds in one way; zero for friction alone.
-        sliding, sticking: (k, 1) friction while it slides, and the largest at which it sticks.
+        rows: (k, nv) Jacobian E of the contact velocities.
+        velocity: (k, 1) slip velocities and gap rates, w = E v + w0; w0 is for instance the speed
+            of a belt.
+        bias: (k, 1) acceleration terms without a: dw/dt = E a + bias.
+        measure: (k, 1) quantity that the stop limits: gap, or velocity of a freewheel. Zero for a
+            row with friction only.
+        sliding, sticking: (k, 1) friction effort during sliding, and largest effort of sticking.
     """
 
     rows: SX
@@ -119,25 +120,25 @@ class ContactState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contacts:
-    """The k rows with contacts: each is a velocity on which a friction, a stop or both act.
+    """Contact rows of a system: k velocities on each of which friction, a stop or both act.
 
-    Those of single coordinates come first, in the order of v, others by component.
+    Rows of single coordinates come first, in the order of v. Other rows follow by component.
 
     Attributes:
-        names: of the coordinates, or of the elements.
-        velocities: indices in v where the row is that of a coordinate alone; None elsewhere.
-        positions: indices in q where the gap is that of a coordinate alone; None elsewhere.
-        groups: equal numbers for equal rows.
+        names: name of the coordinate or of the contact element of each row.
+        velocities: index in v if the row is a single coordinate, else None.
+        positions: index in q if the gap of the row is a single coordinate, else None.
+        groups: group index of each row; rows with equal E share it.
         levers: (k, nv) typical magnitudes of the elements of E.
-        stops, frictions: the elements, None where there is none.
-        bounds: (k, 1) lower limits, then upper ones; zero where there is none.
-        has_lower, has_upper, has_friction: (k, 1) 1 where there is one.
-        has_gap: (k, 1) 1 where a stop has a gap, 0 where it holds in one way alone.
-        restitution, rest_speed: (k, 1) of the stops, zero where there is none.
-        anchors: (k) positions of which the velocities are the rates, of `q`; None for a row that
-            has none.
+        stops, frictions: stop and friction of each row, None if the row has none.
+        bounds: lower limits (k, 1) and upper limits (k, 1); zero if not set.
+        has_lower, has_upper, has_friction: (k, 1) 1 if the row has this limit or friction, else 0.
+        has_gap: (k, 1) 1 for a stop with a gap, 0 for a freewheel or no stop.
+        restitution, rest_speed: (k, 1) parameters of the stops; zero without a stop.
+        anchors: for each row an expression in `q` whose time derivative is the contact velocity;
+            None if no such expression is known.
         q, v: symbols of `state` and `anchors`.
-        state: the contacts at these symbols.
+        state: contact state at these symbols.
     """
 
     names: tuple[str, ...]
@@ -163,50 +164,50 @@ class Contacts:
         return len(self.names)
 
     def at(self, q: SX, v: SX) -> ContactState:
-        """The contacts at other positions (nq, 1) and velocities (nv, 1)."""
+        """Contact state at positions q (nq, 1) and velocities v (nv, 1)."""
         names = [field.name for field in fields(ContactState)]
         values = [getattr(self.state, name) for name in names]
         put = casadi.substitute(values, [self.q, self.v], [casadi.densify(q), casadi.densify(v)])
         return ContactState(**dict(zip(names, put, strict=True)))
 
     def rows(self, q: SX) -> SX:
-        """(k, nv) E."""
+        """(k, nv) Jacobian E of the contact velocities at positions q."""
         (E,) = casadi.substitute([self.state.rows], [self.q], [casadi.densify(q)])
         return SX(E)
 
     @property
     def sizes(self) -> DM:
-        """(k, 1) typical lengths of the rows, 1 for those of coordinates.
+        """(k, 1) typical norms of the rows of E; 1 for a row of a single coordinate.
 
-        Equations that weigh rows take them in these units, however short a lever is. They are
-        constants, so that a row whose lever vanishes in some configuration vanishes there.
+        Equations that compare rows scale them by these constants. Because they do not depend on q,
+        a scaled row still vanishes in a configuration in which its moment arm vanishes.
         """
         return DM(np.linalg.norm(self.levers, axis=1))
 
     def scaled_rows(self, q: SX) -> SX:
-        """(k, nv) E, each row divided by its typical length."""
+        """(k, nv) Jacobian E with each row divided by its typical norm `sizes`."""
         return casadi.mtimes(casadi.diag(1 / self.sizes), self.rows(q))
 
     def velocity(self, q: SX, v: SX) -> SX:
-        """(k, 1) velocities of slip and of gaps."""
+        """(k, 1) slip velocities and gap rates."""
         return self.at(q, v).velocity
 
     def modes(self, values: SX) -> Modes:
-        """The modes from one vector of them, (2 k, 1)."""
+        """Split the mode vector (2 k, 1) into limits and sliding directions, and derive `stuck`."""
         limit, slide = values[: len(self)], values[len(self) :]
         sticks = self.has_friction * (slide == 0)
         return Modes(limit, slide, casadi.fmax(limit**2, sticks))
 
     def first(self, q: SX, v: SX) -> tuple[SX, SX]:
-        """Modes at a start: what rests at a limit touches it, what moves slides.
+        """Initial modes: rows at rest at a limit are in contact, moving rows with friction slide.
 
         Args:
             q: (nq, 1) positions.
             v: (nv, 1) velocities.
 
         Returns:
-            (2 k, 1) modes; (2 k, 1) how far the gaps are below their lower limits, then above the
-            upper ones, by more than rounding where positive.
+            modes (2 k, 1); then penetrations (2 k, 1) below the lower and above the upper limits,
+            less the rounding tolerance. A positive value means that the start violates a limit.
         """
         state = self.at(q, v)
         x, speed = state.measure, state.velocity
@@ -223,30 +224,30 @@ class Contacts:
         return casadi.vertcat(at_limit, direction * self.has_friction), casadi.vertcat(*beyond)
 
     def distance(self, q: SX, limit: SX) -> SX:
-        """(k, 1) how far a gap is from the limit that it is at, zero between limits."""
+        """(k, 1) difference between each gap and its active limit; zero between limits."""
         if not any(stop is not None for stop in self.stops):
             return SX.zeros(len(self))
         gap = self.has_gap * self.at(q, SX.zeros(self.v.numel())).measure
         return casadi.if_else(limit == 0, 0, gap - casadi.if_else(limit < 0, *self.bounds))
 
     def efforts(self, state: ContactState, modes: Modes, y: SX) -> tuple[SX, SX]:
-        """(k, 1) efforts of stops and of friction where y holds the rows.
+        """Split the holding efforts y (k, 1) into efforts of stops and of friction, (k, 1) each.
 
-        Friction takes what it can: how a stop and friction share an effort is not determined for
-        rigid bodies.
+        Friction gets the effort up to its sticking limit, the stop the remainder: rigid bodies
+        leave this split undetermined.
         """
         taken = casadi.fmax(casadi.fmin(y, state.sticking), -state.sticking)
         friction = casadi.if_else(modes.stuck, taken, -modes.slide * state.sliding)
         return modes.stuck * (y - taken), friction
 
     def indicators(self, state: ContactState, modes: Modes, y: SX, inertia: SX) -> SX:
-        """(5 k, 1) in the order of KINDS, positive between events.
+        """(5 k, 1) event indicators in the order of KINDS, positive between events.
 
         Args:
-            state: the contacts now.
-            modes: present.
+            state: current contact state.
+            modes: current modes.
             y: (k, 1) efforts that hold the rows.
-            inertia: (k, 1) what the rows have against them.
+            inertia: (k, 1) effective inertia of each row against y.
         """
         x, limit = state.measure, modes.limit
         bears = state.sticking + _ADHESION * inertia
@@ -261,21 +262,25 @@ class Contacts:
 
 
 def contacts_of(system: System) -> Contacts:
-    """The rows of a system with rigid stops and dry friction.
+    """Collect the contact rows of the rigid stops and dry frictions of a system (cached).
 
     Raises:
-        ModelError: two stops act on one coordinate, or a sensor reads forces that frictions and
-            stops between points change.
+        ModelError: two stops act on one coordinate, or a sensor measures a force that contact
+            efforts between points change.
     """
     found: Contacts = system.cached("contacts", lambda: _contacts(system))
     return found
 
 
 def require_no_contacts(system: System, what: str) -> None:
-    """Refuse a system with rigid stops, Coulomb friction or events, for what does not know them.
+    """Raise if a system has rigid stops, Coulomb friction or events.
+
+    Args:
+        system: open or closed mechanism.
+        what: name of the function that does not support them, for the error message.
 
     Raises:
-        ModelError: names the element, and what to use instead.
+        ModelError: the message names the element and the remedy.
     """
     for force in system.parts:
         if force.element.switches:
@@ -293,15 +298,15 @@ def require_no_contacts(system: System, what: str) -> None:
 
 
 def require_undriven(system: System, contacts: Contacts, driven: Sequence[int]) -> None:
-    """Refuse motions that are prescribed where a contact acts.
+    """Raise if a prescribed motion determines the velocity of a contact row.
 
     Args:
-        system: open or closed.
-        contacts: its contacts.
+        system: open or closed mechanism.
+        contacts: contact rows of the system.
         driven: indices of the velocities whose motion is prescribed.
 
     Raises:
-        ModelError: which, and the remedy.
+        ModelError: the message names the contact and the remedy.
     """
     for name, number in zip(contacts.names, contacts.velocities, strict=True):
         if number is not None and number in driven:
@@ -321,7 +326,7 @@ def require_undriven(system: System, contacts: Contacts, driven: Sequence[int]) 
 
 
 def _is_independent(system: System, contacts: Contacts, driven: Sequence[int], j: int) -> bool:
-    """Whether prescribed motions leave the row of a contact free, as assembled."""
+    """Whether contact row j is independent of the prescribed motions, as assembled."""
     number = contacts.velocities[j]
     if number is not None:
         return are_independent(system, (*driven, number))
@@ -331,10 +336,10 @@ def _is_independent(system: System, contacts: Contacts, driven: Sequence[int], j
 
 
 def require_lasting_rows(system: System, contacts: Contacts) -> None:
-    """Refuse contacts on loops whose independent rows change with the configuration.
+    """Raise if there are contacts and the independent closure rows change with the configuration.
 
     Raises:
-        ModelError: which contact, and the remedy.
+        ModelError: the message names the contact and the remedy.
     """
     if len(contacts) and system.closure is not None and system.closure.varies:
         raise ModelError(
@@ -346,7 +351,15 @@ def require_lasting_rows(system: System, contacts: Contacts) -> None:
 
 @dataclass(slots=True, eq=False)
 class _ContactRow:
-    """One row of contacts while they are collected; the attributes are as of `Contacts`."""
+    """Contact row under construction.
+
+    Attributes:
+        velocity: (1, 1) contact velocity.
+        E: (1, nv) its Jacobian.
+        key: identifies equal rows; rows with equal constant E share one.
+        number: index in v if the row is a single coordinate, else None.
+        stop, friction: elements on this row.
+    """
 
     velocity: SX
     E: SX
@@ -412,7 +425,7 @@ def _contacts(system: System) -> Contacts:
 
 
 def effort_unit(part: AttachedPart, law: Friction | Stop | OneWay) -> str:
-    """The unit of the effort of a friction or stop."""
+    """Unit of the contact effort: that of the law, else of the coordinate, else N."""
     if law.unit is not None:
         return law.unit
     return EFFORT_UNIT[part.levers[0].unit] if part.levers and not part.frames else "N"
@@ -421,7 +434,7 @@ def effort_unit(part: AttachedPart, law: Friction | Stop | OneWay) -> str:
 def _collect(
     system: System, rows: list[_ContactRow], element: ContactElement, q: SX, v: SX
 ) -> None:
-    """Put an element on the row that has no element of its kind yet, or on a new one."""
+    """Add an element to an equal row without an element of its kind, or to a new row."""
     w = contact_velocity(system, element.law, q, v)
     E = SX(casadi.sparsify(casadi.jacobian(w, v)))
     at_rest = casadi.simplify(casadi.substitute(w, v, SX.zeros(system.nv)))
@@ -453,14 +466,14 @@ def _collect(
 
 
 def contact_velocity(system: System, law: Friction | Stop | OneWay, q: SX, v: SX) -> SX:
-    """(1, 1) the velocity on which a friction or stop acts."""
+    """(1, 1) slip velocity of a friction, gap rate of a stop, or velocity of a freewheel."""
     if isinstance(law, Stop):
         return SX(casadi.jtimes(SX(law.gap), q, position_rate(system.tree, q, v)))
     return SX(law.slip if isinstance(law, Friction) else law.velocity)
 
 
 def _levers(system: System, found: Sequence[_ContactRow], rows: SX, q: SX) -> Array:
-    """(k, nv) the largest magnitudes of E as assembled and in some random configurations."""
+    """(k, nv) largest magnitudes of E over the assembled and some random configurations."""
     rng = np.random.default_rng(_SEED)
     p = [1.0 if x.default is None else x.default for x in system.parameters]
     E = Function("E", [q, system.p], [casadi.densify(rows)])
@@ -474,12 +487,12 @@ def _levers(system: System, found: Sequence[_ContactRow], rows: SX, q: SX) -> Ar
     levers: Array = np.max(np.where(np.isfinite(every), every, 0.0), axis=0)
     for j, row in enumerate(found):
         if row.number is None and not levers[j].any():
-            levers[j] = 1.0  # nothing is known of it
+            levers[j] = 1.0  # no sample is finite and nonzero: assume unit moment arms
     return levers
 
 
 def _measure(row: _ContactRow) -> SX | None:
-    """What the indicators of a stop watch."""
+    """Quantity that a stop limits: its gap, or the velocity of a freewheel; None for no stop."""
     if row.stop is None:
         return None
     law = row.stop.law
@@ -487,7 +500,7 @@ def _measure(row: _ContactRow) -> SX | None:
 
 
 def _index(value: SX | None, q: SX) -> int | None:
-    """Which of the positions an expression is; None where it is none of them."""
+    """Index in q of an expression that is a single position, else None."""
     if value is None:
         return None
     elements = casadi.vertsplit(q) if q.numel() else []
@@ -495,7 +508,7 @@ def _index(value: SX | None, q: SX) -> int | None:
 
 
 def _anchor(system: System, row: _ContactRow, q: SX, v: SX) -> SX | None:
-    """What the velocity of a row is the rate of; None where that is not known."""
+    """Expression whose time derivative is the velocity of a row; None if it is not known."""
     if row.stop is not None and isinstance(row.stop.law, Stop):
         return SX(row.stop.law.gap)
     at_rest = casadi.simplify(casadi.substitute(row.velocity, v, SX.zeros(system.nv)))
@@ -509,7 +522,7 @@ def _anchor(system: System, row: _ContactRow, q: SX, v: SX) -> SX | None:
 
 
 def _require_unread(system: System, part: AttachedPart) -> None:
-    """Refuse sensors that read wrenches of joints where contacts act between points."""
+    """Raise if a sensor measures joint wrenches while `part` has contacts between points."""
     for attached in system.sensors if part.frames else ():
         if attached.joint is not None:
             raise ModelError(
@@ -524,7 +537,7 @@ def _stack(values: Iterable[SX]) -> SX:
 
 
 def _column(elements: Sequence[ContactElement | None], *names: str) -> SX:
-    """(k, 1) the first of some fields that the elements have, zero where there is none."""
+    """(k, 1) first of the named fields of each law that is not None; zero without an element."""
     values = []
     for element in elements:
         found = [getattr(element.law, name, None) for name in names] if element else []
@@ -532,21 +545,23 @@ def _column(elements: Sequence[ContactElement | None], *names: str) -> SX:
     return _stack(values)
 
 
-# Accelerations of a system some of whose coordinates contacts constrain.
+# Accelerations of a system with closed contacts.
 
 
 def switched_dynamics(system: System, driven: tuple[int, ...]) -> Function:
-    """``switched_dynamics(q, v, tau, a_p, acting) -> a, tau_p, inertia``: hybrid, with switches.
+    """Hybrid dynamics: ``switched_dynamics(q, v, tau, a_p, acting) -> a, tau_p, inertia``.
+
+    The m prescribed velocities and the k contact rows are constraints that inputs switch on or off.
 
     Args:
-        system: open or closed, with contacts; all coordinates are those of the tree.
-        driven: indices of the velocities that drives move.
+        system: open or closed, with contacts; all coordinates are tree coordinates.
+        driven: indices of the m velocities with prescribed motion.
 
     Returns:
-        Function of q (nq, 1), v and tau (nv, 1), the accelerations a_p (m + k, 1) of drives and of
-        the rows of contacts, and acting (m + k, 1), 1 where a_p is given and 0 where the row is
-        free; a (nv, 1), the efforts tau_p (m + k, 1) that make a_p, and the inertia (k, 1) that
-        rows of contacts have against them: of a coordinate its diagonal element of the matrix.
+        Function of q (nq, 1), v and tau (nv, 1), accelerations a_p (m + k, 1) of the prescribed
+        velocities and contact rows, and acting (m + k, 1): 1 if a_p is imposed, 0 if the row is
+        free. Outputs: a (nv, 1), efforts tau_p (m + k, 1) that impose a_p, and the effective
+        inertia (k, 1) of the contact rows. For a coordinate: diagonal element of the mass matrix.
     """
     contacts = contacts_of(system)
 
@@ -560,7 +575,8 @@ def switched_dynamics(system: System, driven: tuple[int, ...]) -> Function:
             system, s, tau, surroundings(system), E, a_p / every, acting
         )
         A = inertia_matrix(system.tree, s.poses)
-        # a limited link may be massless: what a stop then counts on is a millionth of the others'
+        # lower bound of the effective inertia, for stops on massless links: 1e-6 of the mean
+        # diagonal element of the mass matrix
         least = SX(1e-6 * inertia_size(system, A, s))
         own = [
             _row_inertia(A, rows[j, :]) / contacts.sizes[j] ** 2 if n is None else A[n, n]
@@ -574,26 +590,26 @@ def switched_dynamics(system: System, driven: tuple[int, ...]) -> Function:
 
 
 def _row_inertia(A: SX, row: SX) -> SX:
-    """What moves along a row of about unit length at a unit velocity."""
+    """Return row A row': effective inertia along a row of about unit norm."""
     return SX(casadi.mtimes(row, casadi.mtimes(A, row.T)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactEquations:
-    """What contacts make of the equations of motion.
+    """Equations of motion with contacts, as expressions in the state and in mode symbols.
 
     Attributes:
-        contacts: the rows that they act on.
-        state: the same in this state.
-        values: (2 k, 1) symbols of their modes.
-        modes: the same by name.
+        contacts: contact rows.
+        state: contact state at the positions and velocities of the equations.
+        values: (2 k, 1) symbols of the modes.
+        modes: the modes as named vectors.
         a: (nv, 1) accelerations.
-        driven: indices of the m velocities that drives move.
-        drives: (m, 1) efforts that do so, in their order.
-        tau: (nv, 1) joint efforts, those of drives included and those of contacts left out.
-        efforts: (2 k, 1) of the stops, then of friction.
-        pushes: (nv, 1) the same as joint efforts.
-        indicators: (5 k, 1) as of `Contacts.indicators`.
+        driven: indices of the m velocities with prescribed motion.
+        drives: (m, 1) efforts that impose this motion, in the order of `driven`.
+        tau: (nv, 1) joint efforts including `drives`, without contact efforts.
+        efforts: (2 k, 1) efforts of the stops, then of friction.
+        pushes: (nv, 1) joint efforts equivalent to `efforts`.
+        indicators: (5 k, 1) event indicators, see `Contacts.indicators`.
     """
 
     contacts: Contacts
@@ -612,17 +628,17 @@ class ContactEquations:
 def contact_equations(
     system: System, q: SX, v: SX, tau: SX, driven: Mapping[int, SX]
 ) -> ContactEquations | None:
-    """Accelerations, efforts and indicators under contacts; None where there are none.
+    """Accelerations, efforts and event indicators under contacts; None without contacts.
 
     Args:
-        system: open or closed.
+        system: open or closed mechanism.
         q: (nq, 1) positions.
-        v: (nv, 1) velocities.
+        v: (nv, 1) velocities of the tree.
         tau: (nv, 1) joint efforts.
-        driven: accelerations that drives give to velocities, by their numbers.
+        driven: prescribed accelerations, by index of the velocity.
 
     Raises:
-        ModelError: a contact acts where it cannot.
+        ModelError: a contact is not supported, see `contacts_of`.
     """
     contacts = contacts_of(system)
     if not len(contacts):
@@ -656,29 +672,31 @@ def contact_equations(
     )
 
 
-# Impacts on rigid stops, and what else the modes of contacts do at events.
+# Impacts on rigid stops, and mode changes at events.
 
 
 _PULL = 1e-9
-"""Part of all impulses below which a pull is rounding."""
+"""Fraction of the sum of all impulses below which a pulling impulse counts as rounding error."""
 _ROUNDS = 8
-"""How often at most a wall that pulls is left out, or another one taken in."""
+"""Maximum number of pivots, each of which releases a pulling stop or adds a penetrated stop."""
 
 
 def impact(system: System, driven: tuple[int, ...]) -> Function:
-    """``impact(q, dv_p, acting) -> dv, P``: velocities after impulses that change some by dv_p.
+    """Velocity jump by impulses on chosen velocities: ``impact(q, dv_p, acting) -> dv, P``.
 
-    A dv = J' Lambda + E' P with J dv = 0, and dv as given where `acting` is 1.
+    Solves A dv = J' Lambda + E' P with J dv = 0, and with E dv = dv_p on the rows whose `acting`
+    is 1. A is the mass matrix, J the closure Jacobian, E the rows of prescribed and contact
+    velocities.
 
     Source: Pfeiffer and Glocker 1996, section 6.2.
 
     Args:
         system: open or closed, with contacts.
-        driven: indices of the velocities that drives move.
+        driven: indices of the m velocities with prescribed motion.
 
     Returns:
-        Function of q (nq, 1), dv_p and acting (m + k, 1), of drives and of the rows of contacts;
-        dv (nv, 1) and P (m + k, 1) [N m s or N s].
+        Function of q (nq, 1), dv_p and acting (m + k, 1), for the prescribed velocities and the
+        contact rows; dv (nv, 1) and impulses P (m + k, 1) [N m s or N s].
     """
     contacts = contacts_of(system)
 
@@ -696,16 +714,16 @@ def impact(system: System, driven: tuple[int, ...]) -> Function:
 
 
 def tree_jump(system: System, contact: ContactEquations, x: SX, fired: SX) -> tuple[SX, SX]:
-    """The state of the whole tree, and the modes, after an event; see `jump`.
+    """State of the tree and modes after an event; see `jump`.
 
     Args:
-        system: open or closed.
-        contact: its equations of contact; what drives move, keeps its velocity.
-        x: [q; v; z], z the states of devices.
-        fired: (5 k, 1), 1 for each indicator that is not positive.
+        system: open or closed mechanism.
+        contact: contact equations; their prescribed velocities do not jump.
+        x: state [q; v; z] before the event, z the component states.
+        fired: (5 k, 1) 1 for each event indicator that is not positive, else 0.
 
     Returns:
-        x and modes (2 k, 1).
+        x and modes (2 k, 1) after the event.
     """
     q, v, z = casadi.vertsplit(x, [0, system.nq, system.nq + system.nv, x.numel()])
     after, modes = jump(system, contact.contacts, contact.modes, (q, v, fired), contact.driven)
@@ -721,21 +739,21 @@ def jump(
 ) -> tuple[SX, SX]:
     """Velocities and modes after an event.
 
-    An impact comes before all else: each stop that is met reverses its velocity, those that are
-    touched stay touched, both unless they would have to pull. Friction is finite and has no part
-    in it: what slides afterwards, slides. Otherwise contacts open, stick or slide as their
-    indicators say.
+    An impact has priority. Each stop that is reached reverses its velocity by the restitution, and
+    closed stops stay closed, unless the impulse would have to pull. Friction has no impulse; a row
+    that moves after the impact slides. Without an impact, the fired indicators make contacts open,
+    stick or slide.
 
     Args:
-        system: open or closed.
-        contacts: its contacts.
-        modes: before the event.
-        motion: q (nq, 1) and v (nv, 1), before it; and fired (5 k, 1), 1 for each indicator that
-            is not positive.
-        driven: indices of velocities that drives keep.
+        system: open or closed mechanism.
+        contacts: contact rows of the system.
+        modes: modes before the event.
+        motion: q (nq, 1) and v (nv, 1) before the event, and fired (5 k, 1): 1 for each event
+            indicator that is not positive, else 0.
+        driven: indices of prescribed velocities, which do not jump.
 
     Returns:
-        v (nv, 1) and modes (2 k, 1).
+        v (nv, 1) and modes (2 k, 1) after the event.
     """
     q, v, fired = motion
     lower, upper, pulled, pushed, stopped = casadi.vertsplit(fired, len(contacts))
@@ -770,24 +788,24 @@ def _unilateral(
     targets: tuple[SX, SX],
     driven: tuple[int, ...],
 ) -> tuple[SX, SX]:
-    """Velocities that impulses of walls change, and the walls that take part.
+    """Velocity jump by impulses of stops that only push, and the stops that act.
 
-    A wall that would have to pull takes no part, unless what it touches would leave it slower than
-    the slowest rebound: several contacts could go on pushing each other off for ever. Where very
-    many walls act on each other, what still approaches one meets it again.
+    A stop that would have to pull is released, unless the row would separate more slowly than the
+    slowest rebound: several contacts could otherwise push each other off without end. With very
+    many coupled stops, a row that still approaches its stop causes another impact.
 
-    Source: Murty 1974, which wall to leave out or take in next.
+    Source: Murty 1974 (least-index pivoting), for the next stop to release or add.
 
     Args:
-        system: open or closed.
-        contacts: its contacts.
-        motion: q (nq, 1) and v (nv, 1).
-        targets: (k, 1) -1 for a wall below, 1 for one above, 0 for none; and (k, 1) the changes of
-            the velocities at walls.
-        driven: indices of velocities that do not change.
+        system: open or closed mechanism.
+        contacts: contact rows of the system.
+        motion: q (nq, 1) and v (nv, 1) before the impact.
+        targets: sides (k, 1): -1 for a lower stop, 1 for an upper stop, 0 for none; and required
+            velocity changes (k, 1) at the stops.
+        driven: indices of prescribed velocities, which do not jump.
 
     Returns:
-        dv (nv, 1); (k, 1) 1 for each wall that takes part.
+        dv (nv, 1), and flags (k, 1) that are 1 for each stop that acts.
     """
     (q, v), (wall, change), m = motion, targets, len(driven)
     function, E = impact(system, driven), contacts.rows(q)

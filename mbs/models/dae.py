@@ -1,4 +1,4 @@
-"""Differential-algebraic equations of a mechanism, in the forms that solvers take."""
+"""Differential-algebraic equations of a mechanism, in the forms that solvers accept."""
 
 from __future__ import annotations
 
@@ -39,20 +39,20 @@ from mbs.recursions.parts import later_sources
 from mbs.result import Result, State, device_states_of, state_of
 from mbs.text import quoted
 
-# What loops ask of a motion, on the levels of positions, velocities and accelerations.
+# Loop constraints on the levels of positions, velocities and accelerations.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """The independent rows of a system; all are zero along every motion.
+    """Residuals of the independent constraint rows of a system, zero along every motion.
 
     Attributes:
-        J: (r, nv), the efforts of the rows act along its lines; those of rows that bind positions
-            come first.
-        positions: (s, 1) rows phi(q) that bind positions, s <= r [m or 1].
-        velocities: (r, 1) J v.
-        accelerations: (r, 1) J a + dJ/dt v.
-        norms: one element a quaternion, its squared length less one.
+        J: (r, nv) constraint Jacobian; the row efforts lam act on the joints as J' lam. The s
+            position constraints come first, then velocity (nonholonomic) constraints.
+        positions: (s, 1) residuals phi(q) of the position constraints, s <= r [m or 1].
+        velocities: (r, 1) J v, plus the drift g for rows J v + g = 0.
+        accelerations: (r, 1) J a + dJ/dt v, plus dg/dt.
+        norms: (k, 1) squared norm minus one of each of the k quaternions in q.
     """
 
     J: SX
@@ -63,16 +63,16 @@ class Rows:
 
     @property
     def deepest(self) -> SX:
-        """(r, 1) every row on the lowest level that it has: positions, else velocities."""
+        """(r, 1) residuals of positions, then velocity residuals of nonholonomic rows."""
         return casadi.vertcat(self.positions, self.velocities[self.positions.numel() :])
 
     @property
     def J_positions(self) -> SX:
-        """(s, nv) the lines of J that belong to rows that bind positions."""
+        """(s, nv) rows of J of the position constraints."""
         return self.J[: self.positions.numel(), :]
 
     def join(self, other: Rows) -> Rows:
-        """These rows and others of the same system; of each kind these come first."""
+        """Append the rows of `other`; position constraints of both precede velocity constraints."""
         s, t = self.positions.numel(), other.positions.numel()
 
         def both(mine: SX, theirs: SX) -> SX:
@@ -88,7 +88,7 @@ class Rows:
 
 
 def rows_of(system: System, q: SX, v: SX, a: SX) -> Rows:
-    """The independent rows at the symbols q (nq, 1), v (nv, 1), a (nv, 1)."""
+    """Independent constraint rows at the symbols q (nq, 1), v (nv, 1) and a (nv, 1)."""
     phi, J, drift = SX(0, 1), SX(0, system.nv), None
     if system.is_closed:
         phi, J = independent_closure(system, q), independent_constraint_rows(system, q)
@@ -103,40 +103,38 @@ def rows_of(system: System, q: SX, v: SX, a: SX) -> Rows:
     )
 
 
-# Equations of motion as differential-algebraic equations, in the forms that solvers take.
+# Equations of motion as differential-algebraic equations, in the forms that solvers accept.
 #
-# With loops, positions q and velocities v of the whole tree follow from A a + H = tau + J' lam
-# and one of phi(q) = 0, J v = 0 or J a + psi = 0; or both of the first two, the positions then
-# being moved onto the loops by multipliers mu. Or the loops are solved for, and nothing is left
-# of them.
+# With loops, positions q and velocities v of the whole tree satisfy A a + H = tau + J' lam and
+# one of phi(q) = 0, J v = 0 or J a + psi = 0. The form "ggl" has both phi(q) = 0 and J v = 0; its
+# multipliers mu correct the positions. The form "reduced" solves the loops in advance.
 #
 # Source: Gear, Leimkuhler and Gupta 1985 for the form "ggl"; Brenan, Campbell and Petzold 1996
 # for the index of the others.
 
 
 ConstraintRows = Callable[[ModelSymbols, SX], Rows]
-"""Rows at the symbols of the tree and its accelerations a (nv, 1)."""
+"""Callable (symbols of the tree, accelerations a (nv, 1)) -> constraint rows."""
 
 FORMS = ("reduced", "index1", "index2", "index3", "ggl")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DaeEquations:
-    """dx/dt = ode(x, z, u, p), 0 = alg(x, z, u, p), on symbols x, z, u, p.
+    """Equations dx/dt = ode(x, z, u, p), 0 = alg(x, z, u, p) as SX expressions.
 
     Attributes:
-        x: differential states, those of components last.
-        z: algebraic states; (0, 1) where there are none.
-        u: efforts of the motors, in the order of the actuated `system.speeds` that no device
-            drives, then the inputs of components, `system.inputs`.
-        p: parameters, in the order of `system.parameters`.
-        ode: rates of x.
-        alg: as many rows as z has elements.
-        invariants: of x and p; zero along every motion, so zero at every start.
-        q: (nq, 1) positions of the tree that belong to x.
-        v: (nv, 1) velocities of the tree that belong to x.
-        excess: of p; by how much parameters are out of their bounds, not above zero where they are
-            within.
+        x: symbols of the differential states; component states come last.
+        z: symbols of the algebraic states; (0, 1) if there are none.
+        u: symbols of the inputs: motor efforts in the order of the actuated `system.speeds` without
+            a device, then component inputs in the order of `system.inputs`.
+        p: symbols of the parameters, in the order of `system.parameters`.
+        ode: time derivatives of x.
+        alg: residuals of the algebraic equations, as many as z has elements.
+        invariants: expressions in x and p that are zero along every motion and at a valid start.
+        q: (nq, 1) positions of the tree as expressions in x.
+        v: (nv, 1) velocities of the tree as expressions in x.
+        excess: expressions in p: violation of the parameter bounds, positive outside the bounds.
     """
 
     x: SX
@@ -152,21 +150,21 @@ class DaeEquations:
 
 
 def motors(system: System) -> list[int]:
-    """Numbers of the actuated speeds but those that devices drive."""
+    """Indices of the actuated velocities without a device, such as a motor with a drive line."""
     driven = [device.velocity for device in system.devices]
     return [k for k, s in enumerate(system.speeds) if s.actuated and k not in driven]
 
 
 def implicit(system: System, form: str, constrained: ConstraintRows | None = None) -> DaeEquations:
-    """The forms with x = [q; v] and z = [a; lam], or [a; lam; mu]; the mass stays implicit.
+    """Equations with x = [q; v] and z = [a; lam] or, in form "ggl", z = [a; lam; mu].
 
-    No inertia matrix is built or factorised: the rows of a are the inverse dynamic model, which
-    also serves links without mass.
+    The equations of a are the inverse dynamics. No mass matrix is built or factorised, so that
+    links may be massless.
 
     Args:
-        system: open or closed.
+        system: open or closed mechanism.
         form: "index1", "index2", "index3" or "ggl".
-        constrained: rows besides those of the loops, such as points that stand.
+        constrained: further constraint rows in addition to the loops, such as contact points.
     """
     s = symbols_of(system, "tree")
     q, v, a = s.q, s.v, SX.sym("a", system.nv)
@@ -192,7 +190,7 @@ def implicit(system: System, form: str, constrained: ConstraintRows | None = Non
 
 
 def _keep(rows: Rows, form: str) -> SX:
-    """What the algebraic equations of a form ask of the loops."""
+    """Constraint residuals that are algebraic equations of a form."""
     match form:
         case "index1":
             return rows.accelerations
@@ -204,7 +202,7 @@ def _keep(rows: Rows, form: str) -> SX:
 
 
 def open_chain(system: System) -> DaeEquations:
-    """Open chains, x = [q; v] and no z: the accelerations are those of the direct dynamic model."""
+    """Equations of an open chain with x = [q; v] and no z, by its forward dynamics."""
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     u, tau, rates = driving(system, q, v)
     (a,) = outputs_of(system, direct_dynamics(system), q, v, tau)
@@ -219,10 +217,14 @@ def open_chain(system: System) -> DaeEquations:
 
 
 def closed_form(system: System, branch: tuple[str, ...]) -> DaeEquations:
-    """Closed forms, x = [q_a; v_a] and no z: q is an explicit function of q_a on one branch.
+    """Equations of a system with closed-form loops: x = [q_a; v_a], no z, q = f(q_a).
+
+    Args:
+        system: closed mechanism; q_a and v_a are its independent positions and velocities.
+        branch: labels of the assembly branch on which q follows from q_a.
 
     Raises:
-        NoClosedForm: a loop is solved by iteration only.
+        NoClosedForm: a loop has no closed-form solution.
     """
     active = list(system.active)
     q_a, v_a = SX.sym("q_a", len(active)), SX.sym("v_a", len(active))
@@ -239,7 +241,10 @@ def closed_form(system: System, branch: tuple[str, ...]) -> DaeEquations:
 
 
 def carried_positions(system: System) -> DaeEquations:
-    """Other loops, x = [q; v_a] and no z: all positions are integrated, phi(q) is an invariant."""
+    """Equations of a closed system with x = [q; v_a] and no z; phi(q) is an invariant.
+
+    All positions q are integrated, with the independent velocities v_a only.
+    """
     q, v_a = SX.sym("q", system.nq), SX.sym("v_a", len(system.active))
     u, v, a, rates = _independent_motion(system, q, v_a)
     return equations(
@@ -253,7 +258,12 @@ def carried_positions(system: System) -> DaeEquations:
 
 
 def _independent_motion(system: System, q: SX, v_a: SX) -> tuple[SX, SX, SX, SX]:
-    """Symbols u, velocities of the tree, accelerations of the independent joints, rates of z."""
+    """Motion of a closed system at positions q and independent velocities v_a.
+
+    Returns:
+        input symbols u, tree velocities (nv, 1), independent accelerations, rates of component
+        states.
+    """
     (G,) = outputs_of(system, reduction_matrix(system), q)
     v = casadi.densify(casadi.mtimes(G, v_a))
     if system.closure is not None and constraint_drift(system, q) is not None:
@@ -265,10 +275,10 @@ def _independent_motion(system: System, q: SX, v_a: SX) -> tuple[SX, SX, SX, SX]
 
 
 def require_no_later(system: System) -> None:
-    """Refuse wired accelerations and forces where points that stand change them.
+    """Raise if an input is wired to a measured acceleration or force, which contacts change.
 
     Raises:
-        ModelError: names the first wire.
+        ModelError: the message names the first wire.
     """
     for source in later_sources(system):
         raise ModelError(
@@ -278,13 +288,14 @@ def require_no_later(system: System) -> None:
 
 
 def driving(system: System, q: SX, v: SX, *, resolved: bool = True) -> tuple[SX, SX, SX]:
-    """Symbols u, the efforts tau (nv, 1) that they and devices give, and the rates of the states.
+    """Input symbols u, joint efforts tau (nv, 1) of motors and devices, rates of component states.
 
     Args:
-        system: open or closed.
+        system: open or closed mechanism.
         q: (nq, 1) positions.
         v: (nv, 1) velocities of the tree.
-        resolved: wired readings of accelerations and forces have their values in the rates.
+        resolved: whether sensor signals of accelerations and forces that are wired to inputs are
+            replaced by their expressions in the rates.
     """
     driven = motors(system)
     u = SX.sym("u", len(driven))
@@ -304,7 +315,16 @@ def equations(
     invariants: SX,
     motion: tuple[SX, SX],
 ) -> DaeEquations:
-    """The expressions with their common parts shared."""
+    """Assemble DaeEquations from expressions, after common subexpression elimination.
+
+    Args:
+        system: open or closed mechanism.
+        states: symbols x, z and u.
+        ode: time derivatives of x.
+        alg: residuals of the algebraic equations.
+        invariants: expressions that are zero along every motion.
+        motion: positions q and velocities v of the tree.
+    """
     rules = [row for row in plain_rows(system, motion[0]) if row.kind == "parameter"]
     excess = casadi.vertcat(SX(0, 1), *(row.residual - row.bound for row in rules))
     shared = casadi.cse([casadi.densify(e) for e in (ode, alg, invariants, *motion, excess)])
@@ -324,14 +344,13 @@ _EFFORT = {"m": "N", "rad": "N.m", "1": "N.m"}
 def elements_of(
     system: System, form: str, standing: tuple[Elements, Elements] = ((), ())
 ) -> Mapping[str, Elements]:
-    """For x, z, u, p, alg and invariants of a form, the name and unit of each element.
+    """Name and unit of each element of x, z, u, p, alg and invariants of a form.
 
     Args:
-        system: open or closed.
-        form: "open", "closed form" or "carried" for the three kinds of "reduced", "phase" for that
-            of a contact phase, else as in `mbs.models.dae`.
-        standing: of points that touch, the rows that bind positions and those that bind velocities
-            alone.
+        system: open or closed mechanism.
+        form: "open", "closed form" (x = [q_a; v_a]) or "carried" (x = [q; v_a]) for the three kinds
+            of "reduced", "phase" for the explicit contact phase, else as in `mbs.models.dae`.
+        standing: position constraints and velocity constraints of touching contact points.
     """
     q, v, a, tau = _coordinates(system)
     own = system.states
@@ -373,7 +392,7 @@ def elements_of(
 
 
 def _coordinates(system: System) -> tuple[Elements, Elements, Elements, Elements]:
-    """Of q, v, a and tau, under the names that results of simulations have."""
+    """Elements of q, v, a and tau, named as in simulation results."""
     q = tuple((f"{c.name}.q", c.unit) for c in system.coordinates)
     v = tuple((f"{s.name}.v", s.unit) for s in system.speeds)
     a = tuple((f"{s.name}.a", ACCELERATION_UNIT[s.unit]) for s in system.speeds)
@@ -382,7 +401,10 @@ def _coordinates(system: System) -> tuple[Elements, Elements, Elements, Elements
 
 
 def _rows(system: System) -> tuple[Elements, Elements]:
-    """Of the independent rows of positions and of velocities alone, these as if integrated."""
+    """Elements of the independent position and velocity constraints of the loops.
+
+    Velocity constraints have the unit of their integral; `_of` applies the unit of its rate.
+    """
     if system.closure is None:
         return (), ()
     driven = {c.name: system.coordinates[c.driven].unit for c in system.couplings}
@@ -407,12 +429,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Dae(DaeEquations):
-    """Differential-algebraic equations with names, and a consistent start.
+    """Differential-algebraic equations with element names and a consistent start.
 
     Attributes:
-        form: which of the forms it is.
-        elements: for "x", "z", "u", "p", "alg" and "invariants" the name and unit of each element.
-        x0, z0, u0, p0: a start that fulfils `alg` and `invariants`, one-dimensional.
+        form: form of the equations: "reduced", "index1", "index2", "index3" or "ggl".
+        elements: dict from "x", "z", "u", "p", "alg" and "invariants" to the (name, unit) of each
+            element.
+        x0, z0, u0, p0: consistent start as one-dimensional arrays: `alg` and `invariants` are zero.
     """
 
     form: str
@@ -423,15 +446,15 @@ class Dae(DaeEquations):
     p0: Array
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds all of it; its symbols are new ones of the same names."""
+        """Support pickling; unpickled symbols are new symbols with the same names."""
         return _unpickle, packed({f.name: getattr(self, f.name) for f in fields(self)})
 
     def casadi(self) -> dict[str, SX]:
-        """What `casadi.integrator` takes: x, z, u, p, ode, alg."""
+        """Return the dict x, z, u, p, ode, alg for `casadi.integrator`."""
         return {name: getattr(self, name) for name in ("x", "z", "u", "p", "ode", "alg")}
 
     def function(self) -> Function:
-        """``dae(x, z, u, p) -> ode, alg, invariants, q, v``, of numbers, SX or MX."""
+        """Function ``dae(x, z, u, p) -> ode, alg, invariants, q, v`` of numbers, SX or MX."""
         inputs, outputs = ("x", "z", "u", "p"), ("ode", "alg", "invariants", "q", "v")
         given, results = ([getattr(self, n) for n in names] for names in (inputs, outputs))
         return Function("dae", given, results, list(inputs), list(outputs), {"cse": True})
@@ -449,40 +472,42 @@ def dae(
     parameters: Mapping[str, float] | None = None,
     guess: Guess = None,
 ) -> Dae:
-    """Equations of motion dx/dt = ode, 0 = alg, with everything that acts in `direct_dynamics`.
+    """Equations of motion dx/dt = ode, 0 = alg, with the same efforts as in `direct_dynamics`.
 
-    - "reduced": the loops solved for, no z. Open chains: x = [q; v]. Closed systems with a closed
+    - "reduced": explicit equations, no z. Open chains: x = [q; v]. Closed systems with a closed
       form (`mbs.loops.function`): x = [q_a; v_a], the independent joints, on the branch of the
-      start. Other closed systems, and those in which a spring or a coupling counts the turns of a
-      passive joint: x = [q; v_a], phi(q) an invariant.
+      start. Other closed systems: x = [q; v_a], with phi(q) as an invariant. So are systems in
+      which a spring or coupling depends on the number of revolutions of a passive joint.
     - "index1", "index2", "index3": x = [q; v], z = [a; lam]; A a + H = tau + J' lam and, in this
       order, J a + psi = 0, J v = 0 or phi(q) = 0, of the independent rows.
     - "ggl": x = [q; v], z = [a; lam; mu]; dq/dt = N(q) (v + J' mu), phi(q) = 0 and J v = 0, of
       index 2; mu is zero along every motion.
 
-    In an open chain the last four are the same: z = a, of index 1. d(alg)/d(z) of "index1" is
-    regular where the rows are independent; in the others it is once `alg` has been differentiated
-    index - 1 times. States of components, such as the current of a motor, stand at the end of x,
-    and their inputs, such as its voltage, at the end of u; of a joint that a motor of a drive line
-    turns u has no effort.
+    For an open chain the last four forms are the same: z = a, of index 1. With independent rows,
+    d(alg)/d(z) of "index1" is regular; for the other forms it is regular after `alg` has been
+    differentiated index - 1 times. Component states, such as a motor current, are at the end of x.
+    Component inputs, such as a motor voltage, are at the end of u. u has no effort for a joint that
+    a device drives.
 
     Source: Gear, Leimkuhler and Gupta 1985; Brenan, Campbell and Petzold 1996.
 
     Args:
-        system: open or closed.
-        form: one of the five words.
-        q0: positions at the start by name, as in `mbs.simulate.run`: the assembled configuration.
-            Or a `State`, whose velocities and states of components count where none are given.
-        v0: velocities at the start by name; at rest when left out.
-        tau0: efforts of motors at the start by name, the others zero; they tell u0 and z0.
-        states: of components at the start by name, such as `motor.i`, the others as described.
-        inputs: of components at the start by name, such as `motor.voltage`, or `motor` where it has
-            one alone; likewise.
-        parameters: values of symbols at the start, the others at their defaults.
-        guess: approximate positions of other joints at the start, which choose the branch.
+        system: open or closed mechanism.
+        form: "reduced", "index1", "index2", "index3" or "ggl".
+        q0: start positions by name, as in `mbs.simulate.run`; by default the assembled
+            configuration. Or a `State`, which also supplies velocities and component states that
+            are not given.
+        v0: start velocities by name; zero by default.
+        tau0: start efforts of motors by name, zero by default; they determine u0 and z0.
+        states: start values of component states by name, such as `motor.i`; by default as
+            described.
+        inputs: start values of component inputs by name, such as `motor.voltage`, or by component
+            name if it has a single input; by default as described.
+        parameters: values of symbols at the start; other symbols have their defaults.
+        guess: approximate start positions of other joints, which select the branch.
 
     Raises:
-        ModelError: there is no such form, a name is unknown or has no motor, or a symbol has no
+        ModelError: the form or a name is unknown, a joint of tau0 has no motor, or a symbol has no
             value.
         Unclosable: the loops cannot be closed at q0.
     """
@@ -508,7 +533,7 @@ def dae(
 
 
 _Kind = tuple[str, tuple[str, ...]]
-"""A form, "reduced" being "open", "closed form" or "carried"; and the branch of a closed form."""
+"""Form, with "reduced" resolved into "open", "closed form" or "carried", and branch labels."""
 
 
 def _kind(system: System, form: str, q: Array, p: Array) -> _Kind:
@@ -526,7 +551,10 @@ def _kind(system: System, form: str, q: Array, p: Array) -> _Kind:
 
 
 def _winds(system: System) -> bool:
-    """Whether some passive angle is not the same a whole turn further, as closed forms take it."""
+    """Whether a full revolution of some passive joint changes efforts or couplings.
+
+    Closed forms return angles modulo 2 pi and are not valid for such systems.
+    """
 
     def find() -> bool:
         s = symbols_of(system, "tree")
@@ -546,7 +574,11 @@ def _winds(system: System) -> bool:
 
 
 def _branch(system: System, q: Array, p: Array) -> tuple[str, ...]:
-    """The labels of the closed configuration q."""
+    """Branch labels of the closed configuration q.
+
+    Raises:
+        Unclosable: two branches of a loop meet at q.
+    """
     stages = plan(system)
     branches = branches_at(system, stages, q, p)
     if len(branches) < len(stages):
@@ -577,7 +609,11 @@ def _built(system: System, kind: _Kind) -> tuple[DaeEquations, Mapping[str, Elem
 
 
 def start_efforts(system: System, tau0: Values) -> Array:
-    """(nv,) efforts, of motors only."""
+    """(nv,) joint efforts from values by name.
+
+    Raises:
+        ModelError: a joint with a nonzero effort has no motor.
+    """
     tau = np.array(system.effort(tau0))
     driven = motors(system)
     for k, speed in enumerate(system.speeds):
@@ -598,12 +634,12 @@ def _start_states(system: System, form: str, q: Array, v: Array) -> Array:
 
 
 def _start_algebraic(system: System, point: tuple[Array, ...], size: int) -> Array:
-    """The first of: accelerations, efforts of the closure rows, zeros for mu.
+    """Consistent algebraic states: accelerations, efforts of the closure rows, zeros for mu.
 
     Args:
-        system: open or closed.
-        point: q, v, efforts of motors, states and inputs of components, parameters.
-        size: how many there are.
+        system: open or closed mechanism.
+        point: q, v, motor efforts, component states, component inputs, parameters.
+        size: number of algebraic states.
     """
     z0 = np.zeros(size)
     if size:
@@ -611,7 +647,7 @@ def _start_algebraic(system: System, point: tuple[Array, ...], size: int) -> Arr
         if system.devices:
             found = devices(system)
             at = {"q": q, "v": v, "z": z, "u": u, "p": p}
-            if "row_efforts" in found.name_in():  # outputs alone depend on them
+            if "row_efforts" in found.name_in():  # only the outputs y depend on row efforts
                 at["row_efforts"] = np.zeros(found.numel_in("row_efforts"))
             tau = tau + np.array(found.call([at[name] for name in found.name_in()])[0]).ravel()
         ddm = direct_dynamics(system, coordinates="tree")

@@ -1,4 +1,4 @@
-"""Differential-algebraic equations of a mechanism while some of its points stand on planes."""
+"""Differential-algebraic equations of a mechanism while some of its points touch planes."""
 
 from __future__ import annotations
 
@@ -47,24 +47,25 @@ from mbs.solvers.rank import independent_rows, rank
 from mbs.spatial import zeros
 from mbs.text import did_you_mean, quoted
 
-# Points of links that planes may hold: where they are, how they move, what efforts act there.
+# Contact points on links: definition, motion relative to their planes, friction cone.
 
 
 Touching = Iterable[str] | Mapping[str, str]
-"""Names of the points that stand; or for each name "fixed" or "sliding"."""
+"""Names of fixed contact points, or a mapping from names to "fixed" or "sliding"."""
 
 MODES = ("fixed", "sliding")
 
 
 @dataclass(frozen=True, slots=True)
 class ContactPoint:
-    """The origin of a frame, which may touch the plane x, y of another frame from above.
+    """Contact point: origin of a frame that may touch the x, y plane of another frame from above.
 
     Attributes:
-        name: of the contact.
-        frame: a body, a named frame, or the number of a link.
-        plane: likewise, 0 for the base; its z points from the ground to the point.
-        friction: coefficient of Coulomb friction, None where the ground never lets the point slip.
+        name: name of the contact.
+        frame: frame of the point: name of a body or frame, or index of a link.
+        plane: frame of the plane: name of a body or frame, or index of a link, 0 for the base. Its
+            z axis points from the ground to the point.
+        friction: coefficient of Coulomb friction; None if the point never slips.
     """
 
     name: str
@@ -90,13 +91,13 @@ class ContactPoint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointRows:
-    """How n points move, seen from their planes and in the axes of these, 3 n elements each.
+    """Motion of n contact points relative to their planes, in the axes of the planes.
 
     Attributes:
-        r: positions [m]; the third of each point is its distance from the plane.
-        V: velocities [m/s].
-        J: (3 n, nv), V = J v; the force on a point acts along the lines of its rows.
-        bias: accelerations where those of the joints are zero [m/s^2].
+        r: (3 n, 1) positions [m]; the third element of each point is its distance from the plane.
+        V: (3 n, 1) velocities [m/s].
+        J: (3 n, nv) Jacobian, V = J v; point forces f act on the joints as J' f.
+        bias: (3 n, 1) accelerations for zero joint accelerations [m/s^2].
     """
 
     r: SX
@@ -106,15 +107,15 @@ class PointRows:
 
 
 def point_rows(system: System, s: ModelSymbols, points: Sequence[ContactPoint]) -> PointRows:
-    """The motion of contact points.
+    """Positions, velocities, Jacobian and bias accelerations of contact points.
 
     Args:
-        system: open or closed.
-        s: its symbols, in tree coordinates.
-        points: one or more.
+        system: open or closed mechanism.
+        s: symbols of the system, in tree coordinates.
+        points: one or more contact points.
 
     Raises:
-        ModelError: there is no such frame.
+        ModelError: a frame is unknown.
     """
     tree = system.tree
     moving = link_velocities(tree, s.poses, s.v)
@@ -133,24 +134,25 @@ def point_rows(system: System, s: ModelSymbols, points: Sequence[ContactPoint]) 
 
 
 def constrained_elements(modes: Sequence[str]) -> DM:
-    """(3 n, 1) 1 for each element of the motion that the plane holds.
+    """(3 n, 1) flags: 1 for each point coordinate x, y, z that the plane constrains, else 0.
 
     Args:
-        modes: of each point "fixed", "sliding" or "" where it is free.
+        modes: mode of each point: "fixed", "sliding" or "" if it is free.
     """
     constrained = {"fixed": (1, 1, 1), "sliding": (0, 0, 1), "": (0, 0, 0)}
     return DM([element for mode in modes for element in constrained[mode]])
 
 
 def checked_points(name: str, points: Iterable[ContactPoint]) -> tuple[ContactPoint, ...]:
-    """One or more points, each with a name of its own.
+    """Return contact points as a tuple after checking their type and names.
 
     Args:
-        name: of the mechanism, for errors.
-        points: that may touch.
+        name: name of the mechanism, for error messages.
+        points: contact points.
 
     Raises:
-        ModelError: there is none, two have one name, or something is no contact point.
+        ModelError: there are no points, two points have the same name, or an element is not a
+            ContactPoint.
     """
     every = tuple(points) if isinstance(points, Iterable) else (points,)
     for point in every:
@@ -168,15 +170,15 @@ def checked_points(name: str, points: Iterable[ContactPoint]) -> tuple[ContactPo
 
 
 def modes_of(name: str, points: Sequence[ContactPoint], touching: Touching) -> tuple[str, ...]:
-    """Of each point "fixed", "sliding" or "" where it is free.
+    """Return the mode of each point: "fixed", "sliding" or "" if it is free.
 
     Args:
-        name: of the mechanism, for errors.
-        points: that may touch.
-        touching: those that do.
+        name: name of the mechanism, for error messages.
+        points: all contact points.
+        touching: names of fixed points, or a mapping from names to modes.
 
     Raises:
-        ModelError: there is no such point, one is named twice, or it touches in no known mode.
+        ModelError: a point is unknown or repeated, or its mode is unknown.
     """
     names = [point.name for point in points]
     given = _ways_by_name(name, touching)
@@ -195,7 +197,7 @@ def modes_of(name: str, points: Sequence[ContactPoint], touching: Touching) -> t
 
 
 def _ways_by_name(name: str, touching: Touching) -> dict[str, str]:
-    """How each point touches that is named, each once."""
+    """Mode of each named point; names without a mode are "fixed". Raise if a name is repeated."""
     if isinstance(touching, Mapping):
         return dict(touching)
     alone = isinstance(touching, str) or not isinstance(touching, Iterable)
@@ -206,12 +208,12 @@ def _ways_by_name(name: str, touching: Touching) -> dict[str, str]:
 
 
 def friction_cone(name: str, points: Sequence[ContactPoint], sides: int | None) -> Function:
-    """``cone(f) -> margin``; see `ContactPhases.friction`.
+    """Friction cone margins ``cone(f) -> margin``; see `ContactPhases.friction`.
 
     Args:
-        name: of the mechanism, for errors.
-        points: a column of f (3, n) each.
-        sides: of a pyramid, None for the cone.
+        name: name of the mechanism, for error messages.
+        points: n contact points, one column of f (3, n) each.
+        sides: number of sides of a friction pyramid, None for the cone.
 
     Raises:
         ModelError: a pyramid has fewer than three sides.
@@ -229,7 +231,7 @@ def friction_cone(name: str, points: Sequence[ContactPoint], sides: int | None) 
 
 
 def _slip(f: SX, friction: float | None, sides: int | None) -> SX:
-    """How far a force is from the border of its cone."""
+    """Margin of a contact force to its friction cone, or one margin per side of the pyramid."""
     if friction is None:
         return SX(0, 1)
     if sides is None:
@@ -239,21 +241,21 @@ def _slip(f: SX, friction: float | None, sides: int | None) -> SX:
     return reach - casadi.cos(turns) * f[0] - casadi.sin(turns) * f[1]
 
 
-# Points that stand, as rows beside those of loops, and a start that fulfils both.
+# Contact constraints as additional rows next to the loop rows, and a consistent start.
 
 
 Array = NDArray[np.float64]
 
 _CONFIGURATIONS, _REACH, _SEED = 4, 0.05, 20
-"""Configurations near the start at which dependent rows show, and how far from it they are
-tried."""
+"""Number of random configurations near the start that detect dependent rows, their largest
+displacement [rad or m], which stays near the start, and the seed, for repeatable results."""
 _OFF = 1e-10
-"""How far a given configuration may be from touching by rounding [m]."""
+"""Rounding tolerance on the distances and loop closure of a start configuration [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class PhaseStart:
-    """Where a phase begins, as a user says it; see `ContactPhases.dae`."""
+    """Start of a phase as passed by the user; see the arguments of `ContactPhases.dae`."""
 
     q0: Values
     v0: Values
@@ -263,12 +265,12 @@ class PhaseStart:
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """Points and how each touches.
+    """Contact points of a system with the mode of each point in one phase.
 
     Attributes:
-        system: open or closed.
-        points: all that may touch.
-        modes: of each point "fixed", "sliding" or "" where it is free.
+        system: open or closed mechanism.
+        points: all contact points.
+        modes: mode of each point: "fixed", "sliding" or "" if it is free.
     """
 
     system: System
@@ -277,17 +279,21 @@ class Standing:
 
     @property
     def constrained(self) -> list[int]:
-        """Numbers of what planes hold among the elements x, y, z of all points."""
+        """Indices of the constrained elements among the coordinates x, y, z of all points."""
         flags = constrained_elements(self.modes).elements()
         return [k for k, flag in enumerate(flags) if flag]
 
     @property
     def names(self) -> str:
-        """Of the points that touch."""
+        """Names of the touching points, joined by commas."""
         return ", ".join(p.name for p, mode in zip(self.points, self.modes, strict=True) if mode)
 
     def rows(self, kept: tuple[int, ...]) -> ConstraintRows:
-        """The kept elements as rows; the distances bind positions, and come first."""
+        """Return a callable (s, a) -> constraint rows of the kept point coordinates.
+
+        Distances are position constraints and come first. Coordinates in the plane are velocity
+        constraints.
+        """
         distances, drifts = split(kept)
         order = [*distances, *drifts]
 
@@ -305,7 +311,7 @@ class Standing:
         return rows
 
     def elements(self, kept: tuple[int, ...]) -> tuple[Elements, Elements]:
-        """Name and unit of the rows that bind positions, and of those that bind velocities."""
+        """Name and unit of each position constraint, then of each velocity constraint."""
         distances, drifts = (
             tuple((f"{self.points[k // 3].name}: {'xyz'[k % 3]}", "m") for k in part)
             for part in split(kept)
@@ -313,9 +319,10 @@ class Standing:
         return distances, drifts
 
     def independent(self, q: Array, p: Array) -> tuple[int, ...]:
-        """Constrained elements that depend neither on loops nor on each other near q.
+        """Indices of constrained point coordinates that are independent of loops and each other.
 
-        Rows that depend on others only there, as those of a straight leg, are kept.
+        The rank is the largest rank near q. Rows that are dependent only at q, for instance at a
+        straight leg, are kept.
         """
         constrained, loops = self.constrained, kept_rows(self.system)
         numbers = _numbers(self)
@@ -330,7 +337,7 @@ class Standing:
         return tuple(constrained[k - len(loops)] for k in chosen if k >= len(loops))
 
     def _near(self, q: Array, p: Array) -> Iterator[Array]:
-        """The configuration q, and others that touch and close the loops too."""
+        """Yield q, then nearby configurations that satisfy the contacts and the loops."""
         yield q
         rng, function = np.random.default_rng(_SEED), _touching(self)
 
@@ -343,11 +350,11 @@ class Standing:
                 yield root.x
 
     def start(self, begin: PhaseStart) -> tuple[Array, Array]:
-        """Positions (nq,) at which the points touch, and velocities (nv,) that keep them there.
+        """Consistent start: positions (nq,) and velocities (nv,) that satisfy contacts and loops.
 
         Raises:
-            Unclosable: no configuration with the positions that are given touches.
-            ModelError: a name is unknown, or the velocities that are given do not fit.
+            Unclosable: no configuration with the given positions satisfies the contacts.
+            ModelError: a name is unknown, or the given velocities violate the constraints.
         """
         system = self.system
         p = np.array(system.parameter_values(begin.parameters), dtype=float)
@@ -386,10 +393,11 @@ class Standing:
     def efforts(
         self, kept: tuple[int, ...], motion: tuple[Array, Array], tau: Array, p: Array
     ) -> Array:
-        """Accelerations (nv,) and efforts of the kept rows, as z of "index1" has them.
+        """Initial [a; lam] of form "index1": accelerations (nv,) and efforts of loops and contacts.
 
         Raises:
-            ModelError: they are not determined there, as where a leg is straight.
+            ModelError: the equations are contradictory at this configuration, such as with a
+                straight leg.
         """
         q, v = motion
         distances, drifts = split(kept)
@@ -403,7 +411,8 @@ class Standing:
         K = np.block([[A, -rows.T], [rows, np.zeros((r, r))]])
         right = np.concatenate([tau - H.ravel(), -slopes.ravel()])
         found: Array = np.linalg.lstsq(K, right, rcond=None)[0]
-        # contradictory equations leave parts of one, dependent ones that agree some roundings of K
+        # relative residual: of order one for contradictory equations, of rounding size for
+        # consistent equations, even if they are dependent
         if not np.allclose(K @ found, right, rtol=1e-8, atol=1e-8 * np.abs(right).max(initial=1)):
             raise ModelError(
                 f"{self.system.name}: the forces on {self.names} are not determined at the start,"
@@ -413,12 +422,15 @@ class Standing:
 
 
 def split(kept: tuple[int, ...]) -> tuple[list[int], list[int]]:
-    """The distances among elements x, y, z of points, and the others."""
+    """Split indices of point coordinates into distances (z) and coordinates in the plane (x, y)."""
     return [k for k in kept if k % 3 == 2], [k for k in kept if k % 3 != 2]
 
 
 def _numbers(standing: Standing) -> Function:
-    """``numbers(q, v, p) -> A, H, J_loops, psi, J, bias``, every row of loops and points."""
+    """Function ``numbers(q, v, p) -> A, H, J_loops, psi, J, bias``: all rows of loops and points.
+
+    Outputs: mass matrix, bias efforts, Jacobian and acceleration bias of loops and of points.
+    """
     system = standing.system
 
     def build() -> Function:
@@ -439,7 +451,7 @@ def _numbers(standing: Standing) -> Function:
 
 
 def with_starts(system: System, values: Sequence[SX]) -> list[SX]:
-    """Expressions with the starts of states of components, and the defaults of their inputs."""
+    """Substitute start values of component states and default component inputs in expressions."""
     signals = casadi.vertcat(system.z, system.u)
     if not signals.numel():
         return list(values)
@@ -448,7 +460,10 @@ def with_starts(system: System, values: Sequence[SX]) -> list[SX]:
 
 
 def _touching(standing: Standing) -> Function:
-    """``touching(q, p) -> r, J``: distances, loops and quaternions, all zero where they hold."""
+    """Function ``touching(q, p) -> r, J``: residuals of contacts, quaternions and loops.
+
+    r is zero if the points touch, quaternions have unit norm and loops close; J is dr/dq.
+    """
     system = standing.system
 
     def build() -> Function:
@@ -478,17 +493,17 @@ def _with(q: Array, places: list[int], values: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PhaseDae(Dae):
-    """Equations of a contact phase; see `ContactPhases.dae`.
+    """Differential-algebraic equations of a contact phase; see `ContactPhases.dae`.
 
     Attributes:
-        f: (3, n) forces of the planes on the points, in the axes of the planes, in terms of x, z,
-            u and p; zero for points that are free.
+        f: (3, n) forces of the planes on the points, in the axes of the planes, as expressions of
+            x, z, u and p; zero for free points.
     """
 
     f: SX
 
     def function(self) -> Function:
-        """``dae(x, z, u, p) -> ode, alg, invariants, q, v, f``, of numbers, SX or MX."""
+        """Function ``dae(x, z, u, p) -> ode, alg, invariants, q, v, f`` of numbers, SX or MX."""
         inputs = ("x", "z", "u", "p")
         outputs = ("ode", "alg", "invariants", "q", "v", "f")
         given, results = ([getattr(self, n) for n in names] for names in (inputs, outputs))
@@ -496,13 +511,13 @@ class PhaseDae(Dae):
 
 
 def phase_dae(standing: Standing, explicit: Function, form: str, begin: PhaseStart) -> PhaseDae:
-    """Equations of a phase in one of the forms.
+    """Return the differential-algebraic equations of a phase with a consistent start.
 
     Args:
-        standing: which points touch, and how.
-        explicit: `ContactPhases.accelerations` of the phase.
-        form: as in `mbs.models.dae`.
-        begin: where it starts.
+        standing: contact points and their modes.
+        explicit: forward dynamics of the phase, `ContactPhases.accelerations`.
+        form: form of the equations, see `mbs.models.dae`.
+        begin: start values of the user.
     """
     system = standing.system
     if form not in FORMS:
@@ -551,7 +566,7 @@ def _built(standing: Standing, explicit: Function, form: str, kept: tuple[int, .
 def _explicit(
     standing: Standing, explicit: Function, kept: tuple[int, ...]
 ) -> tuple[DaeEquations, SX]:
-    """States [q; v] and no z: accelerations and forces are solved for."""
+    """Explicit equations (x = [q; v; component states], no z) and forces f of the planes."""
     system = standing.system
     s = symbols_of(system, "tree")
     require_no_later(system)
@@ -570,7 +585,7 @@ def _explicit(
 
 
 def _forces(standing: Standing, kept: tuple[int, ...], z: SX) -> SX:
-    """(3, n) forces on the points, from the efforts of the rows in z = [a; lam; mu]."""
+    """(3, n) forces of the planes on the points, taken from lam in z = [a; lam; mu]."""
     closure, (distances, drifts) = standing.system.closure, split(kept)
     loops, slips = (len(closure.rows), len(closure.slips)) if closure else (0, 0)
     first = standing.system.nv + loops

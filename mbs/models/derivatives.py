@@ -1,4 +1,4 @@
-"""Derivatives of the inverse and the direct dynamic model."""
+"""Derivatives of inverse and forward dynamics."""
 
 from __future__ import annotations
 
@@ -49,17 +49,21 @@ from mbs.recursions.parts import PartsAt
 from mbs.recursions.velocities import resting_base
 from mbs.text import quoted
 
-# Slopes of efforts and accelerations, by every method there is.
+# Derivatives of efforts and accelerations by each method.
 #
 # Source: Carpentier & Mansard 2018; Singh, Russell & Wensing 2022.
 
 
 Blocks = dict[str, SX]
-"""Derivatives by the name of the input that they are taken with respect to."""
+"""Derivatives by the name of the input with respect to which they are taken."""
 
 
 def efforts_by_ad(system: System, s: ModelSymbols, a: SX) -> tuple[Blocks, SX]:
-    """Derivatives of the efforts by differentiating the recursion, and the efforts."""
+    """Derivatives of inverse dynamics by algorithmic differentiation of the recursion.
+
+    Returns:
+        blocks "q", "v" and "a" (m, m); efforts (m, 1).
+    """
     tau = s.reduced_effort(tree_efforts(system, s, s.tree_acceleration(a), surroundings(system)))
     blocks = {
         "q": _along_motion(system, s, tau),
@@ -70,7 +74,11 @@ def efforts_by_ad(system: System, s: ModelSymbols, a: SX) -> tuple[Blocks, SX]:
 
 
 def efforts_by_recursion(system: System, s: ModelSymbols, a: SX) -> tuple[Blocks, SX]:
-    """The same by recursions of the derivatives, for trees."""
+    """Derivatives of inverse dynamics by analytical recursions, for tree coordinates.
+
+    Returns:
+        blocks "q", "v" and "a" (nv, nv); efforts (nv, 1).
+    """
     tree = system.tree
     moving = newton_euler_derivatives(tree, s.poses, s.v, a, resting_base(tree.gravity))
     acting = element_efforts(PartsAt(system, s.q, s.v), s.poses)
@@ -86,17 +94,17 @@ def efforts_by_recursion(system: System, s: ModelSymbols, a: SX) -> tuple[Blocks
 def implicit_formula(
     system: System, s: ModelSymbols, tau: SX, names: Collection[str]
 ) -> tuple[TreeFactor, SX, Blocks]:
-    """What the derivatives of the accelerations are solved from.
+    """Linear systems A x = -dtau/dname whose solutions are the derivatives of accelerations.
 
     Args:
-        system: any.
-        s: its symbols.
+        system: open or closed mechanism.
+        s: symbols of the system.
         tau: (m, 1) efforts.
-        names: what to differentiate with respect to, of "q", "v", "z", "u" and "p".
+        names: inputs of the derivatives, among "q", "v", "z", "u" and "p".
 
     Returns:
-        the factors of A, the accelerations, and for each name minus the derivative of the efforts
-        at these accelerations.
+        factors of the mass matrix A, the accelerations, and for each name the right-hand side:
+        minus the derivative of the inverse dynamics at these accelerations.
     """
     before = solution_order(system, s)
     by = efforts_by_recursion if s.reduction is None else efforts_by_ad
@@ -113,7 +121,7 @@ def implicit_formula(
 def accelerations_by_efforts(
     system: System, s: ModelSymbols, tau: SX, names: tuple[str, ...]
 ) -> tuple[Blocks, SX]:
-    """Derivatives of the accelerations from those of the efforts, and the accelerations."""
+    """Derivatives of forward dynamics by the implicit formula, and the accelerations (m, 1)."""
     wanted = [name for name in names if name != "tau"]
     factor, a, right = implicit_formula(system, s, tau, wanted)
     sides = [*right.values(), casadi.densify(SX.eye(s.size))]
@@ -127,7 +135,7 @@ def accelerations_by_efforts(
 def accelerations_by_ad(
     system: System, s: ModelSymbols, tau: SX, names: tuple[str, ...]
 ) -> tuple[Blocks, SX]:
-    """The same by differentiating the direct model."""
+    """Derivatives of forward dynamics by algorithmic differentiation, and the accelerations."""
     a = outputs_of(system, independent_dynamics(system), s.q, s.v, tau)[0]
     blocks = {
         "q": _along_motion(system, s, a),
@@ -138,13 +146,16 @@ def accelerations_by_ad(
 
 
 def _by_symbols_of(system: System, value: SX, names: Collection[str]) -> Blocks:
-    """Derivatives by states and inputs of components and by parameters, those that are wanted."""
+    """Derivatives with respect to component states z, component inputs u or parameters p.
+
+    Names other than "z", "u" and "p" are ignored.
+    """
     own = {"z": system.z, "u": system.u, "p": system.p}
     return {name: casadi.jacobian(value, own[name]) for name in names if name in own}
 
 
 def _along_motion(system: System, s: ModelSymbols, value: SX) -> SX:
-    """Derivative of a value when the positions move with unit velocities."""
+    """Derivative of a value (k, 1) along unit input velocities: d(value)/dq dq/dv, (k, m)."""
     slope = casadi.jacobian(value, s.q)
     if system.nq != system.nv:
         u = SX.sym("u", system.nv)
@@ -153,17 +164,18 @@ def _along_motion(system: System, s: ModelSymbols, value: SX) -> SX:
     return slope if s.reduction is None else casadi.mtimes(slope, s.reduction.G)
 
 
-# Derivatives of accelerations in two stages: one front, then the same solution for each column.
+# Derivatives of accelerations in two stages: the front Function factorises A and forms the
+# right-hand sides; then a mapped Function solves for each column.
 
 
 def solve_column(before: list[int]) -> Function:
-    """``solve_column(ratios, inverse, right) -> x``: the solution of A x = right.
+    """Solve A x = right for one column: ``solve_column(ratios, inverse, right) -> x``.
 
     Args:
-        before: as of `factorized`.
+        before: index of the nearest ancestor of each row of A, or -1; see `factorize`.
 
     Returns:
-        Function of the factors and one column.
+        Function of the factors of A and one column (n, 1).
     """
     factor, right = factor_symbols(before), SX.sym("right", len(before))
     names = ["ratios", "inverse", "right"], ["x"]
@@ -171,15 +183,15 @@ def solve_column(before: list[int]) -> Function:
 
 
 def staged_accelerations(system: System, names: Sequence[str]) -> tuple[dict[str, MX], list[MX]]:
-    """Derivatives of the accelerations of a tree.
+    """Derivatives of forward dynamics in tree coordinates, as an MX graph with mapped columns.
 
     Args:
-        system: its coordinates are those of the tree.
-        names: what to differentiate with respect to, of "q", "v", "tau", "z", "u" and "p".
+        system: open mechanism.
+        names: inputs of the derivatives, among "q", "v", "tau", "z", "u" and "p".
 
     Returns:
-        the inputs q, v, tau, then z and u where components need them, and p of a system with
-        parameters; then the derivatives in the order of the names, and the accelerations.
+        inputs by name: q, v, tau, then z and u if components need them, and p if the system has
+        parameters; then a list of the derivatives in the order of `names`, and the accelerations.
     """
     solve = solve_column(velocity_antecedents(system.tree))
     order = [name for name in names if name != "tau"]
@@ -199,7 +211,7 @@ def staged_accelerations(system: System, names: Sequence[str]) -> tuple[dict[str
 
 
 def _front(system: System, names: Sequence[str]) -> Function:
-    """Factors of A, accelerations, and the right-hand sides of their derivatives."""
+    """Function of q, v, tau: factors of A, accelerations, right-hand sides of the derivatives."""
     s = symbols_of(system, "tree")
     tau = SX.sym("tau", s.size)
     factor, a, sides = implicit_formula(system, s, tau, names)
@@ -216,11 +228,12 @@ def _front(system: System, names: Sequence[str]) -> Function:
 
 
 _COMPARED = 6
-"""Velocities from the base to a leaf up to which both methods are built and their operations
-counted; in longer trees differentiation takes more."""
+"""Largest number of velocities on a branch at which "auto" builds both methods and counts their
+operations; on longer branches algorithmic differentiation needs more operations."""
 
 _STAGED = 10
-"""Velocities from which the columns of -A^-1 dtau are a map, not written out one by one."""
+"""Smallest number of velocities at which the columns of -A^-1 dtau are a CasADi map: smaller trees
+have expanded columns."""
 
 
 def inverse_dynamics_derivatives(
@@ -229,31 +242,32 @@ def inverse_dynamics_derivatives(
     coordinates: str = "independent",
     with_respect_to: Iterable[str] = ("q", "v", "a"),
 ) -> Function:
-    """``idm_derivatives(q, v, a) -> dtau_dq, dtau_dv, dtau_da, tau``.
+    """Derivatives of inverse dynamics with respect to motion, states and parameters.
 
-    Column k of dtau_dq is the change of the efforts when the positions move with unit velocity k
-    while v and a stay: dq/dt = `system.qdot(q, v)`. For joints without quaternions it is the
-    plain derivative. dtau_da is the inertia matrix. All that `inverse_dynamics` holds is in it.
+    ``idm_derivatives(q, v, a) -> dtau_dq, dtau_dv, dtau_da, tau``. Column k of dtau_dq is the rate
+    of the efforts if the positions move with unit velocity k, dq/dt = `system.qdot(q, v)`, while v
+    and a are constant. For joints without quaternions it is the partial derivative. dtau_da is the
+    inertia matrix. All terms of `inverse_dynamics` are included.
 
     Source: Carpentier & Mansard 2018; Singh, Russell & Wensing 2022.
 
     Args:
-        system: open or closed; q must close the loops.
-        method: "ad" for the differentiated recursion, "analytical" for recursions of the
-            derivatives themselves, "auto" for the one that takes fewer operations.
-        coordinates: of a closed system, "independent" for idm_derivatives(q, v_a, a_a) ->
-            dtau_a_dq_a, dtau_a_dv_a, dtau_a_da_a, tau_a, or "tree"; whatever motors there are,
-            tau_a is at the independent joints, `actuation_matrix` times that of the motors.
-        with_respect_to: which derivatives: of "q", "v", "a", of "z" and "u", the states and inputs
-            of components, and of "p", the parameters.
+        system: open or closed mechanism; q must close the loops.
+        method: "ad" for algorithmic differentiation of the recursion, "analytical" for recursions
+            of the derivatives, "auto" for fewer operations.
+        coordinates: coordinates of a closed system, "independent" for idm_derivatives(q, v_a, a_a)
+            -> dtau_a_dq_a, dtau_a_dv_a, dtau_a_da_a, tau_a, or "tree". tau_a acts on the
+            independent joints; it equals `actuation_matrix` times the motor efforts.
+        with_respect_to: inputs of the derivatives: "q", "v", "a", component states "z", component
+            inputs "u", parameters "p".
 
     Returns:
-        Function of q (nq, 1), v and a (m, 1); matrices (m, m), with respect to z, u and p of as
-        many columns as these have elements, and tau (m, 1).
+        Function of q (nq, 1), v and a (m, 1). Outputs: matrices (m, m), and tau (m, 1). Derivatives
+        with respect to z, u and p have as many columns as these vectors have elements.
 
     Raises:
-        ModelError: an unknown word; derivatives with respect to p of a system without parameters
-            or in independent coordinates; or the analytical method in these.
+        ModelError: a word is unknown; "z", "u" or "p" is requested of a system that has none; "p"
+            or the analytical method is requested in independent coordinates of a closed system.
     """
     require_system(system)
     names = _checked(system, coordinates, with_respect_to, ("q", "v", "a", "z", "u", "p"))
@@ -283,32 +297,32 @@ def direct_dynamics_derivatives(
     coordinates: str = "independent",
     with_respect_to: Iterable[str] = ("q", "v", "tau"),
 ) -> Function:
-    """``ddm_derivatives(q, v, tau) -> da_dq, da_dv, da_dtau, a``.
+    """Derivatives of forward dynamics: ``ddm_derivatives(q, v, tau) -> da_dq, da_dv, da_dtau, a``.
 
-    The accelerations solve tau = idm(q, v, a), so that their derivatives are those of the efforts
-    at these accelerations, multiplied by -A^-1; da_dtau = A^-1. One factorisation of A serves
-    them and the accelerations. da_dq is along the velocities, as in
-    `inverse_dynamics_derivatives`. For a tree with many velocities the columns of the solution
-    are a map, which fast machine code computes several at a time; `expand()` writes them out.
+    The accelerations solve tau = idm(q, v, a). So da_dq = -A^-1 dtau_dq and da_dv = -A^-1 dtau_dv
+    with the derivatives of idm at these accelerations, and da_dtau = A^-1. A is factorised once.
+    da_dq is taken along the velocities, as in `inverse_dynamics_derivatives`. For a tree with many
+    velocities the columns of the solution are a CasADi map, which compiled code vectorises;
+    `expand()` replaces the map by scalar operations.
 
     Source: Carpentier & Mansard 2018, section IV.
 
     Args:
-        system: open or closed; q must close the loops.
-        method: "implicit" for the formula above, "ad" for the differentiated direct model, "auto"
-            for the one that takes fewer operations.
-        coordinates: "independent", where tau_a is as for `inverse_dynamics_derivatives`; "tree" is
-            the same in an open chain.
-        with_respect_to: which derivatives: of "q", "v", "tau", of "z" and "u", the states and
-            inputs of components, and of "p", the parameters.
+        system: open or closed mechanism; q must close the loops.
+        method: "implicit" for the formula above, "ad" for algorithmic differentiation of the
+            forward dynamics, "auto" for fewer operations.
+        coordinates: "independent", with tau_a as for `inverse_dynamics_derivatives`; "tree" is
+            equivalent for an open chain.
+        with_respect_to: inputs of the derivatives: "q", "v", "tau", component states "z", component
+            inputs "u", parameters "p".
 
     Returns:
-        Function of q (nq, 1), v and tau (m, 1); matrices (m, m), with respect to z, u and p of as
-        many columns as these have elements, and a (m, 1).
+        Function of q (nq, 1), v and tau (m, 1). Outputs: matrices (m, m), and a (m, 1). Derivatives
+        with respect to z, u and p have as many columns as these vectors have elements.
 
     Raises:
-        ModelError: an unknown word; derivatives with respect to p of a system without parameters
-            or with loops; tree coordinates of a closed system; or some joint moves no inertia.
+        ModelError: a word is unknown; "z", "u" or "p" is requested of a system that has none; "p"
+            or tree coordinates are requested of a closed system; or a joint moves no inertia.
     """
     require_system(system)
     names = _checked(system, coordinates, with_respect_to, ("q", "v", "tau", "z", "u", "p"))
@@ -342,7 +356,7 @@ def direct_dynamics_derivatives(
 
 
 def _stage(system: System, names: tuple[str, ...]) -> Function:
-    """The derivatives of accelerations of a large tree."""
+    """Build ``ddm_derivatives`` of a large tree with mapped columns."""
     inputs, outputs = staged_accelerations(system, names)
     labels = list(inputs), [*(f"da_d{name}" for name in names), "a"]
     options = {"default_in": default_in(system, len(inputs.keys() - {"p"}))}
@@ -391,7 +405,7 @@ def _check_method(system: System, coordinates: str, method: str, known: tuple[st
 
 
 def _compare(system: System, recursive: str) -> tuple[str, ...]:
-    """The recursive method, and the differentiated one while it may win."""
+    """Candidates of "auto": the given method, and "ad" for trees with short branches."""
     behind: list[int] = []
     for link in system.tree.links:
         before = behind[link.antecedent] if link.antecedent >= 0 else 0
@@ -406,7 +420,7 @@ def _choose(
     build: Callable[[str], Function],
     candidates: tuple[str, ...],
 ) -> Function:
-    """The model by a method, or of the candidates the one of fewer operations."""
+    """Build the model by a method; for "auto" return the candidate with the fewest operations."""
     if method != "auto":
         return build(method)
     function: Function = system.cached(
@@ -421,28 +435,27 @@ def _outputs(of: str, s: ModelSymbols, names: tuple[str, ...], blocks: Blocks, v
     return [*((f"d{of}_d{label}", blocks[name]) for label, name in pairs), (of, value)]
 
 
-# The direct model with its Jacobian by the implicit formula.
+# Forward dynamics with a Jacobian by the implicit formula.
 #
 # Source: Carpentier & Mansard 2018, section IV.
 
 
 def with_implicit_jacobian(system: System, ddm: Function) -> Function:
-    """The direct model, its Jacobian made by the implicit formula where CasADi asks for it.
+    """Return forward dynamics with a custom CasADi Jacobian by the implicit formula.
 
-    CasADi uses it wherever it takes the Jacobian of a call in an MX graph; directional
-    derivatives stay those of algorithmic differentiation, which are cheaper one at a time.
-    Quaternions are brought to unit length first, so that every element of q has the derivative
-    of a motion; at unit length the model is the same.
+    CasADi uses it for full Jacobians of calls in MX graphs. Single directional derivatives still
+    use algorithmic differentiation, which is cheaper. Quaternions are normalised first, so that
+    derivatives with respect to q are along motions; for unit quaternions the values do not change.
 
     Args:
-        system: an open chain.
-        ddm: its `direct_dynamics`.
+        system: open mechanism.
+        ddm: Function `direct_dynamics(system)`.
 
     Returns:
-        a Function with the inputs and outputs of ddm.
+        Function with the inputs and outputs of ddm.
 
     Raises:
-        ModelError: the system has loops, or ddm is not a direct model of it.
+        ModelError: the system has loops, or ddm is not the forward dynamics of the system.
     """
     require_system(system)
     _check(system, ddm)
@@ -489,10 +502,11 @@ def _check(system: System, ddm: Function) -> None:
 
 
 def _velocities(system: System, q: SX) -> SX:
-    """(nv, nq) velocities with which elements of q change, those along no motion left out.
+    """(nv, nq) map from changes of q, projected on motions, to velocities.
 
-    The rate of q is N v. The columns of N for a turn are half unit vectors, across the
-    quaternion; those of a linear velocity are unit vectors.
+    It is the pseudoinverse of N in dq/dt = N v, divided by the norm of a quaternion. Columns of N
+    are orthogonal. Their norm is 1/2 for a rotation (orthogonal to the quaternion) and 1 for a
+    translation.
     """
     u = SX.sym("u", system.nv)
     N = casadi.jacobian(position_rate(system.tree, normalised(system.tree, q), u), u)

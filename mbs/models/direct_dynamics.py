@@ -1,4 +1,4 @@
-"""Direct dynamic models: the inertia matrix and the accelerations that efforts produce."""
+"""Forward dynamics (direct dynamic models) and the inertia matrix."""
 
 from __future__ import annotations
 
@@ -40,26 +40,26 @@ from mbs.solvers.rank import dense, first_best, rank
 from mbs.text import did_you_mean, quoted
 
 _METHODS = ("auto", "articulated", "composite")
-_ARTICULATED = 260  # operations that articulated bodies take at most for one more velocity
+_ARTICULATED = 260  # upper bound of operations per velocity of the articulated-body algorithm
 _SEED = 20260103
 _VANISHING = 1e-12
-"""Inertia left, in parts of what it is with the links behind locked, that counts as none: rounding
-of as many terms as there are links leaves 1e-15 of it."""
+"""Ratio of the inertia against a velocity with free descendants to its inertia with locked
+descendants, below which it counts as zero: a sum over all links has a rounding error of 1e-15."""
 _NO_INERTIA = 1e-30
-"""Stands for an inertia of zero where one divides [kg m^2 or kg]; no body has so little."""
+"""Smallest denominator of this ratio [kg m^2 or kg]; it avoids 0/0, and no body has so little."""
 
 
 def inertia_matrix(system: System, coordinates: str = "independent") -> Function:
-    """``inertia(q) -> A``: kinetic energy is v' A v / 2.
+    """Inertia matrix (mass matrix): ``inertia(q) -> A`` with kinetic energy v' A v / 2.
 
     Source: Walker & Orin 1982; Khalil & Creusot 1997, eq. 27-38; for closed systems G' A G.
 
     Args:
-        system: open or closed; q must close the loops.
-        coordinates: of a closed system, "independent" or "tree".
+        system: open or closed mechanism; q must close the loops.
+        coordinates: coordinates of a closed system, "independent" or "tree".
 
     Returns:
-        Function of q (nq, 1); A (m, m) symmetric, rotors included [kg m^2, kg m or kg].
+        Function of q (nq, 1); A (m, m) symmetric, including rotors [kg m^2, kg m or kg].
     """
 
     def build() -> tuple[Named, Named]:
@@ -79,36 +79,35 @@ def direct_dynamics(
     f_ext: bool = False,
     moving_base: bool = False,
 ) -> Function:
-    """``ddm(q, v, tau) -> a``: the accelerations that the joint efforts produce.
+    """Forward dynamics, accelerations produced by joint efforts: ``ddm(q, v, tau) -> a``.
 
-    Open chains: by articulated bodies, linear in the number of links, or from A a = tau - H with
-    the composite-body inertia matrix, factorised without filling the zeros that branches leave.
-    Closed systems: the latter in the independent joints, ddm(q, v_a, tau_a) -> a_a, or with
-    `coordinates="tree"` ddm(q, v, tau) -> a, lam, where lam are the efforts of the independent
-    closure rows (A a + H = tau + J' lam). Where a closed system has more motors than independent
-    joints, or others, they are ddm(q, v_a, tau_m) -> a_a, of the efforts of all `system.motors`.
+    For open chains: articulated bodies, linear in the number of links, or A a = tau - H with the
+    composite-body inertia matrix A, factorised without fill-in between branches. For closed
+    systems: A a = tau - H in the independent joints, ddm(q, v_a, tau_a) -> a_a. With
+    `coordinates="tree"`: ddm(q, v, tau) -> a, lam, where lam are the efforts of the independent
+    closure rows (A a + H = tau + J' lam). If the motors of a closed system are not exactly its
+    independent joints: ddm(q, v_a, tau_m) -> a_a with the efforts of all `system.motors`.
 
     Source: Featherstone 1983; Featherstone 2008, section 6.5; Khalil & Creusot 1997, eq. 24 and
     section 5.4.
 
     Args:
-        system: open or closed; q must close the loops.
-        method: "articulated" for open chains, "composite", or "auto" for the one that takes
-            fewer operations.
-        coordinates: of a closed system, "independent" or "tree".
-        f_ext: add an input f_ext (6, bodies): for each row of `system.bodies` the wrench
-            [force; moment] that the body exerts on its environment, in the body's frame.
-        moving_base: add the inputs v_0 (6), velocity [V; w] of the base, a_0 (6), accelerations
-            [vd; wd] of its origin and angular, both in its own axes, and R_0 (3, 3), orientation
-            of the base in the frame in which gravity is given.
+        system: open or closed mechanism; q must close the loops.
+        method: "articulated" (open chains only), "composite", or "auto" for fewer operations.
+        coordinates: coordinates of a closed system, "independent" or "tree".
+        f_ext: whether to add an input f_ext (6, bodies): for each row of `system.bodies` the wrench
+            [force; moment] that the body exerts on its environment, in the body frame.
+        moving_base: whether to add the inputs v_0 (6, 1), velocity [V; w] of the base, a_0 (6, 1),
+            linear acceleration of its origin and angular acceleration [vd; wd], both in base axes,
+            and R_0 (3, 3), orientation of the base in the frame that gravity is expressed in.
 
     Returns:
         Function of q (nq, 1), v and tau (m, 1), or tau_m (k, 1), f_ext, v_0, a_0, R_0; a (m, 1)
         [rad/s^2 or m/s^2].
 
     Raises:
-        ModelError: some joint moves no inertia, so that its acceleration is not determined; or
-            the method is unknown, or is for open chains and the system has loops.
+        ModelError: a joint moves no inertia, so that its acceleration is undetermined; the method
+            is unknown; or it is "articulated" and the system has loops.
     """
     require_system(system)
     check_coordinates(system, coordinates)
@@ -126,9 +125,9 @@ def direct_dynamics(
 
 
 def independent_dynamics(system: System) -> Function:
-    """``ddm(q, v_a, tau_a) -> a_a``: `direct_dynamics` of efforts at the independent joints.
+    """Forward dynamics for efforts of the independent joints: ``ddm(q, v_a, tau_a) -> a_a``.
 
-    It is the same but where motors are others than these.
+    It equals `direct_dynamics(system)` if the motors are on the independent joints.
     """
     if system.motors == system.active:
         return direct_dynamics(system)
@@ -158,14 +157,17 @@ def _check_method(system: System, method: str) -> None:
 
 
 def _candidates(system: System) -> tuple[str, ...]:
-    """Methods one of which takes the fewest operations."""
+    """Methods among which "auto" selects the fewest operations."""
     if system.is_closed:
         return ("composite",)
     return ("composite", "articulated") if _composite_may_win(system) else ("articulated",)
 
 
 def _composite_may_win(system: System) -> bool:
-    """Whether factorising A and solving alone take less than articulated bodies can take."""
+    """Whether method "composite" may need fewer operations than articulated bodies.
+
+    The operations to factorise and solve with A are compared to the bound `_ARTICULATED`.
+    """
     depths: list[int] = []
     for before in velocity_antecedents(system.tree):
         depths.append(depths[before] + 1 if before >= 0 else 0)
@@ -210,10 +212,12 @@ def _composite(system: System, s: ModelSymbols, tau: SX, around: Surroundings) -
 
 
 def require_inertia(system: System) -> None:
-    """Refuse a chain in which some velocity moves no inertia.
+    """Raise if an independent velocity moves no inertia.
+
+    Systems with a symbol without default are not checked.
 
     Raises:
-        ModelError: which velocity, and what to give mass to.
+        ModelError: the message names the velocity and the remedy.
     """
 
     def check() -> bool:
@@ -234,7 +238,7 @@ def require_inertia(system: System) -> None:
 
 
 def _loose_in_tree(system: System) -> int | None:
-    """A velocity of an open chain that moves no inertia when those behind it are free."""
+    """Index of a velocity of an open chain that moves no inertia with free descendants, or None."""
     q = SX.sym("q", system.nq)
     poses = link_poses(system.tree, normalised(system.tree, q))
     both = casadi.horzcat(*inertia_pivots(system.tree, poses))
@@ -242,17 +246,17 @@ def _loose_in_tree(system: System) -> int | None:
     rng = np.random.default_rng(_SEED)
     configuration = np.array(system.configuration) + rng.uniform(-1.0, 1.0, system.nq)
     free, locked = np.array(pivots(configuration, system.p_default)).T
-    # The inertia of files may be negative: what counts is whether anything is there.
+    # magnitude: inertia from files may be negative, but must not be zero
     moves = np.abs(free) > _VANISHING * np.maximum(np.abs(locked), _NO_INERTIA)
     return None if moves.all() else int(np.max(np.flatnonzero(~moves)))
 
 
 def _loose_in_loops(system: System) -> int | None:
-    """An independent velocity of a closed system that moves no inertia."""
+    """Index in `system.active` of an independent velocity that moves no inertia, or None."""
     closure, q = system.closure, list(system.configuration)
     assert closure is not None
     active, passive = list(closure.active), list(closure.passive)
-    # rows that are chosen for another configuration may be dependent here
+    # rows selected for a different configuration may be dependent here
     here = rows_at(system, np.array(q), np.array(system.p_default))
     J = dense(constraint_jacobian(here)(q, system.p_default))[kept_rows(here)]
     G = np.zeros((system.nv, len(active)))
@@ -263,29 +267,29 @@ def _loose_in_loops(system: System) -> int | None:
     return None if rank(A) == len(A) else first_best(np.abs(np.linalg.svd(A)[2][-1]))
 
 
-# Hybrid dynamics: some accelerations are given, the efforts of the others.
+# Hybrid dynamics: prescribed accelerations at some velocities, given efforts at all velocities.
 
 
 def hybrid_dynamics(system: System, prescribed: Sequence[str]) -> Function:
-    """``hybrid(q, v, tau, a_p) -> a, tau_p``: motion where some joints are driven along a law.
+    """Dynamics with prescribed motion of some joints: ``hybrid(q, v, tau, a_p) -> a, tau_p``.
 
-    tau_p is the effort that a drive must add to tau at each prescribed velocity. In a closed
-    system q and v close the loops, and lam, the efforts of the independent closure rows, is a
-    third output.
+    tau_p is the effort that a drive must add to tau at each prescribed velocity. For a closed
+    system q and v must close the loops, and a third output lam contains the efforts of the
+    independent closure rows.
 
     Source: Featherstone 2008, section 9.2; loops as in `direct_dynamics`.
 
     Args:
-        system: open or closed; all coordinates are those of the tree.
-        prescribed: names of velocities whose accelerations are given.
+        system: open or closed mechanism; all coordinates are tree coordinates.
+        prescribed: names of velocities with prescribed acceleration.
 
     Returns:
         Function of q (nq, 1), v and tau (nv, 1), a_p (k, 1) in the order of the names; a (nv, 1)
         and tau_p (k, 1) [N m or N].
 
     Raises:
-        ModelError: a name is unknown or comes twice, or the loops let the named velocities not
-            move independently.
+        ModelError: a name is unknown or repeated, or the loops do not let the named velocities move
+            independently.
     """
     require_system(system)
     numbers = _numbers(system, prescribed)
@@ -327,7 +331,10 @@ def _numbers(system: System, prescribed: Sequence[str]) -> tuple[int, ...]:
 
 
 def are_independent(system: System, numbers: tuple[int, ...], *rows: NDArray[np.float64]) -> bool:
-    """Whether the loops leave these velocities, and rows (1, nv), independent as assembled."""
+    """Whether velocities `numbers` and rows (1, nv) are independent of each other and the loops.
+
+    The rank is tested at the assembled configuration.
+    """
     if not system.is_closed and not rows:
         return True
     J = np.empty((0, system.nv))

@@ -13,20 +13,19 @@ from mbs.recursions.parts import PartsAt
 
 
 def energy(system: System, coordinates: str = "independent") -> Function:
-    """``energy(q, v) -> E, U``: kinetic energy, rotors included, and potential energy.
+    """Kinetic energy, including rotors, and potential energy: ``energy(q, v) -> E, U``.
 
-    The potential energy is that of gravity, of the springs of the joints and of what force elements
-    store.
+    The potential energy includes gravity, joint springs and energy stored in force elements.
 
     Source: Khalil & Creusot 1997, eq. 49-50.
 
     Args:
-        system: open or closed; q must close the loops.
-        coordinates: of a closed system, "independent" or "tree".
+        system: open or closed mechanism; q must close the loops.
+        coordinates: coordinates of a closed system, "independent" or "tree".
 
     Returns:
-        Function of q (nq, 1) and v (m, 1); E, U [J], U zero with everything at the base's
-        origin and the springs at rest.
+        Function of q (nq, 1) and v (m, 1); E and U [J]. The gravity term of U is zero at the origin
+        of the base, the spring terms are zero at rest length.
     """
 
     def build() -> tuple[Named, Named]:

@@ -31,32 +31,33 @@ def aba(system: System, **options: Any) -> Function:
     Source: Featherstone 2008, section 7.3.
 
     Args:
-        system: open.
-        **options: the other arguments of `direct_dynamics`.
+        system: open mechanism.
+        **options: further keyword arguments of `direct_dynamics`.
 
     Returns:
-        ``ddm(q, v, tau) -> a``.
+        Function ``ddm(q, v, tau) -> a``, as for `direct_dynamics`.
     """
     return direct_dynamics(system, method="articulated", **options)
 
 
 _OLD = frozenset(("rows", "columns", "expressed_in", "coordinates"))
-"""Arguments of the differential model, which had this name until version 0.2."""
+"""Arguments of `inverse_differential_kinematics`, which was `inverse_kinematics` up to version
+0.2."""
 
 
 def inverse_kinematics(system: System, T: Any = None, *args: Any, **options: Any) -> Solutions:
-    """Return every configuration at which a frame has a pose.
+    """Return all configurations at which a frame has a given pose.
 
     Args:
-        system: open or closed.
+        system: open or closed mechanism.
         T: (4, 4) pose of the frame relative to the base. It is required.
-        *args: the other arguments of `mbs.models.inverse_geometry.solve`.
-        **options: the same by name.
+        *args: further arguments of `mbs.models.inverse_geometry.solve`.
+        **options: keyword arguments of `mbs.models.inverse_geometry.solve`.
 
     Raises:
-        ModelError: there is no pose, or the arguments are those of
-            `inverse_differential_kinematics`, which had this name up to version 0.2. The other
-            errors are those of `mbs.models.inverse_geometry.solve`.
+        ModelError: T is missing, or the arguments belong to `inverse_differential_kinematics`,
+            which had this name up to version 0.2. Errors of `mbs.models.inverse_geometry.solve`
+            are also possible.
     """
     if T is None or isinstance(T, int | str) or _OLD & set(options):
         raise ModelError(

@@ -1,4 +1,4 @@
-"""Direct geometric models: where frames are."""
+"""Direct geometric models (forward kinematics): poses of frames."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from mbs.recursions.route import cheapest_pose
 
 
 def transform(system: System, frame: str | int, relative_to: str | int = "base") -> Function:
-    """``transform(q) -> T``: the pose of a frame seen from another one.
+    """Pose of a frame relative to another frame: ``transform(q) -> T``.
 
     Source: Khalil & Creusot 1997, eq. 1.
 
     Args:
-        system: open or closed; q must close the loops.
-        frame: a body, a named frame, or the number of a link (0 is the base); of a mechanism that
-            was made from a table of frames, the number of a frame there.
-        relative_to: likewise.
+        system: open or closed mechanism; q must close the loops.
+        frame: name of a body or frame, or index of a link (0 for the base). For a mechanism from a
+            table of frames: index of a frame in that table.
+        relative_to: reference frame, specified in the same way.
 
     Returns:
-        Function of q (nq, 1); T (4, 4), homogeneous, in m.
+        Function of q (nq, 1); homogeneous matrix T (4, 4), translation in m.
 
     Raises:
-        ModelError: there is no such frame.
+        ModelError: a frame is unknown.
     """
     require_system(system)
     return _pose(system, ("transform", frame, relative_to), frame, relative_to)
@@ -53,11 +53,10 @@ def _pose(
 
 
 def terminal_frame(system: System) -> str | int:
-    """The frame that a robot is asked for when none is named.
+    """Default frame of a robot (end effector).
 
-    It is the frame or body named "tool", else the only frame that was given a name, not counting
-    those in which mounts are given ("outer_world"), else the last
-    link at the end of a chain that no loop goes through, else the last link.
+    The frame or body named "tool"; else the only named frame, not counting the frames "outer_world"
+    that mounts refer to; else the last link at the end of an open branch; else the last link.
     """
     named = [name for name in system.named_frames if name.rpartition(".")[2] != OUTER_WORLD]
     if "tool" in system.frames:
@@ -71,12 +70,12 @@ def terminal_frame(system: System) -> str | int:
     last = links[-1] if links else len(system.tree.links)
     if not system.numbered:
         return last
-    # Numbers are those of a table: the body of its first frame that this link carries.
+    # frame indices of a table: body of the first frame of the table that is on this link
     return next(name for name in system.numbered.values() if system.frames[name][0] == last - 1)
 
 
 def _open_ends(system: System) -> set[int]:
-    """The numbers of the links that carry no other link and stand in no loop."""
+    """Indices (1-based) of the links at the ends of open branches, in no loop."""
     tree = system.tree
     inner = {link.antecedent for link in tree.links}
     inner |= {k for cut in system.cuts for k in tree.path(cut.link_a) + tree.path(cut.link_b)}
@@ -84,25 +83,28 @@ def _open_ends(system: System) -> set[int]:
 
 
 def direct_geometry(system: System, frame: str | int | None = None) -> Function:
-    """``dgm(q) -> T``: the pose of the terminal frame seen from the base.
+    """Pose of a frame relative to the base (forward kinematics): ``dgm(q) -> T``.
 
-    For a closed system the input is q_a, the positions of the independent joints; the others
-    follow on the branch of the assembled configuration: in closed form where `mbs.loops.function`
-    knows one, else in small steps. Where that leads nowhere T is NaN, and a call with numbers
+    For a closed system the input is q_a, the positions of the independent joints. Other positions
+    follow on the branch of the assembled configuration: in closed form if `mbs.loops.function` has
+    one, else by continuation in small steps. If this fails, T is NaN, and a call with numbers
     raises Unclosable.
 
     Source: Khalil & Creusot 1997, section 3.1.
 
     Args:
-        system: open or closed.
-        frame: a body, a named frame, the number of a link, or None for the terminal frame.
+        system: open or closed mechanism.
+        frame: name of a body or frame, or index of a link. None for "tool", else the only named
+            frame, else the last link of an open branch or of the tree.
 
     Returns:
-        Function of q (nq, 1), or of q_a (m, 1) in a closed system; T (4, 4).
+        Function of q (nq, 1), or of q_a (m, 1) for a closed system; homogeneous matrix T (4, 4),
+        translation in m.
 
     Raises:
-        ModelError: there is no such frame.
-        NoClosedForm: a quaternion turns freely, so that q_a does not say how it stands.
+        ModelError: the frame is unknown.
+        NoClosedForm: an independent velocity belongs to a quaternion joint, whose orientation q_a
+            does not contain.
     """
     require_system(system)
     name = terminal_frame(system) if frame is None else frame
@@ -130,7 +132,7 @@ def _closed_geometry(system: System, name: str | int, pose: Function) -> Functio
 
 
 class _FollowedGeometry(LoopFunction):
-    """The geometry of a system that is followed in steps; a refusal says where its branch ends."""
+    """Direct geometric model by continuation; its error message reports where the branch ends."""
 
     def _refusal(self, q_a: NDArray[np.float64], p: NDArray[np.float64]) -> str:
         names = [parameter.name for parameter in self.system.parameters]

@@ -1,4 +1,4 @@
-"""Inverse dynamic models: efforts that produce a motion."""
+"""Inverse dynamics: joint efforts that produce a motion."""
 
 from __future__ import annotations
 
@@ -31,23 +31,24 @@ def inverse_dynamics(
     f_ext: bool = False,
     moving_base: bool = False,
 ) -> Function:
-    """``idm(q, v, a) -> tau``: the joint efforts that produce the accelerations a.
+    """Inverse dynamics, joint efforts for accelerations a: ``idm(q, v, a) -> tau``.
 
-    Rotors, viscous and Coulomb friction and springs of the joints are included, and force elements.
-    Where a closed system has more motors than independent joints, they are idm(q, v_a, a_a) ->
-    tau_m, the efforts of all `system.motors` with the least sum of squares of the numbers in N m
-    and N; `actuation_null_space` has the other choices.
+    Rotors, viscous and Coulomb friction and springs of the joints, and force elements are included.
+    If the motors of a closed system are not exactly its independent joints, the model is
+    idm(q, v_a, a_a) -> tau_m with the efforts of all `system.motors`. With redundant motors the sum
+    of squares of tau_m, in N m and N, is minimal; `actuation_null_space` spans all solutions.
 
     Source: Khalil & Kleinfinger 1987; Khalil & Creusot 1997, eq. 15-20 and 22.
 
     Args:
-        system: open or closed; q must close the loops.
-        coordinates: of a closed system, "independent" for idm(q, v_a, a_a) -> tau_a, or "tree".
-        f_ext: add an input f_ext (6, bodies): for each row of `system.bodies` the wrench
-            [force; moment] that the body exerts on its environment, in the body's frame.
-        moving_base: add the inputs v_0 (6), velocity [V; w] of the base, a_0 (6), accelerations
-            [vd; wd] of its origin and angular, both in its own axes, and R_0 (3, 3), orientation
-            of the base in the frame in which gravity is given.
+        system: open or closed mechanism; q must close the loops.
+        coordinates: form for a closed system: "independent" for idm(q, v_a, a_a) -> tau_a, or
+            "tree".
+        f_ext: whether to add an input f_ext (6, bodies): for each row of `system.bodies` the wrench
+            [force; moment] that the body exerts on its environment, in the body frame.
+        moving_base: whether to add the inputs v_0 (6, 1), velocity [V; w] of the base, a_0 (6, 1),
+            linear acceleration of its origin and angular acceleration [vd; wd], both in base axes,
+            and R_0 (3, 3), orientation of the base in the frame that gravity is expressed in.
 
     Returns:
         Function of q (nq, 1), v and a (m, 1), f_ext, v_0, a_0, R_0; tau (m, 1), or tau_m (k, 1)
@@ -74,16 +75,18 @@ def inverse_dynamics(
 def bias(
     system: System, coordinates: str = "independent", *, moving_base: bool = False
 ) -> Function:
-    """``bias(q, v) -> H``: the efforts at zero acceleration, so that tau = A a + H.
+    """Joint efforts at zero acceleration (nonlinear effects): ``bias(q, v) -> H``.
 
-    Coriolis, centrifugal and gravity efforts, friction and springs of the joints, force elements.
+    tau = A a + H. H contains Coriolis, centrifugal and gravity efforts, friction and springs of the
+    joints, and force elements.
 
     Source: Khalil & Creusot 1997, eq. 25 and section 5.3.1.
 
     Args:
-        system: open or closed; q must close the loops.
-        coordinates: as for `inverse_dynamics`.
-        moving_base: as for `inverse_dynamics`; the acceleration of the base is part of H.
+        system: open or closed mechanism; q must close the loops.
+        coordinates: coordinates of a closed system, "independent" or "tree".
+        moving_base: whether to add the inputs v_0, a_0, R_0 as for `inverse_dynamics`; H includes
+            the acceleration of the base.
 
     Returns:
         Function of q (nq, 1), v (m, 1), v_0, a_0, R_0; H (m, 1) [N m or N].
@@ -104,17 +107,17 @@ def bias(
 def gravity_effort(
     system: System, coordinates: str = "independent", *, moving_base: bool = False
 ) -> Function:
-    """``gravity(q) -> Q``: the efforts that hold the mechanism still, against springs too.
+    """Joint efforts that balance gravity and springs at rest: ``gravity(q) -> Q``.
 
-    Every force element acts as it does at rest: springs, stops and sources, not dampers.
+    Force elements act with their value at zero velocity: springs, stops and sources, not dampers.
 
     Source: Khalil & Creusot 1997, eq. 23.
 
     Args:
-        system: open or closed; q must close the loops.
-        coordinates: as for `inverse_dynamics`.
-        moving_base: add the input R_0 (3, 3), orientation of the base in the frame in which
-            gravity is given.
+        system: open or closed mechanism; q must close the loops.
+        coordinates: coordinates of a closed system, "independent" or "tree".
+        moving_base: whether to add the input R_0 (3, 3), orientation of the base in the frame that
+            gravity is expressed in.
 
     Returns:
         Function of q (nq, 1) and R_0; Q (m, 1) [N m or N].
@@ -138,19 +141,19 @@ def gravity_effort(
 
 
 def _efforts(system: System, s: ModelSymbols, a: SX, around: Surroundings) -> tuple[SX, Named]:
-    """Efforts of the input coordinates for accelerations of the tree, and what stands between."""
+    """Efforts in input coordinates for accelerations a (nv, 1), and named intermediate results."""
     dynamics = _dynamics(system, s, a, around)
     tau = dynamics.efforts + own_efforts(system, s, a)
     return s.reduced_effort(tau), newton_euler_names(dynamics)
 
 
 def tree_efforts(system: System, s: ModelSymbols, a: SX, around: Surroundings) -> SX:
-    """(nv, 1) efforts of the tree, those of its joints included, for accelerations a (nv, 1)."""
+    """(nv, 1) inverse dynamics of the tree for accelerations a (nv, 1), with joint friction."""
     return _dynamics(system, s, a, around).efforts + own_efforts(system, s, a)
 
 
 def own_efforts(system: System, s: ModelSymbols, a: SX) -> SX:
-    """(nv, 1) what the joints need themselves: drives, friction, springs and stops."""
+    """(nv, 1) efforts of the joints themselves: rotors, friction, springs, stops and components."""
     acting = PartsAt(system, s.q, s.v_tree).efforts()
     return joint_efforts(system.tree, s.q, s.v_tree, a) + acting
 
@@ -161,7 +164,7 @@ def _dynamics(system: System, s: ModelSymbols, a: SX, around: Surroundings) -> D
 
 
 def tree_gravity(system: System, s: ModelSymbols, gravity: SX | None = None) -> SX:
-    """(nv, 1) efforts of the tree that hold it still, against gravity, springs and sources."""
+    """(nv, 1) tree efforts that balance gravity, springs, stops and sources at rest."""
     rest = SX.zeros(system.nv)
     base = resting_base(system.tree.gravity if gravity is None else gravity)
     efforts = newton_euler(system.tree, s.poses, rest, rest, base).efforts
@@ -169,7 +172,7 @@ def tree_gravity(system: System, s: ModelSymbols, gravity: SX | None = None) -> 
 
 
 def static_efforts(system: System, s: ModelSymbols) -> SX:
-    """(nv, 1) efforts of the tree that hold its springs, stops and sources at rest."""
+    """(nv, 1) tree efforts that balance springs, stops and sources at rest, without gravity."""
     rest = SX.zeros(system.nv)
     acting = element_efforts(PartsAt(system, s.q, rest), s.poses)
     return spring_effort(system.tree, s.q) + acting

@@ -1,4 +1,4 @@
-"""Inverse and determinant of a square part of the Jacobian, block by block."""
+"""Inverse and determinant of a square submatrix of the Jacobian, in block triangular form."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from mbs.recursions.square_jacobian import SquareJacobian, square_jacobian
 from mbs.solvers.block_triangular import solve_blocks
 from mbs.text import did_you_mean, quoted
 
-# The square part of a Jacobian that a user names by rows and columns.
+# Square submatrix of a Jacobian that a user selects by rows and columns.
 
 
 _ROWS = ("Vx", "Vy", "Vz", "wx", "wy", "wz")
@@ -28,15 +28,15 @@ _ROWS = ("Vx", "Vy", "Vz", "wx", "wy", "wz")
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Rows of [V; w] and as many columns of a frame's Jacobian.
+    """Square submatrix of the Jacobian of a frame: rows of [V; w] and as many columns.
 
     Attributes:
-        frame: that moves.
-        expressed_in: in whose axes V and w are.
-        rows: numbers 0 to 5.
-        columns: numbers of velocities, in the input coordinates.
-        reduced: whether they are the independent velocities of a closed system.
-        names: of these velocities.
+        frame: frame that moves.
+        expressed_in: frame whose axes V and w are expressed in.
+        rows: indices 0 to 5 into [V; w].
+        columns: indices of the selected velocities among the input velocities.
+        reduced: whether the input velocities are the independent ones of a closed system.
+        names: names of the selected velocities.
     """
 
     frame: str | int
@@ -48,11 +48,11 @@ class Selection:
 
     @property
     def check(self) -> ConfigurationCheck | None:
-        """What refuses the configurations that functions of the matrix cannot take."""
+        """Check that rejects configurations at which the reduced Jacobian is undefined."""
         return DETERMINED if self.reduced else None
 
     def of(self, system: System) -> tuple[SX, SquareJacobian]:
-        """Symbols q, (nq, 1), and the matrix at them in blocks; formed once."""
+        """Return symbols q (nq, 1) and the block form of the matrix at q (cached)."""
         found: tuple[SX, SquareJacobian] = system.cached(
             ("square_jacobian", self), lambda: self._form(system)
         )
@@ -69,10 +69,10 @@ class Selection:
         return q, square_jacobian(target, self.rows, self.columns, G)
 
     def regular(self, system: System) -> tuple[SX, SquareJacobian]:
-        """The same of a matrix that has an inverse.
+        """Return q and the block form as `of`, for a matrix that is invertible.
 
         Raises:
-            ModelError: it is singular in every configuration.
+            ModelError: the matrix is singular in every configuration.
         """
         q, square = self.of(system)
         if square.blocks is None:
@@ -84,7 +84,7 @@ class Selection:
         return q, square
 
     def determinant(self, system: System) -> Function:
-        """``determinant(q) -> det``."""
+        """Function ``determinant(q) -> det`` of the selected submatrix."""
 
         def build() -> tuple[Named, Named]:
             q, square = self.of(system)
@@ -101,11 +101,13 @@ def selection(
     expressed_in: str | int,
     coordinates: str,
 ) -> Selection:
-    """What was named, checked; all rows, and the velocities that move the frame, when left out.
+    """Check the arguments of a user and return the selected square submatrix.
+
+    By default all rows, and as columns the velocities that move the frame.
 
     Raises:
-        ModelError: a row or column does not exist or comes twice, or there are not as many rows
-            as columns.
+        ModelError: a row or column does not exist or is repeated, or the numbers of rows and
+            columns differ.
     """
     require_system(system)
     check_coordinates(system, coordinates)
@@ -170,28 +172,28 @@ def inverse_jacobian(
     expressed_in: str | int = "base",
     coordinates: str = "independent",
 ) -> Function:
-    """``inverse_jacobian(q) -> J_inv``: joint velocities that give a frame a velocity.
+    """Inverse of a square submatrix of the Jacobian: ``inverse_jacobian(q) -> J_inv``.
 
-    The inverse of the rows and columns that are named. It is formed from the blocks that
-    remain in the best axes and about the best reference point, such as the centre of a wrist.
+    J_inv maps the selected rows of a frame velocity to the selected joint velocities. The axes and
+    the reference point, such as the centre of a wrist, are chosen so that small blocks remain.
 
     Source: Khalil & Creusot 1997, section 4.6.
 
     Args:
-        system: open or closed; q must close the loops.
-        frame: a body, a named frame, or the number of a link.
-        rows: of [V; w], numbers 0 to 5 or "Vx" to "wz"; all six when left out.
-        columns: numbers (from 0) or names of velocities, as many; those that move the frame when
-            left out.
-        expressed_in: the frame in whose axes V and w are.
-        coordinates: of a closed system, "independent" or "tree".
+        system: open or closed mechanism; q must close the loops.
+        frame: name of a body or frame, or index of a link.
+        rows: rows of [V; w], indices 0 to 5 or names "Vx" to "wz"; all six by default.
+        columns: velocities, as many as rows, by 0-based index or name; by default the velocities
+            that move the frame.
+        expressed_in: frame whose axes V and w are expressed in.
+        coordinates: velocities of a closed system, "independent" or "tree".
 
     Returns:
-        Function of q (nq, 1); J_inv (m, m): velocities of the columns for those of the rows.
+        Function of q (nq, 1); J_inv (m, m) with one row per selected velocity.
 
     Raises:
-        ModelError: no such frame, row or column, not as many rows as columns, or the matrix is
-            singular in every configuration.
+        ModelError: the frame, a row or a column is unknown, the numbers of rows and columns
+            differ, or the matrix is singular in every configuration.
     """
     chosen = selection(system, frame, rows, columns, expressed_in, coordinates)
 
@@ -211,24 +213,26 @@ def inverse_differential_kinematics(
     expressed_in: str | int = "base",
     coordinates: str = "independent",
 ) -> Function:
-    """``ikm(q, twist) -> v_of_columns``: the same velocities, without forming the inverse.
+    """Joint velocities of a frame velocity: ``ikm(q, twist) -> v_of_columns``.
+
+    Solves with the matrix that `inverse_jacobian` inverts, without forming the inverse.
 
     Source: Khalil & Creusot 1997, section 4.6.
 
     Args:
-        system: as for `inverse_jacobian`, and so are the others.
-        frame: likewise.
-        rows: likewise.
-        columns: likewise.
-        expressed_in: likewise.
-        coordinates: likewise.
+        system: open or closed mechanism; q must close the loops.
+        frame: name of a body or frame, or index of a link.
+        rows: rows of [V; w], as for `inverse_jacobian`.
+        columns: velocities, as for `inverse_jacobian`.
+        expressed_in: frame whose axes V and w are expressed in.
+        coordinates: velocities of a closed system, "independent" or "tree".
 
     Returns:
-        Function of q (nq, 1) and twist (m, 1), the named rows of [V; w] [m/s, rad/s];
-        v_of_columns (m, 1), the named joint velocities.
+        Function of q (nq, 1) and twist (m, 1), the selected rows of [V; w] [m/s, rad/s];
+        v_of_columns (m, 1), the selected joint velocities.
 
     Raises:
-        ModelError: as for `inverse_jacobian`.
+        ModelError: same conditions as for `inverse_jacobian`.
     """
     chosen = selection(system, frame, rows, columns, expressed_in, coordinates)
 
@@ -251,26 +255,27 @@ def jacobian_determinant(
     expressed_in: str | int = "base",
     coordinates: str = "independent",
 ) -> Function:
-    """``determinant(q) -> det``: zero in singular configurations.
+    """Determinant of a square submatrix of the Jacobian: ``determinant(q) -> det``.
 
-    The product of the determinants of the blocks of `inverse_jacobian`; `singularities` gives
-    its factors one by one.
+    It is zero in singular configurations. It is the product of the determinants of the blocks of
+    `inverse_jacobian`; `singularities` returns the single factors.
 
     Source: Khalil & Creusot 1997, section 4.6.
 
     Args:
-        system: as for `inverse_jacobian`, and so are the others.
-        frame: likewise.
-        rows: likewise.
-        columns: likewise.
-        expressed_in: likewise.
-        coordinates: likewise.
+        system: open or closed mechanism; q must close the loops.
+        frame: name of a body or frame, or index of a link.
+        rows: rows of [V; w], as for `inverse_jacobian`.
+        columns: velocities, as for `inverse_jacobian`.
+        expressed_in: frame whose axes V and w are expressed in.
+        coordinates: velocities of a closed system, "independent" or "tree".
 
     Returns:
         Function of q (nq, 1); det (1, 1).
 
     Raises:
-        ModelError: no such frame, row or column, or not as many rows as columns.
+        ModelError: the frame, a row or a column is unknown, or the numbers of rows and columns
+            differ.
     """
     chosen = selection(system, frame, rows, columns, expressed_in, coordinates)
     return chosen.determinant(system)

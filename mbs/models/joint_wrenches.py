@@ -1,4 +1,4 @@
-"""Forces and moments that joints transmit: constraint forces, and what drives the joint."""
+"""Wrenches that joints transmit: constraint forces and the efforts along the joint."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from mbs.recursions.velocities import Acceleration, link_accelerations
 from mbs.solvers.linear import solve_saddle, solve_square
 from mbs.spatial import Pose, PseudoInertia, Wrench, add_wrenches, cross, transform_wrench, zeros
 
-# Wrenches of joints that weld two bodies into one link, as a force sensor between them feels.
+# Wrenches of Fixed joints, which weld two bodies into one link, as a force sensor measures them.
 
 
 def weld_wrench(
@@ -55,18 +55,18 @@ def weld_wrench(
     joint: JointRow,
     others: dict[str, Wrench],
 ) -> Wrench:
-    """The wrench of a Fixed joint on the body of frame_b, about and in frame_b.
+    """Wrench of a Fixed joint on the body of frame_b, about and in frame_b.
 
-    It moves the part that the joint holds, and passes on what this exerts on joints, force elements
-    and its environment.
+    It is the Newton-Euler balance of the part of the link on one side of the joint: inertial wrench
+    plus the wrenches that this part exerts on joints, force elements and environment.
 
     Args:
-        system: open or closed.
-        s: its symbols.
+        system: open or closed mechanism.
+        s: symbols of the system.
         a: (nv, 1) accelerations of the tree.
-        around: what acts from outside.
-        joint: a row with a part.
-        others: wrenches of the joints that do not weld, by their names, about and in frame_b.
+        around: base motion and external wrenches.
+        joint: row of a Fixed joint with its welded part.
+        others: wrenches of all joints that are not Fixed, by name, about and in their frame_b.
     """
     part, (link, pose) = joint.part, joint.frame_b
     assert part is not None
@@ -90,7 +90,10 @@ def weld_wrench(
 
 
 def _on_joint(system: System, q: SX, row: JointRow, link: int, side: str, wrench: Wrench) -> Wrench:
-    """What the body of frame_a or frame_b, `side`, exerts on a joint, in the frame of its link."""
+    """Wrench that the body on `side` "a" or "b" exerts on a joint, in the frame of its link.
+
+    `wrench` is the joint wrench on the body of frame_b, about and in frame_b.
+    """
     T = relative_pose(system.tree, q, (link, Pose.identity()), row.frame_b)
     sign = 1 if side == "a" else -1
     f, m = transform_wrench(T, wrench)
@@ -98,7 +101,7 @@ def _on_joint(system: System, q: SX, row: JointRow, link: int, side: str, wrench
 
 
 def _outside(system: System, part: WeldedPart, around: Surroundings) -> dict[int, Wrench]:
-    """What the bodies of the part exert on their environment."""
+    """Wrenches f_ext that the bodies of a welded part exert on their environment, by link."""
     f_ext = dict(around.inputs).get("f_ext")
     if f_ext is None:
         return {}
@@ -107,7 +110,7 @@ def _outside(system: System, part: WeldedPart, around: Surroundings) -> dict[int
 
 
 def _spin(system: System, part: WeldedPart, v: SX, a: SX, motion: Acceleration) -> SX:
-    """The moment (3, 1) that turns the spin of rotors on the part, in the frame of its link."""
+    """Rate of the angular momentum of the rotors on a part, (3, 1), in the frame of its link."""
     total = zeros()
     for link in system.tree.links:
         if link.rotor is not None and (link.name, "a") in part.ports:
@@ -123,35 +126,35 @@ def joint_wrenches(
     f_ext: bool = False,
     moving_base: bool = False,
 ) -> Function:
-    """``joint_wrenches(q, v, a) -> F``: the wrench that every joint transmits.
+    """Wrenches that all joints transmit: ``joint_wrenches(q, v, a) -> F``.
 
-    A column [force; moment] is what the body of frame_a exerts on the body of frame_b through the
-    joint: about the origin of frame_b and in its axes. The body of frame_a gets the opposite. The
-    column holds everything that acts in the joint: constraint forces, motor, rotor inertia,
-    friction, spring and stops, and the effort that a coupling puts on its coordinates. Force
-    elements between points act beside the joints. A Fixed joint transmits what the part of the link
-    on its one side needs.
+    A column [force; moment] of F is the wrench that the body of frame_a exerts on the body of
+    frame_b through the joint, about the origin of frame_b and in its axes. It contains all loads in
+    the joint: constraint forces, motor, rotor inertia, friction, spring and stops, and the efforts
+    of couplings. Force elements between points are not part of joint wrenches. The wrench of a
+    Fixed joint balances the part of the link on one side of the joint.
 
-    In a closed system the efforts of the joints decide how the loops share the load. With
-    independent coordinates the independent joints have the efforts that the motion needs and the
-    others none; with tree coordinates the input tau gives them all. Along closure rows that were
-    dropped (`system.loops[..].dropped`) rigid bodies do not determine the forces; the wrenches are
-    those with zero there. In over-constrained loops whose independent rows change with the
-    configuration (`system.closure.varies`) they are those with the smallest efforts of rows.
+    In a closed system the joint efforts determine how the loops share the load. With independent
+    coordinates the independent joints have the efforts of the inverse dynamics, and other joints
+    have none. With tree coordinates the input tau gives all efforts. Forces along dropped closure
+    rows (`system.loops[..].dropped`) are undetermined for rigid bodies and set to zero. In
+    over-constrained loops whose independent rows change with the configuration
+    (`system.closure.varies`), the row efforts of smallest norm are used.
 
     Source: Khalil & Creusot 1997, eq. 15-19 and 22; Haug 1989 for cut joints.
 
     Args:
-        system: open or closed; q must close the loops.
-        coordinates: of a closed system, "independent" for joint_wrenches(q, v_a, a_a) -> F, or
-            "tree" for joint_wrenches(q, v, a, tau) -> F, where tau fits the motion, as that of
-            `direct_dynamics` does.
-        f_ext: as for `inverse_dynamics`.
-        moving_base: as for `inverse_dynamics`.
+        system: open or closed mechanism; q must close the loops.
+        coordinates: form for a closed system: "independent" for joint_wrenches(q, v_a, a_a) -> F,
+            "tree" for joint_wrenches(q, v, a, tau) -> F. tau must be consistent with the motion, as
+            in `direct_dynamics`.
+        f_ext: whether to add the input f_ext of external wrenches, see `inverse_dynamics`.
+        moving_base: whether to add the inputs v_0, a_0, R_0 of the base motion, see
+            `inverse_dynamics`.
 
     Returns:
-        Function of q (nq, 1), v, a and tau (m, 1), f_ext, v_0, a_0, R_0; F (6, joints), a column
-        for each row of `system.joints` [N, N m].
+        Function of q (nq, 1), v, a and tau (m, 1), and optionally f_ext, v_0, a_0, R_0; F
+        (6, joints), one column for each row of `system.joints` [N, N m].
     """
     require_system(system)
     check_coordinates(system, coordinates)
@@ -169,9 +172,9 @@ def joint_wrenches(
 
 
 def motion_inputs(system: System, s: ModelSymbols) -> tuple[Named, SX, SX | None]:
-    """Inputs that give a motion and its efforts, accelerations of the tree, and efforts of it.
+    """Return named inputs (q, v, a, tau), accelerations of the tree, and the symbol tau.
 
-    The efforts (nv, 1) are an input with tree coordinates of a closed system, else None.
+    tau (nv, 1) is an input only with tree coordinates of a closed system, else None.
     """
     name, a = s.input("a")
     inputs = [("q", s.q), ("v" + s.suffix, s.v), (name, a)]
@@ -185,15 +188,14 @@ def motion_inputs(system: System, s: ModelSymbols) -> tuple[Named, SX, SX | None
 def wrenches_of_joints(
     system: System, s: ModelSymbols, a: SX, tau: SX | None, around: Surroundings
 ) -> list[Wrench]:
-    """For every row of `system.joints` its wrench about and in frame_b.
+    """Wrench of each row of `system.joints` on the body of frame_b, about and in frame_b.
 
     Args:
-        system: open or closed.
-        s: its symbols.
+        system: open or closed mechanism.
+        s: symbols of the system.
         a: (nv, 1) accelerations of the tree.
-        tau: (nv, 1) efforts of the tree; None where they follow from the motion, as those of
-            `inverse_dynamics` do.
-        around: what acts from outside.
+        tau: (nv, 1) joint efforts; None if they follow from the motion by inverse dynamics.
+        around: base motion and external wrenches.
     """
     cut: dict[str, Wrench] = {}
     loads = [
@@ -220,10 +222,11 @@ def wrenches_of_joints(
 
 
 def row_efforts(system: System) -> Function:
-    """``row_efforts(q, v, a, tau) -> lam``: the effort of every row of the loops.
+    """Efforts of all closure rows: ``row_efforts(q, v, a, tau) -> lam``.
 
     Args:
-        system: with closed loops; the motion fulfils them, and tau fits it.
+        system: closed mechanism. The motion q, v, a must close the loops; tau must be consistent
+            with it.
 
     Returns:
         Function of q (nq, 1), v, a and tau (nv, 1); lam (m, 1) of all rows, dropped ones included.
@@ -239,13 +242,13 @@ def row_efforts(system: System) -> Function:
 
 
 def shown_outputs(system: System, parts: PartsAt, a: SX, tau: SX) -> SX:
-    """(ny, 1) outputs of components, the efforts of their rows known from the motion.
+    """(ny, 1) outputs of components, with the efforts of their constraint rows substituted.
 
     Args:
-        system: open or closed.
-        parts: its components at positions and velocities.
+        system: open or closed mechanism.
+        parts: components of the system at positions and velocities.
         a: (nv, 1) accelerations of the tree.
-        tau: (nv, 1) efforts of the tree, what drives deliver and external loads included.
+        tau: (nv, 1) joint efforts, including drives and external loads.
     """
     y, symbols = parts.outputs(), parts.effort_symbols
     if not symbols.numel() or not casadi.depends_on(y, symbols):
@@ -263,10 +266,10 @@ def shown_outputs(system: System, parts: PartsAt, a: SX, tau: SX) -> SX:
 def closure_efforts(
     system: System, s: ModelSymbols, a: SX, tau: SX | None, around: Surroundings
 ) -> SX:
-    """(m, 1) efforts of all rows: J' lam is what the motors leave of the efforts.
+    """(m, 1) efforts lam of all closure rows: J' lam = required efforts minus motor efforts.
 
-    Those of dropped rows are zero. Where no choice of rows holds everywhere, they are as small as
-    can be together.
+    Efforts of dropped rows are zero. If the independent rows change with the configuration, lam has
+    the smallest norm.
     """
     closure = system.closure
     assert closure is not None
@@ -290,7 +293,14 @@ def closure_efforts(
 
 
 def _at_frame_b(tree: Tree, q: SX, joint: JointRow, through: list[Wrench]) -> Wrench:
-    """The wrench that a joint of the tree transmits, on the body of frame_b."""
+    """Wrench of a tree joint on the body of frame_b, about and in frame_b.
+
+    Args:
+        tree: tree of the system.
+        q: (nq, 1) positions.
+        joint: row of the joint.
+        through: wrench transmitted to each link by its antecedent, in the frame of the link.
+    """
     link = max(joint.frame_a[0], joint.frame_b[0])
     T = relative_pose(tree, q, joint.frame_b, (link, Pose.identity()))
     f, m = transform_wrench(T, through[link])

@@ -1,4 +1,4 @@
-"""Kinematic models: velocities of frames."""
+"""Kinematic models: Jacobians, velocities and accelerations of links and frames."""
 
 from __future__ import annotations
 
@@ -36,31 +36,32 @@ def jacobian(
     intermediate: int | None = None,
     reference: int | None = None,
 ) -> Function:
-    """``jacobian(q) -> J``: velocity of a frame, [V; w] = J v, V being that of its origin.
+    """Geometric Jacobian of a frame: ``jacobian(q) -> J`` with [V; w] = J v.
 
-    With form="renaud" it is ``jacobian_renaud(q) -> R6, L, J``, three factors whose product is
-    that matrix: R6 turns from an intermediate frame into the target axes, L moves the velocity of
-    a reference point to the origin of the frame, J is in the intermediate frame, where it has the
-    fewest terms.
+    V is the velocity of the frame origin, w the angular velocity. form="renaud" returns
+    ``jacobian_renaud(q) -> R6, L, J`` with the full Jacobian R6 L J. Its factor J is about a
+    reference point and in the axes of an intermediate link, which minimise its operations. L
+    transforms to the frame origin, R6 rotates into the axes of `expressed_in`.
 
     Source: Renaud 1980; Khalil & Creusot 1997, eq. 3-5; for closed systems J G.
 
     Args:
-        system: open or closed; q must close the loops.
-        frame: a body, a named frame, or the number of a link.
-        expressed_in: the frame in whose axes V and w are.
+        system: open or closed mechanism; q must close the loops.
+        frame: name of a body or frame, or index of a link.
+        expressed_in: frame whose axes V and w are expressed in.
         form: "full" or "renaud".
-        coordinates: of a closed system, "independent" (v is v_a) or "tree".
-        intermediate: for "renaud", number of the link in whose axes J is, 0 for the base; left
-            out, the one with the fewest operations is taken.
-        reference: for "renaud", number of the link whose origin the velocity J v belongs to.
+        coordinates: velocities of a closed system, "independent" (v is v_a) or "tree".
+        intermediate: intermediate link for "renaud", by index, 0 for the base. By default the link
+            with the fewest operations.
+        reference: link for "renaud", by index, whose origin is the reference point. By default the
+            link with the fewest operations.
 
     Returns:
         Function of q (nq, 1); J (6, m) [m or 1; 1/m or 1], R6 and L (6, 6) [1; m].
 
     Raises:
-        ModelError: there is no such frame or form, or the intermediate frame is not between the
-            base and the frame.
+        ModelError: the frame or the form is unknown, or the intermediate or reference link is not
+            between the base and the frame.
     """
     require_system(system)
     check_coordinates(system, coordinates)
@@ -97,7 +98,7 @@ def jacobian(
 
 
 def in_coordinates(system: System, q: SX, J: SX, coordinates: str) -> SX:
-    """A Jacobian of the tree as one of the velocities that are input: J G in a closed system."""
+    """Convert a Jacobian of tree velocities to input velocities: J G in independent coordinates."""
     if is_reduced(system, coordinates):
         columns = set(casadi.sparsify(J).sparsity().get_triplet()[1])
         require_no_drift(system, "a Jacobian", sorted(columns))
@@ -106,7 +107,11 @@ def in_coordinates(system: System, q: SX, J: SX, coordinates: str) -> SX:
 
 
 def _on_the_way(system: System, link: int, frame: str | int, number: int | None) -> int | None:
-    """The link of this number, which must carry the frame; -1 is the base."""
+    """Convert a link index of the user (0 is the base) to a tree index (-1 is the base).
+
+    Raises:
+        ModelError: the link is not between the base and `link`, the link of the frame.
+    """
     if number is None:
         return None
     k, _ = system.frame(number)
@@ -119,24 +124,24 @@ def _on_the_way(system: System, link: int, frame: str | int, number: int | None)
     return k
 
 
-# Velocities and accelerations of links and frames, from a base that may move itself.
+# Velocities and accelerations of links and frames, with a fixed or moving base.
 
 
 def link_velocities(
     system: System, coordinates: str = "independent", *, moving_base: bool = False
 ) -> Function:
-    """``link_velocities(q, v) -> V``: velocity of every link, each in its own frame.
+    """Velocities of all links, each in its own frame: ``link_velocities(q, v) -> V``.
 
     Source: Khalil & Creusot 1997, eq. 6.
 
     Args:
-        system: open or closed; q must close the loops.
-        coordinates: of a closed system, "independent" (v is v_a) or "tree".
-        moving_base: add an input v_0 (6), velocity [V; w] of the base in its own axes.
+        system: open or closed mechanism; q must close the loops.
+        coordinates: velocities of a closed system, "independent" (v is v_a) or "tree".
+        moving_base: whether to add an input v_0 (6, 1), velocity [V; w] of the base in base axes.
 
     Returns:
-        Function of q (nq, 1), v (m, 1) and v_0; V (6, nl), a column [V; w] for each link: of the
-        origin of its frame and angular [m/s, rad/s].
+        Function of q (nq, 1), v (m, 1) and v_0; V (6, nl) with one column [V; w] per link: velocity
+        of the frame origin and angular velocity [m/s, rad/s].
     """
     require_system(system)
 
@@ -162,21 +167,21 @@ def link_velocities(
 def link_accelerations(
     system: System, coordinates: str = "independent", *, moving_base: bool = False
 ) -> Function:
-    """``link_accelerations(q, v, a) -> Vd``: acceleration of every link, each in its own frame.
+    """Accelerations of all links, each in its own frame: ``link_accelerations(q, v, a) -> Vd``.
 
-    They are those of the origins of the frames, seen from a fixed frame; gravity has no part.
+    They are accelerations relative to an inertial frame, expressed in link axes, without gravity.
 
     Source: Khalil & Creusot 1997, eq. 8-10.
 
     Args:
-        system: open or closed; q must close the loops.
-        coordinates: of a closed system, "independent" (v is v_a) or "tree".
-        moving_base: add inputs v_0 (6), velocity [V; w] of the base, and a_0 (6), accelerations
-            [vd; wd] of its origin and angular, in its own axes.
+        system: open or closed mechanism; q must close the loops.
+        coordinates: velocities of a closed system, "independent" (v is v_a) or "tree".
+        moving_base: whether to add inputs v_0 (6, 1), velocity [V; w] of the base, and a_0 (6, 1),
+            linear acceleration of its origin and angular acceleration [vd; wd], in base axes.
 
     Returns:
-        Function of q (nq, 1), v, a (m, 1), v_0 and a_0; Vd (6, nl), a column [vd; wd] for each
-        link [m/s^2, rad/s^2].
+        Function of q (nq, 1), v, a (m, 1), v_0 and a_0; Vd (6, nl) with one column [vd; wd] per
+        link: acceleration of the frame origin and angular acceleration [m/s^2, rad/s^2].
     """
     require_system(system)
 
@@ -204,27 +209,28 @@ def jacobian_dot_velocity(
     coordinates: str = "independent",
     moving_base: bool = False,
 ) -> Function:
-    """``jpqp(q, v) -> jpqp``: dJ/dt v, the acceleration of a frame when a is zero.
+    """Acceleration of a frame for zero a, the term dJ/dt v: ``jpqp(q, v) -> jpqp``.
 
-    The derivative is the one that a fixed observer sees; `expressed_in` names the axes in which
-    it is then written. In a closed system with independent coordinates it holds what the joints
-    that follow do by themselves: d(J G)/dt v_a.
+    The time derivative is taken in the inertial frame; the result is then expressed in the axes of
+    `expressed_in`. For a closed system with independent coordinates it is d(J G)/dt v_a, including
+    the motion of the dependent joints.
 
     Source: Khalil & Creusot 1997, section 4.4.
 
     Args:
-        system: open or closed; q must close the loops.
-        frame: a body, a named frame, or the number of a link.
-        expressed_in: the frame in whose axes the result is.
-        coordinates: of a closed system, "independent" (v is v_a) or "tree".
-        moving_base: as for `link_accelerations`; the acceleration of the base is part of it.
+        system: open or closed mechanism; q must close the loops.
+        frame: name of a body or frame, or index of a link.
+        expressed_in: frame whose axes the result is expressed in.
+        coordinates: velocities of a closed system, "independent" (v is v_a) or "tree".
+        moving_base: whether to add inputs v_0 and a_0 as for `link_accelerations`; the acceleration
+            of the base is then included.
 
     Returns:
-        Function of q (nq, 1), v (m, 1), v_0 and a_0; jpqp (6, 1), of the frame's origin and
-        angular [m/s^2, rad/s^2].
+        Function of q (nq, 1), v (m, 1), v_0 and a_0; jpqp (6, 1), linear acceleration of the frame
+        origin and angular acceleration [m/s^2, rad/s^2].
 
     Raises:
-        ModelError: there is no such frame.
+        ModelError: the frame is unknown.
     """
     require_system(system)
     check_coordinates(system, coordinates)
@@ -250,7 +256,7 @@ def _state(s: ModelSymbols) -> Named:
 
 
 def _base(moves: bool) -> tuple[Acceleration, Named]:
-    """The base and the inputs that say how it moves."""
+    """Motion of the base without gravity, and the inputs v_0, a_0 if it moves."""
     if not moves:
         return resting_base(zeros()), []
     v_0, a_0 = SX.sym("v_0", 6), SX.sym("a_0", 6)

@@ -1,4 +1,4 @@
-"""The dynamic model in Lagrange's form: tau = A a + B v + Q."""
+"""Dynamic model in Lagrange form: tau = A a + B v + Q."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ from mbs.text import quoted
 
 _METHODS = ("auto", "renaud", "christoffel")
 _SHORT = 8
-"""Velocities up to which differentiation may win, in mechanisms that move in a plane."""
+"""Largest number of velocities at which method "christoffel" is tried: beyond it the recursion has
+fewer operations even in planar mechanisms."""
 
 
 def lagrange(system: System, method: str = "auto", coordinates: str = "independent") -> Function:
-    """``lagrange(q, v) -> A, B, Q``: inertia matrix, Coriolis matrix, gravity and spring efforts.
+    """Inertia matrix, Coriolis matrix, gravity and spring efforts: ``lagrange(q, v) -> A, B, Q``.
 
-    dA/dt - 2 B is skew-symmetric. Friction and dampers are not part of it; Q holds what force
-    elements need at rest. For closed systems B is
-    G' (A dG/dt + B G).
+    dA/dt - 2 B is skew-symmetric. Friction and dampers are not included; Q contains the efforts of
+    gravity and force elements at rest. For closed systems B is G' (A dG/dt + B G), where G is the
+    reduction matrix.
 
     Source: Renaud 1986; Khalil & Creusot 1997, section 5.5.
 
     Args:
-        system: open or closed; q must close the loops.
-        method: "renaud", a recursion over augmented bodies, "christoffel", which differentiates
-            the inertia matrix, or "auto" for the one that takes fewer operations. Their B are the
-            same but for the velocities of quaternion joints, where there are several with these
-            properties; "auto" then takes the recursion.
-        coordinates: of a closed system, "independent" or "tree".
+        system: open or closed mechanism; q must close the loops.
+        method: "renaud" for a recursion over augmented bodies, "christoffel" for derivatives of the
+            inertia matrix, "auto" for fewer operations. With quaternion joints B is not unique, so
+            that the methods differ in B; "auto" then selects "renaud".
+        coordinates: coordinates of a closed system, "independent" or "tree".
 
     Returns:
         Function of q (nq, 1) and v (m, 1); A (m, m), B (m, m), Q (m, 1).
 
     Raises:
-        ModelError: another method was asked for.
+        ModelError: the method is unknown.
     """
     require_system(system)
     if method not in _METHODS:

@@ -18,17 +18,17 @@ from mbs.text import did_you_mean, quoted
 
 Array = NDArray[np.float64]
 Largest = Mapping[str, float] | None
-"""The largest magnitude by the name of a velocity, which replaces that of the description."""
+"""Largest magnitude by the name of a velocity; it replaces the value of the description."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Limits:
-    """Limits in the order of q, v and tau; infinite where there are none.
+    """Bounds of the vectors q, v and tau; infinite for an element without a limit.
 
     Attributes:
-        q_lower, q_upper: (nq,) of positions [rad, m or 1].
-        v_lower, v_upper: (nv,) of velocities [rad/s or m/s].
-        tau_lower, tau_upper: (nv,) of efforts [N m or N]; zero where there is no motor.
+        q_lower, q_upper: (nq,) position bounds [rad, m or 1].
+        v_lower, v_upper: (nv,) velocity bounds [rad/s or m/s].
+        tau_lower, tau_upper: (nv,) effort bounds [N m or N]; zero for a joint without a motor.
     """
 
     q_lower: Array
@@ -40,15 +40,16 @@ class Limits:
 
 
 def limits(system: System, *, speed: Largest = None, effort: Largest = None) -> Limits:
-    """What a system may do: limits of its joints, and of stops where they are narrower.
+    """Bounds of positions, velocities and efforts of a system, for optimal control.
 
-    Elements of unit quaternions are between -1 and 1. Velocities and efforts are those of the
-    description, `velocity` and `effort` of a joint, where they are not given here.
+    Position bounds are the intersection of joint limits and stops. Elements of unit quaternions are
+    between -1 and 1. By default velocity and effort bounds are `velocity` and `effort` of the joint
+    description.
 
     Args:
-        system: open or closed.
-        speed: the largest velocities by name, in both directions [rad/s or m/s].
-        effort: the largest efforts of motors by name, in both directions [N m or N].
+        system: open or closed mechanism.
+        speed: largest velocities by name, in both directions [rad/s or m/s].
+        effort: largest efforts of motors by name, in both directions [N m or N].
 
     Raises:
         ModelError: a name is unknown or has no motor, a value is not a positive number, or limits
@@ -79,7 +80,7 @@ def limits(system: System, *, speed: Largest = None, effort: Largest = None) -> 
 
 
 def _ends(ranges: list[tuple[float, float] | None]) -> tuple[Array, Array]:
-    """Lower and upper ends, infinite where there is no range."""
+    """Lower and upper bounds as arrays; infinite for None."""
     lower, upper = zip(*(given or (-np.inf, np.inf) for given in ranges), strict=True)
     return np.array(lower, dtype=float), np.array(upper, dtype=float)
 
@@ -106,7 +107,7 @@ def _positions(system: System) -> tuple[Array, Array]:
 
 
 def _number(limit: SX | None, otherwise: float) -> float:
-    """A limit that is a number; a symbol has none yet."""
+    """Return a limit as a float, or `otherwise` if it is None or symbolic."""
     value = SX(otherwise) if limit is None else SX(limit)
     return float(value) if value.is_constant() else otherwise
 

@@ -1,7 +1,7 @@
-"""Linear equations of small motions about any state: A, B, C and D.
+"""Linear state-space equations of small motions about any state: A, B, C and D.
 
-The states are displacements of the free coordinates, rotations of quaternion joints as small turns
-in their own axes, then independent velocities, then states of components. They stay on the loops.
+The states are small displacements of the free coordinates, then independent velocities, then states
+of components. A quaternion joint has a rotation vector in its own axes. Loops stay closed.
 
 Source: Haug 1989 for coordinates on a manifold; Meijaard, Papadopoulos, Ruina and Schwab 2007 for
 rolling, where more positions are free than velocities.
@@ -58,16 +58,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearModel:
-    """dx/dt = A x + B u, y = C x + D u, of small changes about a state.
+    """Linear model dx/dt = A x + B u, y = C x + D u of small changes about a state.
 
-    Where the state is no equilibrium, x is the difference between two motions near it.
+    If the state is not an equilibrium, x is the difference between two motions near it.
 
     Attributes:
-        A: (n, n).
-        B: (n, m).
-        C: (k, n).
-        D: (k, m).
-        x, u, y: name and unit of the elements.
+        A: (n, n) state matrix.
+        B: (n, m) input matrix.
+        C: (k, n) output matrix.
+        D: (k, m) feedthrough matrix.
+        x, u, y: name and unit of each state, input and output.
     """
 
     A: Array
@@ -80,24 +80,24 @@ class LinearModel:
 
     @property
     def eigenvalues(self) -> NDArray[np.complex128]:
-        """(n,) of A [1/s], by real part and then imaginary part."""
+        """(n,) eigenvalues of A [1/s], sorted by real part, then by imaginary part."""
         values = np.linalg.eigvals(self.A).astype(complex)
         return values[np.lexsort((values.imag, values.real))]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Linearisation:
-    """The linear equations of a system at any state; `at` gives them in numbers.
+    """Linear equations of a system as functions of the state; `at` evaluates them.
 
     Attributes:
-        system: whose small motions they are.
-        function: `linear(q, v, tau) -> A, B, C, D` on numbers or symbols, and of states z and
-            inputs u of components and parameters p where there are any; tau (nv, 1) are the efforts
-            of the tree.
+        system: the linearised system.
+        function: `linear(q, v, tau) -> A, B, C, D` on numbers or symbols. Component states z,
+            component inputs u and parameters p are further inputs if the system has any; tau
+            (nv, 1) are the joint efforts of the tree.
         x, u, y: name and unit of states, inputs and outputs.
-        holds: of the inputs of `function`, what is zero and what is positive where contacts do what
-            was asked; None where there are none.
-        contacts: what the elements of both are, in words.
+        holds: Function (same inputs) -> zero (2 k, 1), positive (5 k, 1). The k contacts are in the
+            requested mode if these are zero and positive. None for a system without contacts.
+        contacts: description of each element of `zero` and of `positive`, for error messages.
     """
 
     system: System
@@ -118,22 +118,22 @@ class Linearisation:
         parameters: Mapping[str, float] | None = None,
         guess: Guess = None,
     ) -> LinearModel:
-        """The equations about one state.
+        """Evaluate the linear model about one state.
 
         Args:
-            q0: positions by name, the others as assembled; loops are closed at them. Or a `State`,
-                whose velocities and states of components count where none are given.
-            v0: velocities by name; at rest when left out.
-            tau0: efforts of motors by name, the others zero.
-            states: of components by name, such as `motor.i`, the others as described; a component
-                that has one goes by its own name too.
-            inputs: likewise, such as `motor.voltage` or `motor`.
-            parameters: values of symbols, the others at their defaults.
-            guess: approximate positions of other joints, which choose the branch.
+            q0: positions by name; other positions are as assembled, and the loops are closed. Or a
+                `State`, which also supplies velocities and component states that are not given.
+            v0: velocities by name; zero by default.
+            tau0: efforts of motors by name; zero by default.
+            states: component states by name, such as `motor.i`, or by component name if it has a
+                single state. Other states have their described values.
+            inputs: component inputs by name, such as `motor.voltage` or `motor`.
+            parameters: values of symbols; other symbols have their defaults.
+            guess: approximate positions of other joints, which select the assembly branch.
 
         Raises:
-            ModelError: a name is unknown, a symbol has no value, or contacts do not do in this
-                state what `mode` says.
+            ModelError: a name is unknown, a symbol has no value, or the contacts are not in the
+                requested `mode` in this state.
             Unclosable: the loops cannot be closed at q0.
         """
         system = self.system
@@ -157,7 +157,11 @@ class Linearisation:
         return LinearModel(A, B, C, D, self.x, self.u, self.y)
 
     def _require_mode(self, *point: Any) -> None:
-        """Refuse a state in which contacts slip, leave or meet what they should not."""
+        """Raise ModelError if the contacts at this state are not in the requested mode.
+
+        Args:
+            point: numeric inputs of `holds`.
+        """
         assert self.holds is not None
         zero, positive = (np.array(value).ravel() for value in self.holds.call(point))
         still, kept = self.contacts
@@ -176,8 +180,8 @@ class Linearisation:
 
 
 _STILL = 1e-6
-"""Velocity of what sticks, and distance from a limit, in a state that a user writes with six
-digits."""
+"""Tolerance on the velocity of a sticking contact and on the distance from a limit [SI units]: a
+user writes a state with six digits."""
 
 
 def linearise(
@@ -185,22 +189,24 @@ def linearise(
     outputs: Sequence[str] | None = None,
     mode: Mapping[str, float] | None = None,
 ) -> Linearisation:
-    """Linear equations of small motions about any state, loops and rolling discs included.
+    """Linearise the equations of motion about any state, with loops and rolling constraints.
 
-    What sticks adds a velocity that stays zero, and an eigenvalue of zero with it.
+    A sticking contact keeps one velocity at zero, which adds a zero eigenvalue.
+
+    Source: Haug 1989; Meijaard, Papadopoulos, Ruina and Schwab 2007 for rolling.
 
     Args:
-        system: open or closed.
-        outputs: names of y: positions "j1.q", velocities "j1.v", accelerations "j1.a", what
-            sensors read such as "tip.p.x", outputs of components such as "spring.force"; the
-            positions and velocities of all coordinates when left out.
-        mode: what rigid stops and dry frictions do, by their names such as "clutch" or "belt.grip",
-            as their column `mode` of `mbs.simulate.run` says: of a friction the direction of
-            sliding, 0 where it sticks; of a stop -1 or 1 at a limit, 0 between. Those that are left
-            out are 0. Without it a system with contacts or events is refused.
+        system: open or closed mechanism.
+        outputs: names of y: positions "j1.q", velocities "j1.v", accelerations "j1.a", sensor
+            signals such as "tip.p.x", component outputs such as "spring.force". By default the
+            positions and velocities of all coordinates.
+        mode: contact modes of rigid stops and dry frictions by name, such as "clutch" or
+            "belt.grip", as in column `mode` of `mbs.simulate.run`. Friction: direction of sliding,
+            0 if it sticks. Stop: -1 or 1 at a limit, 0 between. Default of each: 0.
 
     Raises:
-        ModelError: an output or an element is unknown, or contacts act and no mode is given.
+        ModelError: an output or an element is unknown, or the system has contacts or events and
+            `mode` is None.
     """
     require_system(system)
     if mode is None:
@@ -260,7 +266,7 @@ def linearise(
 
 
 def _modes(system: System, mode: Mapping[str, float]) -> tuple[float, ...]:
-    """The 2 k modes of k rows of contacts, limits and then directions of sliding."""
+    """Return the 2 k modes of the k contact rows: limits, then directions of sliding."""
     contacts = contacts_of(system)
     require_lasting_rows(system, contacts)
     elements = (*contacts.stops, *contacts.frictions)
@@ -277,7 +283,7 @@ def _modes(system: System, mode: Mapping[str, float]) -> tuple[float, ...]:
 
 
 def _words(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What is zero, and what happens where a number is not positive."""
+    """Describe the zero quantities of `holds`, and each event that a non-positive one means."""
     contacts = contacts_of(system)
     still = [f"the velocity on which {name} acts" for name in contacts.names]
     still += [f"the distance of {name} from its limit" for name in contacts.names]
@@ -294,11 +300,11 @@ def _words(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def _contact(
     system: System, s: ModelSymbols, tau: SX, modes: Sequence[float]
 ) -> tuple[ContactEquations, tuple[SX, SX]] | None:
-    """What contacts do in given modes, with numbers in place of their symbols.
+    """Contact equations with the mode symbols replaced by the numbers `modes`.
 
     Returns:
-        the equations, and what must be positive (5 k, 1) and what is stuck (k, 1); None where there
-        are no contacts.
+        the equations, then the indicators that must be positive (5 k, 1) and the flags of stuck
+        rows (k, 1). None for a system without contacts.
     """
     found = contact_equations(system, s.q, s.v_tree, tau, {})
     if found is None:
@@ -309,7 +315,7 @@ def _contact(
 
 
 def _output_units(system: System) -> dict[str, str]:
-    """Everything that can be an output, with its unit."""
+    """Unit of each possible output, by name."""
     found = {f"{row.name}.q": row.unit for row in system.coordinates}
     found |= {f"{row.name}.v": row.unit for row in system.speeds}
     found |= {f"{row.name}.a": ACCELERATION_UNIT[row.unit] for row in system.speeds}
@@ -333,13 +339,13 @@ def _matrices(
         a_a, every = contact[0].a[list(system.active)], every + contact[0].pushes
     a = s.tree_acceleration(a_a)
     (rates,) = with_readings(system, [rates], (q, v, a, every))
-    # how positions move: dq = T dxi for small displacements xi of the free coordinates
+    # position change dq = T dxi for small displacements xi of the free coordinates
     speed = SX.sym("v", system.nv)
     N = casadi.jacobian(position_rate(system.tree, q, speed), speed)
     T = casadi.mtimes(N, _tangents(system, q))
     rate = position_rate(system.tree, q, v)
     back = _selected(system, N)
-    # T' xi + T xi' = d(rate)/dq T xi + d(rate)/dv_a dv_a, seen in the free coordinates
+    # T' xi + T xi' = d(rate)/dq T xi + d(rate)/dv_a dv_a, projected on the free coordinates
     turning = casadi.jtimes(casadi.vec(T), q, rate)
     A11 = casadi.mtimes(
         back, casadi.mtimes(casadi.jacobian(rate, q), T) - casadi.reshape(turning, *T.shape)
@@ -347,7 +353,7 @@ def _matrices(
     A12 = casadi.mtimes(back, casadi.jacobian(rate, v_a))
 
     def slopes(value: SX) -> tuple[SX, SX]:
-        """Of an expression along states and along inputs."""
+        """Derivatives of an expression with respect to the states and to the inputs."""
         along = [
             casadi.mtimes(casadi.jacobian(value, q), T),
             casadi.jacobian(value, v_a),
@@ -362,15 +368,15 @@ def _matrices(
     first = casadi.horzcat(A11, A12, SX(A11.shape[0], system.z.numel()))
     A = casadi.vertcat(first, A2, A3)
     B = casadi.vertcat(SX(A11.shape[0], efforts.numel()), B2, B3)
-    # tau has what motors give; their symbols were for slopes alone
-    zero = SX.zeros(*motor_efforts.shape)  # (1, 0) where there is none
+    # tau contains the motor efforts; their symbols only served to differentiate
+    zero = SX.zeros(*motor_efforts.shape)  # shape (1, 0) for a system without motors
     return tuple(  # type: ignore[return-value]
         SX(value) for value in casadi.substitute([A, B, C, D], [motor_efforts], [zero])
     )
 
 
 def _tangents(system: System, q: SX) -> SX:
-    """(nv, m) velocities of the tree for unit rates of the free coordinates, loops kept closed."""
+    """(nv, m) tree velocities for unit rates of the free coordinates, with closed loops."""
     free = list(system.free)
     if system.closure is None:
         return SX(DM.eye(system.nv))
@@ -389,15 +395,15 @@ def _tangents(system: System, q: SX) -> SX:
 
 
 def _selected(system: System, N: SX) -> SX:
-    """(m, nq) the rates of the free coordinates from those of positions: a left inverse of N."""
-    # columns of N are orthogonal: those of a quaternion have the squared length 1/4
+    """(m, nq) left inverse of N: maps position rates dq/dt to rates of the m free coordinates."""
+    # columns of N are orthogonal; the columns of a quaternion have the squared length 1/4
     sizes = casadi.sum1(N * N)
     inverse = casadi.mtimes(casadi.diag(1 / sizes.T), N.T)
     return inverse[list(system.free), :]
 
 
 def _outputs(system: System, s: ModelSymbols, a: SX, tau: SX, names: Sequence[str]) -> SX:
-    """(k, 1) the outputs that were asked for."""
+    """(k, 1) expressions of the requested outputs."""
     values: dict[str, SX] = {}
     for k, coordinate in enumerate(system.coordinates):
         values[f"{coordinate.name}.q"] = s.q[k]

@@ -1,4 +1,4 @@
-"""How closed loops tie the velocities and accelerations of active, passive and cut joints."""
+"""Loop constraints between velocities and accelerations of active, passive and cut joints."""
 
 from __future__ import annotations
 
@@ -32,22 +32,22 @@ from mbs.spatial import Pose, zeros
 
 
 def velocity_closure(system: System) -> Function:
-    """``velocity_closure(q) -> Wa, Wp, Wac, Wpc, Wc, W, G``: how the loops tie the velocities.
+    """Velocity constraints of the loops: ``velocity_closure(q) -> Wa, Wp, Wac, Wpc, Wc, W, G``.
 
-    The first rows, Wa v_a + Wp v_p = 0, are the independent closure rows (`system.closure.rows`),
-    couplings included. The others, Wac v_a + Wpc v_p + Wc v_c = 0, give the velocities v_c of the
-    cut joints, in the order of their freedoms: displacement, then angle; a spherical joint has
-    the angular velocity of its frame_b, in frame_b. Wc is minus the identity.
+    Wa v_a + Wp v_p = 0 are the independent closure rows (`system.closure.rows`), including
+    couplings. Wac v_a + Wpc v_p + Wc v_c = 0, with Wc = -I, are the velocities v_c of the cut
+    joints in the order of their freedoms: displacement, then angle. A spherical joint has the
+    angular velocity of its frame_b, in frame_b.
 
     Source: Khalil & Creusot 1997, eq. 11-13.
 
     Args:
-        system: with closed loops; m independent, r passive and c cut velocities.
+        system: closed mechanism with m independent, r passive and c cut velocities.
 
     Returns:
-        Function of q (nq, 1) that closes the loops; Wa (r, m), Wp (r, r), Wac (c, m), Wpc (c, r),
-        Wc (c, c), W (r, m) with v_p = W v_a, and G (nv, m) with v = G v_a; columns in the order
-        of `system.closure.active` and `.passive` [rad or m in each].
+        Function of q (nq, 1), which must close the loops; Wa (r, m), Wp (r, r), Wac (c, m), Wpc
+        (c, r), Wc (c, c), W (r, m) with v_p = W v_a, and G (nv, m) with v = G v_a. Columns are in
+        the order of `system.closure.active` and `.passive` [rad or m in each].
 
     Raises:
         ModelError: the system is an open chain.
@@ -74,24 +74,25 @@ def velocity_closure(system: System) -> Function:
 
 
 def acceleration_closure(system: System, coordinates: str = "independent") -> Function:
-    """``acceleration_closure(q, v_a) -> Psi, Phi, G_dot``: what accelerations have besides W a.
+    """Velocity-dependent terms of the acceleration constraints of the loops.
 
-    Wa a_a + Wp a_p + Psi = 0 and Wac a_a + Wpc a_p + Wc a_c + Phi = 0, with the matrices of
-    `velocity_closure`; G_dot is the rate of G along the motion.
+    ``acceleration_closure(q, v_a) -> Psi, Phi, G_dot``: Wa a_a + Wp a_p + Psi = 0 and
+    Wac a_a + Wpc a_p + Wc a_c + Phi = 0 with the matrices of `velocity_closure`. G_dot is the time
+    derivative of G along the motion.
 
     Source: Khalil & Creusot 1997, eq. 14.
 
     Args:
-        system: with closed loops.
-        coordinates: "independent" (the velocities are v_a) or "tree" (all of them, v, which
-            must keep the loops closed).
+        system: closed mechanism.
+        coordinates: "independent" (the velocities are v_a) or "tree" (all velocities v, which must
+            keep the loops closed).
 
     Returns:
-        Function of q (nq, 1) that closes the loops and v_a (m, 1), or v (nv, 1); Psi (r, 1),
+        Function of q (nq, 1), which must close the loops, and v_a (m, 1) or v (nv, 1); Psi (r, 1),
         Phi (c, 1), G_dot (nv, m).
 
     Raises:
-        ModelError: the system is an open chain, or there are no such coordinates.
+        ModelError: the system is an open chain, or `coordinates` is unknown.
     """
     require_system(system)
 
@@ -118,12 +119,12 @@ def acceleration_closure(system: System, coordinates: str = "independent") -> Fu
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _LoopRows:
-    """Rows that act on the velocities of the tree, and the two kinds of columns.
+    """Constraint rows on the tree velocities, with the indices of active and passive columns.
 
     Attributes:
         tree: (r, nv) independent closure rows.
-        cut: (c, nv) velocities of the cut joints.
-        active, passive: numbers of columns.
+        cut: (c, nv) rows that map tree velocities to velocities of the cut joints.
+        active, passive: indices of the columns of independent and dependent velocities.
     """
 
     tree: SX
@@ -152,7 +153,7 @@ def _loop_rows(system: System, q: SX) -> _LoopRows:
 
 
 def cut_velocities(system: System, q: SX, cut: Cut) -> SX:
-    """(c, nv) velocities of the freedoms of one cut joint, as rows on those of the tree."""
+    """(c, nv) Jacobian of the freedoms of a cut joint with respect to the tree velocities."""
     pose = relative_pose(system.tree, q, *cut.frames)
     v = SX.sym("v", system.nv)
     values = _freedom_velocities(cut, pose, *cut_twist(system, pose, q, v))
@@ -160,7 +161,14 @@ def cut_velocities(system: System, q: SX, cut: Cut) -> SX:
 
 
 def _freedom_velocities(cut: Cut, pose: Pose, V: SX, w: SX) -> list[SX]:
-    """Velocities of the freedoms, from those of frame_b in the axes of frame_a, V and w."""
+    """Velocities of the freedoms of a cut joint.
+
+    Args:
+        cut: cut joint.
+        pose: pose of frame_b relative to frame_a.
+        V: (3, 1) velocity of frame_b relative to frame_a, in the axes of frame_a.
+        w: (3, 1) angular velocity of frame_b relative to frame_a, in the axes of frame_a.
+    """
     joint = cut.edge.joint
     if isinstance(joint, Free):
         return [casadi.mtimes(pose.R.T, V), casadi.mtimes(pose.R.T, w)]
@@ -176,7 +184,7 @@ def _freedom_velocities(cut: Cut, pose: Pose, V: SX, w: SX) -> list[SX]:
 
 
 def _rate(system: System, matrix: SX, q: SX, v: SX) -> SX:
-    """Rate of a matrix of q along the velocities v."""
+    """Time derivative of a matrix that depends on q, for velocities v of the tree."""
     rate = casadi.jtimes(casadi.vec(matrix), q, position_rate(system.tree, q, v))
     return casadi.reshape(rate, *matrix.shape)
 
@@ -190,10 +198,10 @@ def cut_coordinate(system: System, s: ModelSymbols, a: SX, name: str) -> tuple[S
     Angles are between -pi and pi.
 
     Args:
-        system: with closed loops.
-        s: its symbols; the positions close the loops.
+        system: closed mechanism.
+        s: symbols of the system; the positions must close the loops.
         a: (nv, 1) accelerations of the tree.
-        name: of a displacement or angle in `system.cut_coordinates`.
+        name: name of a displacement or angle in `system.cut_coordinates`.
     """
     row = next(row for row in system.cut_coordinates if row.name == name)
     cut = next(cut for cut in system.cuts if cut.edge.joint.name == row.joint)

@@ -1,4 +1,4 @@
-"""What the sensors of a mechanism read, as a model."""
+"""Model of the sensor signals of a mechanism."""
 
 from __future__ import annotations
 
@@ -45,19 +45,20 @@ from mbs.spatial import Wrench, zeros
 
 
 def measurements(system: System, coordinates: str = "independent") -> Function:
-    """``measurements(q, v, a) -> tip_p, tip_v, ...``: what the sensors read.
+    """Sensor signals: ``measurements(q, v, a) -> tip_p, tip_v, ...``.
 
-    An output for every quantity of every sensor, in the order of `system.sensors`, named after both
-    as `AttachedSensor.outputs` does: tip_p for the position of the sensor tip, arm_tip_p for that
-    of arm.tip.
+    There is one output per quantity of each sensor, in the order of `system.sensors`, with the
+    names of `AttachedSensor.outputs`: tip_p is the position of sensor tip, arm_tip_p of arm.tip.
 
     Args:
         system: open or closed, with sensors; q must close the loops.
-        coordinates: of a closed system, "independent" for measurements(q, v_a, a_a), or "tree"
-            for measurements(q, v, a, tau), where tau fits the motion; see `joint_wrenches`.
+        coordinates: form for a closed system: "independent" for measurements(q, v_a, a_a), "tree"
+            for measurements(q, v, a, tau) with tau consistent with the motion, see
+            `joint_wrenches`.
 
     Returns:
-        Function of q (nq, 1), v, a and tau (m, 1); vectors (3, 1), orientations (3, 3), numbers.
+        Function of q (nq, 1), v, a and tau (m, 1); outputs are vectors (3, 1), orientations (3, 3)
+        and scalars.
 
     Raises:
         ModelError: the system has no sensors.
@@ -82,14 +83,14 @@ def measurements(system: System, coordinates: str = "independent") -> Function:
 def readings(
     system: System, s: ModelSymbols, a: SX, tau: SX | None, around: Surroundings
 ) -> list[tuple[str, SX]]:
-    """The outputs of `measurements`, also where wrenches act from outside.
+    """Named outputs of `measurements`, with external wrenches.
 
     Args:
-        system: open or closed.
-        s: its symbols.
+        system: open or closed mechanism.
+        s: symbols of the system.
         a: (nv, 1) accelerations of the tree.
-        tau: (nv, 1) efforts of the tree; None where the independent joints have all of them.
-        around: what acts from outside.
+        tau: (nv, 1) joint efforts; None if they follow from the motion by inverse dynamics.
+        around: base motion and external wrenches.
     """
     state = _observed(system, s, a, tau, around)
     outputs: list[tuple[str, SX]] = []
@@ -105,12 +106,12 @@ def with_readings(
     state: tuple[SX, SX, SX | None, SX],
     wrenches: SX | None = None,
 ) -> list[SX]:
-    """Return expressions in which wired readings of accelerations and forces have their values.
+    """Substitute sensor signals of accelerations and forces that are wired to component inputs.
 
     Args:
-        system: open or closed.
+        system: open or closed mechanism.
         values: expressions of rates and outputs of components.
-        state: q, v, a and tau (nv, 1) of the tree; a follows from tau where it is None.
+        state: q, v, a and tau (nv, 1) of the tree; if a is None, it follows from tau.
         wrenches: external wrenches of the model, if it has any.
 
     Raises:
@@ -145,14 +146,15 @@ def with_readings(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Observed:
-    """A motion that sensors read.
+    """Motion and joint wrenches from which sensor signals are computed.
 
     Attributes:
-        system: whose motion it is.
-        s: its symbols.
+        system: mechanism.
+        s: symbols of the system.
         a: (nv, 1) accelerations of the tree.
-        velocities, accelerations: of the links, each in its frame, gravity left out.
-        wrenches: of the joints, about and in frame_b; empty where no sensor needs them.
+        velocities, accelerations: motion of each link in its frame, without gravity.
+        wrenches: wrench of each joint about and in frame_b; empty if no sensor measures a joint
+            wrench.
     """
 
     system: System
@@ -179,7 +181,7 @@ def _observed(
 
 
 def _on_frames(state: _Observed, attached: AttachedSensor) -> Readings:
-    """How a frame moves, or a distance."""
+    """Signals of a sensor of frame motion, or of the distance between frames."""
     tree = state.system.tree
     return frame_readings(tree, attached, state.s.q, state.velocities, state.accelerations)
 
@@ -196,7 +198,7 @@ def _coordinate(state: _Observed, attached: AttachedSensor) -> Readings:
 
 
 def _cut_rotation(state: _Observed, attached: AttachedSensor) -> Readings:
-    """An element of the quaternion or of the angular velocity of a spherical joint that is cut."""
+    """Quaternion element, or elements of angular velocity and acceleration, of a cut joint."""
     frame_a, frame_b = attached.frames
     motion = relative_motion(state.system.tree, frame_a, frame_b, state.s.q, state.velocities)
     element = attached.coordinate.rpartition(".")[2]

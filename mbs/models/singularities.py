@@ -1,4 +1,4 @@
-"""Singular configurations of a frame: the determinant of its Jacobian as a product of factors."""
+"""Singular configurations of a frame: factors of the determinant of its Jacobian."""
 
 from __future__ import annotations
 
@@ -21,38 +21,40 @@ from mbs.recursions.jacobian import random_samples
 from mbs.recursions.square_jacobian import SquareJacobian
 from mbs.solvers.block_triangular import Block
 
-# Polynomials in sines, cosines and lengths, read from CasADi expressions and factored.
+# Polynomials in variables, sines and cosines, from CasADi expressions, and their factors.
 #
-# An angle that is a sum is opened into sines and cosines of its parts, powers are lowered by s^2
-# + c^2 = 1, and a factor is written with sums of angles where that makes it shorter.
+# Sines and cosines of sums of angles are expanded, even powers are reduced by s^2 + c^2 = 1, and a
+# factor is printed with sums of angles if this is shorter.
 
 
 Atom = tuple[Literal["x", "s", "c"], tuple[tuple[int, int], ...]]
-"""A variable, or sine or cosine of a sum of variables, each with an integer factor."""
+"""Kind and argument: a variable "x", or sine "s" or cosine "c" of a sum of variables. The argument
+lists (index of the variable, integer factor)."""
 Monomial = tuple[tuple[Atom, int], ...]
 Polynomial = dict[Monomial, Fraction]
 
 _ROUNDING = Fraction(1, 10**13)
-"""Part of two terms that they may leave when they cancel: some roundings of doubles, 1e-16 each."""
+"""Relative size of a sum of two terms that counts as cancelled: some rounding errors of doubles,
+1e-16 each."""
 _CONSTANT_ROUNDING = 1e-15
-"""Part of the largest constant below which one is the rounding of zero, such as cos(pi / 2)."""
+"""Size relative to the largest constant below which a constant is a rounded zero, as cos(pi/2)."""
 _MOST_NODES, _MOST_TERMS, _MOST_FACTORED = 200, 80, 30
-"""Of an expression, of a polynomial, and of one that is factored: longer ones take too long, and
-nobody reads them."""
+"""Largest number of nodes of an expression, of terms of a polynomial, and of terms of a factored
+polynomial: longer expressions take too long and are unreadable."""
 _OTHER = {"s": "c", "c": "s"}
 
 
 class NotTrigonometric(Exception):
-    """The expression is no polynomial of this kind, or too long a one."""
+    """The expression is not a polynomial in variables, sines and cosines, or is too long."""
 
 
 def variable(number: int) -> Polynomial:
-    """The polynomial that is one variable."""
+    """Return the polynomial that equals the variable with index `number`."""
     return {((("x", ((number, 1),)), 1),): Fraction(1)}
 
 
 def total(a: Polynomial, b: Polynomial, sign: int = 1) -> Polynomial:
-    """The sum a + sign b."""
+    """Return the sum a + sign b."""
     result = dict(a)
     for monomial, coefficient in b.items():
         _add(result, monomial, sign * coefficient)
@@ -60,7 +62,7 @@ def total(a: Polynomial, b: Polynomial, sign: int = 1) -> Polynomial:
 
 
 def product(a: Polynomial, b: Polynomial) -> Polynomial:
-    """The product of two polynomials."""
+    """Return the product of two polynomials."""
     result: Polynomial = {}
     for m, x in a.items():
         for n, y in b.items():
@@ -69,7 +71,7 @@ def product(a: Polynomial, b: Polynomial) -> Polynomial:
 
 
 def _add(result: Polynomial, monomial: Monomial, coefficient: Fraction) -> None:
-    """One term more; zero where two cancel but for the rounding of the numbers they come from."""
+    """Add a term to a polynomial in place; a sum of rounding size becomes zero."""
     before = result.get(monomial, Fraction(0))
     both = before + coefficient
     cancelled = abs(both) <= _ROUNDING * (abs(before) + abs(coefficient))
@@ -90,10 +92,10 @@ def _within_reason(polynomial: Polynomial) -> Polynomial:
 
 
 def polynomial_of(expression: SX, variables: SX) -> Polynomial:
-    """An expression as a polynomial in variables, their sines and cosines.
+    """Convert an expression to a polynomial in variables, their sines and cosines.
 
     Raises:
-        NotTrigonometric: it is something else, or too long.
+        NotTrigonometric: the expression is not such a polynomial, or is too long.
     """
     graph = graph_of(Function("f", [variables], [casadi.densify(expression)], {"cse": True}))
     if len(graph.nodes) > _MOST_NODES:
@@ -137,14 +139,14 @@ def _operation(op: int, operands: list[Polynomial]) -> Polynomial:
 
 
 def _constant(value: float, least: float) -> Polynomial:
-    """A number; zero when it is what numbers as large as the others of the graph left of it."""
+    """Constant polynomial; zero for a number up to `least`, the rounding error of the graph."""
     if not math.isfinite(value):
         raise NotTrigonometric
     return {(): Fraction(repr(value))} if abs(value) > least else {}
 
 
 def _sine_cosine(angle: Polynomial) -> tuple[Polynomial, Polynomial]:
-    """Sine and cosine of a sum of variables, opened."""
+    """Sine and cosine of a sum of variables, expanded by the addition theorems."""
     s: Polynomial = {}
     c: Polynomial = {(): Fraction(1)}
     for monomial, times in angle.items():
@@ -164,7 +166,7 @@ def _sine_cosine(angle: Polynomial) -> tuple[Polynomial, Polynomial]:
 
 
 def lowered(polynomial: Polynomial, which: Literal["s", "c"]) -> Polynomial:
-    """The same with no square of a sine ("s"), or of a cosine ("c"), left in it."""
+    """Eliminate even powers of sines ("s") or of cosines ("c") by s^2 + c^2 = 1."""
     result: Polynomial = {}
     for monomial, coefficient in polynomial.items():
         term: Polynomial = {(): coefficient}
@@ -183,7 +185,7 @@ def lowered(polynomial: Polynomial, which: Literal["s", "c"]) -> Polynomial:
 
 
 def with_sums_of_angles(polynomial: Polynomial) -> Polynomial:
-    """Products of sines and cosines as sums of sines and cosines of sums of angles."""
+    """Convert products of sines and cosines to sums of sines and cosines of sums of angles."""
     result: Polynomial = {}
     for monomial, coefficient in polynomial.items():
         rest = tuple((atom, power) for atom, power in monomial if atom[0] == "x")
@@ -196,7 +198,7 @@ def with_sums_of_angles(polynomial: Polynomial) -> Polynomial:
 
 
 def _times_wave(waves: Polynomial, atom: Atom) -> Polynomial:
-    """A sum of sines and cosines times one more: 2 cos a cos b = cos(a - b) + cos(a + b)."""
+    """Multiply a sum of sines and cosines by `atom`: 2 cos a cos b = cos(a - b) + cos(a + b)."""
     result: Polynomial = {}
     for monomial, coefficient in waves.items():
         if not monomial:
@@ -239,17 +241,22 @@ def _wave(
 
 @dataclass(frozen=True, slots=True)
 class Factored:
-    """A number times powers of polynomials."""
+    """Product of a number and powers of polynomials.
+
+    Attributes:
+        number: rational coefficient.
+        factors: pairs (polynomial, power).
+    """
 
     number: Fraction
     factors: tuple[tuple[Polynomial, int], ...]
 
 
 def factored(polynomial: Polynomial) -> Factored:
-    """The factors of a polynomial, each in its shortest writing.
+    """Factor a polynomial, and write each factor in its shortest form.
 
     Raises:
-        NotTrigonometric: it is too long to be factored in a moment.
+        NotTrigonometric: the polynomial is too long.
     """
     if not polynomial:
         return Factored(Fraction(0), ())
@@ -301,7 +308,7 @@ def _from_powers(terms: Mapping[tuple[int, ...], object], atoms: list[Atom]) -> 
 
 
 def value(polynomial: Polynomial, variables: SX) -> SX:
-    """The polynomial as a CasADi expression."""
+    """Return a polynomial as a CasADi expression in `variables`."""
     result = SX(0)
     for monomial, coefficient in polynomial.items():
         term = SX(float(coefficient))
@@ -317,12 +324,12 @@ def value(polynomial: Polynomial, variables: SX) -> SX:
 
 
 def text(polynomial: Polynomial, names: list[str], name_of_angle: Callable[[Atom], str]) -> str:
-    """The polynomial as one reads it; products by number, length, sine and cosine in this order.
+    """Print a polynomial; each product has number, variables, cosines and sines in this order.
 
     Args:
-        polynomial: what to write.
-        names: of the variables.
-        name_of_angle: writes a sine or cosine.
+        polynomial: polynomial to print.
+        names: names of the variables.
+        name_of_angle: callable that prints a sine or cosine.
     """
     written = ""
     for monomial, coefficient in polynomial.items():
@@ -345,7 +352,10 @@ def text(polynomial: Polynomial, names: list[str], name_of_angle: Callable[[Atom
 
 
 class Writer:
-    """Names of the variables [q; p] of a system, and of sines and cosines of their sums."""
+    """Printer of polynomials in the variables [q; p] of a system.
+
+    If positions are named q1, q2, ..., sin(q2 + q3) is printed as S23.
+    """
 
     def __init__(self, system: System) -> None:
         positions = [coordinate.name for coordinate in system.coordinates]
@@ -357,7 +367,7 @@ class Writer:
         ]
 
     def is_constant(self, polynomial: Polynomial) -> bool:
-        """Whether no position is in it."""
+        """Whether a polynomial is independent of all positions."""
         return all(
             number >= self._positions
             for monomial in polynomial
@@ -366,7 +376,7 @@ class Writer:
         )
 
     def text(self, polynomial: Polynomial) -> str:
-        """The polynomial as one reads it."""
+        """Return a polynomial as text."""
         return text(polynomial, self._names, self._angle)
 
     def _angle(self, atom: Atom) -> str:
@@ -383,20 +393,20 @@ class Writer:
 
 
 _FACTORED = 3
-"""Largest block whose determinant is factored."""
+"""Largest size of a block whose determinant is factored: larger determinants are too long."""
 _SAME = 1e-9
-"""Part of the largest value by which factors multiplied may differ from the determinant: roundings
-of all their terms are below it, a wrong factor is off by parts of one."""
+"""Tolerance between the product of the factors and the determinant, relative to the largest value:
+rounding errors are smaller, while a wrong factor has a relative error of order one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SingularFactor:
-    """A factor of the determinant: the configuration is singular where it is zero.
+    """Factor of the determinant; configurations at which it is zero are singular.
 
     Attributes:
-        text: the factor as one reads it; S23 is sin(q2 + q3).
-        power: how often it is a factor.
-        function: ``factor(q) -> value``.
+        text: printed factor; S23 denotes sin(q2 + q3).
+        power: exponent of the factor in the determinant.
+        function: Function ``factor(q) -> value`` of the factor without the exponent.
     """
 
     text: str
@@ -411,12 +421,12 @@ class SingularFactor:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Singularities:
-    """The determinant of a square part of a Jacobian is the constant times the factors.
+    """Determinant of a square submatrix of a Jacobian as a constant times factors.
 
     Attributes:
-        constant: the factor that depends on no position, as one reads it.
-        factors: the others; none when no configuration is singular.
-        determinant: ``determinant(q) -> det``.
+        constant: printed factor that is independent of the positions.
+        factors: factors that depend on the positions; empty if no configuration is singular.
+        determinant: Function ``determinant(q) -> det``.
     """
 
     constant: str
@@ -436,27 +446,29 @@ def singularities(
     expressed_in: str | int = "base",
     coordinates: str = "independent",
 ) -> Singularities:
-    """Where a frame loses a direction of motion: the determinant in factors.
+    """Singular configurations of a frame, as factors of the determinant of its Jacobian.
 
-    Every diagonal block of the Jacobian gives a factor. Those of blocks of up to three rows are
-    factored further, as polynomials in sines and cosines; that of a larger block stays whole.
+    Each diagonal block of the block triangular Jacobian contributes its determinant. Determinants
+    of blocks of up to three rows are factored as polynomials in sines and cosines. The determinant
+    of a larger block is a single factor.
 
     Source: Khalil & Creusot 1997, section 4.6.
 
     Args:
-        system: open or closed; q must close the loops.
-        frame: a body, a named frame, or the number of a link.
-        rows: of [V; w], numbers 0 to 5 or "Vx" to "wz"; all six when left out.
-        columns: numbers (from 0) or names of velocities, as many; those that move the frame when
-            left out.
-        expressed_in: the frame in whose axes the rows are.
-        coordinates: of a closed system, "independent" or "tree".
+        system: open or closed mechanism; q must close the loops.
+        frame: name of a body or frame, or index of a link.
+        rows: rows of [V; w], indices 0 to 5 or names "Vx" to "wz"; all six by default.
+        columns: velocities, as many as rows, by 0-based index or name; by default the velocities
+            that move the frame.
+        expressed_in: frame whose axes the rows are expressed in.
+        coordinates: velocities of a closed system, "independent" or "tree".
 
     Returns:
-        The factors; a constant "0" and no factor when every configuration is singular.
+        constant and factors; constant "0" and no factors if every configuration is singular.
 
     Raises:
-        ModelError: no such frame, row or column, or not as many rows as columns.
+        ModelError: the frame, a row or a column is unknown, or the numbers of rows and columns
+            differ.
     """
     chosen = selection(system, frame, rows, columns, expressed_in, coordinates)
     found: Singularities = system.cached(
@@ -505,7 +517,7 @@ def _constant_and_factors(
 
 
 def _parts(system: System, block: Block, det: SX, variables: SX) -> Factored | None:
-    """The factors of a block's determinant; None where it is not factored."""
+    """Factors of the determinant of a block; None if it is too large or the check fails."""
     if block.size > _FACTORED:
         return None
     try:
@@ -523,7 +535,11 @@ def _parts(system: System, block: Block, det: SX, variables: SX) -> Factored | N
 
 
 def _scale(polynomial: Polynomial) -> tuple[Polynomial, Fraction]:
-    """The polynomial with a positive first term and coefficients of usual size, and its scale."""
+    """Scale a polynomial to a positive first coefficient and coefficients up to 12.
+
+    Returns:
+        scaled polynomial and the scale by which to multiply it.
+    """
     first = next(iter(polynomial.values()))
     largest = max(abs(coefficient) for coefficient in polynomial.values())
     scale = Fraction(1)

@@ -1,4 +1,4 @@
-"""The skeleton of a mechanism: points, axes and lines to draw it with, at any configuration."""
+"""Skeleton of a mechanism: points, axes and lines for drawing, at any configuration."""
 
 from __future__ import annotations
 
@@ -22,31 +22,30 @@ from mbs.models.geometry import terminal_frame
 from mbs.recursions.poses import base_poses, link_poses
 from mbs.spatial import Pose
 
-# The lines that stand for a rigid link: between the points at which it is held.
+# Lines that represent a rigid link, between its joints and other points.
 
 
 Array = NDArray[np.float64]
 
 _SAME = 1e-9
-"""Points that are nearer than this part of the size of the link are one [1]."""
+"""Distance relative to the size of the link below which two points coincide [1]: rounding error."""
 
 _WIDE = 1e-6
-"""Points that lie off a line by less than this part of its length are on it [1]."""
+"""Width relative to the length below which points count as collinear [1]: rounding error."""
 
 
 def link_outline(points: Array, held: int) -> list[tuple[int, int]]:
-    """Pairs of points that lines join.
+    """Lines that represent a rigid link, as pairs of point indices.
 
-    The joints are on a line from end to end, or on a polygon that goes round them where three or
-    more are not in line. Each other point is joined to the nearest one, unless it lies between
-    them.
+    Collinear joints are connected by a line from end to end, three or more other joints by a closed
+    polygon. Each further point is connected to the nearest joint, unless it is inside the polygon.
 
     Args:
-        points: (k, 3) in the frame of the link [m].
-        held: how many of them, the first ones, are joints.
+        points: (k, 3) points in the frame of the link [m]; the first `held` points are joints.
+        held: number of joints.
 
     Returns:
-        numbers of points; of those that fall together the first one.
+        pairs of indices into `points`. Coincident points are represented by the first index.
     """
     size = float(np.abs(points - points[0]).max())
     kept = [k for k in range(len(points)) if _is_new(points, k, _SAME * max(size, 1.0))]
@@ -65,7 +64,7 @@ def link_outline(points: Array, held: int) -> list[tuple[int, int]]:
 
 
 def _is_new(points: Array, k: int, apart: float) -> bool:
-    """Whether point k is none of those before it."""
+    """Whether point k is farther than `apart` from each previous point."""
     return bool(np.all(np.linalg.norm(points[:k] - points[k], axis=1) > apart))
 
 
@@ -85,11 +84,11 @@ _AXES = (Motion.REVOLUTE, Motion.PRISMATIC)
 
 @dataclass(frozen=True, slots=True)
 class SkeletonAxis:
-    """An axis of a joint.
+    """Axis of a joint.
 
     Attributes:
-        motion: about it or along it.
-        direction: its column in `directions`.
+        motion: "revolute" for rotation about the axis, "prismatic" for translation along it.
+        direction: column of the axis in `directions`.
     """
 
     motion: Literal["revolute", "prismatic"]
@@ -98,16 +97,16 @@ class SkeletonAxis:
 
 @dataclass(frozen=True, slots=True)
 class SkeletonJoint:
-    """A joint or a constraint between two links.
+    """Joint or constraint between two links.
 
     Attributes:
-        name: of the joint.
-        kind: of joint, in lower case.
-        cut: whether it closes a loop.
-        links: numbers of the links that carry its frame_a and frame_b, 0 for the base.
-        points: columns in `points` of the origins of these frames. They are one place, but where
-            the joint slides, leaves them apart, or is a cut one in an open loop.
-        axes: of its rotations and translations; none where it has no special ones.
+        name: name of the joint.
+        kind: type of the joint, in lower case.
+        cut: whether the joint closes a loop.
+        links: indices of the links of frame_a and frame_b, 0 for the base.
+        points: columns in `points` of the origins of frame_a and frame_b. The origins coincide,
+            except for joints with translations or an offset, and cut joints of an open loop.
+        axes: axes of its revolute and prismatic motions; empty for a joint without fixed axes.
     """
 
     name: str
@@ -120,15 +119,15 @@ class SkeletonJoint:
 
 @dataclass(frozen=True, slots=True)
 class SkeletonLink:
-    """A rigid link, or the base.
+    """Rigid link, or the base.
 
     Attributes:
-        number: of the link, 0 for the base.
-        bodies: names of the bodies that it carries.
-        segments: pairs of columns in `points`: a line from joint to joint, a polygon through three
-            joints or more, lines to frames and force elements; where one point is all, to the
-            frame of the link that is farthest from it, or to the centre of mass; none of the base.
-        mass_centre: column in `points`, None without mass.
+        number: index of the link, 0 for the base.
+        bodies: names of the bodies of the link.
+        segments: pairs of columns in `points`: a line between joints, a polygon through three or
+            more joints, lines to frames and force elements. A link with a single point has a line
+            to its farthest frame or to its centre of mass. Empty for the base.
+        mass_centre: column in `points` of the centre of mass; None for a massless link or base.
     """
 
     number: int
@@ -139,14 +138,14 @@ class SkeletonLink:
 
 @dataclass(frozen=True, slots=True)
 class SkeletonForce:
-    """A force element between two points.
+    """Force element between two points.
 
     Attributes:
-        name: of the element.
-        kind: of element, in lower case.
-        shape: "coil" or "bar", or nothing.
-        links: numbers of the links that carry its ends, 0 for the base.
-        points: columns in `points` of its ends.
+        name: name of the element.
+        kind: type of the element, in lower case.
+        shape: shape of the drawing, such as "coil" or "bar".
+        links: indices of the links of its two ends, 0 for the base.
+        points: columns in `points` of its two ends.
     """
 
     name: str
@@ -158,13 +157,13 @@ class SkeletonForce:
 
 @dataclass(frozen=True, slots=True)
 class SkeletonFrame:
-    """A frame that is shown: a named one, or the terminal frame.
+    """Frame to draw: a named frame or the terminal frame.
 
     Attributes:
-        name: of the frame.
-        link: that carries it, 0 for the base.
-        origin: column in `points`.
-        directions: columns in `directions` of its x, y and z axis.
+        name: name of the frame.
+        link: index of its link, 0 for the base.
+        origin: column in `points` of its origin.
+        directions: columns in `directions` of its x, y and z axes.
     """
 
     name: str
@@ -175,15 +174,15 @@ class SkeletonFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Skeleton:
-    """What a mechanism is drawn with; colours and sizes are the viewer's.
+    """Geometry for drawing a mechanism, without colours and sizes.
 
     Attributes:
-        joints: in the order of the description.
-        links: the base, then the links of the tree.
+        joints: joints in the order of the description.
+        links: base, then links of the tree.
         forces: springs, dampers and other elements between two points.
-        frames: named frames and the terminal one.
-        function: `skeleton(q) -> points (3, n), directions (3, m)`, in the base frame, points in
-            m, directions of unit length; of q and p where the system has parameters.
+        frames: named frames and the terminal frame.
+        function: `skeleton(q) -> points (3, n), directions (3, m)` in the base frame; points in m,
+            directions of unit length. p is a second input if the system has parameters.
     """
 
     joints: tuple[SkeletonJoint, ...]
@@ -194,13 +193,13 @@ class Skeleton:
 
 
 def skeleton(system: System) -> Skeleton:
-    """The points and axes of all joints, and the lines that stand for the links.
+    """Return the points and axes of all joints and the lines of all links, for drawing.
 
     Args:
-        system: open or closed.
+        system: open or closed mechanism.
 
     Returns:
-        what to draw, with the Function that places it at positions q.
+        skeleton with the Function that computes its points and directions at positions q.
 
     Raises:
         ModelError: `system` is not a System.
@@ -212,7 +211,13 @@ def skeleton(system: System) -> Skeleton:
 
 @dataclass(slots=True)
 class _Marks:
-    """Points and directions on links, in the order of their columns."""
+    """Points and directions fixed to links, collected in the order of their columns.
+
+    Attributes:
+        system: mechanism.
+        points: (link index, pose) of each point, -1 for the base.
+        directions: (link index, axis) of each direction, in the frame of the link.
+    """
 
     system: System
     points: list[Frame] = field(default_factory=list)
@@ -227,14 +232,11 @@ class _Marks:
         return len(self.directions) - 1
 
     def local(self, numbers: Sequence[int]) -> NDArray[np.float64]:
-        """(k, 3) points in the frames of their links."""
+        """(k, 3) coordinates of points, by column, in the frames of their links."""
         return self.places([self.points[k][1] for k in numbers])
 
     def places(self, poses: Sequence[Pose]) -> NDArray[np.float64]:
-        """(k, 3) origins of poses, by which lines join the points of a link.
-
-        Symbols have their defaults, or one if they have none.
-        """
+        """(k, 3) numeric origins of poses; parameters have their defaults, or 1 without default."""
         p = [1.0 if np.isnan(value) else value for value in self.system.parameter_values(needed=())]
         origins = casadi.horzcat(*(pose.p for pose in poses))
         return np.array(Function("places", [self.system.p], [origins])(p)).T
@@ -273,7 +275,7 @@ def _joint(marks: _Marks, row: JointRow) -> SkeletonJoint:
 
 
 def _tree_axes(marks: _Marks, name: str) -> tuple[SkeletonAxis, ...]:
-    """The z axes of the links that the joint moves."""
+    """Return the z axes of the links whose revolute or prismatic motion belongs to the joint."""
     system = marks.system
     moved = (
         (j, link.motion)
@@ -284,7 +286,7 @@ def _tree_axes(marks: _Marks, name: str) -> tuple[SkeletonAxis, ...]:
 
 
 def _cut_axes(marks: _Marks, row: JointRow) -> tuple[SkeletonAxis, ...]:
-    """The first axis stands in frame_a, those after it turn with frame_b."""
+    """Axes of a cut joint: the first axis is fixed in frame_a, further axes in frame_b."""
     cut = next(cut for cut in marks.system.cuts if cut.edge.joint.name == row.name)
     frames = (row.frame_a, row.frame_b)
     found = []
@@ -350,13 +352,15 @@ def _segments(
 
 
 def _farthest_frame(marks: _Marks, number: int, joint: int, centre: int | None) -> int | None:
-    """The frame of a link, such as a foot, that is farthest from its joint; None if all are there.
+    """Column of the frame of a link, such as a foot, that is farthest from its joint.
+
+    None if the link has no frame, or if all its frames coincide with the joint.
 
     Args:
-        marks: takes the origin of the frame.
-        number: of the link.
-        joint: column in the points.
-        centre: column of the centre of mass, which is taken where the frame is there.
+        marks: collector to which the origin of the frame is added.
+        number: index of the link.
+        joint: column of the joint in `points`.
+        centre: column of the centre of mass; it is returned if the frame coincides with it.
     """
     places = [pose for link, pose in marks.system.frames.values() if link == number - 1]
     if not places:
@@ -373,7 +377,7 @@ def _farthest_frame(marks: _Marks, number: int, joint: int, centre: int | None) 
 
 
 def _mass_centre(marks: _Marks, number: int) -> int | None:
-    """The column of the centre of mass; None without mass, or if symbols in it have no default."""
+    """Column of the centre of mass; None for zero mass, or if parameters have no default."""
     inertia, system = marks.system.tree.links[number - 1].inertia, marks.system
     known = casadi.vertcat(inertia.m, inertia.ms)
     at = Function("centre", [system.p], [known])(system.parameter_values(needed=()))

@@ -1,4 +1,4 @@
-"""The symbols of a model, what acts from outside, and the devices that drive shafts."""
+"""Symbols of models, external loads on a mechanism, and equations of components and devices."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ COORDINATES = ("independent", "tree")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelSymbols:
-    """Positions and velocities of a system, and how the tree follows the independent joints.
+    """Symbols q and v of a model, with the tree velocities and link poses as expressions in them.
 
     Attributes:
-        q: (nq, 1) positions of the tree; they close the loops.
-        v: (m, 1) velocities that are the model's input.
-        v_tree: (nv, 1) velocities of the tree that follow.
-        suffix: "_a" where the inputs are the independent ones of a closed system.
-        reduction: None in tree coordinates.
-        poses: of every link with respect to its antecedent.
+        q: (nq, 1) positions of the tree; they must close the loops.
+        v: (m, 1) input velocities of the model.
+        v_tree: (nv, 1) velocities of the tree.
+        suffix: "_a" if v are the independent velocities of a closed system, else "".
+        reduction: v_tree = G v and its derivative; None in tree coordinates.
+        poses: pose of each link relative to its antecedent.
     """
 
     q: SX
@@ -46,54 +46,51 @@ class ModelSymbols:
 
     @property
     def size(self) -> int:
-        """Number of velocities that are input."""
+        """Number m of input velocities."""
         return int(self.v.numel())
 
     def tree_acceleration(self, a: SX) -> SX:
-        """(nv, 1) accelerations of the tree for the accelerations a of the input coordinates."""
+        """(nv, 1) accelerations of the tree for accelerations a (m, 1): G a + gamma."""
         if self.reduction is None:
             return a
         assert self.reduction.gamma is not None
         return casadi.mtimes(self.reduction.G, a) + self.reduction.gamma
 
     def reduced_effort(self, tau: SX) -> SX:
-        """Efforts of the tree brought to the input coordinates: G' tau."""
+        """Project joint efforts of the tree on the input coordinates: G' tau."""
         return tau if self.reduction is None else casadi.mtimes(self.reduction.G.T, tau)
 
     def reduced_matrix(self, A: SX) -> SX:
-        """G' A G."""
+        """Project a matrix A (nv, nv) of the tree on the input coordinates: G' A G."""
         if self.reduction is None:
             return A
         G = self.reduction.G
         return casadi.mtimes(G.T, casadi.mtimes(A, G))
 
     def input(self, name: str) -> tuple[str, SX]:
-        """An input in the same coordinates as the velocities, such as ("a_a", symbol)."""
+        """Return a named input (m, 1) in the coordinates of v, such as ("a_a", symbol)."""
         label = name + self.suffix
         return label, SX.sym(label, self.size)
 
 
 def configuration_check(system: System, coordinates: str) -> ConfigurationCheck | None:
-    """What refuses the configurations that a model in these coordinates cannot take.
+    """Return the check of configurations for a model in these coordinates, None if not needed.
 
-    Those of a reduced model close the loops, and its independent joints lead the others there.
+    A model in independent coordinates requires closed loops and dependent joints that are
+    determined by the independent joints.
     """
     require_system(system)
     return DETERMINED if is_reduced(system, coordinates) else None
 
 
 def derivatives_check(system: System, coordinates: str) -> ConfigurationCheck | None:
-    """The same for models that contain second derivatives of the loops."""
+    """Return the stricter check for models that contain second derivatives of the loops."""
     require_system(system)
     return DIFFERENTIABLE if is_reduced(system, coordinates) else None
 
 
 def check_coordinates(system: System, coordinates: str) -> None:
-    """Refuse a word that names no coordinates.
-
-    Raises:
-        ModelError: says which words there are.
-    """
+    """Raise ModelError if `coordinates` is not "independent" or "tree"."""
     if coordinates not in COORDINATES:
         raise ModelError(
             f"{system.name}: coordinates is {coordinates!r}; use 'independent' or 'tree'"
@@ -101,19 +98,19 @@ def check_coordinates(system: System, coordinates: str) -> None:
 
 
 def is_reduced(system: System, coordinates: str) -> bool:
-    """Whether these are the coordinates of the independent joints of a closed system."""
+    """Whether a model is in the independent coordinates of a closed system."""
     return system.is_closed and coordinates == "independent"
 
 
 def symbols_of(system: System, coordinates: str = "independent") -> ModelSymbols:
-    """Fresh symbols of a system.
+    """Return new symbols q and v of a system with the quantities of `ModelSymbols`.
 
     Args:
-        system: any.
-        coordinates: "independent" or "tree"; they are the same in an open chain.
+        system: open or closed mechanism.
+        coordinates: "independent" or "tree"; they are equivalent for an open chain.
 
     Raises:
-        ModelError: another word was given.
+        ModelError: `coordinates` is another word.
     """
     check_coordinates(system, coordinates)
     q = SX.sym("q", system.nq)
@@ -123,31 +120,35 @@ def symbols_of(system: System, coordinates: str = "independent") -> ModelSymbols
         return ModelSymbols(q, v, v, "", None, poses)
     v = SX.sym("v_a", len(system.active))
     reduced = reduction(system, q, v)
-    # dense: joints of a sub-loop that cannot move have structural zeros in G, and `substitute`
-    # takes vectors of one pattern only
+    # v_tree is dense: immobile joints of a sub-loop have structural zeros in G, but `substitute`
+    # requires equal sparsity patterns
     v_tree = reduced.velocities(v)
     return ModelSymbols(q, v, v_tree, "_a", reduced, poses)
 
 
 def solution_order(system: System, s: ModelSymbols) -> list[int]:
-    """For each velocity that is input, the one before it in A; see `factorized`."""
+    """Parent index of each input velocity for the sparse factorisation of A; see `factorize`.
+
+    -1 for a velocity without a parent. In independent coordinates A is dense, so that the parent
+    is the preceding index.
+    """
     if s.reduction is None:
         return velocity_antecedents(system.tree)
     return list(range(-1, s.size - 1))
 
 
-# What acts on a mechanism from outside: gravity, a base that moves, wrenches on bodies.
+# External loads on a mechanism: gravity, a moving base, wrenches on bodies.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surroundings:
-    """What acts on a mechanism.
+    """Base motion and external wrenches of a mechanism.
 
     Attributes:
-        base: its motion, gravity included.
-        external: for some links the wrench that they exert on their environment, about and in
-            their frames.
-        inputs: of the model, that say all this.
+        base: motion of the base; its acceleration includes minus gravity.
+        external: dict from link index to the wrench that the link exerts on the environment, about
+            and in the link frame.
+        inputs: named model inputs that `base` and `external` depend on.
     """
 
     base: Acceleration
@@ -156,15 +157,15 @@ class Surroundings:
 
 
 def surroundings(system: System, f_ext: bool = False, moves: bool = False) -> Surroundings:
-    """A resting base under gravity and no wrenches, or inputs for them.
+    """Return gravity on a resting base without external wrenches, or model inputs for both.
 
     Args:
-        system: whose tree has gravity, given in the base frame at R_0 = 1.
-        f_ext: add the input f_ext (6, bodies): for each row of `system.bodies` the wrench [force;
-            moment] that the body exerts on its environment, in the body's frame.
-        moves: add the inputs v_0 and a_0, (6, 1), velocity [V; w] and acceleration [vd; wd] of
-            the base's origin in its own axes, and R_0, (3, 3), orientation of the base frame in
-            the fixed frame in which gravity is given.
+        system: mechanism; its gravity vector is expressed in the base frame at R_0 = 1.
+        f_ext: whether to add the input f_ext (6, bodies): for each row of `system.bodies` the
+            wrench [force; moment] that the body exerts on its environment, in the body frame.
+        moves: whether to add the inputs v_0 and a_0 (6, 1), velocity [V; w] and acceleration
+            [vd; wd] of the base origin in base axes, and R_0 (3, 3), orientation of the base in the
+            fixed frame that gravity is expressed in.
     """
     gravity, inputs = system.tree.gravity, list[tuple[str, SX]]()
     base, external = resting_base(gravity), dict[int, Wrench]()
@@ -183,12 +184,12 @@ def surroundings(system: System, f_ext: bool = False, moves: bool = False) -> Su
 def exerted(
     system: System, around: Surroundings, poses: list[LinkPose], q: SX, v: SX
 ) -> dict[int, Wrench]:
-    """For some links the wrench that they exert on their environment, force elements included.
+    """Wrenches that links exert on their environment and on force elements, by link index.
 
     Args:
-        system: whose force elements act.
-        around: what else acts.
-        poses: of every link with respect to its antecedent.
+        system: mechanism with force elements.
+        around: base motion and external wrenches.
+        poses: pose of each link relative to its antecedent.
         q: (nq, 1) positions.
         v: (nv, 1) velocities of the tree.
     """
@@ -196,7 +197,7 @@ def exerted(
 
 
 def wrenches_on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
-    """The wrenches of bodies, (6, bodies) in their frames, brought to the frames of their links."""
+    """Transform wrenches (6, bodies) from body frames to link frames; sums by link index."""
     exerted: list[dict[int, Wrench]] = []
     for column, row in enumerate(system.bodies):
         link, pose = system.frames[row.name]
@@ -206,40 +207,45 @@ def wrenches_on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
     return sum_wrenches(*exerted)
 
 
-# Functions made of other models, on the same symbols.
+# Calls of a model on symbols of another model.
 
 
 def outputs_of(system: System, model: Function, *values: SX) -> list[SX]:
-    """The outputs of a model on symbols, those of states, inputs and parameters passed on."""
+    """Call a model on SX values and return its outputs.
+
+    Args:
+        system: mechanism; its symbols z, u and p are passed as the remaining inputs.
+        model: Function of a model.
+        values: first inputs of the model, such as q, v and tau.
+    """
     own = {"z": system.z, "u": system.u, "p": system.p}
     arguments = [*values, *(own[name] for name in model.name_in()[len(values) :])]
     return [SX(output) for output in model.call(arguments)]
 
 
 def dense_function(name: str, inputs: list[SX], outputs: list[SX]) -> Function:
-    """A Function without structural zeros in its outputs, common parts shared."""
+    """Return a Function with dense outputs and common subexpression elimination."""
     return Function(name, inputs, [casadi.densify(o) for o in outputs], {"cse": True})
 
 
-# The drives of shafts, and all states and outputs of parts.
+# Devices that drive shafts, and the states and outputs of all components.
 
 
 def devices(system: System) -> Function:
-    """``devices(v, z, u) -> tau, zdot, y``: motors and torques, states and outputs of components.
+    """Equations of devices and other components: ``devices(v, z, u) -> tau, zdot, y``.
 
-    The elements of z, u and y are those that `devices(system).elements("z")` names: states such as
-    currents; inputs such as voltages and torques; what a simulation shows beside them; of all
-    components that have some.
+    z are component states such as currents, u component inputs such as voltages and torques, y
+    further component outputs of a simulation. `devices(system).elements("z")` names the elements.
 
     Args:
-        system: open or closed, with devices or components that have states or outputs.
+        system: open or closed, with devices or with components that have states or outputs.
 
     Returns:
-        Function of v (nv, 1) velocities of the tree, z (nz, 1) states and u (nu, 1) inputs, and of
-        q (nq, 1) before them where something depends on positions, and of row_efforts (r, 1) after
-        them where an output tells the efforts of rows of components, all of them in the order
-        of the components; tau (nv, 1) what drives deliver at the coordinates [N m or N],
-        zdot (nz, 1), y (ny, 1).
+        Function of tree velocities v (nv, 1), states z (nz, 1) and inputs u (nu, 1). The first
+        input is q (nq, 1) if an output depends on positions. The last input is row_efforts (r, 1),
+        efforts of the constraint rows of components in their order, if an output depends on them.
+        Outputs: efforts tau (nv, 1) of devices on the joint coordinates [N m or N], zdot (nz, 1),
+        y (ny, 1).
 
     Raises:
         ModelError: the system has no device, state or output.
@@ -274,17 +280,17 @@ def devices(system: System) -> Function:
 
 
 def state_count(system: System) -> int:
-    """Number of the states of all parts."""
+    """Number of states of all components."""
     return int(system.z.numel())
 
 
 def part_equations(system: System, q: SX, v: SX) -> tuple[SX, SX, PartsAt]:
-    """What drives deliver at the coordinates, the rates of all states, and the parts themselves.
+    """Efforts of devices (nv, 1), rates of component states, and the evaluated components.
 
-    They are of the symbols `system.z`, `system.u` and `system.p` besides.
+    The expressions also depend on the symbols `system.z`, `system.u` and `system.p`.
 
     Args:
-        system: with parts or without any.
+        system: mechanism with or without components.
         q: (nq, 1) positions.
         v: (nv, 1) velocities of the tree.
     """

@@ -1,4 +1,4 @@
-"""Models of big open trees by one C core, for which a mechanism is a table of numbers."""
+"""Models of large open trees by one C library that interprets a numeric table of the mechanism."""
 
 from __future__ import annotations
 
@@ -36,68 +36,69 @@ from mbs.native.tree_core import COMMON, tree_files
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TreeCore:
-    """The dynamic models of an open tree as machine code that loops over its links.
+    """Dynamic models of an open tree as compiled code that loops over its links.
 
-    Each is a casadi.Function with the inputs and outputs of the builder of its name. Called with
-    numpy arrays it returns numpy arrays, as `mbs.native.compiled` does.
+    Each model is a casadi.Function with the inputs and outputs of the corresponding function of
+    `mbs.models`. Called with numpy arrays it returns numpy arrays, as `mbs.native.compiled` does.
 
     Attributes:
-        system: the tree.
+        system: open mechanism.
     """
 
     system: System
 
     @property
     def idm(self) -> Function:
-        """``idm(q, v, a) -> tau``; see `inverse_dynamics`."""
+        """Inverse dynamics ``idm(q, v, a) -> tau``; see `inverse_dynamics`."""
         return core_function(self.system, "idm")
 
     @property
     def inertia_matrix(self) -> Function:
-        """``inertia(q) -> A``; see `inertia_matrix`. It cannot be differentiated."""
+        """Mass matrix ``inertia(q) -> A``, not differentiable; see `inertia_matrix`."""
         return core_function(self.system, "inertia")
 
     @property
     def ddm(self) -> Function:
-        """``ddm(q, v, tau) -> a``; see `direct_dynamics`."""
+        """Forward dynamics ``ddm(q, v, tau) -> a``; see `direct_dynamics`."""
         return core_function(self.system, "ddm")
 
     @property
     def idm_derivatives(self) -> Function:
-        """``idm_derivatives(q, v, a) -> dtau_dq, dtau_dv, dtau_da, tau``.
+        """Derivatives of inverse dynamics; see `inverse_dynamics_derivatives`.
 
-        See `inverse_dynamics_derivatives`. It cannot be differentiated.
+        ``idm_derivatives(q, v, a) -> dtau_dq, dtau_dv, dtau_da, tau``. Not differentiable.
         """
         return core_function(self.system, "idm_derivatives")
 
     @property
     def ddm_derivatives(self) -> Function:
-        """``ddm_derivatives(q, v, tau) -> da_dq, da_dv, da_dtau, a``.
+        """Derivatives of forward dynamics; see `direct_dynamics_derivatives`.
 
-        See `direct_dynamics_derivatives`. It cannot be differentiated.
+        ``ddm_derivatives(q, v, tau) -> da_dq, da_dv, da_dtau, a``. Not differentiable.
         """
         return core_function(self.system, "ddm_derivatives")
 
 
 def tree_core(system: System) -> TreeCore:
-    """The five dynamic models of an open tree of any size, no equation written out.
+    """Return five compiled dynamic models of an open tree of any size, without symbolic equations.
 
-    One C file, compiled once and kept, loops over the links; the mechanism is a table of numbers,
-    which a short Function of the parameters completes at every call. Rotors, friction and springs
-    of the joints are included. Derivatives are those of the core: CasADi differentiates idm and
-    ddm once; with respect to parameters by the equations, which are built when that is first
-    asked for. Quaternions are brought to unit length first.
+    One C library, compiled once and cached, loops over the links. The mechanism is a numeric table;
+    a short Function computes its parameter-dependent entries at every call. Rotors, friction and
+    springs of the joints are included. CasADi can differentiate idm and ddm once, by derivative
+    code of the library. Derivatives with respect to parameters use symbolic equations, built at the
+    first request. Quaternions are normalised first.
 
     Source: Khalil & Creusot 1997, eq. 15-20; Walker & Orin 1982; Featherstone 1983; Singh, Russell
     & Wensing 2022; Carpentier & Mansard 2018.
 
     Args:
-        system: an open tree of revolute, prismatic, spherical and free motions.
+        system: open tree of revolute, prismatic, spherical and free joints.
 
     Raises:
-        ModelError: the system has loops, or components with equations of their own; or, of ddm, a
-            joint moves no inertia.
-        CompilerError: there is no compiler, or it refused the code.
+        ModelError: the system has loops, components with their own equations, a joint whose frame_b
+            is on the side of the base, or a rotor on a third link. Access to `ddm` and
+            `ddm_derivatives` raises it if a joint moves no inertia.
+        CompilerError: there is no compiler, or the compilation fails.
     """
     require_system(system)
     core_library(system)
@@ -106,11 +107,11 @@ def tree_core(system: System) -> TreeCore:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoreLibrary:
-    """The machine code of a tree.
+    """Compiled code of a tree.
 
     Attributes:
-        path: of the shared library, whose functions have CasADi's calling convention.
-        shapes: by name, Functions that have their inputs and outputs, and no content.
+        path: path of the shared library; its functions have CasADi's calling convention.
+        shapes: placeholder Functions with the signatures of these functions, by name.
     """
 
     path: Path
@@ -118,7 +119,11 @@ class CoreLibrary:
 
 
 def core_library(system: System) -> CoreLibrary:
-    """The library of all models of a tree."""
+    """Compile, or load from the cache, the library of all models of a tree.
+
+    Raises:
+        ModelError: the tree core does not support the system.
+    """
 
     def build() -> CoreLibrary:
         if unknown := unknown_to_core(system):
@@ -138,11 +143,13 @@ _BY_PARAMETERS = [by_parameters(name) for name in ("idm", "ddm")]
 
 
 def _by_parameters(system: System, files: Mapping[str, str]) -> str:
-    """C text that makes the derivatives by parameters from the equations, in this process alone.
+    """C source whose parameter derivatives are built from the equations at their first call.
+
+    The source works only in the current process.
 
     Args:
-        system: the tree, which is kept for it as the library is, to the end of the process.
-        files: C text of its core, which the promise is known by.
+        system: open mechanism; it is kept in memory until the process ends, as is the library.
+        files: C sources of its core; their hash identifies the request.
     """
     digest = hashlib.sha256("\0".join(files.values()).encode()).hexdigest()
     record = cache_dir() / f"{digest[:40]}.promised"
@@ -159,11 +166,11 @@ def _by_parameters(system: System, files: Mapping[str, str]) -> str:
 
 
 def core_function(system: System, name: str) -> Function:
-    """One function of the core by its name in C, such as "idm".
+    """Return a function of the compiled library by its name in C, such as "idm".
 
     Args:
-        system: an open tree.
-        name: one of `CoreLibrary.shapes`.
+        system: open mechanism.
+        name: key of `CoreLibrary.shapes`.
     """
 
     def build() -> Function:
@@ -180,19 +187,19 @@ def core_function(system: System, name: str) -> Function:
     return function
 
 
-# A velocity that moves no inertia.
+# Detection of velocities that move no inertia.
 
 
 _SEED = 20260103
 _VANISHING = 1e-12
-"""Inertia left, in parts of what it is with the links behind locked, that counts as none: rounding
-of as many terms as there are links leaves 1e-15 of it."""
+"""Ratio of the inertia against a velocity with free descendants to its inertia with locked
+descendants, below which it counts as zero: a sum over all links has a rounding error of 1e-15."""
 _NO_INERTIA = 1e-30
-"""Stands for an inertia of zero where one divides [kg m^2 or kg]; no body has so little."""
+"""Smallest denominator of this ratio [kg m^2 or kg]; it avoids 0/0, and no body has so little."""
 
 
 def _require_inertia(system: System) -> None:
-    """Refuse a tree in which some velocity moves no inertia, as `direct_dynamics` does."""
+    """Raise ModelError if a velocity of the tree moves no inertia, as in `direct_dynamics`."""
     if any(p.default is None for p in system.parameters):
         return
     pivots = casadi.external("pivots", str(core_library(system).path))
@@ -200,7 +207,7 @@ def _require_inertia(system: System) -> None:
     q = np.array(system.configuration) + rng.uniform(-1.0, 1.0, system.nq)
     p = [system.p_default] if system.parameters else []
     free, locked = (np.array(x).ravel() for x in pivots(q, *p))
-    # The inertia of files may be negative: what counts is whether anything is there.
+    # magnitude: inertia from files may be negative, but must not be zero
     moves = np.abs(free) > _VANISHING * np.maximum(np.abs(locked), _NO_INERTIA)
     if not moves.all():
         name = system.speeds[int(np.max(np.flatnonzero(~moves)))].name

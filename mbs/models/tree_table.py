@@ -1,4 +1,4 @@
-"""A big open tree as a table of numbers, and the models that loop over it in place of equations."""
+"""Numeric table of an open tree, for compiled models that loop over links instead of equations."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from mbs.spatial import elements
 
 
 def unknown_to_core(system: System) -> str:
-    """Why the tree core has no models of a system, as the end of a sentence; empty when it has."""
+    """Reason, as error text, why `tree_core` does not support a system; empty if it does."""
     if system.is_closed:
         return (
             "tree_core is for open trees and this system has loops or couplings;"
@@ -57,29 +57,31 @@ def unknown_to_core(system: System) -> str:
     return ""
 
 
-# Where loops over the links replace equations written out.
+# Selection of models whose compiled code loops over the links instead of expanded equations.
 
 
 _LONGEST = {"inertia": 30, "idm_derivatives": 13, "ddm_derivatives": 16, "idm": 100}
-"""Velocities from the base to a leaf up to which straight lines are faster: measured on chains
-(docs/speed.md). Branches count by themselves: their runs are what fills the lanes."""
+"""Largest number of velocities on one branch, by model, for which expanded equations are faster
+than loops: measured on chains (docs/speed.md). The longest branch counts, because vector lanes are
+filled along branches."""
 
 _LONGEST_OF_JACOBIAN = {"idm": 9, "ddm": 8}
-"""The same for the Jacobian by q, v and a or tau."""
+"""Largest number of velocities on one branch for which expanded equations are faster for the
+Jacobian with respect to q, v and a or tau: measured on chains."""
 
 _MANY = 60_000
-"""Operations of straight lines beyond which loops are taken in any case: these compile for ten
-seconds and more, and no cache of a processor holds them."""
+"""Number of operations of expanded equations above which loops are always used: such code compiles
+for ten seconds and more, and exceeds the caches of a processor."""
 
 
 @dataclass(frozen=True, slots=True)
 class TreeLoops:
-    """What `mbs.native.compiled` may take for a model of a tree.
+    """Loop code that `mbs.native.compiled` may use instead of the equations of a tree model.
 
     Attributes:
-        system: the tree.
-        name: of the model in the core.
-        normalises: whether the equations bring quaternions to unit length first, as the core does.
+        system: open mechanism.
+        name: name of the model in the tree core, such as "idm".
+        normalises: whether the equations normalise quaternions first, as the tree core does.
     """
 
     system: System
@@ -87,14 +89,14 @@ class TreeLoops:
     normalises: bool = False
 
     def code(self, function: Function, derivatives: int) -> LoopCode | None:
-        """C text of what loops do better than the equations; None where that is nothing.
+        """Return C code with loops if it is faster than the equations, else None.
 
-        Quaternions are left to equations that do not normalise them: off unit length, where
-        solvers that move q freely come, these have other values.
+        None also for quaternion joints if the equations do not normalise quaternions: solvers that
+        vary q freely leave unit norm, and there the values differ.
 
         Args:
-            function: the equations.
-            derivatives: how often the answer will be differentiated.
+            function: Function with the equations.
+            derivatives: number of times that the compiled Function will be differentiated.
         """
         system, name = self.system, self.name
         other = bool(quaternion_slices(system.tree)) and not self.normalises
@@ -117,7 +119,7 @@ class TreeLoops:
 
 
 def _shape(function: Function) -> list[object]:
-    """Names and sizes of inputs and outputs."""
+    """Names and sizes of the inputs and outputs of a Function."""
     return [
         *((function.name_in(k), function.size_in(k)) for k in range(function.n_in())),
         *((function.name_out(k), function.size_out(k)) for k in range(function.n_out())),
@@ -125,7 +127,7 @@ def _shape(function: Function) -> list[object]:
 
 
 def _longest_branch(system: System) -> int:
-    """Velocities from the base to the leaf that has most of them before it."""
+    """Largest number of velocities on a path from the base to a leaf."""
     behind: list[int] = []
     for link in system.tree.links:
         before = behind[link.antecedent] if link.antecedent >= 0 else 0
@@ -134,15 +136,15 @@ def _longest_branch(system: System) -> int:
 
 
 def shapes_of(system: System, table: TreeTable) -> dict[str, Function]:
-    """Functions that have the names and shapes of those of the core, and no content."""
+    """Placeholder Functions with the signatures of the tree core, by name."""
     return tree_functions(table, len(system.parameters), default_in(system, 1)[1:])
 
 
-# The table of a tree: its links depth-first, a node for every velocity.
+# Table of a tree: links in depth-first order, one node per velocity.
 
 
 def _depth_first(links: Sequence[Link]) -> list[int]:
-    """The links in an order in which every subtree follows its joint without a gap."""
+    """Link indices in depth-first order: each subtree is contiguous."""
     behind: list[list[int]] = [[] for _ in links]
     waiting: list[int] = []
     for j, link in enumerate(links):
@@ -157,7 +159,7 @@ def _depth_first(links: Sequence[Link]) -> list[int]:
 
 
 def table_of(system: System) -> TreeTable:
-    """The tree in numbers."""
+    """Return the table of a tree: indices of its nodes, numeric data, parameter-dependent data."""
     links = system.tree.links
     order = _depth_first(links)
     lists = _lists(links, order)
@@ -192,7 +194,7 @@ _UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
 def _put_link(put: Callable[[int, int, SX], None], link: Link, j: int, first: int) -> None:
-    """The numbers of the nodes of a link, the first of which is given."""
+    """Write the data of link j, whose first node is `first`, by `put(row, node, value)`."""
     last, rotor = first + link.motion.nv - 1, link.rotor
     pose, body = link.pose(), link.inertia
     tensor = casadi.vertcat(*(body.J[r, c] for r, c in _UPPER))
@@ -200,7 +202,7 @@ def _put_link(put: Callable[[int, int, SX], None], link: Link, j: int, first: in
     for name, value in fixed:
         for k, element in enumerate(elements(SX(value))):
             put(ROWS[name] + k, last, element)
-    # what a joint itself needs, the same for all of its velocities
+    # data of the joint, equal for all of its velocities
     each = {name: getattr(link, name) for name in ("Ia", "Fv", "stiffness", "rest", "Fs")}
     each["width"] = link.Fs_width
     if rotor is not None:
@@ -221,12 +223,12 @@ _KINDS = {"turn": Motion.REVOLUTE, "slide": Motion.PRISMATIC}
 
 
 _KIND = {Motion.REVOLUTE: 0, Motion.PRISMATIC: 1, Motion.SPHERICAL: 2, Motion.FREE: 2}
-"""The kind of the first motion about an axis, as tree_core.h counts; the slides of free joints come
-first, and are counted last."""
+"""Code in tree_core.h of the first rotation of a joint. The translations of a free joint are its
+first velocities but have the last codes."""
 
 
 def _lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:
-    """The indices of the nodes of a tree."""
+    """Index lists of the nodes of a tree, by name, as declared in tree_core.h."""
     names = ("before", "link", "end", "first", "last", "kind", "q_at", "v_at", "runs_from", "runs")
     result: dict[str, list[int]] = {name: [] for name in (*names, "joints", "rotor", "rub")}
     first, last = dict[int, int](), {-1: -1}
@@ -268,7 +270,7 @@ def _lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:
 
 
 def _extended(runs: list[int], first: int, end: int) -> list[int]:
-    """Runs of nodes with another one behind them."""
+    """Append the run of nodes [first, end) to a flat list of runs; adjacent runs are merged."""
     if runs and runs[-1] == first:
         return [*runs[:-1], end]
     return [*runs, first, end]

@@ -1,4 +1,4 @@
-"""What makes a call of a model meaningful, as numbers beside their bounds."""
+"""Validity of model inputs: residuals of configurations and parameters, and their bounds."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from mbs.loops.examine import loop_rows
 
 
 def validity(system: System) -> Function:
-    """``validity(q) -> residual, bound``: valid where no residual is larger than its bound.
+    """Validity of positions and parameters: ``validity(q) -> residual, bound``.
 
-    The rows that `validity_rows` names: quaternions of unit length, parameters within their bounds,
-    loops that are closed relative to the size of the mechanism, independent joints that lead the
-    others. A NaN is not valid: ask for ``residual <= bound``. Models check this themselves where
-    they are called with numbers; the Function is for what CasADi makes of them, such as graphs
-    and maps of expressions, and for constraints of an optimisation.
+    Valid if ``residual <= bound`` for each row; NaN is invalid. The rows, named by `validity_rows`,
+    are: unit norm of quaternions, bounds of parameters, loop closure relative to the size of the
+    mechanism, and independent joints that determine the dependent joints. Models called with
+    numbers check this themselves. The Function serves CasADi graphs and maps, and constraints of an
+    optimisation.
 
     Args:
-        system: open or closed.
+        system: open or closed mechanism.
 
     Returns:
-        Function of positions q (nq, 1), and parameters p (np, 1) where there are any; residual and
+        Function of positions q (nq, 1) and, for a system with parameters, p (np, 1); residual and
         bound (k, 1), where k may be zero.
 
     Raises:
-        ModelError: `system` is no System.
+        ModelError: `system` is not a System.
     """
     require_system(system)
 
@@ -48,10 +48,10 @@ def validity(system: System) -> Function:
 
 
 def validity_rows(system: System) -> tuple[str, ...]:
-    """What the rows of `validity` tell, in their order.
+    """Names of the rows of `validity`, in order.
 
     Args:
-        system: open or closed.
+        system: open or closed mechanism.
     """
     require_system(system)
     return tuple(row.name for row in _rows(system, SX.sym("q", system.nq)))

@@ -1,4 +1,4 @@
-"""Functions that take arrays, lists and numbers and give numpy arrays."""
+"""Functions whose calls accept arrays, lists and numbers and return numpy arrays."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from mbs.core import code_address, core_library, work_sizes
 from mbs.errors import ModelError
 from mbs.numbers import doubles
 
-# A builtin that calls a compiled function on numbers, without conversions in Python.
+# Built-in (C) callable that evaluates a compiled function without conversions in Python.
 
 
 ArrayCall: TypeAlias = Callable[..., Any]
-"""Takes arrays, lists and numbers, gives arrays; None for what it does not take."""
+"""Callable from arrays, lists and numbers to arrays; returns None for unsupported arguments."""
 
 _MOST = 64
-"""Inputs, and outputs, of a function that is called so; as in the C code."""
+"""Maximum number of inputs, and of outputs, of such a callable; equal to the limit in C."""
 
 
 class InputCheck(NamedTuple):
-    """What determines whether a function takes its inputs.
+    """Function that checks whether the inputs of a model are valid.
 
     Attributes:
-        builtin: of the function that gives 1 where it does.
-        inputs: the numbers of the inputs that it asks for.
+        builtin: built-in callable of the check; its function returns 1 for valid inputs.
+        inputs: indices of the model inputs that are passed to the check.
     """
 
     builtin: Any
@@ -43,22 +43,22 @@ def array_builtin(
     guard: InputCheck | None = None,
     more: int = 0,
 ) -> ArrayCall | None:
-    """The builtin of a function in a library, in CasADi's calling convention.
+    """Return a built-in callable for a function of a library, in CasADi's calling convention.
 
-    Its inputs are arrays, lists and numbers: arrays of doubles whose columns follow each other in
-    memory are read where they are, others are gathered. Its outputs are new arrays, or those that
-    follow the inputs. It answers None for anything else.
+    Its arguments are arrays, lists and numbers. Arrays of doubles in Fortran order are not copied;
+    other arguments are. Output arrays may be passed after the inputs; otherwise new arrays are
+    returned. It returns None for any other argument.
 
     Args:
-        function: the same function for CasADi.
-        library: holds it.
-        finite: answer None too where an input or a result is not a finite number, or a number
-            other than zero stands for several elements.
-        guard: answer None too where it says so.
-        more: doubles of work space beyond what the library says it needs.
+        function: the same function as a CasADi Function, for the signature.
+        library: path of the library that contains the function.
+        finite: whether to return None also if an input or a result is not finite, or if a nonzero
+            number is passed for an input of several elements.
+        guard: check of the inputs; the callable returns None also if the check fails.
+        more: work space in doubles in addition to the size that the library reports.
 
     Returns:
-        the builtin; None when the function has dozens of inputs or outputs.
+        the built-in callable; None if the function has more inputs or outputs than it supports.
     """
     name, code = function.name(), ctypes.CDLL(str(library))
     *sizes, reals = work_sizes(code, name)
@@ -81,18 +81,21 @@ def array_builtin(
 
 
 def _indices(pattern: Sparsity) -> np.ndarray[Any, np.dtype[np.int64]]:
-    """Where the stored elements of a sparse matrix stand in the dense one, column after column."""
+    """Return the indices of the stored elements of a sparse matrix in the dense matrix.
+
+    Elements are counted column by column.
+    """
     return np.array(pattern.find(), dtype=np.int64)
 
 
 def _shape(pattern: Sparsity) -> tuple[Any, ...]:
-    """Rows, columns, number of stored elements, and their indices if some are not stored."""
+    """Return rows, columns, number of stored elements, and their indices (None if dense)."""
     indices = None if pattern.is_dense() else _indices(pattern)
     return (*pattern.shape, pattern.nnz(), indices)
 
 
 def _arguments_of_empty(pattern: Sparsity) -> tuple[Any, ...]:
-    """What numpy.empty is given: one column is a vector, all else a matrix."""
+    """Return the arguments of numpy.empty: a vector for one column, else a matrix by columns."""
     rows, columns = pattern.shape
     return ((rows,) if columns == 1 else (rows, columns)), np.float64, "F"
 
@@ -103,14 +106,14 @@ def with_array_calls(
     like: Any = None,
     code_of: Callable[[Function], Any] | None = None,
 ) -> Function:
-    """The Function, which answers numbers with arrays from now on.
+    """Change a Function in place so that calls with numbers return numpy arrays.
 
     Args:
-        function: one that nobody else holds.
-        library: has its code; None when it is interpreted.
-        like: the method of a model that gives another Function its checks and defaults.
-        code_of: gives what determines whether a model takes its inputs as a Function of this kind;
-            a model that asks something of its inputs takes no short way without it.
+        function: Function without other references.
+        library: library of its code; None if it is interpreted.
+        like: method of a model that adds the checks and defaults of the model to a Function.
+        code_of: callable that compiles the Function which checks model inputs. Without it, calls
+            of a model with such a check use the slower Python implementation.
     """
     result: Any = function if like is None else like(function)
     result.__class__ = _class_with_arrays(type(result))
@@ -120,7 +123,7 @@ def with_array_calls(
         if valid is None:
             finite = like is not None and not result.may_be_nan
             result._arrays = array_builtin(function, library, finite) or _decline
-        elif code_of is not None:  # without it calls go the model's way, which asks them
+        elif code_of is not None:  # otherwise the model checks its inputs in Python
             result._arrays = _guarded(result, function, library, valid, code_of)
     result._last = None if like is None else default_of_last(function, like.__self__)
     result._inputs = function.n_in()
@@ -135,7 +138,7 @@ def _guarded(
     valid: Function,
     code_of: Callable[[Function], Any],
 ) -> ArrayCall:
-    """The builtin of a model that takes not all numbers, made when it is first called."""
+    """Return a callable for a model with an input check; it is compiled at its first call."""
 
     def first(*args: Any) -> Any:
         builtin = code_of(valid)._arrays
@@ -150,10 +153,10 @@ def _guarded(
 
 
 class ArrayCalls:
-    """Mixed into a class of Functions.
+    """Mixin of a class of Functions for calls on arrays.
 
     A call whose arguments are all arrays, lists or numbers returns a numpy array, or a tuple of
-    them; what has one column is a vector. Any other call is CasADi's.
+    arrays for several outputs. An output with one column is a vector. CasADi handles other calls.
     """
 
     _arrays: ArrayCall
@@ -163,20 +166,20 @@ class ArrayCalls:
     _source: tuple[Callable[[Function], Function], tuple[Function]]
 
     def __call__(self, *args: Any, out: Any = None, **kwargs: Any) -> Any:
-        """Evaluate it on arrays, numbers or symbols.
+        """Evaluate the Function on arrays, numbers or symbols.
 
         Args:
-            *args: the inputs in their order; the parameters of a model may be left out.
-            out: arrays of doubles that take the outputs, one or a tuple; fastest when matrices
-                are in columns (order="F") and share no memory with an input.
-            **kwargs: the inputs by name, as of any Function; the answer is then a dict.
+            *args: inputs in order; the parameters of a model may be omitted.
+            out: array of doubles for the output, or a tuple of arrays for several outputs. Matrices
+                in Fortran order that share no memory with an input are fastest.
+            **kwargs: inputs by name, as for any Function; the result is then a dict.
 
         Returns:
-            `out` if given.
+            the outputs, or `out` if it was passed.
 
         Raises:
-            ModelError: `out` does not fit; of a model, an input has a wrong size, or the result
-                is not a number.
+            ModelError: `out` does not fit. For a model also: an input has the wrong size, or the
+                result is not a number.
         """
         if not kwargs:
             plain = out is None and len(args) == self._inputs
@@ -186,7 +189,7 @@ class ArrayCalls:
         return self._slow(args, kwargs, out)
 
     def _fast(self, args: tuple[Any, ...], out: Any) -> Any:
-        """What the builtin answers; None where it takes the arguments not as they are."""
+        """Return the result of the built-in callable; None if it does not support the arguments."""
         if len(args) != self._inputs:
             if self._last is None or len(args) != self._inputs - 1:
                 return None
@@ -196,7 +199,7 @@ class ArrayCalls:
         return self._arrays(*args, *(out if isinstance(out, tuple) else (out,)))
 
     def _slow(self, args: tuple[Any, ...], kwargs: dict[str, Any], out: Any) -> Any:
-        """CasADi's call: of symbols, of several columns, of what is refused."""
+        """Evaluate by CasADi: symbols, several columns, and arguments that raise an error."""
         if any(_holds(x, np.ma.MaskedArray) for x in args):
             raise ModelError(
                 f"{self.name()}: an input has a mask, which would be passed over; give"  # type: ignore[attr-defined]
@@ -206,10 +209,10 @@ class ArrayCalls:
         if numbers:
             found = [doubles(x) for x in args]
             if not any(isinstance(x, str) for x in found):
-                result = self._fast(tuple(found), out)  # of what numpy knows to convert
+                result = self._fast(tuple(found), out)  # arguments that numpy could convert
                 if result is not None:
                     return result if out is None else out
-                if not self._model:  # a model reads its arguments itself
+                if not self._model:  # a model converts and checks its arguments itself
                     args = tuple(found)
         result = super().__call__(*args, **kwargs)  # type: ignore[misc]
         if out is not None:
@@ -217,20 +220,20 @@ class ArrayCalls:
         return _numpy(result) if numbers else result
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds what it was made of, and is compiled where it is read."""
+        """Pickle the original Function; it is compiled again when the pickle is read."""
         return self._source
 
     def __deepcopy__(self, dummy: Any = None) -> ArrayCalls:
-        """Itself: a Function never changes."""
+        """Return the Function itself, because Functions are immutable."""
         return self
 
 
 _OF_CASADI = (DM, SX, MX)
-"""With one of these among the arguments of a call, CasADi says what it returns."""
+"""CasADi types. If an argument has one of them, CasADi determines the type of the result."""
 
 
 def _holds(value: Any, kinds: type | tuple[type, ...]) -> bool:
-    """Whether an argument, or an item of a list, is of these types."""
+    """Return whether a value, or an item of a list, has one of these types."""
     if isinstance(value, (list, tuple)):
         return any(_holds(item, kinds) for item in value)
     return isinstance(value, kinds)
@@ -240,22 +243,22 @@ _CLASSES: dict[type, type] = {}
 
 
 def _class_with_arrays(base: type) -> type:
-    """The class of Functions with this mixin; one for each base."""
+    """Return the subclass of `base` with this mixin; the same class at every call."""
     body = {"__doc__": base.__doc__, "__module__": base.__module__}
     made = type(base.__name__, (ArrayCalls, base), body)
     return _CLASSES.setdefault(base, made)
 
 
 def _decline(*_: Any) -> None:
-    """The answer of a builtin that takes nothing."""
+    """Return None: placeholder of a built-in callable that supports no arguments."""
 
 
 def default_of_last(function: Function, model: Any) -> np.ndarray[Any, Any] | None:
-    """What a model takes for its last input p when it is left out; None when it must be given.
+    """Return the default of the last input `p` of a model; None if it must be passed.
 
     Args:
-        function: with the inputs of the model.
-        model: knows its defaults, as `ModelFunction` does.
+        function: Function with the inputs of the model.
+        model: model with the method `default_of_p`, such as a `ModelFunction`.
     """
     if function.n_in() == 0 or function.name_in(function.n_in() - 1) != "p":
         return None
@@ -271,7 +274,7 @@ def _numpy(result: Any) -> Any:
 
 
 def _copy(function: Any, result: Any, out: Any) -> Any:
-    """`out` with the result in it."""
+    """Copy the result to the arrays of `out` and return `out`."""
     if isinstance(result, dict):
         result = tuple(result.values())
     results = result if isinstance(result, tuple) else (result,)

@@ -1,4 +1,4 @@
-"""Functions evaluated on many states at once: arrays in, arrays out, several cores."""
+"""Evaluate Functions on many states at once: arrays in, arrays out, on several cores."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from mbs.native.kernel import FAST_FLAGS, processor
 from mbs.numbers import doubles
 from mbs.text import quoted
 
-# Arrays of many states: shapes, where their elements are, and messages about what does not fit.
+# Arrays of many states: shapes, memory layout, and error messages for arrays that do not fit.
 
 
 Array: TypeAlias = np.ndarray[Any, Any]
 
-_DOUBLE = 8  # bytes
-_MOST_PAST = 500  # elements of a row whose lanes fit on any stack
-_LINE = 64  # bytes of a cache line
-_SEARCH = 1000  # steps that looking for common memory may take
+_DOUBLE = 8  # size of a double in bytes
+_MOST_PAST = 500  # elements of a state up to which the SIMD lanes of a row fit on any stack
+_LINE = 64  # size of a cache line in bytes
+_SEARCH = 1000  # maximum work of the overlap check of two arrays (`max_work` of np.shares_memory)
 
 
 class CPort(ctypes.Structure):
-    """An array as `mbs_port` in rows.h."""
+    """Address and strides of an array: struct `mbs_port` of rows.h."""
 
     _fields_ = (
         ("at", ctypes.c_void_p),
@@ -47,33 +47,36 @@ class CPort(ctypes.Structure):
 
 @dataclass(frozen=True, slots=True)
 class ArrayPort:
-    """An input or output of one state: its name and shape, of one or two lengths."""
+    """Name and shape of an input or output for one state; the shape has one or two lengths."""
 
     name: str
     shape: tuple[int, ...]
 
     def __str__(self) -> str:
-        """As in a heading, `q[6]`."""
+        """Return name and shape as text, such as `q[6]`."""
         return f"{self.name}[{'x'.join(map(str, self.shape))}]"
 
     @property
     def size(self) -> int:
-        """Elements of one state."""
+        """Number of elements per state."""
         return math.prod(self.shape)
 
     def is_many(self, array: Array) -> bool:
-        """Whether an array that fits has a row for each state."""
+        """Return whether a fitting array has a row for each state (else all states share it)."""
         return array.ndim > len(self.shape)
 
     def taken(self, value: Any, owner: str) -> Array:
-        """The doubles of an input; only arrays of doubles, evenly spaced, are not copied.
+        """Return an input as an array of doubles.
+
+        Arrays of doubles with constant strides are not copied. All other values are.
 
         Args:
-            value: anything.
-            owner: who takes it, to begin a message.
+            value: any object; an array of numbers is expected, for a single state or for many.
+            owner: name of the batch, for the error message.
 
         Raises:
-            ModelError: it holds no numbers, or not of this shape, or of many; says what to give.
+            ModelError: the value is not numeric or has the wrong shape. The message gives the
+                expected shape.
         """
         array = doubles(value)
         fault = array if isinstance(array, str) else self._fault(array)
@@ -82,14 +85,15 @@ class ArrayPort:
         return array if self._steps(array) else np.array(array, order="C")
 
     def require_out(self, array: Any, owner: str) -> None:
-        """Refuse what cannot take this output, of one state or of many, as it is.
+        """Raise if an array cannot receive this output directly, for one state or for many.
 
         Args:
-            array: anything.
-            owner: who fills it, to begin a message.
+            array: any object.
+            owner: name of the batch, for the error message.
 
         Raises:
-            ModelError: says what to give.
+            ModelError: the object is not an array of float64 with the right shape and constant
+                strides.
         """
         fault = ""
         if not isinstance(array, np.ndarray) or array.dtype != np.float64:
@@ -103,7 +107,7 @@ class ArrayPort:
             raise ModelError(f"{owner}: out for {self.name} {fault}")
 
     def _fault(self, array: Array) -> str:
-        """What is wrong with the shape of an array and what to give; empty where it fits."""
+        """Return an error text about the shape of an array; empty if the shape fits."""
         lengths = len(self.shape)
         if array.shape[-lengths:] == self.shape and array.ndim <= lengths + 1:
             return ""
@@ -114,11 +118,12 @@ class ArrayPort:
         )
 
     def c_port(self, array: Array, past_caches: bool) -> CPort:
-        """Where C finds the array.
+        """Return the address and strides of an array for C.
 
         Args:
-            array: one that fits.
-            past_caches: store it past the caches if that is possible.
+            array: array that fits this port.
+            past_caches: whether to store with non-temporal stores (which bypass the caches), if
+                the layout of the array permits it.
         """
         row, column = self._steps(array) or (0, 0)
         address = array.ctypes.data
@@ -128,7 +133,7 @@ class ArrayPort:
         return CPort(address, row, column, past_caches)
 
     def empty(self, states: int | None) -> Array:
-        """A new array whose rows follow each other; of one state alone when `states` is None."""
+        """Return a new C-ordered array for `states` states; for a single state if None."""
         shape = self.shape if states is None else (states, *self.shape)
         count = math.prod(shape)
         memory = np.empty(count + _LINE // _DOUBLE)
@@ -136,7 +141,7 @@ class ArrayPort:
         return memory[first : first + count].reshape(shape)
 
     def _steps(self, array: Array) -> tuple[int, int] | None:
-        """Doubles from state to state and from element to element; None when they vary."""
+        """Return the strides in doubles between states and between elements; None if they vary."""
         if array.flags.c_contiguous and array.flags.aligned:
             return (self.size if self.is_many(array) else 0), 1
         steps = array.strides
@@ -154,13 +159,13 @@ class ArrayPort:
 
 
 def same_place(one: Array, other: Array) -> bool:
-    """Whether two arrays have each element in the same place."""
+    """Return whether two arrays have the same address, shape and strides."""
     first, second = ((x.ctypes.data, x.shape, x.strides) for x in (one, other))
     return first == second
 
 
 def overlap(one: Array, other: Array) -> bool:
-    """Whether two arrays have some element in one place, as far as that is found out soon."""
+    """Return whether two arrays share memory. False if the check takes too long."""
     try:
         return np.shares_memory(one, other, max_work=_SEARCH)  # type: ignore[arg-type]
     except np.exceptions.TooHardError:
@@ -168,25 +173,28 @@ def overlap(one: Array, other: Array) -> bool:
 
 
 def spread(array: Array) -> bool:
-    """Whether every element has a place of its own, of an array whose strides do not interlace."""
+    """Return whether no stride is zero, so that each element has its own memory."""
     return all(step or length < 2 for length, step in zip(array.shape, array.strides, strict=True))
 
 
-# Several Functions of the same inputs as one, its inputs and outputs dense columns.
+# Several Functions joined into one Function whose inputs and outputs are dense columns.
 
 
 def joined(functions: Sequence[Function]) -> tuple[Function, list[ArrayPort], list[ArrayPort]]:
-    """The Functions as one: inputs of one name are one, equal operations are done once.
+    """Join Functions into one. Inputs with the same name become a single input.
+
+    Operations that several Functions have in common are computed once.
 
     Args:
-        functions: at least one.
+        functions: at least one Function.
 
     Returns:
-        the Function, of scalar operations if all of them are, whose inputs and outputs are columns
-        (matrices row by row), then what these are.
+        the joined Function, the names and shapes of its inputs, and the names and shapes of its
+        outputs. Inputs and outputs of the joined Function are columns (matrices row by row). It
+        consists of scalar operations (SX) if all Functions can be expanded.
 
     Raises:
-        ModelError: inputs of one name differ in shape.
+        ModelError: inputs with the same name have different shapes.
     """
     symbols: dict[str, MX] = {}
     ports: dict[str, ArrayPort] = {}
@@ -215,7 +223,7 @@ def joined(functions: Sequence[Function]) -> tuple[Function, list[ArrayPort], li
 
 
 def _shape(size: tuple[int, int]) -> tuple[int, ...]:
-    """What has one column is a vector."""
+    """Return the shape of a matrix; (n,) if it has one column."""
     return size[:1] if size[1] == 1 else size
 
 
@@ -224,7 +232,10 @@ def _labels(count: int) -> list[str]:
 
 
 def _scalar(function: Function, parts: int) -> Function:
-    """The same of scalar operations, those that parts have in common done once; else as it is."""
+    """Expand a joined Function to scalar operations, with common subexpressions computed once.
+
+    Functions that cannot be expanded are returned unchanged.
+    """
     try:
         scalar = function.expand()
     except RuntimeError:
@@ -237,13 +248,13 @@ def _scalar(function: Function, parts: int) -> Function:
 
 
 _SHARE = 8192
-"""States that a thread takes at a time; a multiple of the lanes of every processor."""
+"""States per work item of a thread; a multiple of the lanes of every processor."""
 
-_PAST_CACHES = 4_000_000  # bytes of outputs from which they are stored past the caches
+_PAST_CACHES = 4_000_000  # bytes of all outputs from which stores bypass the caches
 
 
 class _Code(NamedTuple):
-    """A library, the doubles of work space it needs, and the states it computes at once."""
+    """Loaded library, its work space in doubles, and the number of states per SIMD vector."""
 
     library: ctypes.CDLL
     work: int
@@ -252,14 +263,14 @@ class _Code(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Batch:
-    """Functions of the same states as one call on arrays; made by `batch`.
+    """Functions of the same states, evaluated on arrays of states; created by `batch`.
 
     Attributes:
-        function: all of them in one, its inputs and outputs dense columns (matrices row by row).
-        inputs: names and shapes of one state.
-        outputs: the same, Function after Function.
-        defaults: of inputs that may be left out, their values.
-        note: what kind of code answers.
+        function: joined Function; its inputs and outputs are dense columns (matrices row by row).
+        inputs: names and shapes of the inputs for one state.
+        outputs: names and shapes of the outputs for one state, Function after Function.
+        defaults: values of the inputs that may be omitted, by name.
+        note: description of the evaluation: machine code, or interpretation with the reason.
     """
 
     function: Function
@@ -272,44 +283,44 @@ class Batch:
     _guarded: Function | None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds the Functions, which are compiled where it is read."""
+        """Pickle the Functions only; they are compiled again when the pickle is read."""
         return functools.partial(batch, checked=self._guarded is not None), (self._functions,)
 
     @property
     def lanes(self) -> int:
-        """States computed side by side by one core; 0 when CasADi interprets the Functions."""
+        """Number of states that a core computes at once; 0 if CasADi interprets the code."""
         return self._code.lanes if self._code else 0
 
     def __repr__(self) -> str:
-        """What goes in and out, and what computes it."""
+        """Return names and shapes of inputs and outputs, and the note."""
         ins, outs = (", ".join(map(str, ports)) for ports in (self.inputs, self.outputs))
         return f"Batch({ins}) -> ({outs}): {self.note}"
 
     def __call__(
         self, *args: Array, out: Any = None, threads: int | None = None, **named: Array
     ) -> Any:
-        """Evaluate every state.
+        """Evaluate the Functions at all states.
 
-        An input of n elements is an array (N, n) of N states, of r x c elements (N, r, c); one
-        that is the same for all states is (n,) or (r, c). Rows may follow each other in memory
-        (order "C"), or states (order "F"), or be parts of a larger array: such arrays are not
-        copied. Rows are states, while a model called on arrays takes columns, as CasADi does.
-        States do not depend on each other: neither N nor `threads` changes a bit of a result.
+        An input of n elements is an array (N, n) of N states; an input matrix is an array
+        (N, r, c). An input that is the same for all states is (n,) or (r, c). C order, Fortran
+        order and slices of larger arrays are read without a copy. Each row is a state, whereas a
+        model called on arrays expects a column per state, as CasADi does. States are independent:
+        results are bit-identical for every N and every `threads`.
 
         Args:
-            *args: the inputs in their order: arrays, or nested lists, of real numbers. Arrays of
-                doubles that are evenly spaced are not copied.
-            out: arrays that take the outputs, one or a tuple; an output may take the place of an
-                input of its shape.
-            threads: how many work at once; as many as this process may use when left out.
+            *args: inputs in order: arrays or nested lists of real numbers. Arrays of doubles with
+                constant strides are not copied.
+            out: array for the output, or a tuple of arrays for several outputs. An output array
+                may be the array of an input of the same shape.
+            threads: number of threads. Default: the number of cores of this process.
             **named: inputs by name.
 
         Returns:
-            an array (N, n) or (N, r, c) for each output, a tuple of them for several, or `out`;
-            of one state, (n,) or (r, c), when all inputs are.
+            an array (N, n) or (N, r, c) for each output; a tuple of arrays for several outputs;
+            `out` if it was passed. If all inputs are single states, the shape is (n,) or (r, c).
 
         Raises:
-            ModelError: an array does not fit; says which, and how it should be.
+            ModelError: an array does not fit. The message gives its name and the expected shape.
         """
         values = self.ordered(args, named)
         given = [
@@ -333,14 +344,14 @@ class Batch:
         return self.function.name()
 
     def ordered(self, args: Sequence[Any], named: Mapping[str, Any]) -> list[Any]:
-        """Every input in its order, what is left out by its default.
+        """Return all inputs in order, omitted inputs by their default.
 
         Args:
-            args: inputs in their order.
+            args: inputs in order.
             named: inputs by name.
 
         Raises:
-            ModelError: one is missing, or is not taken.
+            ModelError: an input is missing or unknown.
         """
         names = [port.name for port in self.inputs]
         unknown = [name for name in named if name not in names[len(args) :]]
@@ -354,7 +365,7 @@ class Batch:
         return [values[name] for name in names]
 
     def _states(self, given: Sequence[Array]) -> int | None:
-        """How many there are; None when every input is of one."""
+        """Return the number of states; None if all inputs are single states."""
         rows = [
             (port.name, len(array))
             for port, array in zip(self.inputs, given, strict=True)
@@ -366,7 +377,7 @@ class Batch:
         return rows[0][1] if rows else None
 
     def _results(self, out: Any, states: int | None) -> list[Array]:
-        """The arrays of the outputs, new ones or those given."""
+        """Return the arrays of the outputs: new arrays, or `out` after a check."""
         if out is None:
             return [port.empty(states) for port in self.outputs]
         arrays = list(out) if isinstance(out, (tuple, list)) else [out]
@@ -384,7 +395,7 @@ class Batch:
         return arrays
 
     def _require_apart(self, given: Sequence[Array], results: Sequence[Array]) -> None:
-        """Refuse outputs that would write over inputs that are still to be read."""
+        """Raise if an output shares memory with another array, unless it is exactly that input."""
         for port, result in zip(self.outputs, results, strict=True):
             others = [array for array in results if array is not result]
             inputs = [array for array in given if not same_place(array, result)]
@@ -425,7 +436,7 @@ class Batch:
             thread.join()
 
     def _interpret(self, given: Sequence[Array], results: Sequence[Array], states: int) -> None:
-        """The map of CasADi."""
+        """Evaluate all states by the map of the CasADi Function, without machine code."""
         columns = []
         for x, port in zip(given, self.inputs, strict=True):
             every = x.reshape(-1, port.size) if x.size or port.size else np.zeros((1, 0))
@@ -445,24 +456,24 @@ class Batch:
 
 
 def batch(functions: Function | Iterable[Function], *, checked: bool = True) -> Batch:
-    """Functions of the same states as machine code for many of them: several in vector lanes.
+    """Compile Functions of the same states for many states, several states per SIMD vector.
 
-    Sines, cosines and most elementary functions are computed in lanes too; what lanes do not know
-    goes through libm, lane by lane. Values differ from those of the interpreter by about 1e-15 of
-    the largest element. The library is kept in the cache. Without a compiler, or for what is not
-    made of scalar operations, CasADi interprets a map; `Batch.note` says so.
+    Sines, cosines and most elementary functions are vectorised. Functions without a vector version
+    are computed by libm, one lane at a time. Values differ from interpreted values by about 1e-15
+    of the largest element. The library is cached on disk. Without a C compiler, or if a
+    Function does not consist of scalar operations, CasADi interprets a map; `Batch.note` gives the
+    reason.
 
     Args:
-        functions: one or several, such as an inverse and a direct dynamics model: inputs of one
-            name are one input, and operations that they have in common are done once.
-        checked: of models, rows come out as NaN where an input is not a finite number, also one
-            that has no effect, and where positions or parameters have no sense, such as positions
-            that leave loops open; otherwise, as of any other Function, they are computed as they
-            are.
+        functions: a Function, or several, such as an inverse and a direct dynamics model. Inputs
+            with the same name become a single input. Common operations are computed once.
+        checked: whether the rows of models become NaN if an input is not finite (even one without
+            effect) or if positions or parameters are invalid, such as positions that do not close
+            the loops. Other Functions are evaluated without checks.
 
     Raises:
-        ModelError: one is no Function, or their inputs do not fit together.
-        CompilerError: CC names no compiler, or the compiler refused the code.
+        ModelError: an argument is no Function, or the inputs do not fit together.
+        CompilerError: CC names no compiler, or the compiler rejects the code.
     """
     parts: list[Any] = [functions]
     if isinstance(functions, Iterable) and not isinstance(functions, str):
@@ -481,13 +492,13 @@ def batch(functions: Function | Iterable[Function], *, checked: bool = True) -> 
 
 
 def _valid_functions(models: Sequence[Any]) -> list[Function]:
-    """What determines whether models take a state, each once."""
+    """Return the distinct Functions that check whether the states of models are valid."""
     asked = (model.valid() for model in models)
     return list({hash(valid): valid for valid in asked if valid is not None}.values())
 
 
 def _code(function: Function, finite: bool, valid: int) -> tuple[_Code | None, str]:
-    """The machine code, None where there can be none, and what to say about it."""
+    """Return the machine code, None if there is none, and the note of `Batch`."""
     if not compiler_found():
         return None, "interpreted by CasADi, for there is no C compiler"
     try:
@@ -504,7 +515,7 @@ def _code(function: Function, finite: bool, valid: int) -> tuple[_Code | None, s
 
 
 def _defaults(functions: Sequence[Function]) -> dict[str, Array]:
-    """Values of the parameters of models, when they may be left out."""
+    """Return the default parameter values `p` of a model; empty if they may not be omitted."""
     for function in functions:
         model = function if hasattr(function, "default_of_p") else None
         value = None if model is None else default_of_last(function, model)
@@ -514,7 +525,7 @@ def _defaults(functions: Sequence[Function]) -> dict[str, Array]:
 
 
 def cores() -> int:
-    """Processors that this process may use."""
+    """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

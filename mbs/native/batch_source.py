@@ -1,4 +1,4 @@
-"""C text of a Function of many states: several states at a time in vector lanes."""
+"""C code that evaluates a Function for many states, several states at a time in SIMD lanes."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ _HEAD = f"""\
 #define NOINLINE __attribute__((noinline))
 {EXPORT}EXPORT int mbs_batch_lanes(void) {{ return MBS_LANES; }}
 """
-_INLINE = 16  # angles whose code stands in the function; more are called
-_WIDEST = 8  # lanes for which work space is counted
+_INLINE = 16  # angles up to which the sine and cosine code is inlined; else it is called
+_WIDEST = 8  # number of lanes of the widest processor, for the size of the work space
 
 
 @dataclass(frozen=True, slots=True)
 class BatchSource:
-    """C text.
+    """C code of a batch.
 
     Attributes:
-        files: file name to text, one of which defines `mbs_batch(ports, work, first, last)`.
-        work: doubles of work space that a call of it needs.
+        files: file name to text; one file defines `mbs_batch(ports, work, first, last)`.
+        work: work space of a call of `mbs_batch` in doubles.
     """
 
     files: dict[str, str]
@@ -38,7 +38,7 @@ class BatchSource:
 
 
 class _States(LaneCode):
-    """Blocks whose inputs are vectors one after the other."""
+    """Writer of C functions whose inputs are SIMD vectors, element after element."""
 
     __slots__ = ()
 
@@ -52,18 +52,18 @@ class _States(LaneCode):
 def batch_source(
     function: Function, block: int = BLOCK, finite: bool = False, valid: int = 0
 ) -> BatchSource:
-    """The C files of a Function whose inputs and outputs are dense columns.
+    """Return C files that evaluate a Function, whose inputs and outputs are dense columns.
 
     Args:
-        function: made of scalar operations.
-        block: assignments in one C function.
-        finite: outputs of a state are NaN where one of its inputs is not a finite number, also one
-            that has no effect.
-        valid: the last outputs, so many of them, say whether a state is taken: where one is not 1,
-            the others are NaN. They do not leave the code.
+        function: Function of scalar operations.
+        block: maximum number of assignments in a C function.
+        finite: whether all outputs of a state are NaN if an input of the state is not finite, even
+            an input without effect.
+        valid: number of flags among the outputs; they are the last outputs. If a flag is not 1,
+            the other outputs of the state are NaN. Flags are not written to arrays.
 
     Raises:
-        ModelError: it has no scalar operations, or one that C does not have.
+        ModelError: the Function has no scalar operations, or an operation that C lacks.
     """
     graph = graph_of(function)
     pieces = blocks(graph, with_calls(graph, schedule(graph)), block)
@@ -115,9 +115,9 @@ def batch_source(
 
 
 def _flag(inputs: list[tuple[str, int]], flags: list[str], outputs: list[int]) -> list[str]:
-    """What makes outputs NaN in lanes where an input is not finite, for x * 0 is NaN, or a flag 0.
+    """Return C lines that set outputs to NaN in lanes with a non-finite input or a flag 0.
 
-    A flag is 1 or 0, or NaN where an input is.
+    x * 0 is NaN for an infinite or NaN input x. A flag is 1, 0, or NaN for a NaN input.
     """
     return [
         "    mbs_lanes zero = mbs_all(0.0);",

@@ -1,4 +1,4 @@
-"""C text of a graph: operators, the order of operations, slots, blocks of scalars and lanes."""
+"""Writes C code for operation graphs: operators, order, work array, functions, SIMD lanes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from mbs.operations.graph import Graph, Node
 from mbs.operations.text import CODES, NAMES
 from mbs.text import in_c_comment
 
-# One operation of a graph as a C expression, of numbers and of vectors.
+# A single operation of a graph as a C expression, on scalars and on SIMD vectors.
 
 
 _OF_TWO = ("fmod", "remainder", "copysign", "fmin", "fmax", "atan2", "hypot")
@@ -44,7 +44,7 @@ BINARY: Mapping[int, str] = {
     casadi.OP_CONSTPOW: "pow({}, {})",
     **{CODES[name]: f"{name}({{}}, {{}})" for name in _OF_TWO},
 }
-"""C text of the operations of two numbers, by CasADi's codes."""
+"""C expression templates of the operations with two operands, by CasADi operation code."""
 
 _UNARY: Mapping[int, str] = {
     casadi.OP_ASSIGN: "{0}",
@@ -59,7 +59,7 @@ _UNARY: Mapping[int, str] = {
 
 
 ELEMENTWISE = frozenset((*BINARY, *_UNARY))
-"""CasADi's codes of the operations that C has."""
+"""CasADi operation codes that have a C expression."""
 
 _SIGNS_OF_VECTORS = ("add", "sub", "mul", "div", "assign", "neg", "sq", "twice", "inv")
 _IN_EACH_LANE = ("erf", "asinh", "acosh", "atanh", "log1p")
@@ -70,36 +70,36 @@ VECTORS: Mapping[int, str] = {
     },
     casadi.OP_CONSTPOW: "mbs_pow",
 }
-"""Of every operation on vectors that has no sign in C, the function in elementary.h; sines and
-cosines of one angle are made together."""
+"""C functions of elementary.h for the operations on vectors that have no C operator, by operation
+code. The sine and cosine of one angle are computed together and are not in this table."""
 
 
 def expression(
     graph: Graph, number: int, written: Callable[[Graph, int], str] | None = None
 ) -> str:
-    """The C expression of a node.
+    """Return the C expression of a node.
 
     Args:
-        graph: has it.
-        number: of the node.
-        written: gives the text of an operand; `operand` unless given.
+        graph: operation graph that contains the node.
+        number: index of the node.
+        written: callable (graph, node index) -> C text of an operand. Default: `operand`.
 
     Raises:
-        ModelError: the operation has no equivalent in C's library.
+        ModelError: the operation has no equivalent in the C library.
     """
     write = written or operand
     return form_of(graph, number).format(*(write(graph, n) for n in graph.operands(number)))
 
 
 def form_of(graph: Graph, number: int) -> str:
-    """The C expression of a node with placeholders for its operands, as `str.format` takes it.
+    """Return the C expression of a node, with `str.format` placeholders for its operands.
 
     Args:
-        graph: has it.
-        number: of the node.
+        graph: operation graph that contains the node.
+        number: index of the node.
 
     Raises:
-        ModelError: the operation has no equivalent in C's library.
+        ModelError: the operation has no equivalent in the C library.
     """
     op = graph.nodes[number].op
     form = BINARY.get(op) or _UNARY.get(op)
@@ -111,7 +111,7 @@ def form_of(graph: Graph, number: int) -> str:
 
 
 def operand(graph: Graph, number: int) -> str:
-    """A node as it is written inside an expression: input, constant or name of its value."""
+    """Return the C text of a node as an operand: array element, constant or variable name."""
     node = graph.nodes[number]
     if node.op == casadi.OP_INPUT:
         return f"i{node.args[0]}[{node.args[1]}]"
@@ -119,7 +119,7 @@ def operand(graph: Graph, number: int) -> str:
 
 
 def constant(node: Node) -> str:
-    """A constant that C reads back to the last bit."""
+    """Return the C literal of a constant. C reads exactly the same double."""
     if math.isnan(node.value):
         return "NAN"
     if math.isinf(node.value):
@@ -128,55 +128,57 @@ def constant(node: Node) -> str:
     return f"({text})" if text.startswith("-") else text
 
 
-# The order in which machine code computes a graph: its angles first, then block after block.
+# Order of the operations in C: sines and cosines as early as possible, in blocks.
 
 
 LANES = 8
-"""Angles whose sines and cosines are computed at once."""
+"""Angles whose sines and cosines are computed at once, in one batch."""
 
-_ONE_PIECE = 4000  # operations that compilers digest at once, and better so
-_BATCH_SIZE = 50  # as many operations take a compiler as long
+_ONE_PIECE = 4000  # operations up to which a single C function compiles fast and runs fastest
+_BATCH_SIZE = 50  # operations that take as long to compile as one sine and cosine batch
 
 _FREE = (casadi.OP_INPUT, casadi.OP_CONST)
 
 
 @dataclass(frozen=True, slots=True)
 class SinCosGroup:
-    """Sines and cosines computed at once.
+    """Batch of up to LANES angles whose sines and cosines are computed at once.
 
     Attributes:
-        angles: the nodes they are of, at most LANES.
-        results: for each node that is a sine (lane) or cosine (LANES + lane) of them its place.
+        angles: node indices of the angles, at most LANES.
+        results: pairs of node index and element of the result array. The sine of angle `lane` is
+            element `lane`, the cosine is element LANES + lane.
     """
 
     angles: tuple[int, ...]
     results: tuple[tuple[int, int], ...]
 
     def taken(self) -> tuple[int, ...]:
-        """The nodes that must be known before."""
+        """Return the node indices of the operands."""
         return self.angles
 
     def given(self) -> tuple[int, ...]:
-        """The nodes that are known afterwards."""
+        """Return the node indices of the results."""
         return tuple(number for number, _ in self.results)
 
 
 Step: TypeAlias = int | SinCosGroup
-"""A node to compute by its own operation, or a batch."""
+"""Index of a node that is computed by its own operation, or a sine and cosine batch."""
 
 Item: TypeAlias = Step | Calls
-"""A step, or occurrences of a sequence of steps that recurs."""
+"""Step of the schedule, or consecutive calls of a recurring sequence of steps."""
 
 
 def schedule(graph: Graph, phase: Sequence[int] | None = None) -> list[Step]:
-    """Every step that the outputs need, each after what it needs.
+    """Return all steps that the outputs need, in an executable order.
 
-    Angles made of inputs alone come first, all their sines and cosines at once; angles made of
-    those next, and so on; then all that remains, in the order of the graph.
+    Sines and cosines are grouped into batches. The batches whose angles depend on inputs only are
+    first, then the batches that depend on these results, and so on. The remaining nodes follow in
+    the order of the graph.
 
     Args:
-        graph: what to compute.
-        phase: of each node, as `phases` says; nodes of different phases share no batch.
+        graph: operation graph.
+        phase: phase of each node, from `phases`. Nodes of different phases share no batch.
     """
     phase = phase or [0] * len(graph.nodes)
     pending = graph.live()
@@ -194,17 +196,17 @@ def schedule(graph: Graph, phase: Sequence[int] | None = None) -> list[Step]:
 
 
 def plain_order(graph: Graph) -> list[Step]:
-    """Every node that the outputs need and that is computed, in the order of the graph."""
+    """Return the computed nodes that the outputs need, in the order of the graph."""
     live = graph.live()
     return [k for k, node in enumerate(graph.nodes) if live[k] and node.op not in _FREE]
 
 
 def phases(graph: Graph, late: Mapping[int, int]) -> list[int]:
-    """For each node the phase in which it can be computed.
+    """Return the first phase in which each node can be computed.
 
     Args:
-        graph: has the nodes.
-        late: of inputs that are not known from the beginning, the phase from which they are.
+        graph: operation graph.
+        late: input index to the phase from which the input is known. Other inputs have phase 0.
     """
     phase: list[int] = []
     for number, node in enumerate(graph.nodes):
@@ -216,7 +218,7 @@ def phases(graph: Graph, late: Mapping[int, int]) -> list[int]:
 
 
 def blocks(graph: Graph, steps: Sequence[Item], size: int) -> list[list[Item]]:
-    """Steps in pieces of about `size` operations, or in one if they are few enough for that."""
+    """Split steps into blocks of about `size` operations. Short graphs are one block."""
     leaves = Counter(number for result in graph.results for number in result)
     ends = list(accumulate(_weight(step, leaves) for step in steps))
     total = ends[-1] if ends else 0
@@ -227,7 +229,10 @@ def blocks(graph: Graph, steps: Sequence[Item], size: int) -> list[list[Item]]:
 
 
 def _weight(step: Item, leaves: Mapping[int, int]) -> int:
-    """Lines, or what takes a compiler as long; results of sequences leave by tables."""
+    """Return the number of C lines of a step, or of lines that compile in the same time.
+
+    Outputs that a sequence computes are copied by a table and add nothing.
+    """
     if isinstance(step, Calls):
         return 2
     size = _BATCH_SIZE if isinstance(step, SinCosGroup) else 1
@@ -235,17 +240,17 @@ def _weight(step: Item, leaves: Mapping[int, int]) -> int:
 
 
 def needs(graph: Graph, step: Item) -> tuple[int, ...]:
-    """The nodes that must be known before a step."""
+    """Return the node indices of the operands of a step."""
     return graph.operands(step) if isinstance(step, int) else step.taken()
 
 
 def gives(step: Item) -> tuple[int, ...]:
-    """The nodes that are known after a step."""
+    """Return the node indices that a step computes."""
     return (step,) if isinstance(step, int) else step.given()
 
 
 def _take(numbers: Iterable[int], pending: list[bool]) -> list[int]:
-    """Those of the numbers that are pending, which they are no longer."""
+    """Return the pending nodes of `numbers` and clear their pending flag."""
     taken = [number for number in numbers if pending[number]]
     for number in taken:
         pending[number] = False
@@ -253,7 +258,7 @@ def _take(numbers: Iterable[int], pending: list[bool]) -> list[int]:
 
 
 def _ancestors(graph: Graph, numbers: Iterable[int], pending: Sequence[bool]) -> list[int]:
-    """These nodes and those they are made of, as far as they are not computed yet."""
+    """Return the pending nodes of `numbers` and all their pending operands, sorted."""
     needed: set[int] = set()
     stack = list(numbers)
     while stack:
@@ -265,7 +270,7 @@ def _ancestors(graph: Graph, numbers: Iterable[int], pending: Sequence[bool]) ->
 
 
 def _batches(graph: Graph, alive: Sequence[bool], phase: Sequence[int]) -> list[list[SinCosGroup]]:
-    """The batches, those first that need no others."""
+    """Return the sine and cosine batches, grouped by phase and by depth of nested sines."""
     depth = [0] * len(graph.nodes)
     levels: dict[tuple[int, int], dict[int, list[tuple[int, int]]]] = {}
     for number, node in enumerate(graph.nodes):
@@ -291,28 +296,29 @@ def _split(angles: dict[int, list[tuple[int, int]]]) -> list[SinCosGroup]:
     return result
 
 
-# Where values wait that one block of code computes and later ones need.
+# Work array: values that a block computes and later blocks need.
 
 
 Leaving: TypeAlias = tuple[int, int, int]
-"""An element of an output: number of the output, of the element in it, and of the node."""
+"""Element of an output: index of the output, index of the element in it, index of the node."""
 
 
 @dataclass(frozen=True, slots=True)
 class Slots:
-    """Places in a work array.
+    """Layout of the work array that the blocks of a graph share.
 
     Attributes:
-        of: place of each node that more than one block uses, as the C text of an index.
-        outputs: for each computed node where it leaves: number of the output, of the element in
-            it, and the node.
-        copied: for each block the same of the inputs and constants that it copies.
-        count: length of the array.
+        of: node index to the C text of its index in the work array, for the nodes that are used
+            outside their block.
+        outputs: node index to the output elements that the node is stored to.
+        copied: block index to the output elements that are inputs or constants, copied there.
+        count: length of the work array.
         blocks: number of blocks.
-        inputs: of inputs that recurring sequences take, where they are copied to.
-        tables: of recurring sequences, where they find what they take.
-        last: what recurring sequences computed of the outputs: number of the output, of the element
-            in it, and its place.
+        inputs: input index to the first index of its copy in the work array, for the inputs that
+            recurring sequences read.
+        tables: index tables of the calls of each recurring sequence.
+        last: output elements that recurring sequences compute: index of the output, index of the
+            element in it, index in the work array.
     """
 
     of: Mapping[int, str]
@@ -331,14 +337,16 @@ def slots(
     begins: Mapping[int, int] | None = None,
     elsewhere: Container[int] = (),
 ) -> Slots:
-    """A place for each value that outlives its block, free again after its last use.
+    """Assign a work array index to each value that is used outside its block.
+
+    The index is free again after the last use of the value.
 
     Args:
-        graph: what is computed.
-        blocks: the steps.
-        begins: of inputs that are not known from the beginning, the first block that has them;
-            recurring sequences cannot take those.
-        elsewhere: inputs, as nodes, that reach their outputs without a copy.
+        graph: operation graph.
+        blocks: steps of each block, in order.
+        begins: input index to the first block in which the input is known. Default: block 0.
+            Recurring sequences cannot read such inputs.
+        elsewhere: nodes of inputs that are written to the outputs without a copy.
     """
     home = {n: k for k, steps in enumerate(blocks) for step in steps for n in gives(step)}
     calls = [step for steps in blocks for step in steps if isinstance(step, Calls)]
@@ -370,7 +378,7 @@ def slots(
 
 
 def _input_places(graph: Graph, calls: Sequence[Calls]) -> tuple[dict[int, int], int]:
-    """Where the inputs begin that recurring sequences take, and how long they are together."""
+    """Return the offset of each input that recurring sequences read, and the total length."""
     repeats = {step.repeat for step in calls}
     taken = {n for repeat in repeats for column in repeat.taken for n in column.nodes}
     nodes = (graph.nodes[n] for n in taken)
@@ -382,19 +390,19 @@ def _input_places(graph: Graph, calls: Sequence[Calls]) -> tuple[dict[int, int],
 def _places(
     graph: Graph, blocks: Sequence[Sequence[Item]], home: Mapping[int, int], count: int
 ) -> tuple[dict[int, int], int]:
-    """The place of each node that is not used in its own block alone, and how many there are.
+    """Return the work array index of each node that is used outside its block, and the length.
 
-    What an occurrence of a recurring sequence gives stands side by side. Time goes by from block
-    to block, and at every step that is such occurrences.
+    The results of an occurrence of a recurring sequence are contiguous. Lifetimes are counted in
+    a time that increases from block to block and at each `Calls` step.
 
     Args:
-        graph: what is computed.
-        blocks: the steps.
-        home: of each node its block.
-        count: of the places that are taken already.
+        graph: operation graph.
+        blocks: steps of each block, in order.
+        home: node index to the index of the block that computes it.
+        count: number of work array elements that are already in use.
     """
     results = {n for result in graph.results for n in result}
-    together: dict[int, tuple[int, ...]] = {}  # of each node those that stand side by side
+    together: dict[int, tuple[int, ...]] = {}  # node to all results of its occurrence (contiguous)
     born: dict[int, int] = {}
     last: dict[int, int] = {}
     time = 0
@@ -433,25 +441,25 @@ def _places(
 
 
 def _first(graph: Graph, number: int, begins: Mapping[int, int]) -> int:
-    """The first block that knows an input or constant."""
+    """Return the first block in which an input or constant is known."""
     node = graph.nodes[number]
     return begins.get(node.args[0], 0) if node.op == casadi.OP_INPUT else 0
 
 
-_POINTERS = re.compile(r"\b[io]\d+\b")  # of inputs and outputs
+_POINTERS = re.compile(r"\b[io]\d+\b")  # C names of the pointers to inputs and outputs
 
-_MANY_ZEROS = 4  # in a row, from which they are stored at once
-_MANY_LEFT = 8  # elements of an output, from which a table says where they are
+_MANY_ZEROS = 4  # consecutive zeros of an output from which one memset stores them
+_MANY_LEFT = 8  # output elements from which a loop with an index table copies them
 
 
 @dataclass(frozen=True, slots=True)
 class BlockCode:
-    """The C functions of one graph: its blocks.
+    """Writer of the C functions of a graph on doubles: a function per block.
 
     Attributes:
-        graph: what is computed.
-        where: what its blocks leave for each other.
-        sincos: the C function for a batch of angles.
+        graph: operation graph.
+        where: layout of the work array.
+        sincos: name of the C function that computes a sine and cosine batch.
     """
 
     graph: Graph
@@ -463,7 +471,7 @@ class BlockCode:
     zero: ClassVar[str] = "0.0"
 
     def block(self, name: str, number: int, steps: Sequence[Item]) -> str:
-        """A C function: loads what earlier ones left, computes, stores what later ones need."""
+        """Return the C function of a block: load from the work array, compute, store."""
         lines = self._body(number, steps)
         used = set(_POINTERS.findall("\n".join(lines)))
         inputs = (k for k in range(len(self.graph.inputs)) if f"i{k}" in used)
@@ -479,11 +487,11 @@ class BlockCode:
         return "\n".join([*head, *lines, "}"])
 
     def repeats(self) -> list[str]:
-        """The functions of the sequences that recur, and their tables."""
+        """Return the C functions of the recurring sequences, with their tables."""
         return [self._repeat(*item) for item in self.where.tables.items()]
 
     def _repeat(self, repeat: Repeat, table: CallTable) -> str:
-        """The C function of a sequence, and its tables."""
+        """Return the C function of a recurring sequence, with its tables."""
         index, name = _index(self.where.count), self._repeat_name(repeat)
         columns = (taken.nodes for taken in repeat.constants)
         constants = (map(self.number, row) for row in zip(*columns, strict=True))
@@ -509,7 +517,7 @@ class BlockCode:
         return f"{self.graph.name}_repeat{list(self.where.tables).index(repeat)}"
 
     def _ends(self, repeat: Repeat) -> str:
-        """In words, the inputs and outputs whose elements a sequence takes and gives."""
+        """Return comment text that names the inputs and outputs that a sequence accesses."""
         taken = {n for column in repeat.taken for n in column.nodes}
         given = {n for column in repeat.given for n in column.nodes}
         nodes = (self.graph.nodes[n] for n in taken)
@@ -521,7 +529,7 @@ class BlockCode:
         return "".join(f"; {verb} {in_c_comment(names)}" for verb, names in words.items() if names)
 
     def _calls(self, step: Calls) -> str:
-        """Occurrences of a sequence that follow each other."""
+        """Return the C line that calls consecutive occurrences of a sequence, in a loop."""
         name, table = self._repeat_name(step.repeat), self.where.tables[step.repeat]
         loop = f"for (int k = {step.first}; k < {step.first + step.count}; ++k) "
         index = "k" if step.count > 1 else str(step.first)
@@ -530,7 +538,7 @@ class BlockCode:
         return f"  {loop if step.count > 1 else ''}{name}({', '.join(rows)}, w);"
 
     def _inputs(self) -> list[str]:
-        """Copies the inputs that sequences take to the work array."""
+        """Return C lines that copy the inputs of recurring sequences to the work array."""
         sizes = {k: self.graph.inputs[k].sparsity.nnz() for k in self.where.inputs}
         return [
             f"  memcpy(w + {place}, i{k}, {sizes[k]} * sizeof({self.kind}));"
@@ -538,7 +546,7 @@ class BlockCode:
         ]
 
     def _last(self) -> list[str]:
-        """Gives the elements of outputs that sequences computed."""
+        """Return C lines that store the output elements that recurring sequences computed."""
         lines: list[str] = []
         for k, leaving in groupby(self.where.last, lambda leaving: leaving[0]):
             pairs = [row[1:] for row in leaving]
@@ -553,11 +561,11 @@ class BlockCode:
         return lines
 
     def of(self, graph: Graph, where: Slots) -> Self:
-        """The same code of another graph, without inputs of its own but constants."""
+        """Return the writer of another graph whose only input is a table of constants."""
         return replace(self, graph=graph, where=where)
 
     def number(self, number: int) -> str:
-        """A constant as a table has it."""
+        """Return the C text of a constant in a table."""
         return operand(self.graph, number)
 
     def _body(self, number: int, steps: Sequence[Item]) -> list[str]:
@@ -584,15 +592,15 @@ class BlockCode:
         return [f"  const {self.kind} t{n} = w[{of[n]}];" for n in needed]
 
     def input(self, number: int) -> str:
-        """The declaration of an input."""
+        """Return the C declaration of the pointer to an input."""
         return f"const {self.scalar} *restrict i{number} = in[{number}]"
 
     def stored(self, number: int) -> str:
-        """A node as an output takes it."""
+        """Return the C text of a node that is stored to an output."""
         return operand(self.graph, number)
 
     def values(self, step: Step) -> list[str]:
-        """Lines that declare what a step gives."""
+        """Return C lines that declare the results of a step."""
         if not isinstance(step, SinCosGroup):
             return [f"  const double t{step} = {expression(self.graph, step)};"]
         angles = [operand(self.graph, n) for n in step.angles]
@@ -605,7 +613,7 @@ class BlockCode:
         ]
 
     def _stores(self, leaving: Sequence[Leaving]) -> list[str]:
-        """The elements of outputs that are known now."""
+        """Return C lines that store output elements. Runs of zeros are stored by memset."""
         rows = [(k, element, self.stored(node)) for k, element, node in leaving]
         lines: list[str] = []
         for (k, text), elements in groupby(rows, lambda row: (row[0], row[2])):
@@ -621,19 +629,19 @@ class BlockCode:
 
 
 def _index(largest: int) -> str:
-    """The C type of indices; the short one halves tables."""
+    """Return the C type of an index table; unsigned short halves its size."""
     return "unsigned short" if largest < 1 << 16 else "int"
 
 
 def _table(kind: str, name: str, rows: Iterable[Iterable[str]]) -> list[str]:
-    """Lines that declare a table; none for one without values."""
+    """Return C lines that declare a table. Empty if the table has no values."""
     lines = [f"  {', '.join(row)}," for row in rows]
     declared = f"static const {kind} {name}[] = {{"
     return [declared, *lines, "};"] if any(line.strip(" ,") for line in lines) else []
 
 
 def _runs(indices: Sequence[int]) -> list[tuple[int, int]]:
-    """First and last of each run of consecutive numbers."""
+    """Return the first and last number of each run of consecutive numbers."""
     runs: list[tuple[int, int]] = []
     for index in indices:
         if runs and index == runs[-1][1] + 1:
@@ -643,15 +651,15 @@ def _runs(indices: Sequence[int]) -> list[tuple[int, int]]:
     return runs
 
 
-# Blocks of a graph as C functions that compute several columns at once, one in each lane.
+# C functions of a graph that compute several columns of a map at once, one in each SIMD lane.
 
 
 @dataclass(frozen=True, slots=True)
 class LaneCode(BlockCode):
-    """The C functions of one graph, its values vectors.
+    """Writer of the C functions of a graph on SIMD vectors: a column of a map per lane.
 
     Attributes:
-        shared: for each input, whether all columns have the same.
+        shared: whether an input has the same value for all columns, for each input.
     """
 
     shared: Sequence[bool]
@@ -713,17 +721,18 @@ class LaneCode(BlockCode):
         return operand(graph, number)
 
 
-# Where the C code of a Function has its inputs, outputs and work space.
+# Memory of the C code of a whole Function: inputs, outputs and work space.
 
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """The work space: slots, what callers do not need, then what maps take and give.
+    """Work space of a Function: work array of its blocks, discarded outputs, buffers of maps.
 
     Attributes:
-        function: the whole Function.
-        graph: the scalar operations of it; it has more inputs and outputs where there are maps.
-        slots: doubles that its blocks leave for each other.
+        function: whole Function.
+        graph: scalar operations of the Function. If it contains maps, the graph has additional
+            outputs (arguments of the maps) and additional inputs (results of the maps).
+        slots: length of the work array of the blocks, in doubles.
     """
 
     function: Function
@@ -732,18 +741,19 @@ class Memory:
 
     @property
     def size(self) -> int:
-        """Doubles in all."""
+        """Return the total length of the work space in doubles."""
         return self.slots + self._lost + (self._starts[-1] + LANES if self._sizes else 0)
 
     def buffer(self, number: int) -> int:
-        """The number in `out` of an input of the graph that a map gives."""
+        """Return the index in `out` of the buffer of a graph input that a map computes."""
         return len(self.graph.outputs) + number - self.function.n_in()
 
     def pointers(self) -> list[str]:
-        """Lines that declare `in` and `out`.
+        """Return C lines that declare the pointer arrays `in` and `out`.
 
-        What a caller left out is replaced: inputs are zero, outputs are lost. `out` has the
-        outputs of the graph, then those of the maps, which are also the last of `in`.
+        An omitted input is replaced by zeros. An omitted output is written to a discarded part of
+        the work space. `out` contains the outputs of the Function, the arguments of the maps and
+        the results of the maps. The results of the maps are also the last elements of `in`.
         """
         n_in, n_out = self.function.n_in(), self.function.n_out()
         most = max((port.sparsity.nnz() for port in self.graph.inputs[:n_in]), default=0)
@@ -766,7 +776,7 @@ class Memory:
 
     @property
     def _sizes(self) -> list[int]:
-        """Of what maps take, then of what they give."""
+        """Return the lengths of the arguments of the maps, then of their results."""
         taken = self.graph.outputs[self.function.n_out() :]
         given = self.graph.inputs[self.function.n_in() :]
         return [port.sparsity.nnz() for port in (*taken, *given)]

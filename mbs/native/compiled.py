@@ -1,4 +1,4 @@
-"""A Function as machine code: equal to the interpreted one to the last bit, or faster."""
+"""Compile a Function to machine code that is bit-identical to the interpreter, or faster."""
 
 import contextlib
 import ctypes
@@ -35,43 +35,43 @@ from mbs.text import in_c_comment, quoted
 def compiled(
     function: casadi.Function, *, derivatives: int = 1, fast: bool = False, loops: bool = True
 ) -> casadi.Function:
-    """The same Function backed by a cached shared library.
+    """Compile a Function to a shared library, which is cached on disk.
 
-    A call whose arguments are arrays, lists or numbers returns numpy arrays, what has one column
-    as a vector, in about a microsecond, whatever the arrays hold and however they lie in memory;
-    doubles whose columns follow each other are not even copied. `out=` takes arrays for the
-    outputs. A call with symbols, a DM or several columns is as before.
+    A call whose arguments are arrays, lists or numbers takes about a microsecond and returns numpy
+    arrays; an output with one column is returned as a vector. Arrays may have any numeric type and
+    memory layout; doubles in Fortran order are not copied. `out=` passes arrays for the outputs. A
+    call with symbols, a DM or several columns is evaluated as by the given Function.
 
-    Without a compiler, or when the Function holds a node that CasADi cannot write as C or calls
-    an external function, the given Function stays interpreted: the answers are the same, only
-    slower.
+    The Function stays interpreted, with the same values, if there is no compiler, if it contains a
+    node that CasADi cannot write as C, or if it calls an external function.
 
-    CasADi's own C text of a Function that calls the result lacks this code, and ends the process
-    that loads it unless it is linked with `link_flags`. For other computers, generate C of
-    Functions that call the given Function instead.
+    C code that CasADi generates for a Function that calls the result does not contain this code.
+    It must be linked with `link_flags`; otherwise the process that loads it ends. To generate C
+    code for other computers, use Functions that call the given Function instead.
 
     Args:
         function: any Function without free symbols.
-        derivatives: how often the answer can be differentiated: 0, 1 (Jacobians, forward and
-            reverse products) or 2 (Hessians too, for about five times the code), which IPOPT
-            needs unless it approximates them. Their code is made when they are first asked for,
-            in whatever process, and kept. Beyond it CasADi refuses to differentiate:
-            "Derivatives cannot be calculated for adj1_..", the name of the Function after it.
-        fast: code for the processor of this computer, with fused multiplications and all sines
-            and cosines in vector lanes: two to three times faster, equal to the interpreted
-            Function to about 1e-15 of the largest element instead of the last bit. A map
+        derivatives: number of times that the result can be differentiated: 0, 1 (Jacobians,
+            forward and reverse products) or 2 (also Hessians, about five times the code), which
+            IPOPT needs unless it approximates Hessians. Derivative code is compiled at its first
+            use, in any process, and cached. For higher orders CasADi raises "Derivatives cannot be
+            calculated for adj1_..", followed by the name of the Function.
+        fast: whether to generate code for the processor of this computer, with fused
+            multiply-add and vectorised sines and cosines. It is two to three times faster and
+            differs from the interpreter by about 1e-15 of the largest element. A map
             (`Function.map`) is computed for several columns at once.
-        loops: of `fast` code, whether models of big open trees, and their Jacobians, may be
-            computed by loops over the links where that is faster (`mbs.models.tree_core`); False
-            for equations written out in any case.
+        loops: whether `fast` code of models of large open trees, and of their Jacobians, may
+            loop over the links if that is faster (`mbs.models.tree_core`). False: the equations
+            are always written out.
 
     Returns:
-        a Function with the same name, inputs, outputs and default inputs; of a model, with its
-        checks and its parameter defaults too.
+        a Function with the same name, inputs, outputs and default inputs. Models keep their
+        checks and parameter defaults.
 
     Raises:
-        ModelError: it is no Function, it has free symbols, or `derivatives` is not 0, 1 or 2.
-        CompilerError: CC names no compiler, or the compiler refused the code.
+        ModelError: the argument is no Function or has free symbols, or `derivatives` is not 0, 1
+            or 2.
+        CompilerError: CC names no compiler, or the compiler rejects the code.
     """
     require_function(function)
     _check_order(derivatives)
@@ -99,13 +99,13 @@ def compiled(
 def _library(
     function: casadi.Function, derivatives: int, fast: bool, loops: LoopCode | None
 ) -> Path | None:
-    """The library of a Function and its derivatives; None when they cannot be written as C.
+    """Return the library of a Function and its derivatives; None if C cannot express it.
 
     Args:
-        function: is written as straight lines.
-        derivatives: how often it can be differentiated.
-        fast: of which kind the code is.
-        loops: what its Jacobian is made of; None for straight lines.
+        function: Function that is written as straight-line code.
+        derivatives: number of times that the result can be differentiated.
+        fast: True for vectorised code with fused multiply-add, False for bit-identical code.
+        loops: code that loops over the links for its Jacobian; None for straight-line code.
     """
     if calls_machine_code([function]):
         return None
@@ -118,22 +118,22 @@ def _library(
     if loops is not None and loops.by_parameters:
         every.append(by_parameters(function.name()))
     record = write_record(key, text, every, fast, loops) if derivatives else None
-    if derivatives and record is None:  # nothing can be kept on disk: all at once
+    if derivatives and record is None:  # the cache is not writable: compile all derivatives now
         return _built(function, derivatives, fast)
     later = {} if record is None else {"derivatives.c": source(every, record)}
     return indexed_library(key, lambda: _compiled([function], fast, later))
 
 
 def _looped_library(function: casadi.Function, derivatives: int, code: LoopCode) -> Path | None:
-    """The library of a model that loops over its links; None where its record cannot be kept.
+    """Return the library of a model that loops over its links; None if the cache is unusable.
 
-    Derivatives that the loops do not have are straight lines, made on demand.
+    Derivatives without a loop version are straight-line code that is compiled at its first use.
     """
     name = function.name()
     every = derivatives_of(name, derivatives) if derivatives else []
     if code.jacobian:
         of_lines = {f"jac_{name}"}
-        if derivatives == 1:  # CasADi makes products of the Jacobian
+        if derivatives == 1:  # CasADi forms directional derivatives from the Jacobian
             of_lines |= {f"fwd1_{name}", f"adj1_{name}"}
         every = [part for part in every if part.name not in of_lines]
         every += [by_parameters(name)] if code.by_parameters else []
@@ -147,14 +147,14 @@ def _looped_library(function: casadi.Function, derivatives: int, code: LoopCode)
 
 
 def _digest(code: LoopCode | None) -> str:
-    """What distinguishes C text from other text of the same model, such as of another version."""
+    """Return a hash of loop code for the cache key, such as of different versions; else ""."""
     if code is None:
         return ""
     return f", {hashlib.sha256(repr(sorted(code.files.items())).encode()).hexdigest()}"
 
 
 def _built(function: casadi.Function, derivatives: int, fast: bool) -> Path | None:
-    """The library of a Function and its derivatives, all of them made at once."""
+    """Return the library of a Function with all its derivatives, compiled immediately."""
     every = [function, *_all_derivatives(function, derivatives)]
     known = _products(function) if derivatives == 2 else []
     return _compiled(every, fast, {"patterns.c": patterns_source(known)} if known else {})
@@ -165,12 +165,12 @@ def _compiled(
     fast: bool,
     further: Mapping[str, str],
 ) -> Path | None:
-    """The library of Functions.
+    """Compile Functions into a library; None if C cannot express them.
 
     Args:
-        functions: what to compile.
-        fast: code for this processor, where there is any.
-        further: C files that belong to it.
+        functions: Functions to compile.
+        fast: whether to generate fast code, if all Functions permit it.
+        further: additional C files of the library: file name to text.
     """
     library = kernel_library(functions, further) if fast else None
     if library is not None:
@@ -182,9 +182,10 @@ def _compiled(
 
 
 def _exact(functions: Sequence[casadi.Function]) -> str:
-    """C text that gives the bits of the interpreted Functions.
+    """Return C code whose values are bit-identical to the interpreted Functions.
 
-    CasADi's own is one C function, for which compilers take more than proportional time.
+    Long Functions are split, because CasADi writes a single C function, whose compile time grows
+    more than proportionally.
     """
     scalar = all(function.is_a("SXFunction") for function in functions)
     if scalar and any(function.n_instructions() >= LEAST for function in functions):
@@ -194,12 +195,12 @@ def _exact(functions: Sequence[casadi.Function]) -> str:
 
 
 class MachineCode(NamedTuple):
-    """Where C finds the fast code of a Function, in CasADi's calling convention.
+    """Fast code of a Function in memory, in CasADi's calling convention.
 
     Attributes:
-        library: that holds it; as long as it lives the addresses hold.
-        evaluate, checkout, release: addresses, 0 for what it does without.
-        work: pointers to arguments and results, integers and doubles that it works with.
+        library: loaded library. The addresses are valid while it is referenced.
+        evaluate, checkout, release: addresses of the C functions; 0 if a function does not exist.
+        work: sizes of the work arrays: argument pointers, result pointers, integers, doubles.
     """
 
     library: ctypes.CDLL
@@ -210,14 +211,14 @@ class MachineCode(NamedTuple):
 
 
 def machine_code(function: casadi.Function) -> MachineCode | None:
-    """The fast code of a Function for other C code to call; None where there is none.
+    """Return the fast code of a Function for use by other C code; None if there is none.
 
     Args:
         function: any Function without free symbols.
 
     Raises:
-        ModelError: it is no Function, or it has free symbols.
-        CompilerError: CC names no compiler, or the compiler refused the code.
+        ModelError: the argument is no Function or has free symbols.
+        CompilerError: CC names no compiler, or the compiler rejects the code.
     """
     require_function(function)
     path = _library(function, 0, True, None) if compiler_found() else None
@@ -233,16 +234,16 @@ def machine_code(function: casadi.Function) -> MachineCode | None:
 
 
 def fetch_derivatives(record: str, number: int, table: int) -> None:
-    """Make a derivative of a compiled Function; called by its library when it is asked for it.
+    """Compile a derivative of a compiled Function; the library calls this at the first use.
 
     Args:
-        record: path of the file that holds the Function.
-        number: which of its derivatives.
-        table: address of where the addresses of their code go.
+        record: path of the file that contains the serialised Function.
+        number: index of the derivative.
+        table: address of the table that receives the addresses of the derivative code.
 
     Raises:
-        CompilerError: the file has gone, or the compiler refused the code.
-        ModelError: it cannot be written as C.
+        CompilerError: the file was deleted, or the compiler rejects the code.
+        ModelError: the derivative cannot be written as C.
     """
     given, every, fast, loops = read_record(Path(record))
     part = every[number]
@@ -256,7 +257,7 @@ def fetch_derivatives(record: str, number: int, table: int) -> None:
         if not part.pattern:
             return _compiled([part.of(function)], fast, {})
         inner = Derivative(part.name.removeprefix("jac_")).of(function)
-        # of what is compiled, to the element; of second derivatives no code is compiled
+        # the exact pattern of a compiled Jacobian; second derivatives are not compiled for it
         known = inner is function
         text = pattern_source(inner.jacobian()) if known else patterns_source([inner])
         return cached_library({"patterns.c": text})
@@ -273,18 +274,19 @@ def fetch_derivatives(record: str, number: int, table: int) -> None:
 
 
 def c_source(function: casadi.Function, *, derivatives: int = 0) -> str:
-    """C text of a Function, with the derivative functions that an external Function looks for.
+    """Return C code of a Function, with the derivatives that CasADi's `external` looks up.
 
     Args:
         function: any Function without free symbols.
-        derivatives: 0; 1 to add `jac_`, `fwd1_` and `adj1_` of it; 2 to add `fwd1_` and `adj1_`
-            of these two, from which CasADi makes Hessians, some directions at a time.
+        derivatives: 0 for the value only. 1 adds `jac_`, `fwd1_` and `adj1_` of the Function. 2
+            also adds `fwd1_` and `adj1_` of the latter two, from which CasADi forms Hessians
+            direction by direction.
 
     Returns:
-        one C file.
+        text of a C file.
 
     Raises:
-        ModelError: it is no Function, or it has free symbols.
+        ModelError: the argument is no Function or has free symbols.
     """
     require_function(function)
     _check_order(derivatives)
@@ -292,16 +294,18 @@ def c_source(function: casadi.Function, *, derivatives: int = 0) -> str:
 
 
 def generated(functions: Iterable[casadi.Function], name: str = "generated", **options: Any) -> str:
-    """C text of Functions with different names, and of all that they call; see `unwritten`.
+    """Return C code of Functions with different names, and of all Functions that they call.
+
+    The text may contain `#error` lines; see `unwritten`.
 
     Args:
-        functions: what to write.
-        name: what the names of functions that CasADi adds begin with.
-        options: of `casadi.CodeGenerator`.
+        functions: Functions to write.
+        name: prefix of the names of functions that CasADi adds.
+        options: options of `casadi.CodeGenerator`.
 
     Raises:
-        ModelError: an input or output is called by what would end a comment or a string of C, or
-            a Function calls machine code.
+        ModelError: the name of an input or output would end a C comment or string, or a Function
+            calls machine code.
     """
     generator, every = casadi.CodeGenerator(name, options), list(functions)
     for function in every:
@@ -312,10 +316,10 @@ def generated(functions: Iterable[casadi.Function], name: str = "generated", **o
 
 
 def require_names(function: casadi.Function) -> None:
-    """Refuse names of inputs and outputs that comments and strings of C cannot hold as they are.
+    """Raise if the name of an input or output cannot be part of C comments and strings.
 
     Raises:
-        ModelError: says which.
+        ModelError: the message gives the Function and the name.
     """
     for part in (function, *function.find_functions()):
         for name in (*part.name_in(), *part.name_out()):
@@ -327,7 +331,7 @@ def require_names(function: casadi.Function) -> None:
 
 
 def calls_machine_code(functions: Iterable[casadi.Function]) -> bool:
-    """Whether one of these calls an external function, which C text of it does not contain.
+    """Return whether a Function calls an external function, which its C code cannot contain.
 
     Args:
         functions: any Functions.
@@ -336,7 +340,7 @@ def calls_machine_code(functions: Iterable[casadi.Function]) -> bool:
 
 
 def _machine_code_in(function: casadi.Function) -> list[str]:
-    """Names of the external functions that a Function calls."""
+    """Return the names of the external functions that a Function calls."""
     return [
         part.name()
         for part in function.find_functions()
@@ -346,15 +350,15 @@ def _machine_code_in(function: casadi.Function) -> list[str]:
 
 _libraries: dict[str, set[Path]] = {}
 """Libraries of the Functions that `compiled` returned in this process, by name of the Function.
-Users may link other external functions themselves."""
+Other external functions are linked by the user."""
 _DERIVED = re.compile(r"^((jac|fwd\d+|adj\d+)_)*")
 """Prefixes of the names of derivatives."""
 
 
 def _require_equations(function: casadi.Function) -> None:
-    """Raise ModelError if a Function calls one that `compiled` returned.
+    """Raise ModelError if a Function calls a compiled Function.
 
-    C text would refer to symbols of a library that nothing loads, which ends the process.
+    C code would refer to symbols of a library that is not loaded, which ends the process.
     """
     names = [name for name in _machine_code_in(function) if _base(name) in _libraries]
     if names:
@@ -366,7 +370,7 @@ def _require_equations(function: casadi.Function) -> None:
 
 
 def _base(name: str) -> str:
-    """Name of the Function in the name of a derivative, such as idm in adj1_idm."""
+    """Return the name of the Function in the name of its derivative, such as idm in adj1_idm."""
     return _DERIVED.sub("", name)
 
 
@@ -408,7 +412,7 @@ def link_flags(*functions: casadi.Function) -> list[str]:
 
 
 def unwritten(source: str) -> str:
-    """What CasADi could not write of generated C, as the end of a message; empty when nothing."""
+    """Return the end of an error message if generated C has unsupported nodes; else empty."""
     if "#error" not in source:
         return ""
     reason = source[source.index("#error") + 6 :].splitlines()[0].strip()
@@ -419,10 +423,10 @@ def unwritten(source: str) -> str:
 
 
 def require_function(function: object) -> None:
-    """Refuse what is not a Function of numbers, or has no equations to write.
+    """Raise if an object is not a Function with equations and without free symbols.
 
     Raises:
-        ModelError: says what to give.
+        ModelError: the message gives the expected argument.
     """
     if not isinstance(function, casadi.Function) or function.is_null():
         what = "an empty Function" if isinstance(function, casadi.Function) else quoted(function)
@@ -453,5 +457,5 @@ def _all_derivatives(function: casadi.Function, order: int) -> list[casadi.Funct
 
 
 def _products(function: casadi.Function) -> list[casadi.Function]:
-    """The derivative along one direction, forward and reverse."""
+    """Return the directional derivatives of a Function, forward and reverse."""
     return [function.forward(1), function.reverse(1)]

@@ -1,4 +1,4 @@
-"""The C compiler: which one there is, libraries for here and elsewhere, and their cache."""
+"""C compiler: selection, shared libraries for this and other computers, and their cache."""
 
 import atexit
 import contextlib
@@ -28,16 +28,16 @@ from mbs.errors import CompilerError
 from mbs.text import did_you_mean, install_command, quoted
 
 FLAGS = ("-O2", "-ffp-contract=off", "-fPIC", "-shared")
-"""Contraction is off so that compiled code gives the very bits of the interpreted Function."""
+"""Default flags. Contraction is off so that values are bit-identical to the interpreter."""
 
-_LEVELS = ((20_000, "-O2"), (200_000, "-O1"))  # beyond, compilers need minutes or give up
+_LEVELS = ((20_000, "-O2"), (200_000, "-O1"))  # lines; longer code takes minutes or fails
 
 LIBRARY_SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 _ZIG = (
     *ZIG,
     "-g0",  # debug data contain names of temporary folders, which differ in each build
-    # at -O0, zig adds checks of undefined behaviour, with which values differ in the last bits
+    # at -O0, zig adds checks of undefined behaviour, which change the last bits of values
     "-fno-sanitize=all",
     "-Wno-unused-command-line-argument",
 )
@@ -45,11 +45,11 @@ _ZIG = (
 
 @dataclass(frozen=True, slots=True)
 class Compiler:
-    """A C compiler.
+    """C compiler.
 
     Attributes:
-        command: the words that start it.
-        version: what it says it is; two compilers that differ here may give different code.
+        command: program and arguments that start the compiler.
+        version: output of `--version`. Different versions may produce different code.
     """
 
     command: tuple[str, ...]
@@ -57,22 +57,22 @@ class Compiler:
 
 
 def find_compiler() -> Compiler:
-    """The compiler that CC names, else cc, gcc or clang, else the one inside ziglang.
+    """Return the compiler that CC names, else cc, gcc or clang, else ziglang.
 
     Returns:
-        the first of them that starts.
+        the first of these compilers that starts.
 
     Raises:
-        CompilerError: none is installed, or the one that CC names does not start.
+        CompilerError: no compiler is installed, or the compiler that CC names does not start.
     """
     return _find(os.environ.get("CC", ""), os.environ.get("PATH", ""))
 
 
 def compiler_found() -> bool:
-    """Whether this computer has a C compiler.
+    """Return whether this computer has a C compiler.
 
     Returns:
-        False when CC is not set and none is installed.
+        False if CC is not set and no compiler is installed.
 
     Raises:
         CompilerError: the compiler that CC names does not start.
@@ -111,7 +111,7 @@ def _find(chosen: str, path: str) -> Compiler:
 def _words(command: str) -> tuple[str, ...]:
     try:
         return tuple(shlex.split(command, posix=os.name != "nt"))
-    except ValueError:  # a quote is open
+    except ValueError:  # unbalanced quotes
         return (command,)
 
 
@@ -130,13 +130,13 @@ def _probe(command: tuple[str, ...], path: str) -> Compiler | None:
 
 
 def flags_for(source: str) -> tuple[str, ...]:
-    """The flags for generated code: the longer it is, the less a compiler can afford.
+    """Return flags for generated code; longer code is compiled with less optimization.
 
     Args:
         source: text of the longest C file.
 
     Returns:
-        FLAGS with another level of optimization; the numbers that the code gives are the same.
+        FLAGS with a different optimization level. The level does not change computed values.
     """
     lines = source.count("\n")
     level = next((name for limit, name in _LEVELS if lines <= limit), "-O0")
@@ -144,14 +144,14 @@ def flags_for(source: str) -> tuple[str, ...]:
 
 
 def chosen_flags(flags: Sequence[str]) -> tuple[str, ...]:
-    """Return flags with the level of optimization and the architecture that the user chose.
+    """Return flags with the optimization level and the architecture that the user chose.
 
-    MBS_OPTIMIZE names the level. The numbers that code without contraction gives are the same at
-    every level. MBS_ARCHITECTURE names the architecture, such as x86-64-v3. Fast code is compiled
-    for the processor of this computer without it.
+    Environment variable MBS_OPTIMIZE sets the level. Code without contraction computes the same
+    values at every level. MBS_ARCHITECTURE sets the architecture, such as x86-64-v3. If it is
+    unset, fast code is compiled for the processor of this computer.
 
     Raises:
-        CompilerError: MBS_OPTIMIZE is no level, or MBS_ARCHITECTURE is no name.
+        CompilerError: MBS_OPTIMIZE is no level, or MBS_ARCHITECTURE contains invalid characters.
     """
     level = os.environ.get("MBS_OPTIMIZE", "").strip()
     if level not in ("", "0", "1", "2", "3"):
@@ -182,20 +182,20 @@ def compile_library(
     *,
     compiler: Compiler | None = None,
 ) -> Path:
-    """Compile C files into one shared library that brings its own libm reference.
+    """Compile C files into a shared library that is linked with libm.
 
     Args:
         sources: C files.
-        include_dirs: folders searched for headers.
-        flags: every flag, including those that make the library shared.
-        output: library to write.
-        compiler: that builds it, the one of this computer when left out.
+        include_dirs: folders that are searched for headers.
+        flags: all flags, including the flags that make the library shared.
+        output: path of the library.
+        compiler: compiler to use. Default: the compiler of this computer.
 
     Returns:
-        the library.
+        path of the library.
 
     Raises:
-        CompilerError: there is no compiler, or it refused the code.
+        CompilerError: there is no compiler, or it rejects the code.
     """
     compiler = compiler or find_compiler()
     includes = [f"-I{folder}" for folder in include_dirs]
@@ -211,7 +211,7 @@ def compile_library(
 
 
 _MAGIC = (b"\x7fELF", b"MZ", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe")
-"""How shared libraries begin: of Linux, Windows and macOS, for one processor or several."""
+"""First bytes of shared libraries: Linux, Windows, macOS with one and with several processors."""
 
 
 def _is_library(file: Path) -> bool:
@@ -223,14 +223,14 @@ def _is_library(file: Path) -> bool:
 
 
 _LONGEST = 1800.0
-"""Of one call of the compiler [s]: the longest models take minutes; one that hangs ends here."""
+"""Time limit of a compiler call [s]. The longest models take minutes; a hanging call ends here."""
 
 
 def _compile(compiler: Compiler, arguments: Sequence[str], sources: Sequence[Path]) -> None:
     """Run the compiler.
 
     Raises:
-        CompilerError: it does not start or end, is killed, or refuses the code.
+        CompilerError: it does not start or exceeds the time limit, is killed, or rejects the code.
         OSError: the disk is full.
     """
     program, names = compiler.command[0], ", ".join(source.name for source in sources)
@@ -267,28 +267,28 @@ def _compile(compiler: Compiler, arguments: Sequence[str], sources: Sequence[Pat
 
 
 def _complaint(stderr: str) -> str:
-    """The line that says what is wrong; of a linker, the symbol that is missing."""
+    """Return the error line of compiler output; of a linker, the line with the missing symbol."""
     lines = stderr.splitlines()
     found = (s for word in ("undefined reference", "error") for s in lines if word in s)
     return next(found, stderr)
 
 
-# Shared libraries for other computers, made by the compiler inside ziglang.
+# Shared libraries for other computers, built with the compiler of ziglang.
 
 
 _OLD_GLIBC = "2.17"
-"""Every Linux in use since 2014 has it."""
+"""glibc version of libraries for Linux: every Linux in use since 2014 has it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Platform:
-    """A kind of computer that a library is made for.
+    """Operating system and processor for which a library is built.
 
     Attributes:
-        name: as FMI 3.0 names it.
-        fmi2: as FMI 2.0 names it.
-        target: as ziglang names it.
-        suffix: of its shared libraries.
+        name: name in FMI 3.0.
+        fmi2: name in FMI 2.0.
+        target: name in ziglang.
+        suffix: suffix of shared libraries.
     """
 
     name: str
@@ -310,7 +310,7 @@ PLATFORMS = {
 
 
 def host_platform() -> Platform:
-    """This computer."""
+    """Return the platform of this computer."""
     machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower())
     machine = machine or platform.machine().lower()
     system = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
@@ -319,10 +319,10 @@ def host_platform() -> Platform:
 
 
 def platform_named(name: object) -> Platform:
-    """The platform of a name.
+    """Return the platform with a name.
 
     Raises:
-        CompilerError: there is none of that name.
+        CompilerError: no platform has this name.
     """
     if isinstance(name, str) and name in PLATFORMS:
         return PLATFORMS[name]
@@ -332,7 +332,7 @@ def platform_named(name: object) -> Platform:
 
 
 def cross_compiler(goal: Platform) -> Compiler:
-    """The compiler that makes libraries for a platform, on whatever computer it runs.
+    """Return the compiler that builds libraries for a platform, on any computer.
 
     Raises:
         CompilerError: ziglang is not installed.
@@ -346,18 +346,18 @@ def cross_compiler(goal: Platform) -> Compiler:
     return Compiler(command, metadata.version("ziglang"))
 
 
-# Shared libraries kept on disk under the hash of all that made them, so none is built twice.
+# Cache on disk: libraries are stored under a hash of everything that affects their code.
 
 
 def cache_dir() -> Path:
-    """The folder of built libraries: MBS_CACHE_DIR, else the cache folder of the user.
+    """Return the cache folder: MBS_CACHE_DIR, else the cache folder of the user.
 
-    Code that others could have put there would run here: the folder must belong to the user of
-    this process, and nobody else may write into it.
+    Libraries in this folder are executed. The folder must therefore belong to the user of this
+    process, and write permission of other users is removed.
 
     Returns:
-        a folder that exists and can be written: one that lasts as long as this process when the
-        usual one cannot, or is not the user's own.
+        an existing, writable folder. If the usual folder is not writable or belongs to another
+        user, a temporary folder that is deleted at the end of this process.
     """
     chosen = _chosen_dir()
     if chosen is not None and _writable(chosen) and _is_own(chosen):
@@ -375,30 +375,31 @@ def cached_library(
     common: Collection[str] = (),
     together: Collection[str] = (),
 ) -> Path:
-    """The shared library of these sources, built when nobody has built it yet.
+    """Return the shared library of C sources; it is compiled if it is not in the cache.
 
-    Two processes may ask at once: each builds in a folder of its own and the last to finish wins.
-    The name of a library holds a hash of its content; one that is damaged is built again.
+    Several processes may build the same library at once: each builds in its own folder, and the
+    last to finish replaces the file. The file name contains a hash of the content; a damaged
+    library is built again.
 
     Args:
-        files: file name to its text; names that end in .c are compiled, the others are headers.
-        flags: every flag of the compiler; MBS_OPTIMIZE replaces the level of optimization.
-        compiler: that builds it, the one of this computer when left out.
-        suffix: of the library.
-        common: of the C files, those that many libraries have; each is compiled once and kept too.
-        together: of the C files, those that are compiled as one, which reads their headers once;
-            they share no name.
+        files: file name to text; names that end in .c are compiled, other files are headers.
+        flags: all flags of the compiler; MBS_OPTIMIZE replaces the optimization level.
+        compiler: compiler to use. Default: the compiler of this computer.
+        suffix: suffix of the library file.
+        common: names of C files that many libraries contain; their object files are cached too.
+        together: names of C files that are compiled as a single file, which reads their headers
+            once. They must not define the same name twice.
 
     Returns:
         path of the library.
 
     Raises:
-        CompilerError: there is no compiler, or it refused the code.
+        CompilerError: there is no compiler, or it rejects the code.
     """
     chosen, flags = compiler or find_compiler(), chosen_flags(flags)
     try:
         return _library_in(cache_dir(), files, flags, chosen, suffix, common, together)
-    except OSError:  # the disk of the cache is full, or a file in it belongs to somebody else
+    except OSError:  # the disk of the cache is full, or a cache file belongs to another user
         folder = _process_dir()
         try:
             return _library_in(folder, files, flags, chosen, suffix, common, together)
@@ -410,11 +411,11 @@ def cached_library(
 
 
 def known_library(files: Mapping[str, str], flags: Sequence[str] = FLAGS) -> Path | None:
-    """Return the library of `cached_library` if it is in the cache already, None if not.
+    """Return the library of `cached_library` if it is in the cache, else None.
 
     Args:
-        files: file name to its text.
-        flags: every flag of the compiler.
+        files: file name to text.
+        flags: all flags of the compiler.
 
     Raises:
         CompilerError: there is no compiler.
@@ -424,7 +425,7 @@ def known_library(files: Mapping[str, str], flags: Sequence[str] = FLAGS) -> Pat
 
 
 _TOGETHER = "all_of_them.c"
-"""In the folder of a build: it includes the files that are compiled as one."""
+"""Name of the file in the build folder that includes the files of `together`."""
 
 
 def _library_in(
@@ -469,9 +470,9 @@ _INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"', re.MULTILINE)
 def _common_object(
     file: str, files: Mapping[str, str], flags: Sequence[str], compiler: Compiler, build: Path
 ) -> Path:
-    """The object of one C file, built when nobody has: from its text, its headers and the flags."""
+    """Return the object file of a C file; the cache key covers text, headers and flags."""
     read = [file]
-    for name in read:  # grows by the headers of headers
+    for name in read:  # the list grows: headers may include headers
         read += [n for n in _INCLUDE.findall(files[name]) if n in files and n not in read]
     chosen = [*(flag for flag in flags if flag not in ("-shared", "-s")), "-c"]
     key, folder = _key({name: files[name] for name in read}, chosen, compiler), build.parent
@@ -484,11 +485,11 @@ def _common_object(
 
 
 def is_whole(library: Path) -> bool:
-    """Whether the content of a library of the cache is that which its name says."""
+    """Return whether the content of a cached library matches the hash in its name."""
     try:
         facts = library.stat()
         return _checked(library, facts.st_mtime_ns, facts.st_size)
-    except OSError:  # it has gone, or another user keeps it to himself
+    except OSError:  # it was deleted, or another user made it unreadable
         return False
 
 
@@ -513,13 +514,16 @@ def _key(files: Mapping[str, str], flags: Sequence[str], compiler: Compiler) -> 
 
 
 def _install(library: Path, target: Path) -> Path:
-    """The target; where another user keeps one of its name to himself, a copy for this process."""
+    """Move a library to `target`; if another user's unreadable file is there, copy it instead.
+
+    The copy is in the temporary folder of this process.
+    """
     try:
         os.replace(library, target)
     except OSError:
         if not target.exists():
             raise
-        if not is_whole(target):  # else another process holds it open, which some systems protect
+        if not is_whole(target):  # else another process holds it open: it cannot be replaced
             return Path(shutil.copy(library, _process_dir() / target.name))
     return target
 
@@ -549,9 +553,9 @@ def _writable(folder: Path) -> bool:
 
 
 def _is_own(folder: Path) -> bool:
-    """Whether it belongs to the user of this process; then nobody else can write any longer."""
+    """Return whether the folder belongs to this user; if so, others lose write permission."""
     if os.name != "posix":
-        return True  # folders of users are closed to others by default
+        return True  # on Windows, user folders are closed to other users by default
     facts = folder.stat()
     if facts.st_uid != os.geteuid():
         return False
@@ -562,9 +566,9 @@ def _is_own(folder: Path) -> bool:
 
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 BUILD = "build-"
-"""How the names of folders begin in which something is made."""
+"""Prefix of the names of build folders."""
 _ORPHAN = 86_400.0
-"""Age [s] of a build folder that a killed process left: no compiler takes a day."""
+"""Age [s] from which a leftover build folder is deleted: no compilation takes a day."""
 
 
 @functools.cache

@@ -1,11 +1,11 @@
-"""Derivatives of a compiled Function, made when CasADi first asks for them.
+"""Derivatives of a compiled Function that are compiled at their first use.
 
-CasADi finds the derivatives of an external Function `f` by the names `jac_f`, `fwd1_f` and `adj1_f`
-in the library of `f`, whoever asks: a call of `jacobian`, a solver, a graph with a call of `f` in
-it, in this process or in one that a Function was sent to. To write and compile them takes ten times
-as long as `f`. So the library has these names, and behind them what asks Python for the true code
-when it is first called; Python finds the Function in a file of the cache, or makes it where it was
-promised in this process.
+CasADi looks up the derivatives of an external Function `f` by the names `jac_f`, `fwd1_f` and
+`adj1_f` in the library of `f`: for a call of `jacobian`, in a solver or in a graph that calls `f`,
+in this process or in another to which the Function was sent. Their code takes ten times as long to
+generate and compile as `f`. The library therefore defines these names as stubs. At its first call,
+a stub requests the derivative from Python. Python reads the Function from a file in the cache, or
+builds it if this process has registered it with `promise`.
 """
 
 from __future__ import annotations
@@ -45,38 +45,38 @@ _ENDS = {
     "_incref": "void, (void), ()",
     "_decref": "void, (void), ()",
 }
-"""Names beside that of a derivative that CasADi may ask for: type, arguments, what is passed on."""
+"""Suffixes of the functions of a derivative that CasADi may call: type, parameters, arguments."""
 
 _PATTERN = "_sparsity_out"
 
 _FAILS = ("", "_work")
-"""Those that answer 1 where there is no code, which CasADi reports; the others answer 0."""
+"""Suffixes of functions that return 1 if there is no code; CasADi reports it. Others return 0."""
 
 _LATE = ("_release", "_decref")
-"""Those that are called at the end."""
+"""Suffixes of functions that are called last; they do not start a compilation."""
 
 
 class Derivative(NamedTuple):
-    """What is made at once: the code of a derivative, or where a Jacobian has elements.
+    """Unit that is compiled at once: the code of a derivative, or only its sparsity.
 
     Attributes:
-        name: of the Function in C, `jac_fwd1_f` for the Jacobian of `fwd1_f`.
-        pattern: its sparsity alone. CasADi asks for that of `jac_f` also where it takes products
-            with directions in place of the Jacobian.
+        name: name of the C function, such as `jac_fwd1_f` for the Jacobian of `fwd1_f`.
+        pattern: whether it is the sparsity only. CasADi reads the sparsity of `jac_f` even if it
+            uses directional derivatives instead of the Jacobian.
     """
 
     name: str
     pattern: bool = False
 
     def symbols(self) -> list[tuple[str, str]]:
-        """Its names in the library, as beginning and end."""
+        """Return the names of its C functions as pairs of name and suffix."""
         if self.pattern:
             return [(self.name, _PATTERN)]
         apart = self.name.startswith("jac_")
         return [(self.name, end) for end in _ENDS if not (apart and end == _PATTERN)]
 
     def of(self, function: casadi.Function) -> casadi.Function:
-        """That derivative of a Function."""
+        """Return this derivative of a Function."""
         return _derivative(function, self.name)
 
 
@@ -96,10 +96,10 @@ _BY_PARAMETERS = "byp"
 
 
 def by_parameters(function: str) -> Derivative:
-    """The derivative of the first output of a Function by its last input, every element of it.
+    """Return the dense derivative of the first output of a Function by its last input.
 
     Args:
-        function: its name.
+        function: name of the Function.
     """
     return Derivative(f"{_BY_PARAMETERS}_{function}")
 
@@ -111,11 +111,11 @@ def _by_parameters(function: casadi.Function, name: str) -> casadi.Function:
 
 
 def derivatives_of(function: str, order: int) -> list[Derivative]:
-    """The derivatives of a Function by the names that CasADi gives them.
+    """Return the derivatives that CasADi may request, with the names that it uses.
 
     Args:
-        function: its name.
-        order: how often it can be differentiated, 1 or 2.
+        function: name of the Function.
+        order: number of times that it can be differentiated, 1 or 2.
     """
     first = [f"{way}_{function}" for way in _WAYS]
     jacobian = f"jac_{function}"
@@ -129,12 +129,12 @@ def derivatives_of(function: str, order: int) -> list[Derivative]:
 def source(
     every: Sequence[Derivative], record: Path, own: Sequence[Derivative] | None = None
 ) -> str:
-    """C text that has the names of derivatives.
+    """Return C code that defines the stubs of derivatives.
 
     Args:
-        every: the derivatives.
-        record: the file of the Function.
-        own: those of them whose names it has, all when left out.
+        every: all derivatives of the Function.
+        record: path of the file with the Function.
+        own: derivatives whose stubs are defined. Default: all.
     """
     head = resources.files("mbs.native").joinpath("runtime/on_demand.c").read_text("utf-8")
     path = os.fspath(record).replace("\\", "\\\\").replace('"', '\\"').replace("?", "\\?")
@@ -157,13 +157,13 @@ def _lines(every: Sequence[Derivative], own: Sequence[Derivative]) -> Iterator[s
 
 
 def fill(table: int, library: Path, every: Sequence[Derivative], made: int) -> None:
-    """Put the addresses of the functions of a library into the table of another one.
+    """Write the addresses of a compiled derivative to the table of the stubs.
 
     Args:
-        table: its address; it keeps zeros where the library has no such name.
-        library: of a derivative.
-        every: all derivatives.
-        made: the number of that one.
+        table: address of the table. Entries remain zero for names that the library lacks.
+        library: library of the derivative.
+        every: all derivatives of the Function.
+        made: index of the derivative in `every`.
     """
     code, symbols = ctypes.CDLL(os.fspath(library)), every[made].symbols()
     first = sum(len(part.symbols()) for part in every[:made])
@@ -177,14 +177,14 @@ def fill(table: int, library: Path, every: Sequence[Derivative], made: int) -> N
 def write_record(
     key: str, text: str, every: Sequence[Derivative], fast: bool, loops: LoopCode | None = None
 ) -> Path | None:
-    """The file of a Function whose derivatives are made later; None where it cannot be written.
+    """Write the file of a Function whose derivatives are compiled later; None if that fails.
 
     Args:
-        key: distinguishes it from others.
-        text: the serialised Function.
-        every: these derivatives.
-        fast: of which kind their code is.
-        loops: what the Jacobian is made of, where it is not straight lines.
+        key: cache key; it is part of the file name.
+        text: serialised Function.
+        every: derivatives that may be requested.
+        fast: True for vectorised code with fused multiply-add, False for bit-identical code.
+        loops: code of a Jacobian that loops over the links; None for straight-line code.
     """
     record = cache_dir() / f"{key}{_SUFFIX}"
     parts = (part.name + _ONLY_PATTERN * part.pattern for part in every)
@@ -193,7 +193,7 @@ def write_record(
         if read_sealed(record) == content:
             return record
     try:
-        os.fspath(record).encode()  # it stands in C text
+        os.fspath(record).encode()  # the path becomes part of the C code
         write_sealed(content, record)
     except (ExportError, ValueError):
         return None
@@ -204,13 +204,13 @@ _ONLY_PATTERN = "*"
 
 
 class DerivativeSource(NamedTuple):
-    """What derivatives are made of.
+    """Source of the derivatives of a Function.
 
     Attributes:
-        function: gives the Function of that derivative.
-        every: all of the derivatives.
-        fast: of which kind their code is.
-        loops: what the Jacobian is made of, where it is not straight lines.
+        function: callable that returns the Function to differentiate, for a derivative.
+        every: all derivatives that may be requested.
+        fast: True for vectorised code with fused multiply-add, False for bit-identical code.
+        loops: code of a Jacobian that loops over the links; None for straight-line code.
     """
 
     function: Callable[[Derivative], casadi.Function]
@@ -223,21 +223,21 @@ _PROMISED: dict[Path, DerivativeSource] = {}
 
 
 def promise(record: Path, content: DerivativeSource) -> None:
-    """Have derivatives made in this process without a file, in which the equations would stand.
+    """Register the source of derivatives for this process, instead of a file with the equations.
 
     Args:
-        record: the path that the library has.
-        content: of it.
+        record: path that the library passes to `read_record`; no file is written.
+        content: source of the derivatives.
     """
     _PROMISED[record] = content
 
 
-@functools.lru_cache(maxsize=1)  # one derivative is often followed by another
+@functools.lru_cache(maxsize=1)  # several derivatives of a Function are often requested in a row
 def read_record(record: Path) -> DerivativeSource:
-    """The Function, its derivatives and the kind of their code.
+    """Return the source of the derivatives of a Function, registered or from its file.
 
     Raises:
-        CompilerError: the file has gone or is damaged.
+        CompilerError: the file was deleted or is damaged.
     """
     if record in _PROMISED:
         return _PROMISED[record]

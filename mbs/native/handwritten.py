@@ -1,4 +1,4 @@
-"""Functions whose C is written by hand, carried along wherever C of their callers is written."""
+"""Functions with handwritten C code, which is copied into the C code of their callers."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from mbs.native.compiler import FLAGS, cached_library
 from mbs.native.kernel import EXPORT, function_table
 
 FUNCTION = "FUNCTION"
-"""What stands for the name of the function in its C text."""
+"""Placeholder of the function name in handwritten C text."""
 
 RUNTIME_FLAGS = ("-O3", *FLAGS[1:])
-"""Of the run-time: what it does is loops, which the highest level makes faster."""
+"""Flags for the C run-time, which consists of loops that -O3 makes faster."""
 _INTERNAL = """\
 #undef INTERNAL
 #ifdef __GNUC__
@@ -36,11 +36,13 @@ _MACRO = re.compile(r"^#define (\w+)", re.MULTILINE)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandwrittenC:
-    """C text of a function.
+    """C text of a handwritten function.
 
     Attributes:
-        own: the definition of the function and of `jac_` it, after its headers and tables.
-        common: files of the run-time that it calls, shared with others: name to text.
+        own: definitions of the function and its Jacobian `jac_...`, after their includes and
+            tables.
+        common: run-time files that the function includes or calls: file name to text. Several
+            functions may share them.
     """
 
     own: str
@@ -48,31 +50,31 @@ class HandwrittenC:
 
 
 _known: dict[str, HandwrittenC] = {}
-"""By the names of the functions, which hold a hash of the text; each lives as long as the
-process, since a Function does not tell when the last of its copies goes."""
+"""Handwritten functions by name. The name contains a hash of the text. Entries are never removed,
+because the end of the last copy of a Function cannot be observed."""
 
 
 def handwritten(
     signature: Function, jacobian: Function, own: str, common: Mapping[str, str], work: int
 ) -> Function:
-    """A Function of C text; compiled by and for this computer.
+    """Compile handwritten C code for this computer, as a Function.
 
     Args:
-        signature: a Function that has its inputs and outputs, and no content.
-        jacobian: likewise, of its Jacobian.
-        own: C text, which includes headers of `common` and defines ``int FUNCTION(const double
+        signature: placeholder Function with the inputs and outputs; its content is ignored.
+        jacobian: placeholder Function with the inputs and outputs of the Jacobian.
+        own: C text that includes headers of `common` and defines ``int FUNCTION(const double
             **arg, double **res, long long *iw, double *w, int mem)`` and ``jac_FUNCTION``. It may
-            use math.h and string.h, no heap, and no variable that changes outside of functions.
-        common: C files and headers that it is linked with; no two of the C files have a name in
-            common.
-        work: doubles that each of both takes in w.
+            use math.h and string.h, but no heap and no static or global variables that change.
+        common: C files and headers to link: file name to text. The C files must not define the
+            same name twice.
+        work: doubles of w that the function or its Jacobian needs.
 
     Returns:
-        External Function, whose name is that of the signature and a hash of the text. `generated`,
-        and what is made by it, writes the text beside that of Functions that call it.
+        external Function. Its name is the name of the signature and a hash of the text.
+        `generated` writes the text together with the code of Functions that call it.
 
     Raises:
-        CompilerError: there is no compiler, or it refused the code.
+        CompilerError: there is no compiler, or it rejects the code.
     """
     whole = "".join([own, *common.keys(), *common.values()])
     name = f"{signature.name()}_{hashlib.sha256(whole.encode()).hexdigest()[:12]}"
@@ -98,18 +100,17 @@ def _renamed(function: Function, name: str) -> Function:
 
 
 def is_handwritten(function: Function) -> bool:
-    """Whether a Function is one of `handwritten`, or its Jacobian."""
+    """Return whether a Function is the result of `handwritten`, or the Jacobian of a result."""
     return function.is_a("External") and function.name().removeprefix("jac_") in _known
 
 
 def handwritten_text(functions: Iterable[Function]) -> str:
-    """The C text of all that Functions call of `handwritten`; empty where they call none.
+    """Return the handwritten C code that Functions call; empty if there is none.
 
-    It is one text of functions that no other file sees, so that several libraries in one program
-    may have it: what stands in the headers is declared static.
+    All functions of the text are static, so that several libraries of a program may contain it.
 
     Args:
-        functions: any.
+        functions: any Functions.
     """
     called = {
         part.name().removeprefix("jac_"): None
@@ -151,19 +152,22 @@ _DECLARED = (
 
 
 def names_declared(text: str) -> set[str]:
-    """The names that no function beside such a text may have.
+    """Return the names that a handwritten text declares, which other functions must not use.
 
     Args:
-        text: as `handwritten_text` gives it.
+        text: C text from `handwritten_text`.
     """
     return {name for pattern in _DECLARED for name in pattern.findall(text)}
 
 
 def _unfolded(name: str, files: Mapping[str, str], seen: set[str]) -> str:
-    """A file, the headers before it that were not seen yet."""
+    """Return a file without include guard, after the headers that it includes for the first time.
+
+    The names of files in `seen` are skipped and the names of the inserted files are added to it.
+    """
     seen.add(name)
     text = files[name]
-    if guarded := _GUARD.fullmatch(text):  # no guard: that of a library may have the same name
+    if guarded := _GUARD.fullmatch(text):  # drop the guard: a library header may use its name
         text = _PROTOTYPE.sub("INTERNAL ", guarded[1] + guarded[2])
     return _without_includes(text, files, seen)
 

@@ -1,4 +1,4 @@
-"""Shared libraries of fast code, made for the processor of this computer."""
+"""Shared libraries of fast code for the processor of this computer."""
 
 from __future__ import annotations
 
@@ -45,30 +45,33 @@ from mbs.native.repeats import with_calls
 from mbs.native.staged import Mapped, Staged, staged
 from mbs.operations.graph import Graph, graph_of
 
-# C text of a map: all columns by a loop, several at a time in vector lanes.
+# C code of a map: a loop over all columns, several columns at a time in SIMD lanes.
 
 
 class Place(NamedTuple):
-    """Where a column goes: number of the output and of the first element in it."""
+    """Destination of a column: index of the output and index of its first element there."""
 
     output: int
     first: int
 
 
 Columns: TypeAlias = Mapping[tuple[int, int], Place]
-"""Of the inputs of a graph that are outputs of maps, the columns that are part of an output."""
+"""Destinations of map columns: (graph input that is a map result, column index) to its place in
+an output. Only columns that are copied unchanged to an output are in the table."""
 
 
 def direct_columns(graph: Graph, maps: Sequence[Mapped], outputs: int) -> tuple[Columns, set[int]]:
-    """The columns that need no copy, for each element of them is used once, in one output.
+    """Return the columns of maps that can be written directly to an output of the Function.
+
+    Each element of such a column is used only once: as an element of that output.
 
     Args:
-        graph: the scalar operations around the maps.
-        maps: give some of its inputs.
-        outputs: how many of its outputs are those of the whole Function.
+        graph: graph of the scalar operations around the maps.
+        maps: maps, whose results are inputs of the graph.
+        outputs: number of graph outputs that are outputs of the whole Function.
 
     Returns:
-        where they go, and the nodes of their elements.
+        destination of each such column, and the graph nodes of their elements.
     """
     uses, node_of, places = graph.uses(), {}, {}
     for number, node in enumerate(graph.nodes):
@@ -95,12 +98,13 @@ def direct_columns(graph: Graph, maps: Sequence[Mapped], outputs: int) -> tuple[
 
 
 class MapSource(NamedTuple):
-    """C text of a map.
+    """C code of a map.
 
     Attributes:
-        text: functions, the last of which has the name of the map and takes `out`, the outputs of
-            the scalar operations followed by those of the maps, and work space.
-        work: doubles of work space.
+        text: C functions. The last function has the name of the map. Its arguments are the pointer
+            array `out` (outputs of the Function, then arguments and results of the maps) and the
+            work space.
+        work: length of the work space in doubles.
     """
 
     text: str
@@ -110,14 +114,14 @@ class MapSource(NamedTuple):
 def map_source(
     name: str, mapped: Mapped, columns: Columns, buffers: Sequence[int], block: int
 ) -> MapSource:
-    """The C functions of a map.
+    """Return the C functions of a map.
 
     Args:
-        name: of the last of them.
-        mapped: the map.
-        columns: the columns that go to another place than the buffer of their output.
-        buffers: for each output of the map its number in `out`.
-        block: assignments in one C function.
+        name: name of the last C function.
+        mapped: map to write.
+        columns: columns that are written to an output instead of the buffer of the map result.
+        buffers: index in `out` of the buffer of each map output.
+        block: maximum number of assignments in a C function.
     """
     graph = graph_of(mapped.column)
     pieces = blocks(graph, schedule(graph), block)
@@ -148,7 +152,10 @@ def map_source(
 
 
 def _tables(mapped: Mapped, columns: Columns, buffers: Sequence[tuple[int, int]]) -> list[str]:
-    """Where the columns of each output go; of its buffer the number and the length of a column."""
+    """Return C tables with the destination of each column, for each output of a map.
+
+    `buffers` contains the index in `out` and the column length of each output.
+    """
     lines = []
     for k, (port, (buffer, size)) in enumerate(zip(mapped.outputs, buffers, strict=True)):
         places = [columns.get((port, c), Place(buffer, c * size)) for c in range(mapped.columns)]
@@ -158,7 +165,7 @@ def _tables(mapped: Mapped, columns: Columns, buffers: Sequence[tuple[int, int]]
 
 
 def _inputs(graph: Graph, mapped: Mapped) -> list[str]:
-    """Where each input of a column begins."""
+    """Return the C expression of the pointer to each input of the current columns."""
     result = []
     for k, port in enumerate(graph.inputs):
         text = f"out[{mapped.inputs[k]}]"
@@ -169,15 +176,15 @@ def _inputs(graph: Graph, mapped: Mapped) -> list[str]:
     return result
 
 
-# What CasADi asks a compiled function about itself: names, shapes, defaults, work space.
+# C functions that describe a compiled function to CasADi: names, shapes, defaults, work space.
 
 
 def function_table(function: Function, work: int | str) -> str:
-    """C text of the functions beside `name` through which CasADi's `external` learns its shape.
+    """Return the C functions from which CasADi's `external` reads the signature of a function.
 
     Args:
-        function: described; its text declares EXPORT and casadi_int.
-        work: doubles of work space that the code needs, a number or C text.
+        function: Function to describe. The C file must define EXPORT and casadi_int.
+        work: length of the work space of the code in doubles: a number or C text.
     """
     name, n_in, n_out = function.name(), function.n_in(), function.n_out()
     shape = "const casadi_int *"
@@ -205,7 +212,7 @@ def _defaults(function: Function) -> list[str]:
 
 
 def _choose(kind: str, name: str, answers: Sequence[str]) -> str:
-    """A C function of a number that gives the answer of that number, else 0."""
+    """Return a C function that returns `answers[i]` for the argument i, and 0 for other values."""
     cases = "".join(f" case {k}: return {answer};" for k, answer in enumerate(answers))
     return f"EXPORT {kind}{name}(casadi_int i) {{ switch (i) {{{cases} default: return 0; }} }}"
 
@@ -224,18 +231,18 @@ def _work(name: str, n_in: int, n_out: int, work: int | str) -> str:
     return f"EXPORT int {name}_work({pointers}) {{ {sets} return 0; }}"
 
 
-# C text of Functions, made to run fast: straight lines in blocks, angles in vector lanes.
+# Fast C code of Functions: straight-line code in blocks, sines and cosines in SIMD lanes.
 
 
 BLOCK = 500
-"""Assignments in one C function: longer ones compile slower and run no faster."""
+"""Maximum assignments in a C function: longer functions compile slower and run no faster."""
 
 HEADERS = ("sincos.h", "lanes.h", "elementary.h")
-"""What the text includes."""
+"""Headers that the C text includes."""
 
-_INLINE = 16  # batches of angles whose code stands in the function; more are called
+_INLINE = 16  # sine and cosine batches up to which their code is inlined; else it is called
 
-_SHORT = 2500  # operations up to which gcc gains by reordering them before it assigns registers
+_SHORT = 2500  # operations up to which gcc gains by reordering them before register allocation
 
 _GCC = """\
 #if defined(__GNUC__) && !defined(__clang__)
@@ -250,7 +257,7 @@ EXPORT = """\
 #define EXPORT __attribute__((visibility("default")))
 #endif
 """
-"""What stands before functions that CasADi's `external` looks for."""
+"""Preamble of the functions that CasADi's `external` looks up."""
 
 _HEAD = """\
 #include <math.h>
@@ -262,20 +269,20 @@ _HEAD = """\
 
 
 def kernel_source(functions: Iterable[Function], block: int = BLOCK) -> dict[str, str]:
-    """C files of Functions with different names, in CasADi's calling convention.
+    """Return C files of Functions with different names, in CasADi's calling convention.
 
-    The text is for compilers that know vector types (gcc, clang); results differ from those of
-    the interpreter in the last digits.
+    The text requires a compiler with vector types (gcc, clang). Results differ from the
+    interpreter in the last digits.
 
     Args:
-        functions: made of scalar operations and of maps of them, or to be expanded to them.
-        block: assignments in one C function.
+        functions: Functions of scalar operations and maps of them, or expandable to such.
+        block: maximum number of assignments in a C function.
 
     Returns:
-        file name to text: a C file for each Function, and what they include.
+        file name to text: a C file for each Function, and the headers that they include.
 
     Raises:
-        ModelError: some Function has no scalar operations, or one that C does not have.
+        ModelError: a Function does not consist of scalar operations, or C lacks an operation.
     """
     runtime = resources.files("mbs.native").joinpath("runtime")
     headers = {name: runtime.joinpath(name).read_text("utf-8") for name in HEADERS}
@@ -326,13 +333,13 @@ def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: i
 
 
 def _pieces(graph: Graph, late: dict[int, int], maps: int, block: int) -> list[list[list[Item]]]:
-    """The blocks before the first map, between it and the second one, and so on."""
+    """Return the blocks before the first map, between the first and the second map, and so on."""
     phase = phases(graph, late)
     order = schedule(graph, phase)
     every: list[list[Step]] = [[] for _ in range(maps + 1)]
     for step in order:
         every[max(phase[n] for n in gives(step))].append(step)
-    # inputs that maps give are not there from the beginning, as recurring sequences need them
+    # recurring sequences need all inputs from the start, but map results are known later
     return [blocks(graph, steps if maps else with_calls(graph, steps), block) for steps in every]
 
 
@@ -347,19 +354,19 @@ FAST_FLAGS = (
     "-fPIC",
     "-shared",
 )
-"""Contraction fuses multiplications and additions; nothing is assumed about infinities or NaN."""
+"""Flags of fast code. Contraction permits fused multiply-add. Nothing is assumed about NaN."""
 
 
 class LoopCode(NamedTuple):
-    """C text by which a model loops over its links, in place of equations written out.
+    """C code of a model that loops over its links, instead of written-out equations.
 
     Attributes:
         files: file name to text, for `FAST_FLAGS`.
-        common: of the C files, those that many libraries have.
-        value: whether it has the Function itself.
-        jacobian: whether it has its Jacobian `jac_f`.
-        by_parameters: whether that calls `byp_f` for the derivatives by the last input, which the
-            text does not have.
+        common: names of C files that many libraries contain.
+        value: whether the code contains the Function itself.
+        jacobian: whether the code contains the Jacobian `jac_f`.
+        by_parameters: whether `jac_f` calls `byp_f` for the derivatives with respect to the last
+            input. The code does not contain `byp_f`.
     """
 
     files: Mapping[str, str]
@@ -369,10 +376,10 @@ class LoopCode(NamedTuple):
     by_parameters: bool
 
     def library(self, further: Mapping[str, str]) -> Path:
-        """The library of it and of other C files.
+        """Return the library of this code and of additional C files.
 
         Raises:
-            CompilerError: there is no compiler, or it refused the code.
+            CompilerError: there is no compiler, or it rejects the code.
         """
         return cached_library({**self.files, **further}, FAST_FLAGS, common=self.common)
 
@@ -380,18 +387,18 @@ class LoopCode(NamedTuple):
 def kernel_library(
     functions: Sequence[Function], further: Mapping[str, str] | None = None
 ) -> Path | None:
-    """The library of fast code of Functions with different names.
+    """Return the library of fast code of Functions with different names.
 
     Args:
-        functions: what to compile.
-        further: file name to text of what else belongs to it.
+        functions: Functions to compile.
+        further: additional files of the library: file name to text.
 
     Returns:
-        path of the library; None when some Function is not made of scalar operations that C has,
-        and of maps of them.
+        path of the library; None if a Function does not consist of scalar operations with C
+        equivalents and of maps of such operations.
 
     Raises:
-        CompilerError: there is no compiler, or it refused the code.
+        CompilerError: there is no compiler, or it rejects the code.
     """
     try:
         files = kernel_source(functions)
@@ -403,7 +410,7 @@ def kernel_library(
 
 @functools.cache
 def processor() -> str:
-    """What distinguishes processors on which code of this one may not run."""
+    """Return the model and features of the processor; code is valid for an equal text only."""
     try:
         lines = Path("/proc/cpuinfo").read_text("utf-8", "replace").splitlines()
     except OSError:
@@ -412,11 +419,11 @@ def processor() -> str:
     return " ".join(dict.fromkeys(line for line in lines if line.startswith(keys)))
 
 
-# Which library of the cache belongs to a Function, found without writing its C text again.
+# Index of the cache: finds the library of a Function without writing its C text again.
 #
-# The text of a Function and its derivatives may take far longer to write than the library to
-# load. A small file, named by a hash of the serialised Function and of all else that decides the
-# text, holds the name of the library.
+# Writing the text of a Function and its derivatives may take far longer than loading the library.
+# A small file contains the name of the library. It is named by a hash of the serialised Function
+# and of everything else that determines the text.
 
 
 _SUFFIX = ".library"
@@ -424,14 +431,14 @@ _SOURCES = (".py", ".h", ".c")
 
 
 def index_key(function: casadi.Function, options: str) -> tuple[str, str] | None:
-    """The key of a Function in the index of the cache, and its serialised text.
+    """Return the key of a Function in the index of the cache, and its serialised text.
 
     Args:
-        function: that is compiled.
-        options: what else decides its library.
+        function: Function to compile.
+        options: text that distinguishes different libraries of the same Function.
 
     Returns:
-        None for what holds a callback, which has no text.
+        key and text; None if the Function contains a callback, which cannot be serialised.
     """
     try:
         text = function.serialize()
@@ -441,13 +448,14 @@ def index_key(function: casadi.Function, options: str) -> tuple[str, str] | None
 
 
 def indexed_library(key: str, make: Callable[[], Path | None]) -> Path | None:
-    """The library that `make` gives for a Function, remembered from run to run.
+    """Return the library with a key from the cache, or make it and store the key.
 
-    Several processes may ask at once; what is damaged or has gone is made again.
+    Several processes may call this at once. A damaged or deleted library is made again.
 
     Args:
-        key: of `index_key`.
-        make: writes and compiles it; None where that cannot be done, which is not remembered.
+        key: key from `index_key`.
+        make: callable that writes and compiles the library. It returns None if that is
+            impossible, which is not stored.
     """
     folder = cache_dir()
     entry = folder / f"{key}{_SUFFIX}"
@@ -461,7 +469,7 @@ def indexed_library(key: str, make: Callable[[], Path | None]) -> Path | None:
 
 
 def _entry(entry: Path) -> Path | None:
-    """The library that an entry names, when both are whole."""
+    """Return the library that an index entry names; None if a file is missing or damaged."""
     try:
         name = entry.read_text("utf-8")
         library = entry.parent / name
@@ -471,7 +479,7 @@ def _entry(entry: Path) -> Path | None:
 
 
 def _write(entry: Path, name: str) -> None:
-    """Keep the name; where that fails, the next call writes the text of the Function again."""
+    """Store the library name. If the write fails, the next call generates the C text again."""
     try:
         with tempfile.TemporaryDirectory(dir=entry.parent, prefix=BUILD) as folder:
             written = Path(folder) / entry.name
@@ -493,7 +501,7 @@ def _index_key(text: str, options: str) -> str:
 
 @functools.cache
 def _writer() -> str:
-    """A hash of the code that writes the text: another version may write another one."""
+    """Return a hash of the code generator: another version may generate different text."""
     digest = hashlib.sha256()
     for package in ("mbs.native", "mbs.operations"):
         for name, data in sorted(_files(resources.files(package), package)):

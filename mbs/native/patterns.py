@@ -1,7 +1,7 @@
-"""C text that informs CasADi where the derivatives of compiled Functions have no elements.
+"""C code that gives CasADi the sparsity of the Jacobians of compiled Functions.
 
-CasADi asks the library of an external Function `f` for `jac_f_sparsity_out`. Without it every
-element of a Jacobian counts, and a Hessian takes as many directions as there are variables.
+CasADi reads `jac_f_sparsity_out` from the library of an external Function `f`. Without it,
+Jacobians are dense, and a Hessian needs as many directions as there are variables.
 """
 
 from collections.abc import Iterable
@@ -18,26 +18,26 @@ _HEAD = """\
 
 
 def patterns_source(functions: Iterable[Function]) -> str:
-    """One C file with the sparsity of the Jacobians of Functions, in compressed columns.
+    """Return a C file with the Jacobian sparsity of Functions, in compressed column format.
 
     Args:
-        functions: with different names.
+        functions: Functions with different names.
     """
     return "\n".join([_HEAD, *(_pattern(f.name(), _blocks(f)) for f in functions)])
 
 
 def pattern_source(jacobian: Function) -> str:
-    """One C file with the sparsity of the outputs of a Function, in compressed columns.
+    """Return a C file with the sparsity of the outputs of a Jacobian, in compressed columns.
 
     Args:
-        jacobian: of the name that CasADi gives a Jacobian.
+        jacobian: Jacobian with the name `jac_f` that CasADi gives it.
     """
     blocks = [jacobian.sparsity_out(k) for k in range(jacobian.n_out())]
     return "\n".join([_HEAD, _pattern(jacobian.name().removeprefix("jac_"), blocks)])
 
 
 def _blocks(function: Function) -> list[Sparsity]:
-    """Patterns of the Jacobian, all inputs of the first output before those of the second."""
+    """Return the Jacobian blocks: all inputs of the first output, then of the second, etc."""
     return [
         function.jac_sparsity(row, column)
         for row in range(function.n_out())

@@ -1,9 +1,9 @@
-"""Sequences of operations that recur in a graph, such as those of equal windows, legs or links.
+"""Sequences of operations that recur in a graph, such as the operations of equal links.
 
-C text holds such a sequence once, as a function that is called with a table of where its operands
-are: its length, and the time of a compiler, follow the differences between the parts of a
-mechanism, not their number. Operations are not reordered and not changed, so every value keeps its
-bits.
+C code contains such a sequence once, as a function that is called with a table of the indices of
+its operands. The length and the compile time of the code thus depend on the number of different
+parts of a mechanism, not on the number of all parts. Operations are neither reordered nor changed,
+so every value is bit-identical.
 """
 
 from __future__ import annotations
@@ -23,43 +23,45 @@ from mbs.operations.graph import Graph, Node, Port
 Ints = np.ndarray[Any, np.dtype[np.int64]]
 
 LEAST = 4000
-"""Operations of a graph from which repeats are looked for: shorter ones compile in a second."""
+"""Number of operations from which repeats are searched: shorter code compiles in one second."""
 
-_SHORTEST = 24  # operations of a sequence; shorter ones do not pay for their calls
-_LONGEST = 1024  # of a sequence; longer ones are cut, which costs a call in a thousand operations
-_NEAR = 16  # steps to an operand that every occurrence must have alike
-_CALL = 8  # lines that one more occurrence costs: its call and its rows of tables
-_HEAD = 8  # lines of a function beside its body
+_SHORTEST = 24  # operations of a sequence; a shorter sequence does not repay its calls
+_LONGEST = 1024  # operations of a sequence; longer sequences are cut: a call per 1000 operations
+_NEAR = 16  # steps back to an operand up to which the distance is equal in every occurrence
+_CALL = 8  # lines that a call costs: the call itself and its rows of tables
+_HEAD = 8  # lines of a C function without its body
 
-# Of the Jacobian of a Delta robot a quarter would be saved: it ran 1.15 times longer, and the
-# compiler took as long. Where a third is saved it takes half as long at most.
-_SHARE = 2 / 3  # of the lines that may be left
+# The Jacobian of a Delta robot would become a quarter shorter, but ran 1.15 times longer and took
+# as long to compile. If a third of the lines is saved, compilation takes half as long at most.
+_SHARE = 2 / 3  # largest fraction of the lines that may remain
 
-# Of a Stewart platform's dynamics sequences take and give 1.6 and 2.1 values and indices an
-# operation: with them it runs 1.2 times longer. Those of chains and windows have 1.25 at most.
-_ACCESSES = 1.25  # of memory per operation of a sequence
-_BIG = 40_000  # operations beyond which straight lines leave the near caches, and calls are faster
+# Sequences in the dynamics of a Stewart platform read and write 1.6 and 2.1 values and indices per
+# operation and make it 1.2 times slower. Sequences of chains and windows have 1.25 at most.
+_ACCESSES = 1.25  # largest number of memory accesses per operation of a sequence
+_BIG = 40_000  # operations beyond which straight code exceeds the near caches; calls are faster
 
 
 class SeveralNodes(Protocol):
-    """A step that computes several nodes at once."""
+    """Interface of a step that computes several nodes at once."""
 
     def taken(self) -> tuple[int, ...]:
-        """The nodes that must be known before."""
+        """Return the node indices of the operands."""
 
     def given(self) -> tuple[int, ...]:
-        """The nodes that are known afterwards."""
+        """Return the node indices of the results."""
 
 
 S = TypeVar("S", bound=int | SeveralNodes)
 
 
 class OccurrenceNodes(NamedTuple):
-    """An operand of a sequence that it does not compute, or a result that others use.
+    """Node of a sequence and its equivalent node in each occurrence.
+
+    The node is an operand that is computed outside the sequence, or a result that is used outside.
 
     Attributes:
-        node: of the graph of the sequence.
-        nodes: for each occurrence, the node of the whole graph.
+        node: index of the node in the graph of the sequence.
+        nodes: index of the node in the whole graph, for each occurrence.
     """
 
     node: int
@@ -68,16 +70,16 @@ class OccurrenceNodes(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Repeat:
-    """A sequence of operations that recurs.
+    """Sequence of operations that recurs in a graph.
 
     Attributes:
-        graph: the sequence; its only input has the constants that differ, and OP_PARAMETER are
-            values computed elsewhere.
-        steps: the nodes of it to compute, in order.
-        constants: operands that are constants but not always the same.
-        taken: operands computed elsewhere, or inputs of the whole graph.
-        given: results that others use.
-        count: how often it occurs.
+        graph: graph of the sequence. Its only input contains the constants that differ between
+            occurrences. Nodes with OP_PARAMETER are values that are computed outside.
+        steps: indices of the nodes of `graph` to compute, in order.
+        constants: operands that are constants with different values.
+        taken: operands that are computed outside the sequence, or inputs of the whole graph.
+        given: results that are used outside the sequence.
+        count: number of occurrences.
     """
 
     graph: Graph
@@ -90,12 +92,12 @@ class Repeat:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calls:
-    """Occurrences of a sequence that follow each other.
+    """Consecutive occurrences of a sequence.
 
     Attributes:
-        repeat: the sequence.
-        first: number of the first of them.
-        count: of them.
+        repeat: recurring sequence.
+        first: index of the first occurrence.
+        count: number of occurrences.
     """
 
     repeat: Repeat
@@ -103,28 +105,28 @@ class Calls:
     count: int
 
     def taken(self) -> tuple[int, ...]:
-        """The nodes that must be known before."""
+        """Return the indices of the nodes that must be computed before."""
         own = set(self.given())
         span = slice(self.first, self.first + self.count)
         nodes = (node for column in self.repeat.taken for node in column.nodes[span])
         return tuple(node for node in dict.fromkeys(nodes) if node not in own)
 
     def given(self) -> tuple[int, ...]:
-        """The nodes that are known afterwards."""
+        """Return the indices of the nodes that the occurrences compute."""
         return tuple(node for k in range(self.count) for node in self.gives(self.first + k))
 
     def gives(self, occurrence: int) -> tuple[int, ...]:
-        """The nodes that are known after one occurrence."""
+        """Return the indices of the nodes that a single occurrence computes."""
         return tuple(column.nodes[occurrence] for column in self.repeat.given)
 
 
 def with_calls(graph: Graph, steps: Sequence[S], least: int = LEAST) -> list[S | Calls]:
-    """The same steps, sequences that recur as `Calls`; as they are where that saves little.
+    """Replace recurring sequences of steps by `Calls`; return equal steps if that saves little.
 
     Args:
-        graph: what is computed.
-        steps: nodes, and groups of nodes, which are left as they are.
-        least: operations from which repeats are looked for.
+        graph: operation graph.
+        steps: indices of nodes, and groups of nodes, which are never part of a sequence.
+        least: number of steps from which repeats are searched.
     """
     if len(steps) < least:
         return [*steps]
@@ -146,7 +148,7 @@ def with_calls(graph: Graph, steps: Sequence[S], least: int = LEAST) -> list[S |
 def _replaced(
     steps: Sequence[S], found: Iterable[tuple[Repeat, tuple[int, ...]]]
 ) -> list[S | Calls]:
-    """Steps whose sequences are replaced, those that follow each other by one step."""
+    """Replace sequences by `Calls`. Consecutive occurrences become a single step."""
     starts = {place: (r, k) for r, places in found for k, place in enumerate(places)}
     result: list[S | Calls] = []
     k = 0
@@ -162,17 +164,17 @@ def _replaced(
     return result
 
 
-# What recurs: sequences of equal operations, whose near operands are equally near.
+# Search for sequences of equal operations whose near operands are at equal distances.
 
 
 def _tokens(graph: Graph, steps: Sequence[int | SeveralNodes]) -> list[Hashable]:
-    """What a step must share with another one to stand in its place."""
+    """Return a token per step: steps with equal tokens can be part of equal sequences."""
     place = {step: k for k, step in enumerate(steps)}
     nodes = graph.nodes
     tokens: list[Hashable] = []
     for k, step in enumerate(steps):
         if not isinstance(step, int):
-            tokens.append(k)  # unlike any other
+            tokens.append(k)  # a group of nodes differs from all other steps
             continue
         words = [nodes[step].op]
         for operand in nodes[step].args:
@@ -186,15 +188,13 @@ def _tokens(graph: Graph, steps: Sequence[int | SeveralNodes]) -> list[Hashable]
 
 
 def recurring(tokens: Sequence[Hashable]) -> list[tuple[int, tuple[int, ...]]]:
-    """Sequences that recur, none overlapping another, chosen so that much is saved.
-
-    The sequence that saves most is taken first, then the one that saves most of the rest.
+    """Return recurring sequences that do not overlap, chosen greedily by the lines they save.
 
     Args:
-        tokens: equal ones are exchangeable.
+        tokens: token of each step; steps with equal tokens are interchangeable.
 
     Returns:
-        of each the length and the places where it begins.
+        the length and the start indices of each sequence.
     """
     sorted_places, common = _sorted(tokens)
     heap = [
@@ -203,7 +203,7 @@ def recurring(tokens: Sequence[Hashable]) -> list[tuple[int, tuple[int, ...]]]:
         if length * (b - a) > _CALL * (b - a + 1) + _HEAD
     ]
     heapq.heapify(heap)
-    used = np.zeros(len(tokens) + 1, np.int64)  # how many steps before each one are taken
+    used = np.zeros(len(tokens) + 1, np.int64)  # steps before each step that sequences contain
     chosen: list[tuple[int, tuple[int, ...]]] = []
     while heap:
         _, length, a, b = heapq.heappop(heap)
@@ -213,7 +213,7 @@ def recurring(tokens: Sequence[Hashable]) -> list[tuple[int, tuple[int, ...]]]:
         )
         if saved <= _HEAD:
             continue
-        if heap and saved < -heap[0][0]:  # others save more: again after them
+        if heap and saved < -heap[0][0]:  # other sequences save more: try this sequence again later
             heapq.heappush(heap, (-saved, length, a, b))
             continue
         chosen.append((shorter, tuple(kept)))
@@ -225,14 +225,14 @@ def recurring(tokens: Sequence[Hashable]) -> list[tuple[int, tuple[int, ...]]]:
 
 
 def _lengths(places: Ints, length: int) -> list[int]:
-    """A length, and those by which most occurrences that overlap would follow each other."""
+    """Return candidate lengths: `length`, and the distances of overlapping occurrences."""
     gaps = places[1:] - places[:-1]
     near = gaps[(gaps < length) & (gaps >= _SHORTEST)].tolist()
     return list(dict.fromkeys([length, mode(near), min(near)])) if near else [length]
 
 
 def _kept(places: Ints, length: int, used: Ints) -> tuple[int, int, list[int]]:
-    """The lines that a sequence saves, its length, and its places that nothing overlaps."""
+    """Return the saved lines, the length, and the start indices that do not overlap."""
     kept: list[int] = []
     end = -1
     for place in places[used[places + length] == used[places]].tolist():
@@ -243,9 +243,10 @@ def _kept(places: Ints, length: int, used: Ints) -> tuple[int, int, list[int]]:
 
 
 def _sorted(tokens: Sequence[Hashable]) -> tuple[Ints, Ints]:
-    """The places in the order of what follows them, and how far each agrees with the next one.
+    """Return the suffix array of the tokens, and the common prefix length of its neighbours.
 
-    Source: Manber & Myers 1993, by doubling; the lengths of agreement from the same ranks.
+    Lengths are limited by `_LONGEST`. Source: Manber & Myers 1993, prefix doubling. The common
+    prefix lengths follow from the same ranks.
     """
     numbers: dict[Hashable, int] = {}
     count = len(tokens)
@@ -269,7 +270,7 @@ def _sorted(tokens: Sequence[Hashable]) -> tuple[Ints, Ints]:
 
 
 def _intervals(common: Sequence[int]) -> list[tuple[int, int, int]]:
-    """Length, first and last of every run of sorted places that agree so far, and no farther."""
+    """Return (length, first, last) of each maximal range of the suffix array with that prefix."""
     found: list[tuple[int, int, int]] = []
     open_ones: list[tuple[int, int]] = []
     for k, length in enumerate([*common, 0]):
@@ -282,18 +283,18 @@ def _intervals(common: Sequence[int]) -> list[tuple[int, int, int]]:
     return found
 
 
-# What a sequence takes and gives.
+# Operands and results of a sequence.
 
 
 class _Order:
-    """The steps of a graph, and where each node is computed and used."""
+    """Steps of a graph, with the step that computes each node and the last step that uses it."""
 
     def __init__(self, graph: Graph, steps: Sequence[int | SeveralNodes]) -> None:
         count = len(graph.nodes)
         self._graph = graph
         self._nodes = np.array([s if isinstance(s, int) else -1 for s in steps], np.int64)
-        self._place = np.full(count, -1)  # of each node its step; -1 for what is no step of its own
-        self._last = np.full(count, -1)  # of each node the last step that uses it
+        self._place = np.full(count, -1)  # step that computes each node alone; -1 if there is none
+        self._last = np.full(count, -1)  # last step that uses each node
         self._operands = np.full((2, len(steps)), -1)
         for k, step in enumerate(steps):
             if isinstance(step, int):
@@ -307,9 +308,9 @@ class _Order:
             self._last[list(result)] = len(steps)
 
     def repeat(self, length: int, places: Sequence[int]) -> Repeat:
-        """The sequence of a length that begins at these steps."""
+        """Return the sequence of `length` steps that begins at each of these steps."""
         begins = np.array(places)[:, None]
-        every = begins + np.arange(length)  # steps: a row for each occurrence
+        every = begins + np.arange(length)  # indices of steps, one row per occurrence
         within = _Sequence(self._graph)
         stored = self._last[self._nodes[every]] >= begins + length
         for offset in range(length):
@@ -322,7 +323,7 @@ class _Order:
                     operands.append(within.steps[at[0]])
                     continue
                 operands.append(within.operand(tuple(nodes.tolist())))
-                own = np.flatnonzero((at >= 0) & (at < offset))  # its own, but not always the same
+                own = np.flatnonzero((at >= 0) & (at < offset))  # inside only some occurrences
                 stored[own, at[own]] = True
             within.add(self._graph.nodes[self._nodes[every[0, offset]]].op, operands)
         given = (
@@ -332,7 +333,7 @@ class _Order:
         return within.repeat(tuple(given), len(places))
 
     def bases(self, repeat: Repeat) -> int:
-        """How many indices an occurrence looks up, if results stand in the order of their steps."""
+        """Return the number of indices in a table row if results are stored in step order."""
         columns = np.array([t.nodes for t in repeat.taken]).reshape(-1, repeat.count)
         steps = self._place[columns]
         places = np.where(steps < 0, columns - len(self._place), steps)
@@ -340,7 +341,7 @@ class _Order:
 
 
 class _Sequence:
-    """The graph of a sequence in the making."""
+    """Graph of a sequence under construction."""
 
     def __init__(self, graph: Graph) -> None:
         self.steps: list[int] = []
@@ -351,15 +352,15 @@ class _Sequence:
         self._known: dict[Hashable, int] = {}
 
     def add(self, op: int, operands: Sequence[int]) -> None:
-        """The next operation."""
+        """Append an operation."""
         self.steps.append(self._new(Node(op, tuple(operands))))
 
     def operand(self, nodes: tuple[int, ...]) -> int:
-        """What every occurrence has of the whole graph, as a node of the sequence."""
+        """Return the node of the sequence for one node of the whole graph per occurrence."""
         first = self._whole.nodes[nodes[0]]
         if first.op != casadi.OP_CONST:
             return self._once(nodes, Node(casadi.OP_PARAMETER), self._taken, nodes)
-        # to the last bit, and zeros with their signs
+        # compare bit patterns, including the sign of zero
         values = tuple(repr(self._whole.nodes[node].value) for node in nodes)
         if len(set(values)) == 1:
             return self._once(values, first, [], nodes)
@@ -367,7 +368,7 @@ class _Sequence:
         return self._once(values, element, self._constants, nodes)
 
     def repeat(self, given: tuple[OccurrenceNodes, ...], count: int) -> Repeat:
-        """What has been made."""
+        """Return the completed sequence."""
         constants = Port("constants", Sparsity.dense(len(self._constants)))
         graph = Graph(self._whole.name, (constants,), (), tuple(self._nodes), ())
         own = tuple(self._constants), tuple(self._taken)
@@ -386,16 +387,16 @@ class _Sequence:
         return len(self._nodes) - 1
 
 
-# Where an occurrence finds what it takes, and leaves what it gives.
+# Indices of operands and results of each occurrence.
 
 
 class CallTable(NamedTuple):
-    """Indices of a work array, by occurrence.
+    """Work array indices of the operands and results of a sequence.
 
     Attributes:
-        texts: of each node of the sequence that it takes or gives the C text of its index, made of
-            numbers and the elements of a row `at`.
-        rows: for each occurrence.
+        texts: node of the sequence to the C text of its index: a number, plus an element of the
+            row `at` if the index varies between occurrences.
+        rows: row `at` of each occurrence.
     """
 
     texts: Mapping[int, str]
@@ -403,11 +404,13 @@ class CallTable(NamedTuple):
 
 
 def table_of(repeat: Repeat, place: Callable[[int], int]) -> CallTable:
-    """The table of a sequence; indices that always differ by as much share one element of a row.
+    """Return the index table of a sequence.
+
+    Nodes whose indices have a constant difference in all occurrences share an element of a row.
 
     Args:
-        repeat: the sequence.
-        place: of a node of the whole graph its index in the work array.
+        repeat: recurring sequence.
+        place: callable from a node of the whole graph to its index in the work array.
     """
     columns = {t.node: [place(n) for n in t.nodes] for t in (*repeat.given, *repeat.taken)}
     texts: dict[int, str] = {}

@@ -1,8 +1,8 @@
-"""C99 text of Functions of scalar operations, in double or single precision.
+"""C99 code of Functions of scalar operations, in double or single precision.
 
-In double precision the values are bit-identical to those of CasADi's own C text. Long functions are
-split into several C functions: compilers need minutes for fifty thousand statements in one of them,
-and a time proportional to the length for the parts.
+In double precision the values are bit-identical to the C code that CasADi generates. Long functions
+are split into several C functions: compilers need minutes for fifty thousand statements in a single
+function, and a time proportional to the length if it is split.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ _HEAD = f"""\
 
 
 class Work(NamedTuple):
-    """Minimum lengths of the arrays that a C function takes."""
+    """Minimum lengths of the work arrays that a C function needs."""
 
     arg: int = 0
     res: int = 0
@@ -75,7 +75,7 @@ class Work(NamedTuple):
     w: int = 0
 
     def covering(self, other: Work) -> Work:
-        """Return the larger one of each length."""
+        """Return the elementwise maximum of the lengths."""
         return Work(*map(max, self, other))
 
 
@@ -214,7 +214,7 @@ def literal(value: float, real: Real) -> str:
 
 
 class FloatCode(BlockCode):
-    """C functions of one graph in single precision."""
+    """Writer of the C functions of one graph in single precision."""
 
     kind: ClassVar[str] = "float"
     scalar: ClassVar[str] = "float"
@@ -242,7 +242,7 @@ def _float_operand(graph: Graph, number: int) -> str:
 
 
 class _Parts:
-    """C functions of the parts of a Function.
+    """C functions into which a Function is split.
 
     Attributes:
         graph: scalar operations of the Function.

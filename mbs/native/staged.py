@@ -1,7 +1,8 @@
-"""A Function of MX as scalar operations with maps between them.
+"""Split an MX Function into scalar operations and the maps between them.
 
-`Function.map` repeats a Function over the columns of matrices. Expanded, every column is written
-out; here the map stays one step, which machine code computes several columns at a time.
+`Function.map` evaluates a Function for each column of matrices. Expanding the map would write out
+each column. Here a map remains a single step, which machine code evaluates for several columns at
+once.
 """
 
 from __future__ import annotations
@@ -21,16 +22,16 @@ _MAPS = ("Map", "OmpMap", "ThreadMap")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mapped:
-    """A Function of one column, and the columns it is computed of.
+    """Map: a Function of a single column, and the columns for which it is evaluated.
 
     Attributes:
-        column: the Function.
-        columns: how many there are.
-        shared: for each of its inputs, whether all columns have the same.
-        inputs: of each of its inputs the number of the output of `Staged.scalar` that holds it:
-            its non-zero elements when it is shared, else those of LANES columns row by row, then
-            those of the next LANES; zeros complete the last columns.
-        outputs: of each of its outputs the number of the input of `Staged.scalar` that is it:
+        column: Function of a single column.
+        columns: number of columns.
+        shared: whether an input has the same value for all columns, for each input.
+        inputs: index of the output of `Staged.scalar` that contains each input. A shared input is
+            stored by its non-zero elements. Other inputs are stored in groups of LANES columns,
+            row by row; zeros pad the last group.
+        outputs: index of the input of `Staged.scalar` that contains each output, a matrix
             (non-zero elements, columns).
     """
 
@@ -43,13 +44,14 @@ class Mapped:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Staged:
-    """Scalar operations with maps between them.
+    """Scalar operations of a Function, and the maps between them.
 
     Attributes:
-        scalar: all operations outside the maps, a Function of SX. Its inputs are those of the
-            whole Function, then the outputs of the maps; its outputs are those of the whole
+        scalar: SX Function of all operations outside the maps. Its inputs are the inputs of the
+            whole Function, then the outputs of the maps. Its outputs are the outputs of the whole
             Function, then the inputs of the maps.
-        maps: each uses what the inputs and the maps before it determine.
+        maps: maps in order of evaluation. The inputs of a map depend only on the inputs of the
+            Function and on previous maps.
     """
 
     scalar: Function
@@ -57,11 +59,11 @@ class Staged:
 
 
 def staged(function: Function) -> Staged | None:
-    """The stages of a Function.
+    """Split a Function into scalar operations and maps.
 
     Returns:
-        None when there is no map in it, or it has operations between the maps that are not made
-        of scalars or are not known here.
+        the stages; None if the Function contains no map, or an operation between the maps that
+        is not scalar or not supported.
     """
     if not any(f.class_name() in _MAPS for f in (function, *function.find_functions())):
         return None
@@ -90,7 +92,7 @@ def staged(function: Function) -> Staged | None:
 
 
 class _Tiled(NamedTuple):
-    """A matrix repeated to the right."""
+    """Matrix `value` that is repeated `times` times horizontally."""
 
     value: SX
     times: int
@@ -101,12 +103,12 @@ _Value: TypeAlias = SX | _Tiled
 
 @dataclass(slots=True, eq=False)
 class _Trace:
-    """What a call of a Function on symbols does.
+    """Interpreter of a Function on symbols that records the maps it meets.
 
     Attributes:
-        symbols: the outputs of the maps met so far.
-        arguments: their inputs.
-        maps: numbers in them count these two lists alone.
+        symbols: symbols of the outputs of the recorded maps.
+        arguments: inputs of the recorded maps.
+        maps: recorded maps. Their indices refer to `arguments` and `symbols`.
     """
 
     symbols: list[SX] = field(default_factory=list)
@@ -114,7 +116,7 @@ class _Trace:
     maps: list[Mapped] = field(default_factory=list)
 
     def called(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
-        """The outputs."""
+        """Return the outputs of a Function for symbolic arguments."""
         if function.class_name() in _MAPS:
             return self._map(function, arguments)
         if function.is_a("MXFunction"):
@@ -192,7 +194,7 @@ def _whole(value: _Value) -> SX:
 
 
 def _part(arguments: Sequence[_Value], node: MX) -> _Value:
-    """The argument, or the part of it, that an input node stands for."""
+    """Return the argument, or the part of an argument, that an input node of MX reads."""
     place, pattern = node.info(), node.sparsity()
     argument = arguments[place["ind"]]
     if isinstance(argument, _Tiled) and argument.value.shape[0] == pattern.shape[0]:
@@ -202,12 +204,12 @@ def _part(arguments: Sequence[_Value], node: MX) -> _Value:
 
 
 def _elements(value: SX) -> SX:
-    """The non-zero elements as a vector."""
+    """Return the non-zero elements of a matrix as a vector."""
     return SX(value.nz[:]) if value.nnz() else SX(0, 1)
 
 
 def _in_lanes(value: SX, rows: int, columns: int) -> SX:
-    """Columns side by side, LANES at a time, completed by zeros."""
+    """Reorder columns into groups of LANES, row by row; zeros pad the last group."""
     elements = casadi.vertcat(_elements(value), 0)
     indices = [
         column * rows + row if column < columns else rows * columns
@@ -219,7 +221,7 @@ def _in_lanes(value: SX, rows: int, columns: int) -> SX:
 
 
 def _select(node: MX, values: list[SX]) -> SX:
-    """Some non-zero elements of a matrix in another pattern."""
+    """Return selected non-zero elements of a matrix with the sparsity of the node."""
     facts, pattern = node.info(), node.sparsity()
     if "nz" in facts:
         indices = list(facts["nz"])

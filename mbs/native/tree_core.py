@@ -1,7 +1,8 @@
-"""Libraries of the tree core: one C file for all mechanisms, and a table of numbers for each.
+"""Libraries of the tree core: C code for all open trees, with a numeric table per mechanism.
 
-The core, runtime/tree_core.c, is compiled once and kept. What is compiled for a mechanism are its
-numbers, the functions by which CasADi calls the core, and a short Function of the parameters.
+The core, runtime/tree_core.c, is compiled once and cached. The code that is compiled for a
+mechanism consists of its table, the functions by which CasADi calls the core, and a short Function
+of the parameters.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ ROWS = {
     **{"Ia": 25, "Fv": 26, "stiffness": 27, "rest": 28, "Fs": 29, "width": 30},
     **{"spin": 31, "own": 34},
 }
-"""The first row of each quantity, as tree_core.h has them."""
+"""First row of each quantity in the table, as in tree_core.h."""
 
 ROW_COUNT = 35
 """MBS_ROWS of tree_core.h."""
@@ -34,21 +35,22 @@ _LIST_NAMES = (
 
 
 def place_of(row: int, node: int) -> int:
-    """Where a number of a node stands: eight nodes side by side, their rows one after the other."""
+    """Return the index of an element in the table: blocks of eight nodes, row by row."""
     return node // 8 * (8 * ROW_COUNT) + 8 * row + node % 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TreeTable:
-    """A mechanism as numbers; the fields are those of tree_core.h.
+    """Numeric description of a mechanism, with the fields of struct mbs_tree in tree_core.h.
 
     Attributes:
-        size: velocities.
-        positions: elements of q.
-        lists: indices by the names of their lists.
-        numbers: the table, see `place_of`, then gravity; NaN where they follow from parameters.
-        places: where these are.
-        dependent: ``numbers(p)``, their values; None without parameters.
+        size: number of velocities (nodes of the tree).
+        positions: length of q.
+        lists: integer lists of tree_core.h by name.
+        numbers: table, indexed by `place_of`, followed by gravity (3). Elements that depend on
+            parameters are NaN.
+        places: indices of the elements that depend on parameters.
+        dependent: Function ``numbers(p)`` of their values; None without parameters.
     """
 
     size: int
@@ -60,24 +62,24 @@ class TreeTable:
 
     @property
     def in_order(self) -> bool:
-        """Whether v has the order of the tree."""
+        """Whether the elements of v have the order of the tree."""
         return list(self.lists["v_at"]) == list(range(self.size))
 
     @property
     def plain(self) -> bool:
-        """Whether q has this order too, element by element."""
+        """Whether q and v both have the order of the tree, element by element."""
         return self.in_order and list(self.lists["q_at"]) == list(self.lists["v_at"])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JacobianPattern:
-    """What need not be zero of the Jacobians of a model.
+    """Sparsity of the Jacobians of a model.
 
     Attributes:
-        by_v: of that by velocities.
-        by_q: of that by positions.
-        coupled: whether all joints of a tree that stands on the base are coupled, not only those
-            on one branch.
+        by_v: sparsity of the Jacobian by velocities.
+        by_q: sparsity of the Jacobian by positions.
+        coupled: whether all joints of a tree on the base are coupled. If not, a joint is coupled
+            with its ancestors and descendants only.
     """
 
     by_v: Sparsity
@@ -86,12 +88,12 @@ class JacobianPattern:
 
     @property
     def is_dense(self) -> bool:
-        """Whether nothing is zero."""
+        """Whether the Jacobians are dense."""
         return bool(self.by_v.is_dense())
 
 
 def nodes_of_positions(table: TreeTable) -> list[int]:
-    """For every element of q a node of its joint."""
+    """Return the node of each element of q; the first node for a joint of several velocities."""
     nodes = [0] * table.positions
     for node, at in enumerate(table.lists["q_at"]):
         if at >= 0:
@@ -103,7 +105,7 @@ def nodes_of_positions(table: TreeTable) -> list[int]:
 
 
 def jacobian_pattern(table: TreeTable, model: str) -> JacobianPattern:
-    """The pattern of the Jacobians of "idm" or "ddm"; dense where v has another order."""
+    """Return the sparsity for model "idm" or "ddm"; dense if v is not in tree order."""
     n, coupled = table.size, model == "ddm"
     rows = [_rows(table, node, coupled) if table.in_order else range(n) for node in range(n)]
     by_v, by_q = (
@@ -114,7 +116,7 @@ def jacobian_pattern(table: TreeTable, model: str) -> JacobianPattern:
 
 
 def _rows(table: TreeTable, node: int, coupled: bool) -> Sequence[int]:
-    """The nodes whose efforts, or accelerations, a node can change; as mbs_tree_pack has them."""
+    """Return the nodes whose effort (or acceleration) depends on a node, as in mbs_tree_pack."""
     lists = table.lists
     if coupled:
         while lists["link"][node] >= 0:
@@ -136,12 +138,12 @@ def _sparsity(size: int, columns: Sequence[Sequence[int]]) -> Sparsity:
 def tree_functions(
     table: TreeTable, parameters: int, default: Sequence[float] = ()
 ) -> dict[str, Function]:
-    """Functions that have the names and shapes of the core's, and no content.
+    """Return placeholder Functions with the names and signatures of the functions of the core.
 
     Args:
-        table: of the mechanism.
-        parameters: how many there are.
-        default: CasADi's default of all of them, when there are some.
+        table: table of the mechanism.
+        parameters: number of parameters.
+        default: default values of the parameters. CasADi uses the first value for all of them.
     """
     n, nq = table.size, table.positions
     sizes = {"q": nq, "v": n, "a": n, "tau": n, "p": parameters}
@@ -166,7 +168,7 @@ def tree_functions(
     for name, (inputs, outputs) in shapes.items():
         every = [*inputs, *(["p"] if parameters else [])]
         symbols = [MX.sym(x, sizes[x]) for x in every]
-        if name.startswith("jac_"):  # CasADi gives the output of the model too
+        if name.startswith("jac_"):  # CasADi also passes the output of the model
             every.append(f"out_{outputs[0][0].split('_')[1]}")
             symbols.append(MX.sym("output", n))
         values = [MX(DM.ones(pattern)) for _, pattern in outputs]
@@ -177,18 +179,18 @@ def tree_functions(
 
 
 COMMON = ("tree_core.c",)
-"""Of the files of `tree_files`, those that all mechanisms have."""
+"""Names of the C files of `tree_files` that all mechanisms have in common."""
 
 
 def tree_files(table: TreeTable, functions: Mapping[str, Function]) -> dict[str, str]:
-    """C text of models of a mechanism, in CasADi's calling convention.
+    """Return the C code of models of a mechanism, in CasADi's calling convention.
 
-    Where the table follows from parameters the Jacobians call `byp_idm` and `byp_ddm` for the
-    derivatives by these, of which the text has only declarations.
+    If table elements depend on parameters, the Jacobians call `byp_idm` and `byp_ddm` for the
+    derivatives by the parameters. The text only declares these functions.
 
     Args:
-        table: of the mechanism.
-        functions: which models: some of `tree_functions`.
+        table: table of the mechanism.
+        functions: models to include: some of the Functions of `tree_functions`.
 
     Returns:
         file name to text, for `FAST_FLAGS`; see `COMMON`.
@@ -196,7 +198,7 @@ def tree_files(table: TreeTable, functions: Mapping[str, Function]) -> dict[str,
     runtime = resources.files("mbs.native").joinpath("runtime")
     own = ("tree_core.c", "tree_core.h", "sincos.h", "lanes.h")
     files = {name: runtime.joinpath(name).read_text("utf-8") for name in own}
-    # the core is kept by its text, that of its headers, compiler and flags: "native" needs more
+    # the cached core depends on text, compiler and flags; "-march=native" also on the processor
     files["lanes.h"] += f"/* {processor()} */\n"
     files["mechanism.c"] = _source(table, functions)
     if table.dependent is not None:
@@ -205,7 +207,7 @@ def tree_files(table: TreeTable, functions: Mapping[str, Function]) -> dict[str,
 
 
 def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
-    """C text of the numbers of a mechanism and of the functions that CasADi calls."""
+    """Return the C code of the table of a mechanism and of the functions that CasADi calls."""
     dependent = table.dependent
     head = [
         "#include <math.h>",
@@ -278,9 +280,10 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
 
 
 def _by_parameters(model: str, inputs: int) -> list[str]:
-    """What calls the derivatives of a model by parameters, made when they are first asked for.
+    """Return C code that calls the derivatives of a model by its parameters.
 
-    Their work space is not known before, so it is not CasADi's.
+    The derivatives are compiled at their first use. The size of their work space is not known
+    before, so the work space is allocated on the heap instead of by CasADi.
     """
     name = by_parameters(model).name
     return [
@@ -311,7 +314,7 @@ def _parameter(function: Function) -> str:
 
 
 def _call(name: str, table: TreeTable, function: Function) -> tuple[list[str], int]:
-    """What a function does, and doubles of work space; inputs and outputs are those of CasADi."""
+    """Return the C lines that call the core, and the additional work space in doubles."""
     match name:
         case "inertia":
             return ["  mbs_tree_inertia(m, arg[0], res[0], w);"], 0
@@ -324,9 +327,11 @@ def _call(name: str, table: TreeTable, function: Function) -> tuple[list[str], i
 
 
 def _jacobian(model: str, table: TreeTable, function: Function) -> tuple[list[str], int]:
-    """Derivatives by positions, of those along the velocities; what a tree lets be zero left out.
+    """Return the C lines of a Jacobian, and the additional work space in doubles.
 
-    Derivatives by parameters, which the core does not have, are those of the equations.
+    The core computes dense derivatives along the velocities. They are converted to derivatives by
+    positions, and only structurally nonzero elements are stored. Derivatives by parameters come
+    from the written-out equations.
     """
     lines = []
     if "p" in function.name_in():
@@ -374,12 +379,12 @@ def _number(value: float) -> str:
 
 
 def _wrapped(words: map[str]) -> str:
-    """Words with commas, some on each line."""
+    """Return words separated by commas, twelve per line."""
     every = list(words)
     return ",\n".join(", ".join(every[k : k + 12]) for k in range(0, len(every), 12))
 
 
 def dependent_numbers(values: Sequence[SX], p: SX) -> Function:
-    """``numbers(p)``: the numbers of a table that follow from parameters."""
+    """Return the Function ``numbers(p)`` of the table elements that depend on parameters."""
     column = casadi.densify(casadi.vertcat(*values))
     return Function("dependent_numbers", [p], [column], ["p"], ["numbers"], {"cse": True})

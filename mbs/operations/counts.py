@@ -1,7 +1,7 @@
-"""How many operations a Function takes, in the convention of the literature.
+"""Count the operations of a Function, in the convention of the literature.
 
 Source: the convention of Khalil & Kleinfinger 1987: multiplications and additions are counted,
-signs are not, and what depends on constant parameters alone is done once and counted apart.
+sign changes are not. Operations on constant parameters alone are counted separately.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from casadi import Function
 from mbs.operations.graph import Graph, graph_of
 
 _DIVISION = 2
-"""Multiplications that take the time of a division."""
+"""Cost of a division in multiplications."""
 _MUL = {casadi.OP_MUL, casadi.OP_SQ}
 _ADD = {casadi.OP_ADD, casadi.OP_SUB, casadi.OP_TWICE}
 _DIV = {casadi.OP_DIV, casadi.OP_INV}
@@ -40,14 +40,14 @@ class Count:
     """Numbers of operations.
 
     Attributes:
-        mul: multiplications, squares among them.
-        add: additions and subtractions; 2 x is x + x.
+        mul: multiplications, including squares.
+        add: additions and subtractions; 2 x counts as x + x.
         div: divisions.
         sqrt: square roots.
-        trig: sines, cosines and other functions of angles, one each.
-        other: what remains, such as tanh, powers, comparisons.
-        parameter_only: operations on constants and parameters alone, done once and in none of
-            the numbers above.
+        trig: evaluations of sines, cosines and other trigonometric functions.
+        other: other operations, such as tanh, powers and comparisons.
+        parameter_only: operations on constants and parameters alone. They are done once and are
+            not included in the numbers above.
     """
 
     mul: int = 0
@@ -60,35 +60,33 @@ class Count:
 
     @property
     def total(self) -> int:
-        """All operations, each counted once."""
+        """Number of all operations, each counted once."""
         return self.mul + self.add + self.div + self.sqrt + self.trig + self.other
 
     @property
     def price(self) -> int:
-        """What decides between two forms: multiplications, additions, and twice the divisions.
+        """Cost for the choice between equal forms: mul + add + 2 div.
 
-        Ways to one result have the same sines, cosines and roots.
+        Equal forms have the same sines, cosines and roots.
         """
         return self.mul + self.add + _DIVISION * self.div
 
     def __str__(self) -> str:
-        """Multiplications (divisions among them) / additions, as tables give them."""
+        """Return "multiplications/additions", as in the literature; divisions count as mul."""
         return f"{self.mul + self.div}/{self.add}"
 
 
 def count(function: Function, parameters: Iterable[str] = ("p",)) -> Count:
-    """The operations of a Function; nodes that no output needs are not counted.
+    """Count the operations of a Function. Nodes that no output needs are not counted.
 
-    A product by -1 or 1 costs nothing and a product by 2 is an addition, as when one writes by
-    hand.
+    A product by -1 or 1 is free and a product by 2 is an addition, as in handwritten code.
 
     Args:
-        function: made of scalar operations, or a Function that can be expanded to them.
-        parameters: names of inputs that do not change from call to call; names that the
-            Function does not have are ignored.
+        function: Function of scalar operations, or a Function that can be expanded to them.
+        parameters: names of inputs that are constant from call to call. Unknown names are ignored.
 
     Returns:
-        the numbers; `str` of them is the "multiplications/additions" of the literature.
+        the numbers of operations; `str` of them is "multiplications/additions".
 
     Raises:
         ModelError: the Function has no scalar operations.
@@ -97,12 +95,12 @@ def count(function: Function, parameters: Iterable[str] = ("p",)) -> Count:
 
 
 def cheapest(*models: Function) -> Function:
-    """Of Functions that compute the same, the one with the lowest `price`; the first of equals."""
+    """Return the Function with the lowest `price` among equal Functions; the first if several."""
     return models[0] if len(models) == 1 else min(models, key=lambda model: count(model).price)
 
 
 def count_graph(graph: Graph, parameters: Iterable[str] = ("p",)) -> Count:
-    """The operations of a graph; see `count`."""
+    """Count the operations of a graph; see `count`."""
     alive, fixed = graph.live(), graph.fixed_by(parameters)
     changing: Counter[str] = Counter()
     once: Counter[str] = Counter()
@@ -119,7 +117,7 @@ def _numbers(tally: Counter[str]) -> Count:
 
 
 def _kind(graph: Graph, number: int) -> str:
-    """The attribute of Count that an operation adds to; empty when it is free."""
+    """Return the attribute of Count for an operation; empty if the operation is free."""
     op = graph.nodes[number].op
     return _kind_of_product(graph, number) if op in _MUL else _KIND.get(op, "other")
 

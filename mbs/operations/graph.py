@@ -1,4 +1,4 @@
-"""A Function as a graph of scalar operations, which passes rewrite and printers print."""
+"""A Function as a graph of scalar operations, for passes and printers."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from mbs.text import quoted
 
 
 class Node(NamedTuple):
-    """A scalar.
+    """Scalar value of a graph: input element, constant or operation.
 
     Attributes:
         op: CasADi's code of the operation, `casadi.OP_...`.
-        args: numbers of the nodes it is made of, one or two; of an input, OP_INPUT, the number of
-            the input and of the non-zero element in it.
-        value: of a constant, OP_CONST.
+        args: indices of the one or two operand nodes. For an input (OP_INPUT): index of the input
+            and index of the non-zero element in it.
+        value: value of a constant (OP_CONST).
     """
 
     op: int
@@ -30,7 +30,7 @@ class Node(NamedTuple):
 
 
 class Port(NamedTuple):
-    """An input or output: its name and where its elements are."""
+    """Input or output: its name and its sparsity."""
 
     name: str
     sparsity: Sparsity
@@ -38,14 +38,14 @@ class Port(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Graph:
-    """Scalar operations in an order in which they can be computed.
+    """Scalar operations of a Function in an executable order.
 
     Attributes:
-        name: of the Function.
-        inputs: its inputs.
-        outputs: its outputs.
-        nodes: each made of nodes before it.
-        results: for each output the numbers of the nodes that are its non-zero elements.
+        name: name of the Function.
+        inputs: inputs of the Function.
+        outputs: outputs of the Function.
+        nodes: nodes; the operands of a node precede it.
+        results: node indices of the non-zero elements of each output.
     """
 
     name: str
@@ -55,12 +55,12 @@ class Graph:
     results: tuple[tuple[int, ...], ...]
 
     def operands(self, number: int) -> tuple[int, ...]:
-        """The nodes that a node is made of; none of an input or constant."""
+        """Return the indices of the operands of a node; empty for an input or constant."""
         node = self.nodes[number]
         return () if node.op in (casadi.OP_INPUT, casadi.OP_CONST) else node.args
 
     def live(self) -> list[bool]:
-        """For each node, whether an output needs it."""
+        """Return whether an output needs the node, for each node."""
         alive = [False] * len(self.nodes)
         for result in self.results:
             for number in result:
@@ -72,7 +72,7 @@ class Graph:
         return alive
 
     def uses(self) -> list[int]:
-        """For each node how often nodes and outputs use it; a square uses its operand once."""
+        """Return the number of uses of each node by nodes and outputs; a square counts once."""
         uses = [0] * len(self.nodes)
         for number in range(len(self.nodes)):
             for operand in self.operands(number):
@@ -83,7 +83,7 @@ class Graph:
         return uses
 
     def fixed_by(self, names: Iterable[str]) -> list[bool]:
-        """For each node, whether constants and the inputs of these names alone determine it."""
+        """Return whether only constants and the named inputs determine a node, for each node."""
         known = {k for k, port in enumerate(self.inputs) if port.name in set(names)}
         fixed: list[bool] = []
         for number, node in enumerate(self.nodes):
@@ -94,16 +94,16 @@ class Graph:
         return fixed
 
     def with_nodes(self, nodes: Sequence[Node], results: Sequence[Sequence[int]]) -> Graph:
-        """The same Function computed by other nodes."""
+        """Return the same Function with other nodes."""
         return replace(self, nodes=tuple(nodes), results=tuple(tuple(r) for r in results))
 
 
 def graph_of(function: Function) -> Graph:
-    """The scalar operations of a Function; one made of MX is expanded first.
+    """Return the scalar operations of a Function; an MX Function is expanded first.
 
     Raises:
-        ModelError: it is no Function, or it calls something that has no scalar operations, such
-            as an integrator.
+        ModelError: the argument is no Function, or it contains calls without scalar operations,
+            such as an integrator.
     """
     if not isinstance(function, Function) or function.is_null():
         raise ModelError(f"{quoted(function)} is not a Function; give a casadi.Function")
@@ -135,7 +135,7 @@ def graph_of(function: Function) -> Graph:
 
 
 def _scalar(function: Function) -> Function:
-    """The Function made of scalar operations alone."""
+    """Expand a Function to scalar operations (SX)."""
     try:
         scalar = function if function.is_a("SXFunction") else function.expand()
         calls = any(
@@ -153,11 +153,11 @@ def _scalar(function: Function) -> Function:
 
 
 def function_of(graph: Graph, defaults: Sequence[float] = ()) -> Function:
-    """The Function that computes a graph, nodes that no output needs left out.
+    """Return the Function that computes a graph, without the nodes that no output needs.
 
     Args:
-        graph: what to compute.
-        defaults: for each input the number that stands for it when it is not given.
+        graph: operations to compute.
+        defaults: default values of the inputs.
     """
     symbols = [SX.sym(port.name, port.sparsity) for port in graph.inputs]
     elements = [[SX(s.nz[k]) for k in range(s.nnz())] for s in symbols]
@@ -178,12 +178,12 @@ def function_of(graph: Graph, defaults: Sequence[float] = ()) -> Function:
 
 
 def value_of(node: Node, values: Sequence[SX], elements: Sequence[Sequence[SX]]) -> SX:
-    """Expression of a node.
+    """Return the SX expression of a node.
 
     Args:
         node: node of a graph.
-        values: expressions of the nodes before it.
-        elements: for each input the expressions of its non-zero elements.
+        values: expressions of the previous nodes, by index.
+        elements: expressions of the non-zero elements of each input.
     """
     if node.op == casadi.OP_INPUT:
         return elements[node.args[0]][node.args[1]]
@@ -193,7 +193,7 @@ def value_of(node: Node, values: Sequence[SX], elements: Sequence[Sequence[SX]])
     return SX(SX.binary(node.op, first, *second) if second else SX.unary(node.op, first))
 
 
-# Graphs written node by node: nothing twice, constants folded, signs taken outwards.
+# Construction of graphs node by node: equal nodes merged, constants evaluated, signs outwards.
 
 
 COMMUTATIVE = {
@@ -210,15 +210,15 @@ _EVEN = {casadi.OP_COS, casadi.OP_COSH, casadi.OP_FABS, casadi.OP_SQ}
 
 
 class Builder:
-    """The nodes of a graph in the making.
+    """Builder of the nodes of a graph.
 
-    Every method returns the number of the node that holds the value asked for: an old one where
-    there is one. A sign is a node of its own, taken outwards through sums, products and odd
-    functions, so that x - y and y - x, or sin(x) and sin(-x), are one value.
+    Each method returns the index of the node with the requested value, an existing node if there
+    is one. A sign is a separate node. It is moved outwards through sums, products and odd
+    functions, so that x - y and y - x, or sin(x) and sin(-x), share their nodes.
 
     Attributes:
-        nodes: each made of nodes before it.
-        fixed: for each node, whether constants and parameters alone determine it.
+        nodes: nodes; the operands of a node precede it.
+        fixed: whether a node depends on constants and parameters only, for each node.
     """
 
     def __init__(self, graph: Graph, parameters: Iterable[str] = ()) -> None:
@@ -239,7 +239,7 @@ class Builder:
         }
 
     def node(self, op: int, args: tuple[int, ...], value: float = 0.0) -> int:
-        """The node as it is, without a rule; the old one if it is there."""
+        """Return the node with this operation, unsimplified; an existing node if there is one."""
         if op in COMMUTATIVE and args[1] < args[0]:
             args = (args[1], args[0])
         node = Node(op, args, value)
@@ -251,13 +251,13 @@ class Builder:
         return number
 
     def add(self, node: Node, operands: Sequence[int]) -> int:
-        """A node of another graph, made of these operands here."""
+        """Return the node for a node of another graph, with operands of this builder."""
         if node.op in (casadi.OP_INPUT, casadi.OP_CONST):
             return self.node(node.op, node.args, node.value)
         return self.apply(node.op, *operands)
 
     def apply(self, op: int, *operands: int) -> int:
-        """An operation on nodes."""
+        """Return the simplified result of an operation on nodes."""
         rule = self._rules.get(op)
         if rule is not None:
             return rule(*operands)
@@ -270,27 +270,27 @@ class Builder:
         return self.node(op, operands)
 
     def cost_since(self, start: int) -> int:
-        """How many nodes from this number on take time at every call."""
+        """Return the number of nodes from `start` on that cost time at every call."""
         numbers = range(start, len(self.nodes))
         return sum(1 for n in numbers if not self.fixed[n] and self.nodes[n].op not in _FREE)
 
     def forget_since(self, start: int) -> None:
-        """Take back all nodes from this number on."""
+        """Remove all nodes from `start` on."""
         for node in self.nodes[start:]:
             del self._numbers[node]
         del self.nodes[start:], self.fixed[start:]
 
     def constant(self, value: float) -> int:
-        """A constant."""
+        """Return the node of a constant."""
         return self.node(casadi.OP_CONST, (), float(value))
 
     def value(self, number: int) -> float | None:
-        """The number that a node is; None when it is no constant."""
+        """Return the value of a constant node; None for another node."""
         node = self.nodes[number]
         return node.value if node.op == casadi.OP_CONST else None
 
     def unsigned(self, number: int) -> tuple[int, int]:
-        """A node as a sign, 1 or -1, times a node without one."""
+        """Return sign (1 or -1) and node of a value, where the node itself has no sign."""
         node = self.nodes[number]
         if node.op == casadi.OP_NEG:
             return -1, node.args[0]
@@ -299,7 +299,7 @@ class Builder:
         return 1, number
 
     def negative(self, a: int) -> int:
-        """-a."""
+        """Return -a."""
         node = self.nodes[a]
         if node.op == casadi.OP_NEG:
             return node.args[0]
@@ -308,7 +308,7 @@ class Builder:
         return self.node(casadi.OP_NEG, (a,))
 
     def sum(self, a: int, b: int) -> int:
-        """The sum a + b."""
+        """Return a + b."""
         folded = self._both_constant(casadi.OP_ADD, a, b)
         if folded is not None:
             return folded
@@ -326,11 +326,11 @@ class Builder:
         return result if sign_a > 0 else self.negative(result)
 
     def difference(self, a: int, b: int) -> int:
-        """The difference a - b."""
+        """Return a - b."""
         return self.sum(a, self.negative(b))
 
     def product(self, a: int, b: int) -> int:
-        """The product a b."""
+        """Return a b."""
         folded = self._both_constant(casadi.OP_MUL, a, b)
         if folded is not None:
             return folded
@@ -341,7 +341,7 @@ class Builder:
         return result if sign_a == sign_b else self.negative(result)
 
     def quotient(self, a: int, b: int) -> int:
-        """The quotient a / b; by a constant it is a product."""
+        """Return a / b; a product if b is constant."""
         (sign_a, a), (sign_b, b) = self.unsigned(a), self.unsigned(b)
         divisor = self.value(b)
         if self.value(a) == 1.0:
@@ -353,7 +353,7 @@ class Builder:
         return result if sign_a == sign_b else self.negative(result)
 
     def _multiply(self, a: int, b: int) -> int:
-        """The product a b without signs; a constant is a."""
+        """Return a b for operands without signs; if one is constant, it is a."""
         factor = self.value(a)
         if factor == 0.0:
             return a
@@ -375,14 +375,14 @@ class Builder:
         return self.node(casadi.OP_MUL, (a, b))
 
     def _plain_sum(self, a: int, b: int) -> int:
-        """The sum a + b without signs; where one of them is x minus the other it is x."""
+        """Return a + b for operands without signs; x if they are x - b and b."""
         for one, other in ((a, b), (b, a)):
             if self._is(one, casadi.OP_SUB) and self.nodes[one].args[1] == other:
                 return self.nodes[one].args[0]
         return self.node(casadi.OP_ADD, (a, b))
 
     def _remainder(self, a: int, b: int) -> int | None:
-        """The difference a - b, known where a is a sum of b and something else."""
+        """Return a - b if a is a sum or difference with b as its operand; else None."""
         node = self.nodes[a]
         if node.op == casadi.OP_ADD and b in node.args:
             return node.args[1] if node.args[0] == b else node.args[0]
@@ -391,7 +391,7 @@ class Builder:
         return None
 
     def _subtract(self, a: int, b: int) -> int:
-        """The difference a - b without signs; that of b - a negated where it is there."""
+        """Return a - b for operands without signs; -(b - a) if b - a exists."""
         if a == b:
             return self.constant(0.0)
         if self.value(b) == 0.0:
@@ -417,7 +417,7 @@ class Builder:
         return result if sign > 0 else self.negative(result)
 
     def _both_constant(self, op: int, a: int, b: int) -> int | None:
-        """A sum or product of constants; None of anything else."""
+        """Return the sum or product of two constants; None for other operands."""
         one, other = self.nodes[a], self.nodes[b]
         if one.op != casadi.OP_CONST or other.op != casadi.OP_CONST:
             return None
@@ -425,7 +425,7 @@ class Builder:
         return self.constant(one.value * other.value if product else one.value + other.value)
 
     def _fold(self, op: int, operands: Sequence[int]) -> int:
-        """An operation on constants; it stays when the result is no finite number."""
+        """Evaluate an operation on constants; it remains a node if the result is not finite."""
         numbers = [DM(self.nodes[a].value) for a in operands]
         result = DM.unary(op, *numbers) if len(numbers) == 1 else DM.binary(op, *numbers)
         if not math.isfinite(float(result)):
@@ -442,7 +442,7 @@ class Builder:
 
 
 def rebuild(graph: Graph, builder: Builder) -> Graph:
-    """The live nodes of a graph added to a builder, one by one."""
+    """Add the live nodes of a graph to a builder."""
     numbers = [-1] * len(graph.nodes)
     for number, alive in enumerate(graph.live()):
         if alive:
@@ -452,11 +452,11 @@ def rebuild(graph: Graph, builder: Builder) -> Graph:
     return graph.with_nodes(builder.nodes, results)
 
 
-# Leave out what no output needs.
+# Removal of unused nodes.
 
 
 def drop(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
-    """The same graph without the nodes that no output needs."""
+    """Return the graph without the nodes that no output needs."""
     numbers = [-1] * len(graph.nodes)
     nodes: list[Node] = []
     for number, alive in enumerate(graph.live()):

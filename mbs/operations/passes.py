@@ -1,4 +1,4 @@
-"""Passes: each makes an equal graph, cheaper in one respect."""
+"""Simplification passes: each returns an equivalent graph that is cheaper in one respect."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from mbs.operations.polynomials import (
     without,
 )
 
-# Sums of angles in place of products of sines and cosines.
+# Trigonometric functions of sums of angles instead of products of sines and cosines.
 
 
 class _Meeting(NamedTuple):
-    """A term with a sine or cosine, `first`, of one angle and one, `second`, of the other."""
+    """Term with sines or cosines of two angles: factor `first` and factor `second`."""
 
     monomial: Monomial
     coefficient: int
@@ -38,16 +38,16 @@ class _Meeting(NamedTuple):
 
 
 def angles(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
-    """Rotations about parallel axes joined: c2 c3 - s2 s3 is cos(q2 + q3).
+    """Join rotations about parallel axes: c2 c3 - s2 s3 becomes cos(q2 + q3).
 
-    Rotations of vectors, one after the other, are joined too. Each pair of angles is tried by
-    itself and stays joined if the graph got cheaper.
+    Consecutive rotations of vectors are joined too. Each pair of angles is tried separately. The
+    result is kept if the graph is cheaper.
     """
     return improved(graph, parameters, _join_angles, lambda pair: pair[0] != pair[1])
 
 
 def _join_angles(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polynomial:
-    """Two angles joined wherever both of their terms are there; itself if they never are."""
+    """Join two angles wherever both terms exist; return the same polynomial if they never do."""
     opened = multiplied_out(algebra, polynomial, pair)
     meetings: dict[Monomial, dict[tuple[int, int], _Meeting]] = {}
     nodes = algebra.builder.nodes
@@ -67,7 +67,7 @@ def _join_angles(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polyno
 
 
 def _of_both(algebra: Algebra, monomial: Monomial, pair: Pair) -> Iterator[tuple[int, int]]:
-    """Two factors, one of each angle."""
+    """Yield pairs of factors: a sine or cosine of the first angle and one of the second."""
     known = {n: name for n in monomial if (name := angle(algebra, n)) in pair}
     for first, a in known.items():
         for second, b in known.items():
@@ -78,7 +78,7 @@ def _of_both(algebra: Algebra, monomial: Monomial, pair: Pair) -> Iterator[tuple
 def _join(
     algebra: Algebra, result: Polynomial, rest: Monomial, one: _Meeting, other: _Meeting
 ) -> None:
-    """Two terms as one in place, if their coefficients agree: cos cos - sin sin and the like."""
+    """Join two terms of `result` in place if their coefficients agree, as cos cos - sin sin."""
     builder = algebra.builder
     if any(result.get(m.monomial) != m.coefficient for m in (one, other)):
         return
@@ -103,10 +103,10 @@ _MOST_WORK = 20_000
 
 
 def factor(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
-    """Sums of products with common factors put outside: a b + a c is a (b + c).
+    """Factor out common factors of sums of products: a b + a c becomes a (b + c).
 
-    The factor that saves most products is taken first. Products that are used elsewhere are
-    opened too where that is no dearer, as the bracket may be there already.
+    The factor that saves most products is factored out first. Products that are used several times
+    are expanded too if this is not more expensive, because the same bracket may already exist.
     """
     names = tuple(parameters)
     trials = (rewritten(graph, names, write) for write in (_opened_first, _opened_last))
@@ -114,7 +114,7 @@ def factor(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
 
 
 def _opened_first(algebra: Algebra, polynomial: Polynomial) -> int:
-    """The cheapest form of a polynomial; of equals the one with its products opened."""
+    """Write the cheapest form of a polynomial; among equals the form with expanded products."""
     return algebra.cheapest(reversed(_forms(algebra, polynomial)))
 
 
@@ -131,7 +131,7 @@ def _forms(algebra: Algebra, polynomial: Polynomial) -> list[partial[int]]:
 
 
 def _open_products(algebra: Algebra, polynomial: Polynomial) -> Polynomial:
-    """The same polynomial, no factor of which is a product."""
+    """Expand the factors that are products, so that no factor of a term is a product."""
     total: Polynomial = {}
     for monomial, coefficient in polynomial.items():
         factors: Monomial = ()
@@ -161,7 +161,7 @@ def _factor(algebra: Algebra, polynomial: Polynomial) -> int:
 
 
 def _savings(algebra: Algebra, polynomial: Polynomial) -> Counter[int]:
-    """How many products are saved when a node is put outside, of nodes that save any."""
+    """Return the products saved by factoring out each node, for nodes that save any."""
     savings: Counter[int] = Counter()
     for monomial, coefficient in polynomial.items():
         unit = algebra.is_unit(coefficient)
@@ -174,7 +174,7 @@ def _savings(algebra: Algebra, polynomial: Polynomial) -> Counter[int]:
 
 
 def _with_factor(algebra: Algebra, polynomial: Polynomial, number: int) -> Polynomial:
-    """The polynomial with all multiples of a node written as one product."""
+    """Factor out a node: all its multiples in the polynomial become one product."""
     builder, rest = algebra.builder, dict(polynomial)
     bracket: Polynomial = {}
     for monomial, coefficient in polynomial.items():
@@ -191,7 +191,7 @@ def _with_factor(algebra: Algebra, polynomial: Polynomial, number: int) -> Polyn
 def _quotient(
     algebra: Algebra, monomial: Monomial, coefficient: int, number: int
 ) -> Polynomial | None:
-    """A term divided by a node; None when that is no factor of it."""
+    """Divide a term by a node; return None if the node is not a factor."""
     if number in monomial:
         return {without(monomial, number): coefficient}
     sign, unsigned = algebra.builder.unsigned(coefficient)
@@ -200,19 +200,19 @@ def _quotient(
     return None
 
 
-# Fold constants and move signs to where they are free.
+# Evaluation of constants, and sign changes moved to positions without cost.
 
 
 def fold(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
-    """Constants computed, 0 and 1 removed, signs taken outwards, one node for equal nodes.
+    """Evaluate constants, remove 0 and 1, move signs outwards, and merge equal nodes.
 
-    A sign that is left goes into a difference that nothing else uses: -(x - y) is y - x.
+    A remaining sign is absorbed by a difference without other uses: -(x - y) becomes y - x.
     """
     return drop(_reverse_differences(drop(rebuild(graph, Builder(graph, parameters)))))
 
 
 def _reverse_differences(graph: Graph) -> Graph:
-    """Differences of which the negatives alone are used, reversed."""
+    """Reverse differences of which only the negative is used."""
     negated = {n.args[0] for n in graph.nodes if n.op == casadi.OP_NEG}
     plain = {number for result in graph.results for number in result}
     for number, node in enumerate(graph.nodes):
@@ -232,7 +232,7 @@ def _reverse_differences(graph: Graph) -> Graph:
 
 
 def _without_assignments(graph: Graph) -> Graph:
-    """Whatever uses an assignment uses what is assigned."""
+    """Copy propagation: uses of an assignment refer to its operand."""
     target = list(range(len(graph.nodes)))
     nodes = list(graph.nodes)
     for number, node in enumerate(nodes):
@@ -243,7 +243,7 @@ def _without_assignments(graph: Graph) -> Graph:
     return graph.with_nodes(nodes, [[target[n] for n in result] for result in graph.results])
 
 
-# Order the operations so that few values wait at a time.
+# Order of operations that keeps few values alive at once.
 
 
 _LEAVES = (casadi.OP_INPUT, casadi.OP_CONST)
@@ -252,11 +252,12 @@ _Rank = Callable[[int], tuple[int, ...]]
 
 
 def order(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
-    """The same nodes, outputs one after the other and operands in the order that needs less room.
+    """Reorder operations so that fewer values are alive at once.
 
-    Where an operation is commutative its operands are exchanged, so that a walk from the outputs
-    to the inputs, as CasADi makes it, finds this order.
-    Source: Sethi & Ullman 1970, with shared nodes counted where they are met first.
+    Outputs are computed in order. Operands of commutative operations are exchanged so that the
+    depth-first traversal of CasADi finds the same order.
+
+    Source: Sethi & Ullman 1970; a shared node belongs to its first use.
     """
     graph = drop(graph)
     room = _room(graph)
@@ -272,7 +273,7 @@ def order(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
 
 
 def waiting(graph: Graph) -> int:
-    """The largest number of values that are kept at a time, inputs and constants apart."""
+    """Return the largest number of values alive at once, without inputs and constants."""
     last = list(range(len(graph.nodes)))
     for number in range(len(graph.nodes)):
         for operand in graph.operands(number):
@@ -288,7 +289,7 @@ def waiting(graph: Graph) -> int:
 
 
 def _room(graph: Graph) -> list[int]:
-    """Sethi and Ullman's number of values that a node needs, as if nothing were shared."""
+    """Return the Sethi-Ullman number of each node: values alive at once, as if none were shared."""
     room: list[int] = []
     for number, node in enumerate(graph.nodes):
         needs = sorted((room[a] for a in graph.operands(number)), reverse=True)
@@ -305,7 +306,7 @@ def _depth(graph: Graph) -> list[int]:
 
 
 def _walk(graph: Graph, rank: _Rank) -> Graph:
-    """The graph in the order of a walk from the outputs, operands of lower rank first."""
+    """Return the graph in depth-first order from the outputs, operands of lower rank first."""
     operands = [graph.operands(number) for number in range(len(graph.nodes))]
     for number, node in enumerate(graph.nodes):
         if node.op in COMMUTATIVE:
@@ -329,14 +330,14 @@ def _walk(graph: Graph, rank: _Rank) -> Graph:
     return graph.with_nodes(nodes, [[numbers[n] for n in result] for result in graph.results])
 
 
-# Gather parameters: what depends on them alone is done once.
+# Products and sums of parameters, which need to be computed only once.
 
 
 def parameters(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
-    """Products and sums associated so that parameter-only factors and terms meet.
+    """Reassociate products and sums so that parameter-only factors and terms are combined.
 
-    c1 (x c2) is (c1 c2) x, c1 x + c2 x is (c1 + c2) x, and c1 (c2 x + c3 y) is
-    (c1 c2) x + (c1 c3) y. What is used elsewhere is never computed a second time.
+    c1 (x c2) becomes (c1 c2) x, c1 x + c2 x becomes (c1 + c2) x, and c1 (c2 x + c3 y) becomes
+    (c1 c2) x + (c1 c3) y. Values with other uses are not computed a second time.
     """
     return rewritten(graph, parameters, _gather)
 
@@ -348,7 +349,7 @@ def _gather(algebra: Algebra, polynomial: Polynomial) -> int:
 
 
 def _opened_parameters(algebra: Algebra, polynomial: Polynomial) -> Polynomial:
-    """A polynomial, sums among its terms opened that have a term in common with it."""
+    """Expand the sums among the terms of a polynomial that have a monomial in common with it."""
     total = dict(polynomial)
     for monomial, coefficient in polynomial.items():
         inside = algebra.written.get(monomial[0], {}) if len(monomial) == 1 else {}
@@ -358,21 +359,21 @@ def _opened_parameters(algebra: Algebra, polynomial: Polynomial) -> Polynomial:
     return total
 
 
-# The sum of the squares of a sine and a cosine is 1.
+# sin^2 + cos^2 = 1.
 
 
 def pythagoras(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
-    """Squares of sines and cosines reduced: s s x + c c x is x, x - s s x is c c x.
+    """Reduce squares of sines and cosines: s s x + c c x becomes x, x - s s x becomes c c x.
 
-    With other coefficients p1 s s x + p2 c c x is p1 x + (p2 - p1) c c x.
-    A vector rotated to and fro is itself again. Each angle is tried by itself and stays so if the
-    graph got cheaper.
+    With different coefficients, p1 s s x + p2 c c x becomes p1 x + (p2 - p1) c c x. Rotations of a
+    vector back and forth thus cancel. Each angle is tried separately. The result is kept if the
+    graph is cheaper.
     """
     return improved(graph, parameters, _reduce, lambda pair: pair[0] == pair[1])
 
 
 def _reduce(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polynomial:
-    """The squares of an angle's sine and cosine reduced where that saves a term or product."""
+    """Reduce the squares of the sine and cosine of an angle where this saves operations."""
     opened = multiplied_out(algebra, polynomial, pair)
     result = dict(opened)
     for monomial in opened:
@@ -385,7 +386,7 @@ def _reduce(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polynomial:
 def _reduced_rest(
     algebra: Algebra, polynomial: Polynomial, number: int, rest: Monomial
 ) -> Polynomial:
-    """The cheapest of the forms of the terms with rest, c c rest and s s rest."""
+    """Return the cheapest form of the terms `rest`, c c `rest` and s s `rest`."""
     builder = algebra.builder
     argument = builder.nodes[number].args[0]
     squares = [
@@ -404,7 +405,7 @@ def _reduced_rest(
     return min(forms, key=algebra.cost)
 
 
-# Share common parts of sums and products.
+# Common parts of sums and products.
 
 
 _SUMS = {casadi.OP_ADD, casadi.OP_SUB}
@@ -413,10 +414,10 @@ _LONGEST_OPENED = (1, 8)
 
 
 def share(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
-    """Sums and products associated so that parts of several of them are computed once.
+    """Reassociate sums and products so that their common parts are computed once.
 
-    Sums and products are opened to sets of signed terms and of factors; the pair that most sets
-    hold becomes a node, until no pair occurs twice.
+    Sums are sets of signed terms and products are sets of factors. The pair of elements that
+    occurs in most sets becomes a node, until no pair occurs twice.
     Source: Breuer 1969, generation of optimal code for expressions via factorization.
     """
     names = tuple(parameters)
@@ -428,13 +429,13 @@ def share(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
 
 
 def _associate(graph: Graph, parameters: tuple[str, ...], ops: set[int], longest: int) -> Graph:
-    """The graph with its sums or products associated anew.
+    """Reassociate the sums or the products of a graph.
 
     Args:
-        graph: folded.
-        parameters: names of inputs.
-        ops: either.
-        longest: so many elements a group may have that is used elsewhere and opened even so.
+        graph: graph after `fold`.
+        parameters: names of the inputs that are parameters.
+        ops: operations to reassociate, `_SUMS` or `_PRODUCTS`.
+        longest: largest number of elements of a group that is expanded although it has other uses.
     """
     fixed = graph.fixed_by(parameters)
     groups = _opened_groups(graph, ops, fixed, longest)
@@ -449,7 +450,7 @@ def _associate(graph: Graph, parameters: tuple[str, ...], ops: set[int], longest
 def _opened_groups(
     graph: Graph, ops: set[int], fixed: list[bool], longest: int
 ) -> dict[int, Group]:
-    """The terms of every sum, or factors of every product, that is more than part of another."""
+    """Return the terms of each sum, or the factors of each product, that is not part of another."""
     uses = graph.uses()
     groups: dict[int, Group] = {}
     part_of_another: set[int] = set()
@@ -483,7 +484,7 @@ def _part(groups: dict[int, Group], number: int, opened: bool, alone: bool, long
 
 
 def _gather_fixed(group: Group, fixed: list[bool], known: dict[int, Group], first: int) -> None:
-    """Replace the parameter-only elements of a group by one, in place."""
+    """Replace the parameter-only elements of a group by a single element, in place."""
     together = {e: s for e, s in group.items() if fixed[e]}
     if len(together) < 2:
         return
@@ -495,7 +496,7 @@ def _gather_fixed(group: Group, fixed: list[bool], known: dict[int, Group], firs
 
 
 def _write(graph: Graph, groups: dict[int, Group], builder: Builder, ops: set[int]) -> Graph:
-    """The graph in which groups are computed element by element."""
+    """Return the graph in which each group is computed element by element."""
     numbers: dict[int, int] = {}
 
     def write(name: int) -> None:
@@ -518,7 +519,7 @@ def _write(graph: Graph, groups: dict[int, Group], builder: Builder, ops: set[in
 
 
 def _in_order(graph: Graph, groups: dict[int, Group]) -> Iterator[int]:
-    """Nodes and groups that the outputs need, operands first."""
+    """Yield the nodes and groups that the outputs need, operands first."""
     done: set[int] = set()
     stack = [number for result in reversed(graph.results) for number in reversed(result)]
     while stack:

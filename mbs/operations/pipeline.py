@@ -1,4 +1,4 @@
-"""Equal Functions that take fewer operations, pass by pass."""
+"""Simplify Functions: equal Functions with fewer operations, by a sequence of passes."""
 
 from __future__ import annotations
 
@@ -19,18 +19,17 @@ from mbs.operations.passes import angles, factor, fold, order, parameters, pytha
 from mbs.operations.verification import Witness, witness
 from mbs.text import did_you_mean, quoted
 
-# The passes by name, in the order in which they are made.
+# Passes by name, in the order in which they are applied.
 
 
 @dataclass(frozen=True, slots=True)
 class Pass:
-    """A transformation that makes a graph cheaper.
+    """Transformation that makes a graph cheaper.
 
     Attributes:
-        name: what it is called by.
-        meaning: what it does, in a line.
-        apply: takes a graph and the names of the inputs that are parameters, and gives an equal
-            graph.
+        name: name of the pass, for the argument `passes` of `simplify`.
+        meaning: description of the pass in one line.
+        apply: callable (graph, names of the inputs that are parameters) -> equivalent graph.
     """
 
     name: str
@@ -48,7 +47,7 @@ PASSES = (
     Pass("share", "compute common parts of sums and products once", share),
     Pass("order", "order the operations so that few values wait at a time", order),
 )
-"""The passes in the order in which they are made."""
+"""Passes in the order in which they are applied."""
 
 
 _MOST_ROUNDS = 6
@@ -56,14 +55,14 @@ _MOST_ROUNDS = 6
 
 @dataclass(frozen=True, slots=True)
 class PassReport:
-    """One pass over a Function.
+    """Result of a single pass over a Function.
 
     Attributes:
-        name: of the pass.
-        seconds: how long it took, with the comparison afterwards.
-        before: operations before it.
-        after: operations after it; more than before when it was undone.
-        kept: whether its result was kept.
+        name: name of the pass.
+        seconds: duration of the pass and of the numeric comparison [s].
+        before: operations before the pass.
+        after: operations after the pass, even if its result was discarded.
+        kept: whether the result was kept.
     """
 
     name: str
@@ -79,12 +78,12 @@ Step = PassReport
 
 @dataclass(frozen=True, slots=True)
 class Simplification:
-    """What the passes made of a Function.
+    """Simplified Function and the passes that were applied.
 
     Attributes:
-        function: the simplified one.
-        graph: its operations, in the order of the last pass.
-        steps: the passes, as they were made.
+        function: simplified Function.
+        graph: operations of the Function, in the order of the last pass.
+        steps: reports of the passes, in order.
     """
 
     function: Function
@@ -92,7 +91,7 @@ class Simplification:
     steps: tuple[PassReport, ...]
 
     def __str__(self) -> str:
-        """A table of the passes: multiplications/additions before and after, seconds."""
+        """Return a table of the passes: multiplications/additions before and after, seconds."""
         rows = [("pass", "before", "after", "seconds")]
         rows += [
             (
@@ -113,24 +112,26 @@ def simplify(
     passes: Iterable[str] | None = None,
     parameters: Iterable[str] = ("p",),
 ) -> Function:
-    """An equal Function that takes fewer operations.
+    """Return an equivalent Function with fewer operations.
 
-    Its derivatives are finite where those of the given one are: no division and no root is new.
+    Divisions and roots are never added, so derivatives are finite wherever the derivatives of the
+    given Function are.
 
     Args:
-        function: made of scalar operations, or a Function that can be expanded to them.
-        passes: names of passes, see `PASSES`, made in the order of that table; all by default.
-        parameters: names of inputs that do not change from call to call; operations on them
-            alone are free, see `split`.
+        function: Function of scalar operations, or a Function that can be expanded to them.
+        passes: names of passes, see `PASSES`; they are applied in the order of that table.
+            Default: all passes.
+        parameters: names of inputs that are constant from call to call. Operations on these
+            inputs alone are not counted, see `split`.
 
     Returns:
-        a Function with the same name, inputs, outputs and default inputs; of a model, with its
-        checks and its parameter defaults too, and with the names of those intermediate
-        quantities that it still computes.
+        a Function with the same name, inputs, outputs and default inputs. Models keep their
+        checks, their parameter defaults and the names of the intermediate quantities that are
+        still computed.
 
     Raises:
-        ModelError: the Function has no scalar operations, gives no numbers, or a pass has no
-            such name.
+        ModelError: the Function has no scalar operations or no finite values, or a pass is
+            unknown.
     """
     return simplification(function, passes, parameters).function
 
@@ -140,10 +141,10 @@ def simplification(
     passes: Iterable[str] | None = None,
     parameters: Iterable[str] = ("p",),
 ) -> Simplification:
-    """What `simplify` does, with the operations that each pass saved.
+    """Simplify a Function as `simplify` does, with a report of the operations that passes save.
 
-    The passes are made one after the other until none saves anything more. Each result is compared
-    with the given Function at random points, and undone if it takes more operations.
+    Passes are repeated until none saves further operations. Each result is compared with the given
+    Function at random points. It is discarded if it needs more operations.
     """
     chosen, names = _choose(passes), tuple(parameters)
     graph, steps = graph_of(function), list[PassReport]()
@@ -187,14 +188,14 @@ def _make(
 
 
 def _function_like(function: Function, graph: Graph) -> Function:
-    """The Function of a graph, with the defaults of another and, of a model, checks and names."""
+    """Return the Function of a graph, with defaults (for models also checks) of `function`."""
     defaults = [function.default_in(k) for k in range(function.n_in())]
     made = function_of(graph, defaults)
     rewritten: Any = getattr(function, "rewritten", None)
     return made if rewritten is None else rewritten(made)
 
 
-# What depends on parameters alone, apart from what changes from call to call.
+# Separation of the operations on parameters from the operations of every call.
 
 
 _CONSTANTS = "c"
@@ -202,12 +203,12 @@ _CONSTANTS = "c"
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """A Function in two: what is done once, and what is done at every call.
+    """Function that is split in two: operations done once, and operations done at every call.
 
     Attributes:
-        setup: from the parameters to c, a column of everything that main needs of them.
-        main: from the other inputs and c to the outputs.
-        inputs: names of the inputs of the Function that was split, in their order.
+        setup: Function from the parameters to c, a column of all values that `main` needs.
+        main: Function from the other inputs and c to the outputs.
+        inputs: names of the inputs of the original Function, in order.
     """
 
     setup: Function
@@ -215,7 +216,7 @@ class Split:
     inputs: tuple[str, ...]
 
     def joined(self) -> Function:
-        """The Function that was split: main after setup."""
+        """Return the original Function: `main` after `setup`."""
         sparsity = {
             f.name_in(k): f.sparsity_in(k) for f in (self.main, self.setup) for k in range(f.n_in())
         }
@@ -228,19 +229,18 @@ class Split:
 
 
 def split(function: Function, parameters: Iterable[str] = ("p",)) -> Split:
-    """A Function in two, so that work on parameters is not repeated.
+    """Split a Function in two, so that operations on parameters are not repeated.
 
-    Numbers of c are parameters that main uses as they are, and results that it uses. Constants
-    are in main itself. Simplify the Function first, so that there is little of both.
+    c contains the parameters and the parameter-only results that `main` uses. Constants are part
+    of `main`. Simplify the Function first to reduce both.
 
     Args:
-        function: made of scalar operations, or a Function that can be expanded to them.
-        parameters: names of inputs that do not change from call to call; names that the
-            Function does not have are ignored.
+        function: Function of scalar operations, or a Function that can be expanded to them.
+        parameters: names of inputs that are constant from call to call. Unknown names are ignored.
 
     Returns:
-        `setup(p) -> c`, of the parameters that the Function has in its order, for a model with
-        their defaults, and `main(..., c) -> ...`, of its other inputs and its outputs.
+        `setup(p) -> c` and `main(..., c) -> ...`. `setup` has the parameters of the Function in
+        their order; for a model also their defaults. `main` has the other inputs and all outputs.
 
     Raises:
         ModelError: the Function has no scalar operations, or an input is named c.
@@ -262,7 +262,7 @@ def split(function: Function, parameters: Iterable[str] = ("p",)) -> Split:
 
 
 def _needed_of_parameters(graph: Graph, names: set[str]) -> list[int]:
-    """Parameter-only nodes that outputs or changing nodes use, constants apart."""
+    """Return the parameter-only nodes that outputs or changing nodes use, without constants."""
     fixed = graph.fixed_by(names)
     used = [number for result in graph.results for number in result]
     for number in range(len(graph.nodes)):
@@ -272,14 +272,14 @@ def _needed_of_parameters(graph: Graph, names: set[str]) -> list[int]:
 
 
 def _setup(graph: Graph, names: set[str], kept: list[int], column: Port) -> Graph:
-    """The graph from parameters to the kept nodes."""
+    """Return the graph that computes the kept nodes from the parameters."""
     inputs = tuple(port for port in graph.inputs if port.name in names)
     nodes = _renumber(graph, [port.name for port in inputs])
     return Graph(f"{graph.name}_setup", inputs, (column,), nodes, (tuple(kept),))
 
 
 def _main(graph: Graph, names: set[str], kept: list[int], column: Port) -> Graph:
-    """The graph in which the kept nodes are inputs."""
+    """Return the graph whose last input contains the kept nodes."""
     inputs = tuple(port for port in graph.inputs if port.name not in names)
     nodes = list(_renumber(graph, [port.name for port in inputs]))
     for position, number in enumerate(kept):
@@ -288,7 +288,7 @@ def _main(graph: Graph, names: set[str], kept: list[int], column: Port) -> Graph
 
 
 def _renumber(graph: Graph, names: list[str]) -> tuple[Node, ...]:
-    """The nodes with inputs counted among these names; others are left as they are."""
+    """Return nodes in which input indices refer to `names`; other nodes are unchanged."""
     index = {k: names.index(p.name) for k, p in enumerate(graph.inputs) if p.name in names}
 
     def renumber(node: Node) -> Node:
@@ -299,26 +299,27 @@ def _renumber(graph: Graph, names: list[str]) -> tuple[Node, ...]:
     return tuple(renumber(node) for node in graph.nodes)
 
 
-# The named scalars of a Function found again in an equal one that computes them otherwise.
+# Named scalars of a Function, identified in an equivalent Function with other operations.
 
 
 _SAME = 1e-9
-"""Two scalars are equal whose values at every point differ by no more than this part of them."""
+"""Relative difference up to which two scalars are equal, at every test point."""
 
 
 def names_found(function: Function, named: Function) -> Function:
-    """A Function with further outputs: those of its scalars that bear a name in an equal one.
+    """Add outputs to a Function: its scalars that have a name in an equivalent Function.
 
-    Scalars are the same where their values at random points are. No operation but signs is
-    added: a name whose scalar, or its opposite, the Function does not compute is left out, and
-    so is one of a constant.
+    Scalars are identified by equal values at random points. Only sign changes are added as
+    operations. A named scalar is omitted if the Function computes neither it nor its opposite, or
+    if it is constant.
 
     Args:
-        function: of scalar operations, such as a simplified model.
-        named: of the same inputs; its outputs are those of the Function, then named scalars.
+        function: Function of scalar operations, such as a simplified model.
+        named: Function with the same inputs. Its outputs are the outputs of `function`, followed
+            by the named scalars.
 
     Returns:
-        the Function; after its own outputs come those scalars of `named` that were found.
+        the Function with the identified scalars of `named` as additional outputs.
     """
     graph, count = graph_of(function), function.n_out()
     points = witness(named).points
@@ -344,13 +345,13 @@ def names_found(function: Function, named: Function) -> Function:
 
 
 def _scalars(named: Function, point: Sequence[DM], count: int) -> NDArray[np.float64]:
-    """The named scalars at a point; no number where an output is not one scalar."""
+    """Return the named scalars at a point; NaN for outputs that are not scalar."""
     outputs = Function.call(named, list(point))[count:]
     return np.array([float(x) if x.shape == (1, 1) else np.nan for x in outputs])
 
 
 def _values(graph: Graph, points: Sequence[Sequence[DM]]) -> NDArray[np.float64]:
-    """(nodes, points) the value of every node."""
+    """Return the values of all nodes at all points, (nodes, points)."""
     size = len(graph.nodes)
     port, numbers = Port("nodes", Sparsity.dense(size, 1)), tuple(range(size))
     every = function_of(replace(graph, outputs=(port,), results=(numbers,)))
@@ -360,10 +361,12 @@ def _values(graph: Graph, points: Sequence[Sequence[DM]]) -> NDArray[np.float64]
 def _find(
     graph: Graph, target: NDArray[np.float64], computed: NDArray[np.float64]
 ) -> dict[int, int]:
-    """For named scalars that vary, where there is one, the first node that has their values.
+    """Return the first node with the same values for each named scalar that is not constant.
+
+    Named scalars without such a node are omitted.
 
     Args:
-        graph: its operations that an output needs are looked through.
+        graph: graph whose live operations are searched.
         target: (names, points) values of the named scalars.
         computed: (nodes, points) values of the nodes.
     """

@@ -1,8 +1,8 @@
-"""Graphs read as polynomials with parameter-only coefficients, and written anew.
+"""Rewrite graphs as polynomials with parameter-only coefficients.
 
-Sums and products that are used once are opened, so that a chain of them is one polynomial; what
-is used more often stays one indeterminate. A pass reshapes the polynomials or says how they are
-computed.
+Sums and products that are used once are expanded, so that a chain of them is a single polynomial.
+A node that is used several times is an indeterminate. A pass transforms the polynomials, or
+chooses how they are computed.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from mbs.operations.counts import count_graph
 from mbs.operations.graph import Builder, Graph, drop
 
 Monomial = tuple[int, ...]
-"""Sorted numbers of nodes to be multiplied, in a Builder; a square is a number twice."""
+"""Sorted node indices (in a Builder) of the factors of a product; a square contains one twice."""
 
 Polynomial = dict[Monomial, int]
-"""The number of the parameter-only coefficient of each monomial, in a Builder."""
+"""Monomial to the node index (in a Builder) of its parameter-only coefficient."""
 
 Writer = Callable[["Algebra", Polynomial], int]
-"""Writes a polynomial as nodes and returns the number of the last."""
+"""Callable that writes a polynomial as nodes and returns the index of the last node."""
 
 _LONGEST_NEGATED = 100
 _POLYNOMIAL_OPS = {
@@ -35,14 +35,14 @@ _POLYNOMIAL_OPS = {
 
 
 class Algebra:
-    """Polynomials over a Builder.
+    """Arithmetic of polynomials whose coefficients and indeterminates are nodes of a Builder.
 
     Attributes:
-        builder: where coefficients and indeterminates are nodes.
-        written: the polynomials that were written as nodes, by the number of the node.
-        names: what nodes are computed from, in words; see trigonometry.
-        angles_within: the angles in polynomials that were written; see trigonometry.
-        one: the coefficient 1.
+        builder: builder of the nodes.
+        written: node index to the polynomial that was written as this node.
+        names: node index to a text of the expression that it computes; see `angle`.
+        angles_within: node index to the angles in its polynomial; see `angles_met`.
+        one: index of the coefficient 1.
     """
 
     def __init__(self, builder: Builder) -> None:
@@ -53,7 +53,7 @@ class Algebra:
         self.one = builder.constant(1.0)
 
     def read(self, number: int) -> Polynomial:
-        """A node as a coefficient times one indeterminate; a coefficient alone if it is fixed."""
+        """Return a node as coefficient times indeterminate; a coefficient only if it is fixed."""
         builder, coefficient = self.builder, self.one
         while not builder.fixed[number]:
             node = builder.nodes[number]
@@ -70,14 +70,14 @@ class Algebra:
         return {(): builder.product(coefficient, number)}
 
     def indeterminate(self, number: int) -> Polynomial:
-        """A node as one indeterminate with its sign; a coefficient if it is fixed."""
+        """Return a node as an indeterminate with a sign; as a coefficient if it is fixed."""
         if self.builder.fixed[number]:
             return {(): number}
         sign, number = self.builder.unsigned(number)
         return {(number,): self.one if sign > 0 else self.builder.constant(-1.0)}
 
     def opened(self, polynomial: Polynomial) -> Polynomial:
-        """The same polynomial, an indeterminate that is a multiple of another being read so."""
+        """Return the polynomial with indeterminates c x of other nodes x written as c times x."""
         total: Polynomial = {}
         for monomial, coefficient in polynomial.items():
             read = self.read(monomial[0]) if len(monomial) == 1 else {monomial: self.one}
@@ -85,16 +85,16 @@ class Algebra:
         return total
 
     def is_unit(self, coefficient: int) -> bool:
-        """Whether a coefficient is 1 or -1."""
+        """Return whether a coefficient is 1 or -1."""
         return self.builder.value(coefficient) in (1.0, -1.0)
 
     def cost(self, polynomial: Polynomial) -> int:
-        """Operations of the sum of terms."""
+        """Return the number of operations of the plain sum of terms."""
         products = (len(m) - self.is_unit(c) for m, c in polynomial.items() if m)
         return sum(products) + len(polynomial) - 1
 
     def accumulate(self, total: Polynomial, terms: Iterable[tuple[Monomial, int]]) -> None:
-        """Add terms to a polynomial, in place; what cancels goes."""
+        """Add terms to a polynomial, in place; terms that cancel are removed."""
         for monomial, coefficient in terms:
             if monomial in total:
                 coefficient = self.builder.sum(total.pop(monomial), coefficient)
@@ -102,14 +102,14 @@ class Algebra:
                 total[monomial] = coefficient
 
     def scaled(self, polynomial: Polynomial, factor: int) -> Polynomial:
-        """A polynomial times a coefficient."""
+        """Return a polynomial times a coefficient."""
         if factor == self.one:
             return dict(polynomial)
         products = ((m, self.builder.product(c, factor)) for m, c in polynomial.items())
         return {m: c for m, c in products if self.builder.value(c) != 0.0}
 
     def monomial(self, monomial: Monomial) -> int:
-        """The product of a monomial; powers by squaring."""
+        """Write a monomial as nodes; powers are computed by squaring."""
         if len(set(monomial)) == len(monomial):
             return self._product(monomial)
         powers = Counter(monomial)
@@ -125,12 +125,12 @@ class Algebra:
         return result if result >= 0 else self.one
 
     def term(self, monomial: Monomial, coefficient: int) -> int:
-        """Coefficient times monomial as a node."""
+        """Write coefficient times monomial as nodes."""
         product = self.monomial(monomial)
         return product if coefficient == self.one else self.builder.product(coefficient, product)
 
     def cheapest(self, forms: Iterable[Callable[[], int]]) -> int:
-        """The number that the form with the fewest new operations gives; the first of equals."""
+        """Write the form with the fewest new operations (the first of equals); return its node."""
         start = len(self.builder.nodes)
         tried = []
         for form in forms:
@@ -146,7 +146,7 @@ class Algebra:
         self.builder.forget_since(start)
 
     def plain(self, polynomial: Polynomial) -> int:
-        """A polynomial as the sum of its terms."""
+        """Write a polynomial as the sum of its terms."""
         total = -1
         for monomial, coefficient in polynomial.items():
             term = self.term(monomial, coefficient)
@@ -155,21 +155,21 @@ class Algebra:
 
 
 def rewritten(graph: Graph, parameters: Iterable[str], write: Writer) -> Graph:
-    """A graph of which a pass writes every polynomial.
+    """Return a graph in which a callable writes every polynomial.
 
     Args:
-        graph: what to rewrite.
-        parameters: names of inputs of which coefficients are made.
-        write: how.
+        graph: graph to rewrite.
+        parameters: names of the inputs that coefficients may depend on.
+        write: callable that writes a polynomial.
     """
     return _Rewriting(graph, Algebra(Builder(graph, parameters)), write).graph()
 
 
 class _Rewriting:
-    """One walk over a graph.
+    """Traversal of a graph that converts its nodes to polynomials and back.
 
-    A node used once is kept as a polynomial until something needs it as a node. A polynomial of
-    more than one term has one owner, who may change it in place.
+    A node that is used once is kept as a polynomial until it is needed as a node. A polynomial of
+    several terms has a single owner, which may change it in place.
     """
 
     def __init__(self, graph: Graph, algebra: Algebra, write: Writer) -> None:
@@ -179,7 +179,7 @@ class _Rewriting:
         self._forms: list[Polynomial] = []
 
     def graph(self) -> Graph:
-        """The rewritten graph."""
+        """Return the rewritten graph."""
         for number in range(len(self._old.nodes)):
             self._forms.append(self._form(number))
         results = [[self._number(self._forms[n]) for n in r] for r in self._old.results]
@@ -212,7 +212,7 @@ class _Rewriting:
         return number
 
     def _combine(self, op: int, forms: list[Polynomial]) -> Polynomial | None:
-        """An operation on polynomials; None when the result is none."""
+        """Apply an operation to polynomials; return None if the result is no polynomial."""
         first, *others = forms
         second = others[0] if others else first
         if op == casadi.OP_ASSIGN:
@@ -229,7 +229,7 @@ class _Rewriting:
         return self._plus(first, second, sign)
 
     def _plus(self, first: Polynomial, second: Polynomial, sign: int) -> Polynomial:
-        """The sum first + sign second, in place of the longer one."""
+        """Return first + sign second; the longer polynomial is changed in place."""
         if len(second) > _LONGEST_NEGATED and sign != self._algebra.one:
             second = self._algebra.indeterminate(self._number(second))
         scaled = second if sign == self._algebra.one else self._algebra.scaled(second, sign)
@@ -241,7 +241,7 @@ class _Rewriting:
         return longer
 
     def _over(self, first: Polynomial, second: Polynomial) -> Polynomial | None:
-        """A quotient by a coefficient is a product by its inverse."""
+        """Return a quotient by a coefficient as a product; None for other divisors."""
         if not _is_coefficient(second):
             return None
         inverse = self._builder.apply(casadi.OP_INV, second[()])
@@ -258,12 +258,12 @@ class _Rewriting:
         return {tuple(sorted(m1 + m2)): self._builder.product(c1, c2)}
 
     def _bears(self, form: Polynomial) -> bool:
-        """Whether a coefficient times every term costs no more than times the sum."""
+        """Return whether scaling each term costs no more than scaling the sum."""
         units = sum(1 for m, c in form.items() if m and self._algebra.is_unit(c))
         return units <= 1
 
     def _single(self, form: Polynomial) -> tuple[Monomial, int]:
-        """A polynomial as one term."""
+        """Return a polynomial as a single term; a sum is written as a node."""
         if len(form) > 1:
             form = self._algebra.indeterminate(self._number(form))
         return next(iter(form.items()))
@@ -274,18 +274,18 @@ def _is_coefficient(form: Polynomial) -> bool:
 
 
 def without(monomial: Monomial, *factors: int) -> Monomial:
-    """A monomial divided by some of its factors."""
+    """Return a monomial without some of its factors."""
     rest = list(monomial)
     for factor in factors:
         rest.remove(factor)
     return tuple(rest)
 
 
-# Polynomials in sines and cosines: which angles are in them, and how they meet.
+# Polynomials in sines and cosines: their angles, and the pairs of angles in products.
 
 
 Pair = tuple[str, str]
-"""The names of two angles; one name twice for an angle and itself."""
+"""Names of two angles; the same name twice for the squares of an angle."""
 
 Reshape = Callable[[Algebra, Polynomial], Polynomial]
 
@@ -298,7 +298,7 @@ _MOST_WORK = 40_000
 
 
 def angle(algebra: Algebra, number: int) -> str:
-    """A name of the angle of a sine or cosine, the same in equal graphs; else empty."""
+    """Return a name of the angle of a sine or cosine, equal for equal expressions; else empty."""
     node = algebra.builder.nodes[number]
     if node.op not in (casadi.OP_SIN, casadi.OP_COS):
         return ""
@@ -306,12 +306,12 @@ def angle(algebra: Algebra, number: int) -> str:
 
 
 def angles_in(algebra: Algebra, monomial: Monomial) -> set[str]:
-    """The names of the angles of which a monomial has sines or cosines."""
+    """Return the names of the angles whose sines or cosines are factors of a monomial."""
     return {name for number in monomial if (name := angle(algebra, number))}
 
 
 def angles_met(algebra: Algebra, polynomial: Polynomial) -> set[Pair]:
-    """Pairs of angles that meet in a product, directly or within a factor."""
+    """Return the pairs of angles that occur in a product, directly or within a factor."""
     met: set[Pair] = set()
     for monomial in polynomial:
         inner: set[str] = set()
@@ -324,9 +324,9 @@ def angles_met(algebra: Algebra, polynomial: Polynomial) -> set[Pair]:
 
 
 def multiplied_out(algebra: Algebra, polynomial: Polynomial, pair: Pair) -> Polynomial:
-    """A polynomial, factors that hold one angle opened where the other is a factor too.
+    """Expand the factors that contain one angle of a pair if the other angle is a factor too.
 
-    Products in products are opened, and one sum of each term.
+    Nested products are expanded. In each term at most one sum is expanded.
     """
     total: Polynomial = {}
     waiting = [(monomial, c, True) for monomial, c in reversed(polynomial.items())]
@@ -355,17 +355,18 @@ def improved(
     reshape: Callable[[Pair, Algebra, Polynomial], Polynomial],
     pairs: Callable[[Pair], bool],
 ) -> Graph:
-    """A graph reshaped for each pair of angles for which that makes it cheaper, by themselves.
+    """Return the graph transformed for each pair of angles for which this makes it cheaper.
 
-    A polynomial stays as it is where the reshaped one is much dearer by itself; a little dearer
-    it may be, as what is no longer needed then may be worth more. Of a large graph only the pairs
-    that are met most often are tried, so that the work grows with the number of nodes.
+    A polynomial remains unchanged if the transformed one is much more expensive. It may be slightly
+    more expensive, because nodes that become unused may save more. In a large graph only the most
+    frequent pairs are tried, so that the work grows with the number of nodes.
 
     Args:
-        graph: what is computed.
+        graph: graph to transform.
         parameters: names of the inputs that are constant.
-        reshape: gives a polynomial as it is with a pair; itself where nothing changes.
-        pairs: whether a pair is of the kind that is reshaped.
+        reshape: callable (pair, algebra, polynomial) -> transformed polynomial. It returns an
+            equal polynomial if nothing changes.
+        pairs: callable that returns whether a pair is to be tried.
     """
     names, met = tuple(parameters), Counter[Pair]()
 
@@ -398,7 +399,7 @@ def _writer(reshape: Reshape, allowance: int) -> Callable[[Algebra, Polynomial],
 
 
 def _factor_with(algebra: Algebra, monomial: Monomial, pair: Pair, opens_sums: bool) -> int | None:
-    """A factor that is itself written with one angle of a pair while the other is a factor."""
+    """Return a factor to expand: it contains one angle of a pair while the other is a factor."""
     if len(monomial) > _LONGEST_MONOMIAL:
         return None
     present = angles_in(algebra, monomial)
@@ -413,7 +414,7 @@ def _factor_with(algebra: Algebra, monomial: Monomial, pair: Pair, opens_sums: b
 
 
 def _within(algebra: Algebra, factor: int, depth: int = _DEEPEST_PRODUCT) -> frozenset[str]:
-    """The angles that are factors in a polynomial that is written, products in it opened."""
+    """Return the angles of the factors in the polynomial of a node, nested products expanded."""
     known = algebra.angles_within.get(factor)
     if known is None:
         names: set[str] = set()
@@ -427,7 +428,7 @@ def _within(algebra: Algebra, factor: int, depth: int = _DEEPEST_PRODUCT) -> fro
 
 
 def _name(algebra: Algebra, number: int) -> str:
-    """What a node is computed from; empty when that is much."""
+    """Return a text of the expression that a node computes; empty if it is too deep."""
     known = algebra.names.get(number)
     if known is None:
         known = algebra.names[number] = _spelt(algebra, number, _DEEPEST_NAME)
@@ -444,28 +445,28 @@ def _spelt(algebra: Algebra, number: int, depth: int) -> str:
     return f"({node.op} {' '.join(parts)})" if all(parts) else ""
 
 
-# The pairs of elements that many groups have in common.
+# Pairs of elements that occur in several groups.
 
 
 Group = dict[int, int]
-"""The sign of each element of a group, 1 or -1."""
+"""Element to its sign, 1 or -1."""
 
 _Pair = tuple[int, int, int]
-"""Two elements, the lower first, and the product of their signs."""
+"""Two elements, the lower index first, and the product of their signs."""
 
 _LONGEST = 48
 
 
 def extract_pairs(groups: dict[int, Group], first_name: int) -> None:
-    """Make what several groups have in common an element of theirs, in place.
+    """Replace common parts of groups by new groups, in place.
 
-    The pair that occurs most often, up to a common sign, becomes a group of its own, again and
-    again until no pair occurs twice. Of a long group the first elements alone take part, so that
-    the work grows with the number of elements.
+    The pair of elements that occurs most often, up to a common sign, becomes a group, until no
+    pair occurs twice. Only the first elements of a long group are considered, so that the work
+    grows with the number of elements.
 
     Args:
-        groups: by name; they get the new groups too.
-        first_name: the first of the numbers that are free as names.
+        groups: groups by name; the new groups are added.
+        first_name: first index that is free as a name.
     """
     extraction = _Extraction(groups)
     name = first_name
@@ -486,7 +487,7 @@ class _Extraction:
         heapq.heapify(self._queue)
 
     def most_common(self) -> _Pair | None:
-        """A most frequent pair; None when none occurs twice."""
+        """Return a most frequent pair; None if no pair occurs twice."""
         while self._queue:
             count, pair = heapq.heappop(self._queue)
             occurrences = len(self._holders.get(pair, ()))
@@ -497,7 +498,7 @@ class _Extraction:
         return None
 
     def replace(self, pair: _Pair, name: int) -> None:
-        """Make a group of a pair and an element of those that contain it."""
+        """Make a pair a new group, and replace it by one element in the groups that contain it."""
         a, b, sign = pair
         for holder in list(self._holders.pop(pair)):
             group = self._groups[holder]

@@ -1,4 +1,4 @@
-"""CasADi's operations in text: their names, and expressions as people write them."""
+"""Names of CasADi's operations, and graphs as infix expressions."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ NAMES: Mapping[int, str] = {
     for name, code in vars(casadi).items()
     if name.startswith("OP_")
 }
-"""What CasADi calls its operations; functions bear the names that they have in C's library."""
+"""Names of CasADi's operations by code. Functions have the same names as in the C library."""
 
 CODES: Mapping[str, int] = {name: code for code, name in NAMES.items()}
-"""CasADi's code of an operation by its name."""
+"""CasADi's operation codes by name."""
 
 SUM, NEGATIVE, PRODUCT, POWER, ATOM = range(5)
-"""How tightly the outermost operation of a text binds."""
+"""Binding strengths of the outermost operator of a text, from weak to strong."""
 
 _SIGNS: Mapping[int, tuple[str, int, tuple[int, ...]]] = {
     casadi.OP_ADD: ("{} + {}", SUM, (SUM, SUM)),
@@ -38,27 +38,27 @@ _SIGNS: Mapping[int, tuple[str, int, tuple[int, ...]]] = {
     casadi.OP_NE: ("{} != {}", SUM, (SUM, NEGATIVE)),
     casadi.OP_IF_ELSE_ZERO: ("({})*{}", PRODUCT, (SUM, POWER)),
 }
-"""Operations written with signs: the form, how tightly it binds, what its operands must."""
+"""Operations with infix operators: template, own binding strength, least strength of operands."""
 
 
 class Infix:
-    """The nodes of a graph as people write them, in the grammar of descriptions.
+    """Printer of graph nodes as infix expressions, in the grammar of `mbs.expressions`.
 
     Args:
-        graph: what is written.
-        inputs: names of the elements of every input, by its name.
+        graph: graph to print.
+        inputs: input name to the names of its elements.
     """
 
     def __init__(self, graph: Graph, inputs: Mapping[str, Sequence[str]]) -> None:
         self._graph, self._inputs = graph, inputs
 
     def text(self, number: int, tightness: int = SUM) -> str:
-        """A node, in brackets where it binds less than asked for."""
+        """Return the text of a node, in brackets if it binds weaker than `tightness`."""
         text, own = self._write(number)
         return f"({text})" if own < tightness else text
 
     def _write(self, number: int) -> tuple[str, int]:
-        """The text of a node, and how tightly it binds."""
+        """Return the text of a node and its binding strength."""
         return self._expression(self._graph.nodes[number])
 
     def _expression(self, node: Node) -> tuple[str, int]:

@@ -1,4 +1,4 @@
-"""Whether two Functions are equal, at random points."""
+"""Numeric comparison of Functions at random points."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from casadi import DM, Function
 from mbs.errors import ModelError
 
 _POINTS = 3
-"""Points at which Functions are compared: where an error hides at one it shows at another."""
+"""Number of test points: an error that is hidden at one point is visible at another."""
 _BOXES = ((0.1, 0.9), (-1.0, 1.0), (-3.0, 3.0), (0.5, 2.0), (1.0, 30.0), (-100.0, 100.0))
-"""Ranges of the inputs, tried in this order until a Function has values: within the domain of
-arcsines, roots and logarithms first, then what needs larger or negative numbers."""
+"""Ranges of the inputs, tried in order until the Function is finite: first the domain of arcsines,
+roots and logarithms, then ranges for functions that need larger or negative inputs."""
 _TRIES = 4
 _OF_THE_LARGEST, _OF_ALL = 1e-9, 1e-12
-"""Parts of the largest element of an output, and of all outputs, by which passes may change it:
-other orders of sums round by 1e-15 times their condition, a wrong term is off by parts of one."""
+"""Allowed differences, relative to the largest element of the output and of all outputs. A new
+order of sums changes values by 1e-15 times their condition; a wrong term by a large fraction."""
 _NUDGES, _NUDGE, _MARGIN = 16, 1e-12, 10.0
-"""Where that is passed, as by an output that is zero but for rounding: how often and by which part
-the inputs are changed, some thousand roundings, and how many times what that makes is allowed."""
+"""Rounding test if these are exceeded, such as for an output that is zero except for rounding:
+number of perturbations, relative size (some thousand roundings), factor on the largest effect."""
 
 Values = tuple[np.ndarray, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Witness:
-    """What a Function gives at some points.
+    """Values of a Function at test points.
 
     Attributes:
-        function: what is witnessed.
-        points: numbers for every input.
-        values: the non-zero elements of every output, at each point.
+        function: Function that was evaluated.
+        points: values of all inputs, for each point.
+        values: non-zero elements of all outputs, for each point.
     """
 
     function: Function
@@ -41,10 +41,14 @@ class Witness:
     values: tuple[Values, ...]
 
     def require_equal(self, function: Function, what: str) -> None:
-        """Refuse a Function that gives something else where the first gave numbers.
+        """Raise if another Function has different values where this Function is finite.
+
+        Args:
+            function: Function to compare.
+            what: name of the transformation that made it, for the error message.
 
         Raises:
-            ModelError: says which output differs, and after what.
+            ModelError: an output differs. The message gives the output and `what`.
         """
         for point, expected in zip(self.points, self.values, strict=True):
             got = _values(function, point)
@@ -59,7 +63,7 @@ class Witness:
                 )
 
     def _rounding(self, output: int) -> float:
-        """What the last digits of the inputs change of an output: all there is of a zero."""
+        """Return the change of an output by perturbed inputs: the rounding error of a zero."""
         random, found = np.random.default_rng(0), 0.0
         for point, expected in zip(self.points, self.values, strict=True):
             for _ in range(_NUDGES):
@@ -70,10 +74,10 @@ class Witness:
 
 
 def witness(function: Function, seed: int = 0) -> Witness:
-    """A Function at points where it is finite, or finite in as many elements as possible.
+    """Evaluate a Function at random points at which its elements are finite, or most of them.
 
     Raises:
-        ModelError: it is finite at none of many points.
+        ModelError: no output element is finite at any of many points.
     """
     random = np.random.default_rng(seed)
     tried: list[tuple[int, tuple[DM, ...], Values]] = []
@@ -103,7 +107,7 @@ def _values(function: Function, point: Sequence[DM]) -> Values:
 
 
 def _within(one: np.ndarray, other: np.ndarray, allowed: float) -> bool:
-    """Whether they differ by no more than this where the first are numbers."""
+    """Return whether two arrays differ by at most `allowed` where the first is finite."""
     known = np.isfinite(one)
     return bool(np.all(np.abs(one[known] - other[known]) <= allowed))
 

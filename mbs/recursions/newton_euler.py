@@ -1,4 +1,4 @@
-"""Inverse dynamics by Newton and Euler, linear in the inertial parameters.
+"""Inverse dynamics by the Newton-Euler recursion, linear in the inertial parameters.
 
 Source: Khalil & Kleinfinger 1987; Khalil & Creusot 1997, eq. 15-20.
 """
@@ -18,7 +18,7 @@ from mbs.recursions.regrouping import regroup, shift_frames
 from mbs.recursions.velocities import Acceleration, effort, link_accelerations, moment_of_rotation
 from mbs.spatial import PseudoInertia, Wrench, add_wrenches, cross, is_zero, zeros
 
-# Rotors that spin with joints: what their angular momentum asks of joints and carriers.
+# Rotors that spin with joints: efforts on joints and moments on carrier links.
 #
 # A rotor of inertia Jm about the unit vector z of link c, its carrier, spins at N qd relative to
 # it. Its locked inertia belongs to link c. The spin adds N^2 Jm qd^2 / 2 + N Jm qd (z . w_c) to
@@ -29,16 +29,19 @@ from mbs.spatial import PseudoInertia, Wrench, add_wrenches, cross, is_zero, zer
 
 
 def momentum_on(link: Link, carrier: int) -> SX:
-    """(3, 1) angular momentum that a unit velocity of the joint gives a carrier, in its frame.
+    """(3, 1) angular momentum of the rotor on link `carrier` per unit joint velocity [kg m^2].
 
-    Zero where the joint has no rotor or its rotor is on another link [kg m^2].
+    It is in the frame of the carrier. Zero if the joint has no rotor, or a rotor on another link.
     """
     rotor = link.rotor
     return rotor.momentum if rotor is not None and rotor.carrier == carrier else zeros()
 
 
 def spin_momenta(tree: Tree, v: SX) -> dict[int, SX]:
-    """For every link that carries rotors their angular momentum (3, 1), seen from it [N m s]."""
+    """Angular momentum (3, 1) of the rotors on each link relative to it, by carrier index [N m s].
+
+    Index -1 is the base. Links without rotors have no entry.
+    """
     total: dict[int, SX] = {}
     for link in tree.links:
         if link.rotor is not None:
@@ -48,7 +51,7 @@ def spin_momenta(tree: Tree, v: SX) -> dict[int, SX]:
 
 
 def rotor_efforts(tree: Tree, a: SX, motions: list[Acceleration], base: Acceleration) -> SX:
-    """(nv, 1) efforts that accelerate the rotors of the joints [N m or N]."""
+    """(nv, 1) joint efforts that accelerate the spin of the rotors [N m or N]."""
     total = SX.zeros(tree.nv)
     for link in tree.links:
         if link.rotor is not None:
@@ -60,7 +63,7 @@ def rotor_efforts(tree: Tree, a: SX, motions: list[Acceleration], base: Accelera
 
 
 def rotor_moments(tree: Tree, v: SX, a: SX, motions: list[Acceleration]) -> dict[int, SX]:
-    """For every link that carries rotors the moment (3, 1) that turns their spin [N m]."""
+    """Moment (3, 1) that each link exerts on its rotors to change their spin, by index [N m]."""
     total: dict[int, SX] = {}
     for link in tree.links:
         if link.rotor is None or link.rotor.carrier < 0:
@@ -72,12 +75,12 @@ def rotor_moments(tree: Tree, v: SX, a: SX, motions: list[Acceleration]) -> dict
 
 
 def rotor_energy(tree: Tree, v: SX, w: list[SX]) -> SX:
-    """Kinetic energy of the spin, beyond that of the locked rotors [J].
+    """Kinetic energy of the spin of rotors, in addition to locked rotors [J].
 
     Args:
-        tree: the links.
+        tree: links of the tree.
         v: (nv, 1) joint velocities.
-        w: (3, 1) angular velocities of the links, each in its frame.
+        w: angular velocity (3, 1) of each link, in its frame.
     """
     total = SX(0)
     for link in tree.links:
@@ -91,13 +94,14 @@ def rotor_energy(tree: Tree, v: SX, w: list[SX]) -> SX:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Dynamics:
-    """Everything that the recursions of Newton and Euler compute.
+    """Results of the Newton-Euler recursion.
 
     Attributes:
-        motions: of the links, each in its frame.
-        own: the wrench that moves each body, in its frame.
-        wrenches: the wrench that each joint transmits, in the frame of its link.
-        efforts: (nv, 1) its part along the motion, and what spins the rotors [N m or N].
+        motions: acceleration of each link, in its frame.
+        own: inertial wrench of each body, in its frame.
+        wrenches: wrench that each joint transmits, in the frame of its link.
+        efforts: (nv, 1) projection of `wrenches` on the joint motions, plus the efforts that
+            accelerate rotors [N m or N].
     """
 
     motions: list[Acceleration]
@@ -114,37 +118,37 @@ def newton_euler(
     base: Acceleration,
     external: dict[int, Wrench] | None = None,
 ) -> Dynamics:
-    """The wrenches that produce the joint accelerations a, without drives, friction and springs.
+    """Inverse dynamics for joint accelerations a, without drives, joint friction and springs.
 
-    Accelerations run from the base to the leaves, wrenches from the leaves to the base, with the
-    inertial parameters regrouped.
+    The forward pass computes accelerations, the backward pass wrenches, with regrouped inertial
+    parameters.
 
     Args:
-        tree: the links.
-        poses: each with respect to its antecedent.
+        tree: links of the tree.
+        poses: pose of each link relative to its antecedent.
         v: (nv, 1) joint velocities.
         a: (nv, 1) joint accelerations.
         base: motion of the base; see `resting_base`.
-        external: for some links the wrench that they exert on their environment.
+        external: wrench that a link exerts on its environment, by link index.
     """
-    # passes: frames where distances vanish, parameters in as few places as possible
+    # preparation: shift frames so that distances vanish, and regroup inertial parameters
     bodies = [PseudoInertia.of(link.inertia) for link in tree.links]
-    if not external:  # those are about the origins of the description
+    if not external:  # external wrenches are about the original frame origins
         poses, bodies = shift_frames(tree, poses, bodies, base_rests=is_zero(base.w))
     bodies = regroup(tree, poses, bodies)
 
-    # forward: accelerations of the links, and the wrenches that move their bodies
+    # forward pass: accelerations of the links, and inertial wrenches of their bodies
     motions = link_accelerations(tree, poses, v, a, base)
     own = [inertial_wrench(body, motion) for body, motion in zip(bodies, motions, strict=True)]
 
-    # what bodies exert on their environment and on the rotors that they carry
+    # add the wrenches that links exert on their environment and on their rotors
     wrenches = list(own)
     for j, wrench in (external or {}).items():
         wrenches[j] = add_wrenches(wrenches[j], wrench)
     for c, moment in rotor_moments(tree, v, a, motions).items():
         wrenches[c] = (wrenches[c][0], wrenches[c][1] + moment)
 
-    # backward: wrenches to the base, and of each its part along the joint
+    # backward pass: sum the wrenches towards the base, and project each on its joint motion
     efforts = rotor_efforts(tree, a, motions, base)
     for j, link in reversed(list(enumerate(tree.links))):
         i = link.antecedent
@@ -155,21 +159,21 @@ def newton_euler(
 
 
 def inertial_wrench(body: PseudoInertia, motion: Acceleration) -> Wrench:
-    """The wrench that moves a body: F = m vd + U ms, M = its moment of U + ms x vd."""
+    """Wrench that moves a body: F = m vd + U ms, M = J wd + w x (J w) + ms x vd."""
     f = body.m * motion.vd + casadi.mtimes(motion.rate.U, body.ms)
     return f, moment_of_rotation(body.S, motion.rate) + cross(body.ms, motion.vd)
 
 
-# What a joint itself needs of effort, whatever moves with it: drive, friction and spring.
+# Effort of a joint itself, independent of the moved bodies: rotor inertia, friction and spring.
 #
 # Source: Khalil & Creusot 1997, eq. 20; Khalil & Dombre 2002 for elastic joints.
 
 
 def joint_efforts(tree: Tree, q: SX, v: SX, a: SX) -> SX:
-    """(nv, 1) rotor inertia, friction and spring of every joint [N m or N].
+    """(nv, 1) efforts of rotor inertia, friction and spring of each joint [N m or N].
 
     Args:
-        tree: the links.
+        tree: links of the tree.
         q: (nq, 1) positions.
         v: (nv, 1) velocities.
         a: (nv, 1) accelerations.
@@ -178,21 +182,21 @@ def joint_efforts(tree: Tree, q: SX, v: SX, a: SX) -> SX:
 
 
 def rotor_and_friction(tree: Tree, v: SX, a: SX) -> SX:
-    """(nv, 1) Ia a + Fv v + Fs tanh(v / Fs_width) of every joint [N m or N].
+    """(nv, 1) Ia a + Fv v + Fs tanh(v / Fs_width) of each joint [N m or N].
 
-    The sign(v) of the source is smoothed over a width so that integrators and optimisers can use
-    the same model; a width of zero gives the sign.
+    tanh replaces sign(v) of the source, so that integrators and optimisers can use the same model.
+    A width of zero selects sign(v).
     """
     return casadi.vertcat(*(_rotor_and_friction(link, v[link.v], a[link.v]) for link in tree.links))
 
 
 def spring_effort(tree: Tree, q: SX) -> SX:
-    """(nv, 1) stiffness (q - rest), what holds the spring of every joint [N m or N]."""
+    """(nv, 1) efforts stiffness (q - rest) that balance the joint springs [N m or N]."""
     return casadi.vertcat(*(_spring_effort(link, q[link.q]) for link in tree.links))
 
 
 def spring_energy(tree: Tree, q: SX) -> SX:
-    """Energy in the springs of the joints, zero where they are at rest [J]."""
+    """Energy of the joint springs, zero at their rest positions [J]."""
     total = SX(0)
     for link in tree.links:
         if not link.stiffness.is_zero():
@@ -208,7 +212,7 @@ def _spring_effort(link: Link, q: SX) -> SX:
 
 def _rotor_and_friction(link: Link, v: SX, a: SX) -> SX:
     total = zeros(link.motion.nv)
-    if link.motion is Motion.FREE:  # the velocity is in the turning frame
+    if link.motion is Motion.FREE:  # the linear velocity is in rotating axes
         a = a + casadi.vertcat(cross(v[3:6], v[0:3]), zeros())
     step = smooth_sign(v, link.Fs_width)
     for coefficient, rate in ((link.Ia, a), (link.Fv, v), (link.Fs, step)):

@@ -33,26 +33,26 @@ from mbs.spatial import (
     zeros,
 )
 
-# What a joint must know of everything behind it: inertia, its rate, and the wrench it takes.
+# Composite quantities of the subtree of a joint: inertia, Coriolis terms and required wrench.
 #
 # Source: Khalil, Bennis & Gautier 1990 (composite links); Singh, Russell & Wensing 2022 (their
-# composite matrix B, of which twelve numbers are left for an observer at rest or in steady
-# motion).
+# composite matrix B, which has twelve numbers for an observer at rest or in steady motion).
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SubtreeMotion:
-    """Links that move together, about a point and for an observer who moves with it.
+    """Composite inertia, Coriolis terms and wrench of a subtree, about a point.
 
-    With r and r_dot the place and velocity of an element of mass dm, N = integral of r_dot r' dm.
+    Velocities are relative to an observer that moves with the point. With position r and velocity
+    r_dot of a mass element dm, N = integral of r_dot r' dm.
 
     Attributes:
-        body: their inertia.
-        K: (3, 3) 2 (tr(N) - N): times an angular velocity, the moment that it adds to bodies
-            that move [kg m^2/s].
-        n: (3, 1) twice their linear momentum [kg m/s].
-        f: (3, 1) force that they take [N].
-        m: (3, 1) moment that they take [N m].
+        body: composite inertia.
+        K: (3, 3) 2 (tr(N) - N): K w is the Coriolis moment of an additional angular velocity w of
+            the whole subtree [kg m^2/s].
+        n: (3, 1) twice the linear momentum [kg m/s].
+        f: (3, 1) force required by the motion [N].
+        m: (3, 1) moment required by the motion [N m].
     """
 
     body: Inertia
@@ -63,18 +63,18 @@ class SubtreeMotion:
 
     @staticmethod
     def zero() -> SubtreeMotion:
-        """No link at all."""
+        """Return the value of an empty subtree."""
         return SubtreeMotion(Inertia.zero(), zeros(3, 3), zeros(), zeros(), zeros())
 
     @staticmethod
     def of_link(pseudo: PseudoInertia, motion: Acceleration, spin: SX, moment: SX) -> SubtreeMotion:
-        """One link, for an observer at the origin of its frame.
+        """Return the value of one link, for an observer at the origin of its frame.
 
         Args:
-            pseudo: of the link, about and in its frame.
-            motion: of the link.
-            spin: (3, 1) angular momentum of rotors on the link, seen from it, in its frame.
-            moment: (3, 1) moment that their spin takes.
+            pseudo: inertia of the link, about and in its frame.
+            motion: motion of the link.
+            spin: (3, 1) angular momentum of the rotors on the link relative to it, in its frame.
+            moment: (3, 1) moment that the link exerts on these rotors, in its frame.
         """
         twice = 2 * motion.w
         f, m = inertial_wrench(pseudo, motion)
@@ -87,7 +87,7 @@ class SubtreeMotion:
         )
 
     def __add__(self, other: SubtreeMotion) -> SubtreeMotion:
-        """Both, about the same point."""
+        """Add the value of other links, about the same point."""
         return SubtreeMotion(
             self.body + other.body,
             self.K + other.K,
@@ -97,12 +97,12 @@ class SubtreeMotion:
         )
 
     def rotate(self, R: Rotation) -> SubtreeMotion:
-        """In the axes of frame i, R being the orientation of the present ones in i."""
+        """Transform to the axes of frame i; R is the orientation of the current axes in i."""
         f, m = R.apply(self.f), R.apply(self.m)
         return SubtreeMotion(self.body.rotate(R), R.apply_to_square(self.K), R.apply(self.n), f, m)
 
     def shift(self, axis: int, t: SX) -> SubtreeMotion:
-        """Displaced by t [m] along a coordinate axis."""
+        """Transform to a frame in which the current origin is at t [m] on a coordinate axis."""
         if t.is_zero():
             return self
         K, m = SX(self.K), SX(self.m)
@@ -116,7 +116,7 @@ class SubtreeMotion:
         return SubtreeMotion(self.body.shift(axis, t), K, self.n, self.f, m)
 
     def drifting(self, twice: SX) -> SubtreeMotion:
-        """For an observer to whom everything has half of `twice` added to its velocity."""
+        """Change to an observer that measures all velocities larger by half of `twice`."""
         ms, K = self.body.ms, SX(self.K)
         for k in range(3):
             for h in {0, 1, 2} - {k}:
@@ -125,38 +125,38 @@ class SubtreeMotion:
         return SubtreeMotion(self.body, K, self.n + self.body.m * twice, self.f, self.m)
 
     def through(self, step: AxesStep) -> SubtreeMotion:
-        """Seen from the other end of a step."""
+        """Transform along one step of the path between two joint axes."""
         if isinstance(step, Drift):
             return self.drifting(step.twice)
         return step.body(self)
 
     def wrench_of(self, twist: Twist) -> Wrench:
-        """Momentum for a velocity; force and moment for an acceleration."""
+        """Return the momentum for a velocity `twist`, or the wrench for an acceleration `twist`."""
         return self.body.momentum(twist.linear, twist.angular)
 
     def wrench_of_spin(self, s: SX) -> Wrench:
-        """What an angular velocity added to all of them adds to the wrench."""
+        """Return the change of the wrench by an additional angular velocity s of the subtree."""
         return cross(s, self.n), casadi.mtimes(self.K, s)
 
     def wrench_of_displacement(self, unit: Twist) -> Wrench:
-        """What a displacement changes of the wrench that goes with it."""
+        """Return the rate of the wrench if it moves along `unit` with the subtree."""
         t, s = unit.linear, unit.angular
         return cross(s, self.f), cross(s, self.m) + cross(t, self.f)
 
     def spin_of(self, unit: Twist) -> SX:
-        """(3, 1) times an angular velocity: the effort that it adds along a unit motion."""
+        """Return the gradient (3, 1) of the effort along `unit` by an added angular velocity."""
         return casadi.mtimes(self.K.T, unit.angular) + cross(self.n, unit.linear)
 
 
 def subtree_motions(
     tree: Tree, axes: list[JointAxes], own: list[SubtreeMotion]
 ) -> list[SubtreeMotion]:
-    """Everything behind each joint, in its axes.
+    """Return the composite quantities of the subtree of each joint, in the joint axes.
 
     Args:
-        tree: the links.
-        axes: of the joints.
-        own: of each link alone, in its frame.
+        tree: links of the tree.
+        axes: axes of the joints.
+        own: quantities of each link alone, in its frame.
     """
     in_frame, parallel = list(own), [SubtreeMotion.zero()] * len(own)
     result = list(own)
@@ -175,38 +175,38 @@ def subtree_motions(
     return result
 
 
-# What one joint changes of the wrench behind it, on its way to the joints before.
+# Change of the subtree wrench by one joint, passed to all joints between it and the base.
 #
 # Source: Singh, Russell & Wensing 2022.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Couple:
-    """What a rotor that spins with a joint takes of its carrier, (3, 1) each.
+    """Derivatives of the moment that a carrier link exerts on a joint-driven rotor, (3, 1) each.
 
     Attributes:
-        dv: moment for a unit velocity of the joint.
-        da: for a unit acceleration.
+        dv: derivative with respect to the velocity of the joint.
+        da: derivative with respect to the acceleration of the joint.
     """
 
     dv: SX
     da: SX
 
     def rotate(self, R: Rotation) -> Couple:
-        """In the axes of frame i, R being the orientation of the present ones in i."""
+        """Transform to the axes of frame i; R is the orientation of the current axes in i."""
         return Couple(R.apply(self.dv), R.apply(self.da))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EffortColumn:
-    """How the wrench of a subtree changes with its joint, and its effort with other joints.
+    """Derivatives of a subtree wrench by its joint, and of the joint effort by other joints.
 
     Attributes:
-        dq: change of the wrench with the position of the joint.
-        dv: with its velocity.
-        momentum: with its acceleration; its power with an acceleration of everything behind the
-            joint is the effort that this takes.
-        spin: (3, 1) times an angular velocity given to everything behind the joint: the effort.
+        dq: derivative of the wrench with respect to the position of the joint.
+        dv: derivative of the wrench with respect to the velocity of the joint.
+        momentum: derivative of the wrench with respect to the acceleration of the joint. Its power
+            along an acceleration of the whole subtree is the effort of the joint.
+        spin: (3, 1) gradient of the joint effort by an additional angular velocity of the subtree.
     """
 
     dq: Wrench
@@ -215,7 +215,7 @@ class EffortColumn:
     spin: SX
 
     def through(self, step: AxesStep) -> EffortColumn:
-        """Seen from the other end of a step."""
+        """Transform along one step of the path between two joint axes."""
         if isinstance(step, Drift):
             return self.drifting(step.twice)
         return EffortColumn(
@@ -226,24 +226,24 @@ class EffortColumn:
         )
 
     def rotate(self, R: Rotation) -> EffortColumn:
-        """In the axes of frame i, R being the orientation of the present ones in i."""
+        """Transform to the axes of frame i; R is the orientation of the current axes in i."""
         dq, dv, momentum = ((R.apply(f), R.apply(m)) for f, m in (self.dq, self.dv, self.momentum))
         return EffortColumn(dq, dv, momentum, R.apply(self.spin))
 
     def drifting(self, twice: SX) -> EffortColumn:
-        """For an observer to whom everything has half of `twice` added to its velocity."""
+        """Change to an observer that measures all velocities larger by half of `twice`."""
         spin = self.spin + cross(twice, self.momentum[0])
         return EffortColumn(self.dq, self.dv, self.momentum, spin)
 
     def with_couple(self, couple: Couple) -> EffortColumn:
-        """With couples that velocity and acceleration of the joint take besides."""
+        """Add the moments of a rotor that spins with the joint."""
         (f_v, m_v), (f_a, m_a) = self.dv, self.momentum
         return EffortColumn(
             self.dq, (f_v, m_v + couple.dv), (f_a, m_a + couple.da), self.spin + couple.dv
         )
 
     def row(self, line: Line) -> tuple[SX, SX, SX]:
-        """Effort of the column's joint for position, velocity and acceleration along a line."""
+        """Derivatives of the effort of this joint by position, velocity, acceleration of `line`."""
         return (
             line.second.power(*self.momentum) + casadi.dot(self.spin, line.spin),
             line.faster.power(*self.momentum) + casadi.dot(self.spin, line.unit.angular),
@@ -251,13 +251,13 @@ class EffortColumn:
         )
 
     def efforts(self, line: Line) -> tuple[SX, SX, SX]:
-        """Effort along a line for position, velocity and acceleration of the column's joint."""
+        """Derivatives of the effort of `line` by position, velocity, acceleration of this joint."""
         unit = line.unit
         return unit.power(*self.dq), unit.power(*self.dv), unit.power(*self.momentum)
 
 
 def effort_column(subtree: SubtreeMotion, line: Line) -> EffortColumn:
-    """What a joint changes that moves a subtree along a line, in the axes of both."""
+    """Return the derivatives by a joint that moves a subtree along `line`, in the joint axes."""
     spinning = add_wrenches(subtree.wrench_of(line.second), subtree.wrench_of_spin(line.spin))
     return EffortColumn(
         dq=add_wrenches(spinning, subtree.wrench_of_displacement(line.unit)),
@@ -268,26 +268,29 @@ def effort_column(subtree: SubtreeMotion, line: Line) -> EffortColumn:
 
 
 def rotor_couple(rotor: CarriedRotor, axes: JointAxes) -> Couple:
-    """The couple of a rotor, in the axes of the joint of the link that carries it."""
+    """Return the moment derivatives of a rotor, in the joint axes `axes` of its carrier link."""
     momentum = rotor.momentum if axes.rotation is None else axes.rotation.apply(rotor.momentum)
     return Couple(cross(axes.w, momentum), momentum)
 
 
-# Which columns of the derivatives cost less in the base than through the axes of all joints.
+# Selection of columns that need fewer operations in base axes than in the axes of all joints.
 
 
 _TURN, _SLIDE, _DRIFT, _PAIR = 42, 12, 12, 17
-"""Operations of a column on its way through the axes of the joints before."""
+"""Numbers of operations to rotate, translate or change the observer of a column on the path
+through joint axes, and to evaluate a pair of joints there."""
 
 _BASE_PAIR, _BASE_COLUMN, _BASE_LINE = 67, 130, 150
-"""Operations in the base: of a pair, and of the way there of a column and of a line."""
+"""Numbers of operations in base axes: to evaluate a pair of joints, to transform a column and to
+transform a line to the base."""
 
 
 def links_by_base(tree: Tree, axes: list[JointAxes]) -> set[int]:
-    """Links whose columns cost less by way of the base; empty when too few do.
+    """Return the links whose columns need fewer operations in base axes.
 
-    In the base a pair of joints costs the same however far they are apart and however their axes
-    lie; on the path through the joints right angles and vanishing distances are cheaper still.
+    Empty if the total saving does not pay for the base axes. In base axes a pair of joints has a
+    constant cost. On the path through joint axes the cost grows with the distance of the joints,
+    and is reduced by right angles and zero distances.
     """
     saved: dict[int, int] = {}
     for j, link in enumerate(tree.links):
@@ -304,7 +307,7 @@ def links_by_base(tree: Tree, axes: list[JointAxes]) -> set[int]:
 
 
 def _cost(step: AxesStep) -> int:
-    """Operations that a step takes of a column."""
+    """Number of operations to transform a column along a step."""
     match step:
         case Drift():
             return _DRIFT
@@ -314,19 +317,20 @@ def _cost(step: AxesStep) -> int:
     return 3 * (_TURN + _SLIDE)
 
 
-# The axes of the joints seen from the base, where every joint meets every other at once.
+# Joint axes and unit motions in the base frame, in which all pairs of joints meet directly.
 #
 # Source: Singh, Russell & Wensing 2022 (all vectors in the ground frame).
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BaseAxes:
-    """The axes of a joint in the base.
+    """Axes of a joint relative to the base.
 
     Attributes:
-        place: where they stand.
+        place: displacement from the base to the joint axes.
         twice: (3, 1) twice the velocity of their origin, in the base [m/s].
-        lines: the motions of the joint, about the origin of the base, for an observer at rest.
+        lines: unit motions and rates of the joint, about the origin of the base, for an observer at
+            rest.
     """
 
     place: FreeDisplacement
@@ -335,7 +339,7 @@ class BaseAxes:
 
 
 def base_axes(tree: Tree, axes: list[JointAxes]) -> list[BaseAxes]:
-    """The axes of every joint in the base."""
+    """Return the axes of all joints relative to the base."""
     result: list[BaseAxes] = []
     for link, own in zip(tree.links, axes, strict=True):
         i = link.antecedent
@@ -361,12 +365,13 @@ def _after(step: AxesStep, R: SX, p: SX, twice: SX) -> tuple[SX, SX, SX]:
 
 
 def _rotate(R: SX, turn: Rotation) -> SX:
-    """R times the matrix of a turn."""
+    """Return R times the matrix of a rotation."""
     return casadi.horzcat(*(turn.apply_inverse(R[k, :].T) for k in range(3))).T
 
 
 Passage = tuple[int, tuple[Line, ...], EffortColumn]
-"""A joint that a column passes, the motions of this joint, and the column in the same axes."""
+"""Index of a link on the path of a column to the base, unit motions of its joint, and the column in
+the same axes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -374,11 +379,11 @@ class EffortDerivatives:
     """Joint efforts, without drives, friction and springs, and their derivatives.
 
     Attributes:
-        dq: (nv, nv) along the velocities of the joints: column k is the rate of the efforts when
-            the positions move with unit velocity k while v and a stay as they are.
-        dv: (nv, nv) with respect to velocities.
-        A: (nv, nv) with respect to accelerations: the inertia matrix.
-        efforts: (nv, 1).
+        dq: (nv, nv) derivative along joint velocities: column k is the rate of the efforts if the
+            positions move with unit velocity k while v and a are constant.
+        dv: (nv, nv) derivative with respect to velocities.
+        A: (nv, nv) derivative with respect to accelerations: the inertia matrix.
+        efforts: (nv, 1) joint efforts.
     """
 
     dq: SX
@@ -390,15 +395,15 @@ class EffortDerivatives:
 def newton_euler_derivatives(
     tree: Tree, poses: list[LinkPose], v: SX, a: SX, base: Acceleration
 ) -> EffortDerivatives:
-    """Derivatives of the efforts of `newton_euler`.
+    """Return the derivatives of the efforts of `newton_euler`.
 
-    Inertia, its rate and the wrench of everything behind a joint run from the leaves to the
-    base. From them come, for each joint, the change of that wrench with its position, velocity
-    and acceleration; each runs on to the base and gives an effort at every joint it passes.
+    A backward pass computes composite inertia, Coriolis terms and wrench of each subtree. For each
+    joint they determine the derivatives of the subtree wrench by its position, velocity and
+    acceleration. These are passed to the base and projected on each joint on the path.
 
     Args:
-        tree: the links.
-        poses: each with respect to its antecedent.
+        tree: links of the tree.
+        poses: pose of each link relative to its antecedent.
         v: (nv, 1) joint velocities.
         a: (nv, 1) joint accelerations.
         base: motion of the base; see `resting_base`.
@@ -459,7 +464,10 @@ def _fill(
 def _rotor_couples(
     tree: Tree, axes: list[JointAxes], j: int
 ) -> tuple[Couple | None, Couple | None]:
-    """Of the rotor of joint j on its own link, and on the link before."""
+    """Moment derivatives of the rotor of joint j, if it is on link j, and if on the antecedent.
+
+    At least one of the two results is None.
+    """
     rotor = tree.links[j].rotor
     if rotor is None or rotor.carrier < 0:
         return None, None
@@ -470,14 +478,14 @@ def _rotor_couples(
 def _through_axes(
     tree: Tree, axes: list[JointAxes], j: int, column: EffortColumn, couple: Couple | None
 ) -> Iterator[Passage]:
-    """A column of joint j in the axes of every joint before, one after the other.
+    """Yield a column of joint j in the axes of each joint on its path to the base.
 
     Args:
-        tree: the links.
-        axes: of the joints.
-        j: the joint.
-        column: in its axes.
-        couple: of its rotor on the link before, in the axes of that link.
+        tree: links of the tree.
+        axes: axes of the joints.
+        j: index of the joint.
+        column: column in the axes of joint j.
+        couple: moment derivatives of its rotor on the antecedent, in the joint axes of that link.
     """
     while tree.links[j].antecedent >= 0:
         for step in axes[j].path:
@@ -494,7 +502,7 @@ def _through_axes(
 def _through_base(
     tree: Tree, placed: list[BaseAxes], j: int, column: EffortColumn, couple: Couple | None
 ) -> Iterator[Passage]:
-    """The same, with every joint before it in the base."""
+    """Yield a column of joint j in base axes, with each joint on its path; see `_through_axes`."""
     i = tree.links[j].antecedent
     column = column.through(placed[j].place).drifting(placed[j].twice)
     if couple is not None:
@@ -506,7 +514,7 @@ def _through_base(
 def _set_own(
     result: EffortDerivatives, k: int, start: int, lines: tuple[Line, ...], column: EffortColumn
 ) -> None:
-    """The entries of velocity k with those of its own joint, from number `start` on."""
+    """Set row k of the derivatives at the columns of a joint, whose first velocity is `start`."""
     for h, line in enumerate(lines, start):
         result.dq[k, h], result.dv[k, h], result.A[k, h] = column.row(line)
 
@@ -514,7 +522,10 @@ def _set_own(
 def _turn_row(
     result: EffortDerivatives, k: int, start: int, lines: tuple[Line, ...], subtree: SubtreeMotion
 ) -> None:
-    """Add what velocity k of a backward joint, fixed on the link before, does not turn with it."""
+    """Add to row k of dq the term of a backward joint.
+
+    Its unit motions are fixed on the antecedent and do not move with the joint itself.
+    """
     unit = lines[k - start].unit
     for h, line in enumerate(lines, start):
         result.dq[k, h] += line.unit.rate_on(unit).power(subtree.f, subtree.m)
@@ -523,7 +534,7 @@ def _turn_row(
 def _set_pairs(
     result: EffortDerivatives, k: int, start: int, lines: tuple[Line, ...], column: EffortColumn
 ) -> None:
-    """The entries of velocity k with those of a joint before, from number `start` on."""
+    """Set the entries of velocity k and of an ancestor joint, whose first velocity is `start`."""
     _set_own(result, k, start, lines, column)
     for h, line in enumerate(lines, start):
         result.dq[h, k], result.dv[h, k], result.A[h, k] = column.efforts(line)

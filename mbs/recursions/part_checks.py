@@ -1,7 +1,7 @@
-"""What is asked of components by their equations when a mechanism is assembled.
+"""Checks of the equations of components when a mechanism is assembled.
 
-A mistake is said at once, by component and method, and not by a solver later on: shapes, names and
-symbols of what the methods return, loads against the energy, heat that is negative.
+They cover shapes, names and symbols of the returned values, consistency of loads with the energy,
+and the sign of the dissipation. Errors name the component and the method.
 """
 
 from __future__ import annotations
@@ -38,13 +38,14 @@ from mbs.text import did_you_mean, one_line, quoted
 Array = NDArray[np.float64]
 
 _PROBES, _SEED = 4, 20261123
-"""Random states at which powers are compared: a law that is wrong is wrong at almost all."""
+"""Number and seed of random states at which powers are compared: a wrong law fails at almost all
+states."""
 _SAME = 1e-8
-"""Difference of powers, in parts of the largest: formulas agree to 1e-12, mistakes are of size one;
-laws with steep slopes lose some digits."""
+"""Tolerance on the difference of powers relative to the largest: correct formulas agree to 1e-12,
+errors are of order one, and laws with steep slopes lose some digits."""
 _NEGATIVE = 1e-9
-"""Heat below zero that is rounding, in parts of the other powers."""
-_COLUMNS = ("q", "v", "a", "tau")  # of a coordinate in results
+"""Rounding tolerance on a negative dissipation, relative to the largest power."""
+_COLUMNS = ("q", "v", "a", "tau")  # suffixes of the columns of a coordinate in results
 _FROM_AT = "take what is declared from at, such as at.k, and not from self"
 _NO_TRUTH = (
     "write casadi.if_else, casadi.fmax and casadi.logic_and where if, max and `and` ask a symbol"
@@ -52,13 +53,13 @@ _NO_TRUTH = (
 
 
 def check_parts(system: System) -> None:
-    """Refuse components whose equations contradict what they declare, or each other.
+    """Raise if the equations of a component contradict its declarations or each other.
 
     Args:
-        system: open, or with loops that are not analysed yet.
+        system: open system, or closed system before the analysis of its loops.
 
     Raises:
-        AssemblyError: names the component, the method and what to change.
+        AssemblyError: the message names the component, the method and the remedy.
     """
     if not system.parts:
         return
@@ -76,19 +77,20 @@ def check_parts(system: System) -> None:
             if isinstance(given, WireSource):
                 at.signal(given)
         _require_state_between(system, part, at)
-        if not type(part.element).__module__.startswith("mbs."):  # ours are asked in tests
+        if not type(part.element).__module__.startswith("mbs."):  # tests check own components
             check_part(system, part, at)
 
 
 _AT_ONCE = ("loads", "energy", "rows", "velocity_rows", "frictions", "stops", "events", "crossings")
-"""Methods whose results determine accelerations, or are evaluated before these are known."""
+"""Methods whose results determine accelerations, or are evaluated before the accelerations."""
 
 
 def _require_state_between(system: System, part: AttachedPart, at: PartsAt) -> None:
-    """Refuse inputs that follow from accelerations or forces, except where they feed rates alone.
+    """Raise if an input depends on accelerations or forces and may change them directly.
 
     Raises:
-        AssemblyError: the component has a method on which accelerations or events depend.
+        AssemblyError: the component has a method of `_AT_ONCE`, and an input is wired to a signal
+            of accelerations or forces.
     """
     later = casadi.vertcat(SX(0, 1), *(later_signal(system, one) for one in later_sources(system)))
     if not later.numel() or not part.element.has(*_AT_ONCE):
@@ -103,39 +105,39 @@ def _require_state_between(system: System, part: AttachedPart, at: PartsAt) -> N
 
 
 def check_part(system: System, part: AttachedPart, at: PartsAt) -> None:
-    """Ask one component.
+    """Check one component; see `check_parts`.
 
     Args:
-        system: that it is in.
-        part: the component.
+        system: system with the component.
+        part: component to check.
         at: all components at symbols of positions and velocities.
 
     Raises:
-        AssemblyError: as `check_parts`.
+        AssemblyError: the message names the component, the method and the remedy.
     """
     assert at.v is not None
     _Check(system, part, at, at.q, at.v).run()
 
 
 class _Check:
-    """The questions to one component.
+    """Checks of one component.
 
     Args:
-        system: that it is in.
-        part: the component.
+        system: system with the component.
+        part: component to check.
         at: all components at the symbols q and v.
-        q, v: these symbols.
+        q, v: symbols of positions and velocities.
     """
 
     def __init__(self, system: System, part: AttachedPart, at: PartsAt, q: SX, v: SX) -> None:
         self.system, self.part, self.at, self.q, self.v = system, part, at, q, v
         self.element = part.element
-        # its inputs are symbols here, whatever feeds them: it answers for itself alone
+        # inputs are free symbols, so that the checks are independent of the wires
         self.inputs = {name: SX.sym(name) for name in part.inputs}
         self.seen = at.with_inputs(part, self.inputs)
 
     def run(self) -> None:
-        """All questions."""
+        """Run all checks."""
         energy, heat = self._scalar("energy"), self._scalar("dissipation")
         if energy is not None:
             self._require_free_of(energy, "energy", self.v, "velocities")
@@ -153,13 +155,13 @@ class _Check:
         if loads and (energy is not None or heat is not None):
             self._compare_powers(loads, energy, heat, rates)
 
-    # What the methods return.
+    # Checks of the returned values.
 
     def _returned(self, method: str, at: At | None = None) -> Any:
-        """What a method returns; an error in it is told by its name."""
+        """Call a method of the component; an exception becomes an AssemblyError that names it."""
         try:
             return getattr(self.element, method)(self.seen if at is None else at)
-        except ExpressionError as error:  # numbers of self times symbols
+        except ExpressionError as error:  # a parameter self.k, not at.k, multiplies a symbol
             fault = one_line(str(error)).split(";")[0]
             raise AssemblyError(
                 f"{self._title}: {method} raises {type(error).__name__}: {fault}; {_FROM_AT}"
@@ -215,7 +217,7 @@ class _Check:
             self._require_known(SX(value), f"loads at {port}")
 
     def _named(self, method: str, names: Iterable[str]) -> Mapping[str, SX]:
-        """The values of a method that must give one for each name."""
+        """Values of a method that must return exactly one value for each name."""
         wanted = list(names)
         if not wanted and not self.element.has(method):
             return {}
@@ -239,7 +241,7 @@ class _Check:
         return self._named("outputs", self.element.output_names)
 
     def _figures(self) -> None:
-        """What pictures show, at the defaults of the parameters."""
+        """Check that the drawing of the component can be evaluated at default parameters."""
         known = {p.name: p.default for p in self.system.parameters if p.default is not None}
         try:
             self.element.drawn(known)
@@ -319,7 +321,7 @@ class _Check:
                 )
 
     def _contacts(self) -> None:
-        """Frictions and stops: what they act on, and their numbers at random states."""
+        """Check frictions and stops: types, labels, velocities, and values at random states."""
         labels = dict[str, str]()
         for method, kinds, give in (
             ("stops", (Stop, OneWay), "custom.Stop(gap) or custom.OneWay(velocity)"),
@@ -343,7 +345,7 @@ class _Check:
                 self._contact(label, law)
 
     def _limits(self) -> None:
-        """Pairs of parameters, by coordinate."""
+        """Check that `limits` returns pairs of constant expressions by coordinate."""
         found = self._mapping("limits") if self.element.has("limits") else {}
         for port, pair in found.items():
             if port not in self.part.coordinates:
@@ -393,7 +395,7 @@ class _Check:
             self._stop(label, law)
 
     def _contact_velocity(self, what: str, label: str, given: Any) -> None:
-        """A velocity is linear in velocities; what it is at rest follows from parameters."""
+        """Check that a contact velocity is linear in v, with a constant term of parameters only."""
         name = f"the {what}{_of(label)}"
         value = self._value(name, given)
         signals = casadi.vertcat(self.system.z, self.system.u, *self.inputs.values())
@@ -412,14 +414,14 @@ class _Check:
             )
 
     def _without_slip(self, slip: SX, value: SX) -> SX:
-        """A value at the velocities nearest to v whose slip is zero."""
+        """Evaluate an expression at the velocities nearest to v with zero slip."""
         slip = SX(slip)
         slopes = casadi.jacobian(slip, self.v).T
         nearest = self.v - slopes * slip / (casadi.sumsqr(slopes) + NONZERO)
         return casadi.substitute(value, self.v, nearest)
 
     def _stop(self, label: str, law: Stop) -> None:
-        """A gap of positions, limits and numbers of parameters."""
+        """Check that the gap depends on positions, and the limits and numbers on parameters."""
         name = f"the gap{_of(label)}"
         gap = self._value(name, law.gap)
         signals = casadi.vertcat(self.system.z, self.system.u, *self.inputs.values())
@@ -449,7 +451,10 @@ class _Check:
     def _require_range(
         self, what: str, value: SX, least: SX | float, greatest: SX | float, told: str
     ) -> None:
-        """Refuse a number that is no finite one in a range at a random state."""
+        """Raise if a value is not finite or outside a range at a random state.
+
+        `told` is the remedy in the error message.
+        """
         symbols = casadi.vertcat(self.system.z, *self.inputs.values())
         given = [self.q, self.v, symbols, self.system.p]
         found = Function("range", given, [value, SX(least), SX(greatest)])
@@ -474,7 +479,7 @@ class _Check:
         return self._value(method, self._returned(method))
 
     def _value(self, what: str, value: Any) -> SX:
-        """A number or an expression (1, 1) of known symbols."""
+        """Convert a returned value to an expression (1, 1) of known symbols, or raise."""
         try:
             found = SX(value)
         except Exception:
@@ -489,7 +494,7 @@ class _Check:
         self._require_known(found, what)
         return found
 
-    # What they may depend on.
+    # Checks of the symbols in expressions.
 
     def _require_known(self, value: SX, what: str) -> None:
         known = casadi.vertcat(
@@ -539,7 +544,7 @@ class _Check:
                 " alone, or does not vanish at rest; write a sum of velocities, each with a factor"
             )
 
-    # Loads against the energy and the heat.
+    # Consistency of loads, energy and dissipation.
 
     def _compare_powers(
         self,
@@ -548,7 +553,7 @@ class _Check:
         heat: SX | None,
         rates: Mapping[str, SX],
     ) -> None:
-        """P, the power of the loads, is what the energy and the heat leave: -dE/dt - D."""
+        """Check the power balance P = -dE/dt - D of loads, energy and dissipation."""
         system, symbols = self.system, casadi.vertcat(self.system.z, *self.inputs.values())
         E = SX(0) if energy is None else energy
         rate = casadi.jtimes(E, self.q, position_rate(system.tree, self.q, self.v))
@@ -572,7 +577,8 @@ class _Check:
             if heat is not None and not self.part.inputs:
                 self._require_balance(P, dE, heat_at, sizes.max())
             elif energy is not None and not self.part.states and not self.inputs:
-                # friction and damping give the same power both ways, the energy the opposite
+                # for reversed velocities the power of friction and damping is equal, the power of
+                # the energy is opposite
                 self._require_balance((P - back[0]) / 2, (dE - back[1]) / 2, 0.0, sizes.max())
 
     def _require_balance(self, P: float, dE: float, heat: float, size: float) -> None:
@@ -599,7 +605,7 @@ class _Check:
         return total
 
     def _probes(self) -> Iterable[tuple[Array, Array, Array, Array]]:
-        """Random positions, velocities, states with inputs, and parameters."""
+        """Yield random positions, velocities, component states with inputs, and parameters."""
         system, rng = self.system, np.random.default_rng(_SEED)
         p = np.array([1.0 if x.default is None else x.default for x in system.parameters])
         for _ in range(_PROBES):
@@ -617,12 +623,12 @@ class _Check:
 
 
 def _of(label: str) -> str:
-    """Which friction or stop is meant, in words."""
+    """Text " of 'label'" for error messages; empty for an empty label."""
     return f" of {label!r}" if label else ""
 
 
 def _kind(value: Any) -> str:
-    """What something is, in a few words."""
+    """Short description of a value for error messages."""
     if value is None:
         return "nothing"
     if isinstance(value, SX):

@@ -1,7 +1,7 @@
-"""Components by their equations, evaluated in a tree: loads, energy, rates, rows, signals.
+"""Equations of components evaluated in a tree: loads, energy, rates, constraint rows, signals.
 
-A component's methods see an `At`: its ports where they are at positions q and velocities v, and
-its numbers. Signals run along wires, each output following from states, ports and inputs.
+Methods of a component receive an `At`: motion of its ports at positions q and velocities v, and the
+values of its parameters, states and inputs. Wires connect outputs to inputs.
 """
 
 from __future__ import annotations
@@ -39,24 +39,24 @@ from mbs.recursions.velocities import Velocity, link_velocities
 from mbs.spatial import Pose, cross, skew
 
 UNBOUNDED = 1e100
-"""Bound of the speed of a crossing that has none: far above every speed, and finite in C."""
+"""Speed bound of a crossing without a bound: far above all speeds, and a finite number in C."""
 _MOST_READINGS = 1000
-"""Symbols of readings that a system keeps: more than mechanisms have wires."""
+"""Number of sensor symbols that a system caches: more than a mechanism has wires."""
 _ENDING = ("mbs.components.sources",)
-"""Modules whose crossings end steps in FMUs too: laws that jump."""
+"""Modules of discontinuous laws, whose crossings end integration steps also in FMUs."""
 
 
 def later_signal(system: System, source: WireSource) -> SX:
-    """The symbol of a reading that follows from accelerations or forces.
+    """Return the symbol of a sensor signal that depends on accelerations or forces.
 
-    Rates and outputs depend on it until `mbs.models.measurements.with_readings` replaces it.
+    `mbs.models.measurements.with_readings` substitutes its value in rates and outputs.
     """
     symbol: SX = system.recent("readings", source, lambda: SX.sym(str(source)), _MOST_READINGS)
     return symbol
 
 
 def later_sources(system: System) -> list[WireSource]:
-    """Readings of accelerations and forces that are wired to inputs."""
+    """Return the sensor signals of accelerations and forces that are wired to component inputs."""
     sensors = {attached.sensor.name: attached for attached in system.sensors}
     wired = [s for part in system.parts for s in part.inputs.values() if isinstance(s, WireSource)]
     return [
@@ -74,15 +74,14 @@ def _is_later(attached: AttachedSensor, name: str) -> bool:
 
 
 class PartsAt:
-    """The components of a system at positions and velocities of its tree.
+    """Components of a system, evaluated at positions and velocities of its tree.
 
     Args:
-        system: whose components they are.
+        system: system with the components.
         q: (nq, 1) positions.
-        v: (nv, 1) velocities; at rest when left out.
-        shifts: by how much ports on coordinates are moved, by their names; not when left out.
-        twists: (6, 1) velocities that frames have beside those of the tree, by port, in their own
-            axes; none when left out.
+        v: (nv, 1) velocities; zero by default.
+        shifts: additional displacements of ports on coordinates, by port; zero by default.
+        twists: (6, 1) additional velocities of frames, by port, in their own axes; zero by default.
     """
 
     def __init__(
@@ -98,31 +97,31 @@ class PartsAt:
         self.tree, self.parts = system.tree, system.parts
         self._shifts, self._twists = shifts or {}, twists or {}
         self._moving: list[Velocity] | None = None
-        # by component: what it sees, what it does, symbols of its rows' efforts, its outputs
+        # caches by component name: arguments, loads, symbols of row efforts, outputs
         self._found: dict[str, At] = {}
         self._loads: dict[str, Mapping[str, Load]] = {}
         self._efforts: dict[str, dict[str, SX]] | None = None
         self._outputs: dict[str, tuple[Mapping[str, SX], Mapping[str, SX]]] = {}
-        # by source; None while it is being found
+        # cache by source of a wire; None during evaluation, to detect cycles
         self._signals: dict[WireSource, SX | None] = {}
 
     @property
     def moving(self) -> list[Velocity] | None:
-        """Velocities of the links, each in its frame; None at rest."""
+        """Velocity of each link in its frame; None if no velocities are given."""
         if self._moving is None and self.v is not None:
             self._moving = link_velocities(self.tree, link_poses(self.tree, self.q), self.v)
         return self._moving
 
-    # What a component sees.
+    # Arguments of the methods of components.
 
     def at(self, part: AttachedPart) -> At:
-        """What the methods of a component get, signals of wires included."""
+        """Return the argument of the methods of a component, with wired inputs."""
         if part.name not in self._found:
             self._found[part.name] = self._seen(part, self._inputs_of(part))
         return self._found[part.name]
 
     def with_inputs(self, part: AttachedPart, inputs: Mapping[str, SX]) -> At:
-        """What the methods of a component get where its inputs have these values."""
+        """Return the argument of the methods of a component for the given input values."""
         return self._seen(part, {name: partial(_same, value) for name, value in inputs.items()})
 
     def _inputs_of(self, part: AttachedPart) -> Mapping[str, Callable[[], SX]]:
@@ -189,10 +188,11 @@ class PartsAt:
         return given if isinstance(given, SX) else self.signal(given)
 
     def signal(self, source: WireSource) -> SX:
-        """What an output of a component, or a sensor, gives.
+        """Return the signal of a wire: a state or output of a component, or a sensor signal.
 
         Raises:
-            AssemblyError: it follows from itself, or from what equations of motion determine.
+            AssemblyError: the signal depends on itself, or on forces that the equations of motion
+                determine.
         """
         for attached in self.system.sensors:
             if attached.sensor.name == source.owner:
@@ -226,7 +226,7 @@ class PartsAt:
         return value
 
     def _with_placeholders(self, part: AttachedPart) -> tuple[Mapping[str, SX], Mapping[str, SX]]:
-        """The outputs of a component, and the symbols of its inputs in them."""
+        """Outputs of a component as expressions of input symbols, and these symbols by name."""
         if part.name not in self._outputs:
             symbols = {name: SX.sym(name) for name in part.inputs}
             seen = self.with_inputs(part, symbols)
@@ -235,7 +235,11 @@ class PartsAt:
         return self._outputs[part.name]
 
     def _reading(self, attached: AttachedSensor, source: WireSource) -> SX:
-        """What a sensor reads of positions and velocities."""
+        """Sensor signal; a symbol if it depends on accelerations or forces.
+
+        Raises:
+            AssemblyError: the sensor measures a cut joint.
+        """
         sensor = attached.sensor
         name, _, element = source.signal.partition(".")
         readings: Readings = {}
@@ -256,10 +260,10 @@ class PartsAt:
         number = quantity.elements.index(element)
         return casadi.vec(readings[name])[number]
 
-    # What components do.
+    # Loads, energy, rates, events and outputs.
 
     def loads(self, part: AttachedPart) -> Mapping[str, Load]:
-        """What a component does to its ports: as it says, or by the slopes of its energy."""
+        """Return the loads of a component by port: method `loads`, else minus energy gradient."""
         if part.name not in self._loads:
             element = part.element
             if element.has("loads"):
@@ -276,17 +280,17 @@ class PartsAt:
         value: Callable[[At], SX],
         inputs: Mapping[str, SX] | None = None,
     ) -> Mapping[str, Load]:
-        """What loads do the work of a value where ports move a little, by port.
+        """Return the gradient of a scalar by small displacements of the ports, as loads by port.
 
-        Frames are moved by x and rotated by y in their own axes, coordinates by s; the slopes are
-        forces, moments and efforts. Inputs do not change.
+        Frames are translated and rotated in their own axes, coordinates are displaced; the
+        derivatives are forces, moments and efforts. Inputs are constant.
 
         Source: Haug 1989, the principle of virtual work.
 
         Args:
-            part: the component.
-            value: (1, 1) of positions.
-            inputs: values of its inputs; those of this state when left out.
+            part: component.
+            value: callable that returns the scalar (1, 1) as a function of positions.
+            inputs: values of the inputs; by default the wired values.
         """
         small = [SX.sym("d", 6) for _ in part.frames]
         frames = tuple(
@@ -313,12 +317,14 @@ class PartsAt:
     def loads_of_rows(
         self, part: AttachedPart, lam: SX, *, velocities: bool = False
     ) -> list[FrameLoad]:
-        """What the rows of a component do to its frames, each in its axes, about its origin.
+        """Return the loads of constraint rows on the frames of a component.
+
+        Each load is in the axes of the frame, about its origin.
 
         Args:
-            part: the component.
-            lam: (k, 1) efforts of its rows.
-            velocities: of those that bind velocities alone.
+            part: component.
+            lam: (k, 1) efforts of the rows.
+            velocities: whether the rows are velocity constraints (`velocity_rows`).
         """
 
         def work(at: At) -> SX:
@@ -328,7 +334,7 @@ class PartsAt:
         if not velocities:
             loads = self.slopes(part, work)
             return [self._own_load(loads[port]) for port in part.element.frames]
-        # the power of rows of velocities, where frames have twists beside those of the tree
+        # gradient of the power of velocity rows by additional twists of the frames
         twists = {port: SX.sym("t", 6) for port in part.element.frames}
         moved = PartsAt(self.system, self.q, self.v, twists=twists)
         every = casadi.vertcat(*twists.values())
@@ -341,7 +347,7 @@ class PartsAt:
         return load
 
     def efforts(self) -> SX:
-        """(nv, 1) what the coordinates need of effort to overcome the components on them."""
+        """(nv, 1) joint efforts that balance the components on coordinates, without drives."""
         total = SX.zeros(self.tree.nv)
         for part in self.parts:
             if part.coordinates and not part.element.drives:
@@ -349,7 +355,7 @@ class PartsAt:
         return total
 
     def delivered(self) -> SX:
-        """(nv, 1) what drives deliver at the coordinates [N m or N]."""
+        """(nv, 1) joint efforts that drives exert on the coordinates [N m or N]."""
         total = SX.zeros(self.tree.nv)
         for part in self.parts:
             if part.element.drives:
@@ -367,7 +373,7 @@ class PartsAt:
                     total[lever.velocity] += lever.factor * own
 
     def energy(self) -> SX:
-        """What the components store [J]."""
+        """Energy that the components store [J]."""
         total = SX(0)
         for part in self.parts:
             if part.element.has("energy"):
@@ -375,7 +381,7 @@ class PartsAt:
         return total
 
     def frame_loads(self, part: AttachedPart) -> list[tuple[str, Frame, FrameLoad]]:
-        """Port, frame, and the load on it in axes of the frame, about its origin."""
+        """Return port, frame, and load on the frame in its axes about its origin, for each load."""
         loads, result = self.loads(part), []
         for port, frame in zip(part.element.frames, part.frames, strict=True):
             load = loads.get(port)
@@ -398,7 +404,7 @@ class PartsAt:
         return casadi.vertcat(*rates)
 
     def events(self) -> list[PartEvent]:
-        """What happens at once in all components, in their order."""
+        """Events of all components, in order."""
         found, first = list[PartEvent](), 0
         for part in self.parts:
             if part.element.has("events"):
@@ -410,13 +416,13 @@ class PartsAt:
         return found
 
     def crossings(self, *, of_bends: bool = True) -> list[Approach]:
-        """What passes through zero where the laws of components have bends.
+        """Event indicators of the points at which laws of components are not smooth.
 
-        Those of the user that are no `Approach` have no pace and the speed zero.
+        An indicator that is given as an expression gets the speed 0 and pace 0.
 
         Args:
-            of_bends: whether those of laws of this package that are continuous count too, such as
-                curves, but not contacts.
+            of_bends: whether to include continuous laws of this package with discontinuous
+                derivatives, such as curves. Contacts are always included.
         """
         found = list[Approach]()
         for part in self.parts:
@@ -431,13 +437,13 @@ class PartsAt:
         return found
 
     def approaches(self, found: Sequence[Approach]) -> SX:
-        """(nc, 2) speeds and paces of crossings.
+        """(nc, 2) speed and pace of each event indicator, see `Approach`.
 
-        A path that turns returns to an obstacle: the angular velocities on which the rate of a
-        crossing depends belong to its pace.
+        A rotating path may return to an obstacle. So the norm of the angular velocities on which
+        the rate of an indicator depends is added to its pace.
 
         Args:
-            found: as `crossings` gives them.
+            found: event indicators of `crossings`.
         """
         assert self.v is not None
         rate_q = position_rate(self.tree, self.q, self.v)
@@ -461,10 +467,10 @@ class PartsAt:
         return casadi.vertcat(*found)
 
     def laws(self) -> SX:
-        """(n, 1) loads, rates and signals of components of users without crossings of their own.
+        """(n, 1) loads, rates and wired signals of user-defined components without `crossings`.
 
-        The laws of the components of this package are continuous, or give their crossings. The
-        outputs of components of users act on the motion only through wires.
+        Their discontinuities are unknown. Components of this package are continuous or define
+        `crossings`. Outputs of user-defined components affect the motion only through wires.
         """
         found, by_user = [SX(0, 1)], dict[str, bool]()
         for part in self.parts:
@@ -490,7 +496,8 @@ class PartsAt:
         """(ny, 1) outputs of all components.
 
         Args:
-            lam: efforts of the rows of components, as `row_efforts` has them.
+            lam: (r, 1) efforts of the rows of components in the order of `effort_symbols`; by
+                default the outputs contain the symbols.
         """
         efforts = self.row_efforts()
         values = [SX(0, 1)]
@@ -505,7 +512,7 @@ class PartsAt:
         return every if lam is None else casadi.substitute(every, self.effort_symbols, lam)
 
     def row_efforts(self) -> Mapping[str, Mapping[str, SX]]:
-        """Symbols of the efforts of rows, by component and label; `effort_symbols` is all."""
+        """Symbols of the efforts of constraint rows, by component and label."""
         if self._efforts is None:
             self._efforts = {}
             for velocities in (False, True):
@@ -516,7 +523,7 @@ class PartsAt:
 
     @property
     def effort_symbols(self) -> SX:
-        """(r, 1) all of `row_efforts`, those of positions first, each by component."""
+        """(r, 1) symbols of all row efforts: position rows by component, then velocity rows."""
         found = self.row_efforts()
         order = [
             found[name][label]
@@ -533,13 +540,13 @@ def _same(value: Any) -> Any:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PartEvent:
-    """An event of a component.
+    """Event of a component.
 
     Attributes:
-        name: of the component.
-        label: of the event in it.
-        when: (1, 1) positive before it.
-        then: what elements of z become, by their indices.
+        name: name of the component.
+        label: name of the event within the component.
+        when: (1, 1) event indicator, positive before the event.
+        then: new values of elements of z, by index.
     """
 
     name: str
@@ -549,7 +556,7 @@ class PartEvent:
 
 
 def part_event_names(system: System) -> tuple[tuple[str, str], ...]:
-    """Component and label of what happens at once in a system, in the order of the events."""
+    """Return the component name and label of each event of a system, in order."""
 
     def names() -> tuple[tuple[str, str], ...]:
         q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
@@ -560,12 +567,12 @@ def part_event_names(system: System) -> tuple[tuple[str, str], ...]:
 
 
 def after_events(system: System, events: Sequence[PartEvent], fired: SX) -> SX:
-    """(nz, 1) states of components after events.
+    """(nz, 1) component states after events.
 
     Args:
-        system: whose components they are.
-        events: of all components.
-        fired: 1 for each event that happens, 0 for the others.
+        system: system with the components.
+        events: events of all components.
+        fired: 1 for each event that occurs, else 0.
     """
     after = SX(system.z)
     for k, event in enumerate(events):
@@ -574,15 +581,15 @@ def after_events(system: System, events: Sequence[PartEvent], fired: SX) -> SX:
     return after
 
 
-# Rows by which components bind positions, unknowns and velocities.
+# Constraint rows of components on positions, unknowns and velocities.
 
 
 def part_rows(at: PartsAt, *, velocities: bool = False) -> list[tuple[str, list[tuple[str, Row]]]]:
-    """For each component with rows its name, and labels and rows.
+    """Return name and labelled constraint rows of each component that has rows.
 
     Args:
-        at: the components.
-        velocities: rows that bind velocities alone.
+        at: evaluated components.
+        velocities: whether to return velocity constraints instead of position constraints.
     """
     method = "velocity_rows" if velocities else "rows"
     result = []
@@ -594,5 +601,5 @@ def part_rows(at: PartsAt, *, velocities: bool = False) -> list[tuple[str, list[
 
 
 def as_row(row: Row | SX) -> Row:
-    """A row; an expression alone is a length."""
+    """Convert an expression to a Row with the default unit, m."""
     return row if isinstance(row, Row) else Row(SX(row))

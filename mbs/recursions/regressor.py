@@ -1,8 +1,8 @@
-"""The equations of motion as a matrix times the inertial parameters of the links.
+"""Regressor: equations of motion as a matrix times the inertial parameters of the links.
 
-The motions of the links and the axes of the joints are computed once. An element is the work of a
-unit wrench, that of one parameter of link j, in a unit velocity of a joint before it. What joint j
-cannot tell from a part of link i is no new column: it is a sum of columns of link i.
+An element is the power of the unit wrench of one parameter of link j along a unit velocity of joint
+j or an ancestor joint. A column of link j that is a linear combination of columns of its antecedent
+is formed as that sum.
 
 Source: Khalil & Creusot 1997, section 6.1; Gautier & Khalil 1990 for the sums.
 """
@@ -32,11 +32,10 @@ from mbs.spatial import (
     zeros,
 )
 
-# Columns of a link that are sums of columns of the link before it.
+# Columns of a link that are sums of columns of its antecedent.
 #
-# A joint cannot tell a part of its link from the same part fixed on the link before: mass on the
-# axis of a revolute joint, the rotational inertia behind a prismatic joint, the mass at the
-# centre of a spherical joint.
+# Some parts of a link move as if fixed on the antecedent: mass on the axis of a revolute joint, the
+# rotational inertia of a link on a prismatic joint, the mass at the centre of a spherical joint.
 #
 # Source: Gautier & Khalil 1990.
 
@@ -44,19 +43,19 @@ from mbs.spatial import (
 _XX, _YY, _MZ, _M = 0, 3, 8, 9
 _DEPTH = 9
 _OWN_PRODUCTS = {**dict.fromkeys(range(6), 2), _MZ: 5, _M: 3}
-"""Products of an element that is computed as the work of its own unit wrench."""
+"""Number of products to compute an element as the power of its unit wrench, by parameter index."""
 
 Elements = Mapping[int, Callable[[int], SX]]
-"""For some rows what computes the element of a column, given the number of its parameter."""
+"""Map from row index to a callable that computes the element of a parameter, given its index."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColumnSum:
-    """A column of link j: columns of link i times constants, less a column of link j.
+    """Column of link j as a linear combination of columns of its antecedent i.
 
     Attributes:
-        terms: a constant, and columns of link i that it multiplies, each with its sign.
-        less: number of the column of link j, or None.
+        terms: pairs of a constant and the columns of link i that it multiplies, as (index, sign).
+        less: index of a column of link j to subtract, or None.
     """
 
     terms: tuple[tuple[SX, tuple[tuple[int, int], ...]], ...]
@@ -64,11 +63,11 @@ class ColumnSum:
 
     @property
     def products(self) -> int:
-        """Products of an element."""
+        """Number of products per element."""
         return sum(not (c.is_one() or c.is_minus_one()) for c, _ in self.terms)
 
     def of(self, before: SX, own: SX) -> SX:
-        """The element of a row, from the row (1, 10) of link i and that of link j."""
+        """Return the element of a row, from the rows (1, 10) of link i and of link j."""
         total = SX(0)
         for constant, columns in self.terms:
             part = SX(0)
@@ -79,13 +78,13 @@ class ColumnSum:
 
 
 def fill_rows(tree: Tree, poses: list[LinkPose], height: int, links: list[Elements]) -> list[SX]:
-    """For every link the ten columns (height, 10) of its inertial parameters.
+    """Return the columns (height, 10) of the inertial parameters of each link.
 
     Args:
-        tree: the links.
-        poses: each with respect to its antecedent.
+        tree: links of the tree.
+        poses: pose of each link relative to its antecedent.
         height: number of rows.
-        links: what computes the elements of the columns that are no sums, for each link.
+        links: for each link, callables that compute the elements of columns that are not sums.
     """
     result: list[SX] = []
     for j, rows in enumerate(links):
@@ -103,7 +102,10 @@ def fill_rows(tree: Tree, poses: list[LinkPose], height: int, links: list[Elemen
 
 
 def column_sums(tree: Tree, poses: list[LinkPose], j: int) -> dict[int, ColumnSum]:
-    """The columns of link j that cost less as sums; none where it stands on the base."""
+    """Return the columns of link j that need fewer products as sums, by parameter index.
+
+    Empty for a link on the base.
+    """
     link = tree.links[j]
     if link.antecedent < 0:
         return {}
@@ -122,7 +124,7 @@ def column_sums(tree: Tree, poses: list[LinkPose], j: int) -> dict[int, ColumnSu
 
 
 def _sum(motion: Motion, pose: LinkPose, part: tuple[int, ...]) -> ColumnSum:
-    """The column of the first parameter of link j, when all parameters of `part` are one."""
+    """Express the sum of columns `part` of link j by columns of link i, solved for the last one."""
     ten = zeros(10)
     for k in part:
         ten[k] = 1
@@ -136,7 +138,7 @@ def _sum(motion: Motion, pose: LinkPose, part: tuple[int, ...]) -> ColumnSum:
 
 
 def _group(constants: list[SX]) -> tuple[tuple[SX, tuple[tuple[int, int], ...]], ...]:
-    """Columns with the same constant, but for its sign, together; those with zero left out."""
+    """Group column indices by their constant up to the sign; zero constants are dropped."""
     groups: list[tuple[SX, list[tuple[int, int]]]] = []
     for column, constant in enumerate(constants):
         if constant.is_zero():
@@ -153,17 +155,17 @@ def _group(constants: list[SX]) -> tuple[tuple[SX, tuple[tuple[int, int], ...]],
     return tuple((constant, tuple(columns)) for constant, columns in groups)
 
 
-# Velocities of the joints before a link, as the link sees them.
+# Unit velocities of the joints on the path to a link, in the frame of the link.
 #
-# Across a run of parallel axes a velocity is turned once, by the sum of the angles.
+# Across a run of parallel axes a vector is rotated once, by the sum of the angles.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathTwist:
-    """What a unit of one joint velocity gives a link, or the rate at which that changes.
+    """Velocity of a link for a unit joint velocity, or the rate of this velocity.
 
     Attributes:
-        row: number of the velocity.
+        row: index of the joint velocity.
         t: (3, 1) velocity of the origin of the frame.
         n: (3, 1) angular velocity.
     """
@@ -173,35 +175,35 @@ class PathTwist:
     n: SX
 
     def at(self, p: SX) -> PathTwist:
-        """About the point p, (3, 1) in the same axes."""
+        """Transform to the point p, (3, 1) in the same axes."""
         return PathTwist(self.row, self.t + cross(self.n, p), self.n)
 
     def seen(self, turn: Callable[[SX], SX]) -> PathTwist:
-        """In other axes."""
+        """Apply a rotation of axes to both vectors."""
         return PathTwist(self.row, turn(self.t), turn(self.n))
 
     def rate(self, of: Velocity) -> PathTwist:
-        """How it changes where it is fixed on a link that moves with this velocity."""
+        """Return the rate of the twist if it is fixed on a link with the velocity `of`."""
         t = cross(of.V, self.n) + cross(of.w, self.t)
         return PathTwist(self.row, t, cross(of.w, self.n))
 
 
 def path_twists(tree: Tree, poses: list[LinkPose]) -> list[list[PathTwist]]:
-    """For every link unit velocities of the joints from the base to it, in its frame."""
+    """Return for each link the unit velocities of all joints on its path, in its frame."""
     return _carry(tree, poses, _unit_twists(tree, poses))
 
 
 def path_twist_rates(
     tree: Tree, poses: list[LinkPose], velocities: list[Velocity]
 ) -> list[list[PathTwist]]:
-    """How those of `path_twists` change, seen at rest.
+    """Return the rates of `path_twists`, for an observer at rest.
 
-    Each is fixed on the link of its joint, of a backward joint on the link before.
+    A unit velocity is fixed on the link of its joint or, for a backward joint, on the antecedent.
 
     Args:
-        tree: the links.
-        poses: each with respect to its antecedent.
-        velocities: of the links.
+        tree: links of the tree.
+        poses: pose of each link relative to its antecedent.
+        velocities: velocity of each link in its frame.
     """
     own = [
         [twist.rate(_of_directions(tree, poses[j], velocities, j)) for twist in twists]
@@ -211,7 +213,7 @@ def path_twist_rates(
 
 
 def _of_directions(tree: Tree, pose: LinkPose, velocities: list[Velocity], j: int) -> Velocity:
-    """Velocity, in frame j, of what the unit motions of joint j are fixed on."""
+    """Velocity, in frame j, of the link on which the unit motions of joint j are fixed."""
     if not tree.links[j].backward:
         return velocities[j]
     i = tree.links[j].antecedent
@@ -221,7 +223,7 @@ def _of_directions(tree: Tree, pose: LinkPose, velocities: list[Velocity], j: in
 
 
 def seen_by_links(tree: Tree, poses: list[LinkPose], vector: SX) -> list[SX]:
-    """A vector (3, 1) of the base in the frame of every link."""
+    """Express a vector (3, 1) of the base in the frame of each link."""
     result: list[SX] = []
     for link, pose in zip(tree.links, poses, strict=True):
         first = poses[pose.run[0]] if len(pose.run) > 1 else pose
@@ -239,7 +241,7 @@ def _unit_twists(tree: Tree, poses: list[LinkPose]) -> list[list[PathTwist]]:
 
 
 def _carry(tree: Tree, poses: list[LinkPose], own: list[list[PathTwist]]) -> list[list[PathTwist]]:
-    """To every link the twists of the links before it, and its own."""
+    """Return for each link the twists of its ancestors and its own twists, in its frame."""
     outer: list[list[PathTwist]] = []
     inner: list[list[PathTwist]] = []
     result: list[list[PathTwist]] = []
@@ -260,22 +262,22 @@ def _carry(tree: Tree, poses: list[LinkPose], own: list[list[PathTwist]]) -> lis
 
 
 Unit = tuple[SX | None, SX | None]
-"""Force and moment, or linear and angular momentum, of a unit of a parameter; None for zero."""
+"""Force and moment, or linear and angular momentum, for a unit parameter; None for zero."""
 
 
 def inertial_regressor(tree: Tree, poses: list[LinkPose], motions: list[Acceleration]) -> list[SX]:
-    """For every link the matrix (nv, 10) that gives the joint efforts of its ten parameters.
+    """Return the regressor (nv, 10) of each link: joint efforts per unit inertial parameter.
 
     Args:
-        tree: the links.
-        poses: each with respect to its antecedent.
-        motions: of the links; see `link_accelerations`.
+        tree: links of the tree.
+        poses: pose of each link relative to its antecedent.
+        motions: acceleration of each link; see `link_accelerations`.
     """
     return _work_of_units(tree, poses, [unit_wrenches(motion) for motion in motions])
 
 
 def _work_of_units(tree: Tree, poses: list[LinkPose], units: list[list[Unit]]) -> list[SX]:
-    """For every link the matrix (nv, 10) of the work of its units in unit joint velocities."""
+    """Return for each link the power (nv, 10) of its unit wrenches along unit joint velocities."""
     links: list[Elements] = [
         {twist.row: partial(element, twist, own) for twist in twists}
         for own, twists in zip(units, path_twists(tree, poses), strict=True)
@@ -284,7 +286,7 @@ def _work_of_units(tree: Tree, poses: list[LinkPose], units: list[list[Unit]]) -
 
 
 def unit_wrenches(motion: Acceleration) -> list[Unit]:
-    """The wrenches that move a link of which one inertial parameter is one, in their order."""
+    """Return the ten inertial wrenches of a link with one unit parameter and zero others."""
     w, wd, vd, U = motion.w, motion.wd, motion.vd, motion.rate.U
     xy, xz, yz = w[0] * w[1], w[0] * w[2], w[1] * w[2]
     x_spread, y_spread, z_spread = motion.rate.spread
@@ -308,29 +310,29 @@ def axis(k: int) -> SX:
 
 
 def work(twist: PathTwist, unit: Unit) -> SX:
-    """Work of a wrench in a velocity, both about the origin of one frame and in it."""
+    """Return the power of a wrench along a velocity, both about and in the same frame."""
     f, m = unit
     turning = SX(0) if m is None else SX(casadi.dot(twist.n, m))
     return turning if f is None else turning + casadi.dot(twist.t, f)
 
 
 def element(twist: PathTwist, units: list[Unit], k: int) -> SX:
-    """Work of the unit of parameter k."""
+    """Return the power of the unit wrench of parameter k along a velocity."""
     return work(twist, units[k])
 
 
-# Energy as a row times the inertial parameters of the links.
+# Energy regressor: energy as a row times the inertial parameters of the links.
 #
 # Source: Gautier & Khalil 1988; Khalil & Creusot 1997, eq. 52.
 
 
 def inertial_energy(tree: Tree, poses: list[LinkPose], velocities: list[Velocity]) -> list[SX]:
-    """For every link the row (1, 10) whose product with its parameters is its energy E + U.
+    """Return the row (1, 10) of each link; its product with the parameters is the energy E + U.
 
     Args:
-        tree: the links.
-        poses: each with respect to its antecedent.
-        velocities: of the links; see `link_velocities`.
+        tree: links of the tree.
+        poses: pose of each link relative to its antecedent.
+        velocities: velocity of each link; see `link_velocities`.
     """
     ups = seen_by_links(tree, poses, -tree.gravity)
     heights: list[SX] = []
@@ -345,12 +347,12 @@ def inertial_energy(tree: Tree, poses: list[LinkPose], velocities: list[Velocity
 
 
 def unit_energies(velocity: Velocity, up: SX, height: SX) -> list[SX]:
-    """Energies of a link of which one inertial parameter is one, in their order.
+    """Return the ten energies of a link with one unit parameter and zero others.
 
     Args:
-        velocity: of the link.
-        up: (3, 1) the opposite of gravity, in its frame.
-        height: potential energy of a unit of mass at its origin.
+        velocity: velocity of the link.
+        up: (3, 1) minus gravity, in the frame of the link.
+        height: potential energy of a unit mass at the origin of the frame.
     """
     V, w = velocity.V, velocity.w
     x, y, z = w[0], w[1], w[2]
@@ -359,32 +361,32 @@ def unit_energies(velocity: Velocity, up: SX, height: SX) -> list[SX]:
     return [*turning, *firsts, 0.5 * casadi.dot(V, V) + height]
 
 
-# Momentum and its rate as matrices times the inertial parameters, without joint accelerations.
+# Momentum regressors, which do not need joint accelerations.
 #
-# The effort of a joint is the rate of the momentum along its axis, less what the turning of that
-# axis makes of it, and gravity: Gamma = d(D1 K)/dt + D2 K.
+# The joint efforts are Gamma = d(D1 K)/dt + D2 K with the inertial parameters K: rate of the
+# momentum along the joint axis, minus the term of the moving axis, plus gravity.
 #
 # Source: Khalil & Restrepo 1996; Khalil & Creusot 1997, eq. 41-43.
 
 
 def momentum_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Velocity]) -> list[SX]:
-    """For every link the matrix (nv, 10) of D1: the derivative of kinetic energy in v.
+    """Return D1 (nv, 10) of each link: derivative of its kinetic energy by v, per unit parameter.
 
     Args:
-        tree: the links.
-        poses: each with respect to its antecedent.
-        velocities: of the links; see `link_velocities`.
+        tree: links of the tree.
+        poses: pose of each link relative to its antecedent.
+        velocities: velocity of each link; see `link_velocities`.
     """
     return _work_of_units(tree, poses, [unit_momenta(velocity) for velocity in velocities])
 
 
 def position_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Velocity]) -> list[SX]:
-    """For every link the matrix (nv, 10) of D2: less the derivative of E - U in the positions.
+    """Return D2 (nv, 10) of each link: minus derivative of E - U by positions, per unit parameter.
 
     Args:
-        tree: the links.
-        poses: each with respect to its antecedent.
-        velocities: of the links; see `link_velocities`.
+        tree: links of the tree.
+        poses: pose of each link relative to its antecedent.
+        velocities: velocity of each link; see `link_velocities`.
     """
     links: list[Elements] = []
     paths = path_twists(tree, poses)
@@ -402,7 +404,7 @@ def position_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Veloc
 
 
 def _level_rows(tree: Tree, paths: list[list[PathTwist]], ups: list[SX]) -> set[int]:
-    """Velocities that raise nothing: rotations about vertical axes and level slides."""
+    """Indices of velocities without gravity effort: vertical rotation axes, level translations."""
     own = [
         (twist, ups[j])
         for j, link in enumerate(tree.links)
@@ -413,7 +415,7 @@ def _level_rows(tree: Tree, paths: list[list[PathTwist]], ups: list[SX]) -> set[
 
 
 def unit_momenta(velocity: Velocity) -> list[Unit]:
-    """Momenta of a link of which one inertial parameter is one, in their order."""
+    """Return the ten momenta of a link with one unit parameter and zero others."""
     V, w = velocity.V, velocity.w
     turning = (
         (w[0], 0, 0),
@@ -429,7 +431,10 @@ def unit_momenta(velocity: Velocity) -> list[Unit]:
 
 
 def unit_lifts(up: SX) -> list[Unit]:
-    """The wrenches that hold such a link against gravity, whose opposite is `up`, (3, 1)."""
+    """Return the ten wrenches that hold a link with one unit parameter against gravity.
+
+    `up`, (3, 1), is minus gravity in the frame of the link.
+    """
     nothing: Unit = (None, None)
     return [nothing] * 6 + [(None, cross(axis(k), up)) for k in range(3)] + [(up, None)]
 

@@ -1,8 +1,8 @@
-"""Inertial parameters moved towards the base, and frames slid to where distances vanish.
+"""Regrouping of inertial parameters towards the base, and shift of frames along joint axes.
 
-What joint j cannot tell from a part of link i belongs to link i: mass on the axis of a revolute
-joint, the whole rotational inertia behind a prismatic joint, the mass at the centre of a
-spherical joint. The equations stay the same; their constants are sums that are computed once.
+A part of link j that moves as if fixed on its antecedent i is added to link i: mass on the axis of
+a revolute joint, the whole rotational inertia of a link on a prismatic joint, the mass at the
+centre of a spherical joint. The equations do not change, and regrouped constants are computed once.
 
 Source: Gautier & Khalil 1990.
 """
@@ -21,12 +21,12 @@ from mbs.spatial import Body, Inertia, ScrewDisplacement, body_through, elements
 
 
 def regroup(tree: Tree, poses: list[LinkPose], bodies: list[Body]) -> list[Body]:
-    """The bodies of a tree with the same equations of motion and fewer parameters.
+    """Return bodies with fewer nonzero parameters and the same equations of motion.
 
     Args:
-        tree: the links.
-        poses: each with respect to its antecedent.
-        bodies: of the links, about and in their frames.
+        tree: links of the tree.
+        poses: pose of each link relative to its antecedent.
+        bodies: inertia of each link, about and in its frame.
     """
     bodies = list(bodies)
     for j in reversed(range(len(tree.links))):
@@ -41,7 +41,7 @@ def regroup(tree: Tree, poses: list[LinkPose], bodies: list[Body]) -> list[Body]
 
 
 def _parts(motion: Motion, body: Body) -> tuple[Body, Body]:
-    """What link j keeps and what belongs to link i, both about and in frame j."""
+    """Split a body of link j into the part it keeps and the part for link i, both in frame j."""
     match motion:
         case Motion.REVOLUTE:
             return body.along_axis()
@@ -51,7 +51,10 @@ def _parts(motion: Motion, body: Body) -> tuple[Body, Body]:
 
 
 def _seen_through(body: Body, motion: Motion, pose: LinkPose) -> Body:
-    """A moved part about and in frame i; behind a prismatic joint it has no place, only axes."""
+    """Transform a regrouped part from frame j to frame i.
+
+    For a prismatic joint the part is a rotational inertia, which only needs a rotation.
+    """
     if motion is Motion.PRISMATIC:
         for step in reversed(pose.steps):
             body = body.rotate(step.rotation)
@@ -63,7 +66,7 @@ def _seen_through(body: Body, motion: Motion, pose: LinkPose) -> Body:
 
 
 def _join(body: Body, part: Body) -> Body:
-    """Two bodies welded together; numbers that cancel are zero, so that they fold."""
+    """Sum of two bodies about the same point; cancelling numbers become exact zeros."""
     both = zip(_moments(body), _moments(part), strict=True)
     return type(body)(*(_sum(a, b) for a, b in both))
 
@@ -77,25 +80,26 @@ def _moments(body: Body) -> tuple[SX, SX, SX]:
     return body.J if isinstance(body, Inertia) else body.S, body.ms, body.m
 
 
-# Frames slid along the axes of their joints to where distances vanish.
+# Shift of frames along the axes of their joints, so that distances vanish.
 #
-# The origin of the frame of a revolute link may stand anywhere on its axis. Three places save
-# operations: the foot of the axis when it is at rest, because no force on it does any work and
-# gravity alone accelerates it; the foot of the axis of a last link; the height of the link behind
-# it when that one rotates about a parallel axis and the frame stands beside its foot already: a
-# distance that is passed on to a joint without one saves nothing.
+# The origin of the frame of a revolute link may be anywhere on its axis. Three positions save
+# operations. First, the foot of the axis (origin of the joint frame on the antecedent) if it is at
+# rest: forces on it do no work, and its acceleration is gravity alone. Second, the foot of the axis
+# of a last link. Third, the height of the next link if its axis is parallel and the frame already
+# has a height above its own foot. A distance that is only moved to a joint without a distance saves
+# no operations.
 
 
 def shift_frames(
     tree: Tree, poses: list[LinkPose], bodies: list[Body], *, base_rests: bool = True
 ) -> tuple[list[LinkPose], list[Body]]:
-    """The same tree with other frames of revolute links.
+    """Return poses and bodies after shifting frames of revolute links along their axes.
 
     Args:
-        tree: the links.
-        poses: each with respect to its antecedent.
-        bodies: of the links, about and in their frames.
-        base_rests: whether the base has no motion.
+        tree: links of the tree.
+        poses: pose of each link relative to its antecedent.
+        bodies: inertia of each link, about and in its frame.
+        base_rests: whether the base does not move.
     """
     rise = _rises(tree, poses, base_rests)
     if all(up.is_zero() for up in rise):
@@ -105,7 +109,7 @@ def shift_frames(
 
 
 def _rises(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
-    """How far each frame moves up its axis [m]."""
+    """Shift of each frame along its axis [m]."""
     resting = _resting(tree, poses) if base_rests else set()
     rise = [SX(0)] * len(poses)
     for j in reversed(range(len(poses))):
@@ -121,7 +125,7 @@ def _rises(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
 
 
 def _resting(tree: Tree, poses: list[LinkPose]) -> set[int]:
-    """Links whose axis has its foot at rest."""
+    """Indices of the links whose foot of the axis is at rest."""
     found: set[int] = set()
     for j, link in enumerate(tree.links):
         i = link.antecedent
@@ -136,13 +140,13 @@ def _resting(tree: Tree, poses: list[LinkPose]) -> set[int]:
 
 
 def _between(tree: Tree, poses: list[LinkPose], rise: list[SX], j: int) -> LinkPose:
-    """The pose of link j when its frame and that of its antecedent are moved."""
+    """Pose of link j relative to its antecedent after both frames have been shifted."""
     pose, i = poses[j], tree.links[j].antecedent
     b = -rise[i] if i >= 0 else SX(0)
     screw = pose.motion[0]
     if isinstance(screw, ScrewDisplacement):
         r = screw.t + rise[j]
-        if len(pose.run) > 1 and not b.is_zero():  # the seat has a height in any case
+        if len(pose.run) > 1 and not b.is_zero():  # parallel axes: combine both shifts in one
             b, r = b + r, SX(0)
         pose = replace(pose, motion=(replace(screw, t=r),))
     if b.is_zero():

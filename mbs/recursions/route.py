@@ -1,8 +1,8 @@
-"""The path from one frame of a tree to another one, its price, and how frames move along it.
+"""Path between two frames of a tree, relative pose and motion of frames, and operation counts.
 
-Rotations about parallel axes that follow each other are joined into one by the sum of their
-angles; what lies between them is seen from before the first. The steps of a link are written here
-once more than in `link_poses`, because a sum needs the angles, not their sines and cosines.
+Successive rotations about parallel axes are joined into one rotation by the sum of their angles.
+The displacements of a link are defined here in addition to `link_poses`, because sums need the
+angles, not their sines and cosines.
 
 Source: Khalil & Kleinfinger 1986 for the frames; Renaud 1980 for sums of angles.
 """
@@ -34,14 +34,14 @@ from mbs.spatial import (
     zeros,
 )
 
-# The price of a result, by which one of several forms of it is chosen.
+# Operation count of an expression, to select one of several equivalent forms.
 
 
 def cost(value: SX, q: SX, p: SX) -> int:
-    """The price of a matrix; see `mbs.operations.counts.Count.price`.
+    """Return the weighted operation count of a matrix; see `mbs.operations.counts.Count.price`.
 
     Args:
-        value: of the symbols q and p.
+        value: expression of the symbols q and p.
         q: (nq, 1) positions.
         p: (np, 1) parameters; operations on them alone are free.
     """
@@ -52,7 +52,7 @@ def cost(value: SX, q: SX, p: SX) -> int:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RotationAboutZ:
-    """A rotation about z by an angle [rad], backwards on the path from its end to its beginning."""
+    """Rotation about z by an angle [rad]; `backwards` if the path passes it in reverse."""
 
     angle: SX
     backwards: bool = False
@@ -60,28 +60,31 @@ class RotationAboutZ:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OtherRotation:
-    """Any other rotation."""
+    """Rotation about another axis, or by a matrix."""
 
     rotation: Rotation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathTranslation:
-    """A displacement p, (3, 1), in the axes where it stands [m]."""
+    """Translation p (3, 1) [m] in the current axes of the path."""
 
     p: SX
 
 
 @dataclass(frozen=True, slots=True)
 class JointAt:
-    """Where joint k acts: on its axis z, or where the directions of its three axes are constant."""
+    """Marker of joint k on a path: a point on its z axis, or axes in which its motion is constant.
+
+    The second case is for joints with several velocities.
+    """
 
     link: int
 
 
 @dataclass(frozen=True, slots=True)
 class OriginOf:
-    """The origin of frame k, -1 for the base."""
+    """Marker of the origin of frame k on a path, -1 for the base."""
 
     link: int
 
@@ -90,12 +93,12 @@ PathStep = RotationAboutZ | OtherRotation | PathTranslation | JointAt | OriginOf
 
 
 def path_to(tree: Tree, q: SX, frame: tuple[int, Pose]) -> list[PathStep]:
-    """The steps from the base to a frame at the positions q.
+    """Return the steps from the base to a frame at positions q.
 
     Args:
-        tree: the links.
+        tree: links of the tree.
         q: (nq, 1) positions.
-        frame: link (-1 for the base) and pose of the frame in it.
+        frame: index of the link (-1 for the base) and pose of the frame in the link.
     """
     j, inside = frame
     steps: list[PathStep] = [OriginOf(-1)]
@@ -129,7 +132,7 @@ def _link_steps(k: int, link: Link, q: SX) -> list[PathStep]:
 
 
 def _seat_steps(frame: Khalil) -> list[PathStep]:
-    """From one frame to the axis of the next."""
+    """Steps from a frame to the axis of the next joint, by Khalil's parameters."""
     return [
         RotationAboutZ(frame.gamma),
         PathTranslation(vector([0, 0, frame.b])),
@@ -139,7 +142,7 @@ def _seat_steps(frame: Khalil) -> list[PathStep]:
 
 
 def _fixed_steps(frame: Khalil) -> list[PathStep]:
-    """From one frame to the next, which does not move."""
+    """Steps from a frame to the next frame of the same link, by Khalil's parameters."""
     return [
         *_seat_steps(frame),
         RotationAboutZ(frame.theta),
@@ -159,7 +162,7 @@ def _is_idle(step: PathStep) -> bool:
 
 
 def reverse_path(steps: Iterable[PathStep]) -> list[PathStep]:
-    """The same path from its end to its beginning."""
+    """Return the path in reverse, from its end to its beginning."""
     return [_inverse(step) for step in reversed(list(steps))]
 
 
@@ -175,21 +178,23 @@ def _inverse(step: PathStep) -> PathStep:
 
 
 def inverse_rotation(rotation: Rotation) -> Rotation:
-    """The inverse rotation."""
+    """Return the inverse rotation."""
     if isinstance(rotation, AxisRotation):
         return AxisRotation(rotation.axis, -rotation.s, rotation.c)
     return MatrixRotation(rotation.matrix.T)
 
 
 def join_rotations(steps: Sequence[PathStep], tree: Tree) -> list[PathStep]:
-    """The path with successive rotations about one z axis made one, after what lies between them.
+    """Join successive rotations about parallel z axes into one rotation.
+
+    The joined rotation follows the translations between them, which are rotated accordingly.
 
     Args:
-        steps: a path outwards from some frame.
-        tree: its links; joints with three axes need their own axes.
+        steps: path from a frame to another frame.
+        tree: links of the tree; joints with several velocities need their own axes.
 
     Returns:
-        the steps, without a `RotationAboutZ` in them.
+        steps without `RotationAboutZ`.
     """
     result: list[PathStep] = []
     rotations: list[RotationAboutZ] = []
@@ -218,7 +223,7 @@ def _one_rotation(rotations: list[RotationAboutZ]) -> list[PathStep]:
 
 
 def _total(rotations: list[RotationAboutZ]) -> AxisRotation:
-    """One rotation of several, their angles added in the order of the tree in either direction."""
+    """Join rotations about z; angles are added in the order of the tree in both directions."""
     forward, backward = (
         [rotation.angle for rotation in rotations if rotation.backwards is backwards]
         for backwards in (False, True)
@@ -240,7 +245,7 @@ def _sum(angles: list[SX]) -> SX:
 def path_between(
     tree: Tree, q: SX, a: tuple[int, Pose], b: tuple[int, Pose]
 ) -> tuple[list[PathStep], list[PathStep]]:
-    """The path from frame a to frame b: back to their common link, then out to b."""
+    """Return the path from frame a back to the last common link, and from there to frame b."""
     to_a, to_b = path_to(tree, q, a), path_to(tree, q, b)
     fork = OriginOf(common_link(tree, a[0], b[0]))
     return reverse_path(to_a[to_a.index(fork) + 1 :]), to_b[to_b.index(fork) + 1 :]
@@ -249,15 +254,15 @@ def path_between(
 def relative_pose(
     tree: Tree, q: SX, a: tuple[int, Pose], b: tuple[int, Pose], *, outwards: bool = False
 ) -> Pose:
-    """Frame b seen from frame a, rotations about parallel axes joined.
+    """Return the pose of frame b relative to frame a, with joined rotations about parallel axes.
 
     Args:
-        tree: the links.
+        tree: links of the tree.
         q: (nq, 1) positions.
-        a: link (-1 for the base) and pose of the frame in it.
-        b: likewise.
-        outwards: begin at frame a instead of frame b; the pose is the same, its operations are
-            others.
+        a: index of the link (-1 for the base) and pose of frame a in the link.
+        b: index of the link (-1 for the base) and pose of frame b in the link.
+        outwards: whether to multiply from frame a to frame b. By default the product starts at b.
+            The pose is equal, but the operations differ.
     """
     back, out = path_between(tree, q, a, b)
     steps = join_rotations([*back, *out], tree)
@@ -278,7 +283,10 @@ def relative_pose(
 
 
 def cheapest_pose(tree: Tree, q: SX, p: SX, a: tuple[int, Pose], b: tuple[int, Pose]) -> Pose:
-    """The relative pose from whichever end it takes fewer operations; p are the parameters."""
+    """Return `relative_pose` with the multiplication order that needs fewer operations.
+
+    p are the parameters, operations on which are free.
+    """
     both = [relative_pose(tree, q, a, b, outwards=outwards) for outwards in (False, True)]
     return min(both, key=lambda pose: cost(pose.matrix, q, p))
 
@@ -286,7 +294,7 @@ def cheapest_pose(tree: Tree, q: SX, p: SX, a: tuple[int, Pose], b: tuple[int, P
 def express(
     tree: Tree, q: SX, axes: tuple[int, Pose], frame: tuple[int, Pose], vectors: Iterable[SX]
 ) -> list[SX]:
-    """Vectors of a frame in the axes of another one, rotation by rotation."""
+    """Express vectors (3, 1) of `frame` in the axes of the frame `axes`."""
     back, out = path_between(tree, q, axes, frame)
     turned = list(vectors)
     for step in reversed(join_rotations([*back, *out], tree)):
@@ -296,17 +304,17 @@ def express(
 
 
 def common_link(tree: Tree, a: int, b: int) -> int:
-    """The last link that is on the path to both links; -1 is the base."""
+    """Return the last link on the paths to both links a and b, -1 for the base."""
     shared = [k for k, m in zip(tree.path(a), tree.path(b), strict=False) if k == m]
     return shared[-1] if shared else -1
 
 
 def along(rotation: Rotation, vectors: Iterable[SX]) -> list[SX]:
-    """Each vector of the rotated frame in the fixed one; zeros stay zeros."""
+    """Rotate vectors from the rotated frame to the fixed frame; zero vectors are not changed."""
     return [v if is_zero(v) else casadi.densify(rotation.apply(v)) for v in vectors]
 
 
-# How frames fixed on links move, by themselves and seen from each other.
+# Absolute and relative motion of frames that are fixed on links.
 #
 # Source: Khalil & Dombre 2002 for composition of velocities and accelerations.
 
@@ -317,11 +325,11 @@ BASE: Frame = (-1, Pose.identity())
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RelativeAcceleration:
-    """Accelerations of a frame b for an observer who moves with a frame a, in the axes of a.
+    """Acceleration of a frame b relative to a moving frame a, in the axes of a.
 
     Attributes:
-        A: (3, 1) of the origin of b [m/s^2].
-        wd: (3, 1) angular [rad/s^2].
+        A: (3, 1) acceleration of the origin of b [m/s^2].
+        wd: (3, 1) angular acceleration of b [rad/s^2].
     """
 
     A: SX
@@ -331,14 +339,14 @@ class RelativeAcceleration:
 def relative_motion(
     tree: Tree, a: Frame, b: Frame, q: SX, moving: list[Velocity] | None
 ) -> RelativeMotion:
-    """How frame b moves, seen from frame a and in its axes.
+    """Return the pose and velocity of frame b relative to frame a, in the axes of a.
 
     Args:
-        tree: the links.
-        a: the frame of the observer.
-        b: the frame that moves.
+        tree: links of the tree.
+        a: reference frame.
+        b: observed frame.
         q: (nq, 1) positions.
-        moving: velocities of the links, each in its frame; at rest when None.
+        moving: velocity of each link in its frame; None for zero velocities.
     """
     T = relative_pose(tree, q, a, b)
     if moving is None:
@@ -350,7 +358,7 @@ def relative_motion(
 
 
 def frame_velocity(frame: Frame, moving: list[Velocity]) -> tuple[SX, SX]:
-    """Linear and angular velocity of a frame, in its axes."""
+    """Return the linear and angular velocity of a frame, in its own axes."""
     link, pose = frame
     if link < 0:
         return zeros(), zeros()
@@ -361,13 +369,13 @@ def frame_velocity(frame: Frame, moving: list[Velocity]) -> tuple[SX, SX]:
 def relative_acceleration(
     motion: RelativeMotion, a: Frame, b: Frame, motions: list[Acceleration]
 ) -> RelativeAcceleration:
-    """Accelerations of frame b, seen from frame a and in its axes.
+    """Return the acceleration of frame b relative to frame a, in the axes of a.
 
     Args:
-        motion: of b seen from a.
-        a: the frame of the observer.
-        b: the frame that moves.
-        motions: of the links, each in its frame; gravity takes no part where the base rests.
+        motion: pose and velocity of b relative to a.
+        a: reference frame.
+        b: observed frame.
+        motions: acceleration of each link in its frame, without gravity; see `resting_base`.
     """
     A_a, w_a, wd_a = _acceleration(a, motions)
     A_b, _, wd_b = _acceleration(b, motions)
@@ -380,7 +388,7 @@ def relative_acceleration(
 
 
 def _acceleration(frame: Frame, motions: list[Acceleration]) -> tuple[SX, SX, SX]:
-    """Acceleration of the origin, angular velocity and acceleration of a frame, in its axes."""
+    """Return origin acceleration, angular velocity and acceleration of a frame, in its axes."""
     link, pose = frame
     if link < 0:
         return zeros(), zeros(), zeros()

@@ -1,8 +1,8 @@
-"""A square part of a Jacobian, brought to triangular blocks.
+"""Square submatrix of a Jacobian in block triangular form.
 
-Linear and angular velocity are taken in the axes of whichever links, and of whichever reference
-point, leave the smallest blocks: with the reference in the centre of a spherical wrist the wrist
-separates from the arm.
+The axes of linear and angular velocity and the reference point are selected among the links so that
+the blocks are smallest. With the reference at the centre of a spherical wrist, for instance, the
+wrist is decoupled from the arm.
 
 Source: Renaud 1980; Khalil & Creusot 1997, section 4.6.
 """
@@ -35,19 +35,19 @@ from mbs.solvers.block_triangular import Block, block_triangular, determinant, s
 from mbs.spatial import skew
 
 _SINGULAR = 1e-9
-"""Part of the largest singular value that counts as zero: rounding leaves 1e-15, and at random
-positions a matrix that is not always singular is far from it."""
+"""Singular value relative to the largest that counts as zero: rounding errors are 1e-15, and at
+random positions the values of a matrix that is not always singular are much larger."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SquareJacobian:
-    """A square matrix as X B, X orthogonal but for a shear.
+    """Square matrix X B, where X is a product of rotations and a shear.
 
     Attributes:
-        B: (m, m), with exact zeros beside its blocks.
-        blocks: in the order in which equations can be solved; None when it is always singular.
-        X_inverse: (m, m).
-        sign: 1 or -1, so that the determinant is the sign times those of the blocks.
+        B: (m, m) block triangular matrix, up to permutations, with structural zeros.
+        blocks: diagonal blocks in the order of solution; None for an always singular matrix.
+        X_inverse: (m, m) inverse of X.
+        sign: 1 or -1; the determinant is the sign times the product of the block determinants.
     """
 
     B: SX
@@ -56,22 +56,22 @@ class SquareJacobian:
     sign: int
 
     def inverse(self) -> SX:
-        """(m, m) inverse of the matrix, block after block."""
+        """(m, m) inverse of the matrix, by block substitution."""
         assert self.blocks is not None
         return solve_blocks(self.B, self.blocks, self.X_inverse)
 
     def seen(self, twist: SX) -> SX:
-        """(m, 1) a right-hand side as the blocks need it."""
+        """(m, 1) transform of a right-hand side to the equations of B: X^-1 twist."""
         return casadi.densify(casadi.mtimes(self.X_inverse, twist))
 
     def determinants(self) -> list[SX]:
-        """The determinants of the blocks; a zero when the matrix is always singular."""
+        """Determinants of the blocks; a single zero for an always singular matrix."""
         if self.blocks is None:
             return [SX(0)]
         return [determinant(block.of(self.B)) for block in self.blocks]
 
     def determinant(self) -> SX:
-        """The determinant of the matrix."""
+        """Determinant of the matrix."""
         product = SX(self.sign)
         for factor in self.determinants():
             product = product * factor
@@ -80,7 +80,15 @@ class SquareJacobian:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _View:
-    """Axes and reference for a selection, as places in a survey; rows of [V; w] that take part."""
+    """Candidate of axes and reference point, with the resulting matrix.
+
+    Attributes:
+        linear, angular: indices in the survey of the frames whose axes V and w are expressed in.
+        reference: index in the survey of the reference point; None for the moving frame.
+        V_rows, w_rows: components of V and w in these axes that span the selected rows.
+        B: (samples, m, m) numeric matrix.
+        blocks: diagonal blocks of its pattern; None if it is always singular.
+    """
 
     linear: int
     angular: int
@@ -91,7 +99,10 @@ class _View:
     blocks: tuple[Block, ...] | None
 
     def rank(self, size: int) -> tuple[float, ...]:
-        """Smaller is better: work on blocks, entries that vary, distance from the middle."""
+        """Sort key, lower is better: block work, numbers of varying entries, distance from middle.
+
+        `size` is the number of frames of the survey; axes in the middle of the path are preferred.
+        """
         if self.blocks is None:
             return (0.0,)
         changes = varying(self.B)
@@ -104,13 +115,13 @@ class _View:
 def square_jacobian(
     target: VelocityTarget, rows: Sequence[int], columns: Sequence[int], G: SX | None = None
 ) -> SquareJacobian:
-    """Rows and columns of the Jacobian of a tree, in blocks.
+    """Return a square submatrix of the Jacobian of a tree in block triangular form.
 
     Args:
-        target: the frame that moves, and the axes.
-        rows: of [V; w], 0 to 5.
-        columns: of v, as many.
-        G: (nv, m) when the columns are those of J G instead.
+        target: moving frame, and axes of the Jacobian J.
+        rows: indices 0 to 5 into [V; w].
+        columns: indices of columns, as many as rows.
+        G: (nv, m) reduction matrix; if given, the columns belong to J G.
     """
     tree, q = target.tree, target.q
     found = survey(target)
@@ -141,14 +152,14 @@ def square_jacobian(
 
 
 def _values(target: VelocityTarget, A: SX) -> Array:
-    """(samples, ...) a matrix at the configurations of a survey."""
+    """(samples, ...) numeric values of a matrix at the random configurations of a survey."""
     f = Function("f", [target.q, target.p], [casadi.densify(A)])
     samples = random_samples(target.tree, target.p.numel())
     return np.array([np.array(f(*sample)) for sample in samples])
 
 
 def _places(tree: Tree, found: Survey, columns: Sequence[int]) -> list[int]:
-    """The base, the links of these columns, and the axes that were asked for."""
+    """Indices in the survey of the base, the links of these columns, and the required axes."""
     kept = []
     for place in found.on_path:
         link, _ = found.frames[place]
@@ -159,13 +170,14 @@ def _places(tree: Tree, found: Survey, columns: Sequence[int]) -> list[int]:
 
 
 def _back(rows: Sequence[int], R_V: SX, R_w: SX, arm: SX) -> SX:
-    """From rows of [V; w] as they were asked for to those of a view: X^-1.
+    """Return X^-1, which maps the required rows of [V; w] to the rows of a view.
 
     Args:
-        rows: that were asked for.
-        R_V: rows of the orientation of the target axes in the linear axes.
-        R_w: likewise in the angular axes.
-        arm: (3, 1) from the reference to the frame's origin, in the target axes.
+        rows: required rows.
+        R_V: rows of the orientation of the target axes in the axes of the linear velocity.
+        R_w: rows of the orientation of the target axes in the axes of the angular velocity.
+        arm: (3, 1) vector from the reference point to the origin of the moving frame, in the target
+            axes.
     """
     V_rows, w_rows = [k for k in rows if k < 3], [k - 3 for k in rows if k >= 3]
     Q_V, Q_w = R_V[:, V_rows], R_w[:, w_rows]
@@ -194,7 +206,7 @@ def _always_singular(values: Array) -> bool:
 def _views(
     found: Survey, places: Sequence[int], rows: Sequence[int], columns: Sequence[int]
 ) -> Iterator[_View]:
-    """Ways to look at the selection that mix none of its rows with others."""
+    """Yield the views in which the selected rows do not mix with other rows of [V; w]."""
     V_rows, w_rows = [k for k in rows if k < 3], [k - 3 for k in rows if k >= 3]
     memo: dict[bytes, tuple[Block, ...] | None] = {}
     references = [None, *(k for k in found.separate_origins() if k in places)]
@@ -220,13 +232,13 @@ def _views(
 
 
 def _rows_reached(R: Array, rows: Sequence[int]) -> tuple[int, ...] | None:
-    """Components in turned axes of which these rows are made; None unless they are as many."""
+    """Components in rotated axes that the rows depend on; None if their number differs."""
     kept = np.flatnonzero(nonzero(R[:, list(rows)]).any(axis=0))
     return tuple(kept.tolist()) if len(kept) == len(rows) else None
 
 
 def _leaks(arm: Array, R: Array, w: Array, V_rows: Sequence[int], w_kept: Sequence[int]) -> bool:
-    """Whether the linear rows take in angular velocities that are no row of the selection."""
+    """Whether a change of reference adds angular velocities outside the selection to V rows."""
     rest = [k for k in range(3) if k not in w_kept]
     share = np.cross(np.swapaxes(R[:, :, rest] @ w[:, rest], 1, 2), arm[:, None])
     return bool(nonzero(share[:, :, list(V_rows)]).any())

@@ -18,15 +18,15 @@ from mbs.spatial import cross, formula, is_zero, origin, vector, wrench_through,
 # Motion subspaces of joints: velocities that a joint adds to its link, and efforts along them.
 #
 # The directions of a motion are constant in frame j. The directions of a backward motion are
-# constant in its seat, which is frame_b of the joint; positive velocities move frame j against
-# them.
+# constant in its seat (the joint frame on the antecedent), which is frame_b of the joint; positive
+# velocities move frame j opposite to them.
 
 
 def motion_at_joint(link: Link, v: SX) -> tuple[SX, SX]:
-    """Linear and angular velocity of frame j relative to link i, where its directions are constant.
+    """Velocity (linear, angular) of link j relative to link i, in axes of constant direction.
 
-    They are of the body of link j, about the origin of frame j and in its axes; of a backward
-    motion about the origin of its seat and in the axes of the seat.
+    The reference point and the axes are those of frame j or, for a backward motion, of the seat
+    (joint frame on link i).
     """
     match link.motion:
         case Motion.REVOLUTE:
@@ -44,7 +44,7 @@ def _along_z(v: SX) -> SX:
 
 
 def effort_at_joint(link: Link, f: SX, m: SX) -> SX:
-    """The part of a wrench along the motion; the wrench is about and in the same frame."""
+    """Project a wrench on the joint motion; the wrench is about and in the frame of the motion."""
     match link.motion:
         case Motion.REVOLUTE:
             return m[2]
@@ -55,23 +55,23 @@ def effort_at_joint(link: Link, f: SX, m: SX) -> SX:
 
 
 def unit_motions_at_joint(link: Link) -> list[tuple[SX, SX]]:
-    """Linear and angular velocity for a unit of each velocity of a link, in the same frame."""
+    """Linear and angular velocity for each unit joint velocity, as in `motion_at_joint`."""
     identity = SX.eye(link.motion.nv)
     return [motion_at_joint(link, casadi.densify(identity[:, k])) for k in range(link.motion.nv)]
 
 
 def motion_behind(link: Link, pose: LinkPose, v: SX) -> tuple[SX, SX]:
-    """Linear and angular velocity of frame j relative to its seat, both in frame j."""
+    """Linear and angular velocity of frame j relative to its seat, in the axes of frame j."""
     return _behind(link, pose, motion_at_joint(link, v))
 
 
 def unit_motions(link: Link, pose: LinkPose) -> list[tuple[SX, SX]]:
-    """Linear and angular velocity in frame j for a unit of each of its velocities."""
+    """Linear and angular velocity of frame j, in its axes, for each unit joint velocity."""
     return [_behind(link, pose, unit) for unit in unit_motions_at_joint(link)]
 
 
 def _behind(link: Link, pose: LinkPose, velocity: tuple[SX, SX]) -> tuple[SX, SX]:
-    """A velocity that `motion_at_joint` gives, about and in frame j."""
+    """Transform a result of `motion_at_joint` to the origin and axes of frame j."""
     if not link.backward:
         return velocity
     linear, angular = velocity
@@ -81,7 +81,7 @@ def _behind(link: Link, pose: LinkPose, velocity: tuple[SX, SX]) -> tuple[SX, SX
 
 
 def effort(link: Link, pose: LinkPose, f: SX, m: SX) -> SX:
-    """The part of a wrench, force f and moment m about the origin of frame j, along the motion."""
+    """Project a force f and moment m about the origin of frame j on the joint motion."""
     if link.backward:
         f, m = wrench_through(pose.motion, f, m)
     return effort_at_joint(link, f, m)
@@ -92,8 +92,8 @@ class Velocity:
     """Velocity of a link.
 
     Attributes:
-        V: (3, 1) of the origin of frame j, in frame j [m/s].
-        w: (3, 1) angular, in frame j [rad/s].
+        V: (3, 1) velocity of the origin of frame j, in frame j [m/s].
+        w: (3, 1) angular velocity, in frame j [rad/s].
     """
 
     V: SX
@@ -103,7 +103,14 @@ class Velocity:
 def link_velocities(
     tree: Tree, poses: list[LinkPose], v: SX, base: Velocity | None = None
 ) -> list[Velocity]:
-    """Velocity of every link for the joint velocities v, (nv, 1), and that of the base."""
+    """Return the velocity of each link in its frame.
+
+    Args:
+        tree: links of the tree.
+        poses: pose of each link relative to its antecedent.
+        v: (nv, 1) joint velocities.
+        base: velocity of the base; zero by default.
+    """
     result: list[Velocity] = []
     for link, pose in zip(tree.links, poses, strict=True):
         i = link.antecedent
@@ -116,18 +123,18 @@ def link_velocities(
     return result
 
 
-# The matrix U of a turning body, and its moment, on the fewest products.
+# Matrix U of a rotating body and its moment, with the fewest products.
 #
 # Source: Balafoutis, Patel & Misra 1988 for the moment; Khalil & Creusot 1997, eq. 8-10.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RotationRate:
-    """How acceleration changes over a turning body: U = skew(wd) + skew(w) skew(w).
+    """Gradient of the acceleration over a rotating body: U = skew(wd) + skew(w) skew(w).
 
     Attributes:
-        U: (3, 3) [rad/s^2].
-        spread: U33 - U22, U11 - U33 and U22 - U11.
+        U: (3, 3) gradient [rad/s^2].
+        spread: differences U33 - U22, U11 - U33 and U22 - U11.
     """
 
     U: SX
@@ -135,12 +142,12 @@ class RotationRate:
 
 
 def rotation_rate(w: SX, wd: SX, across: SX | None = None) -> RotationRate:
-    """U on six products of the velocities, or on five.
+    """Return U with six products of angular velocities, or five if `across` is given.
 
     Args:
         w: (3, 1) angular velocity.
         wd: (3, 1) angular acceleration.
-        across: x^2 + y^2 of w where it is known; y^2 then needs no product.
+        across: x^2 + y^2 of w if it is already known; then y^2 needs no product.
     """
     if across is None or w[0].is_zero() or w[1].is_zero():
         U, *spread = _rotation_rate(w, wd, SX(0), False)
@@ -165,13 +172,14 @@ def _rotation_rate(w: SX, wd: SX, across: SX, known: bool) -> tuple[SX, SX, SX, 
 
 
 def moment_of_rotation(S: SX, rate: RotationRate) -> SX:
-    """(3, 1) J wd + w x (J w), the skew part of U S: thirteen products when S[2, 2] is zero.
+    """(3, 1) moment J wd + w x (J w), from the skew part of U S.
 
-    Row x is (U S)_zy - (U S)_yz, the integral of y (U r)_z - z (U r)_y.
+    Row x is (U S)_zy - (U S)_yz, the integral of y (U r)_z - z (U r)_y over the mass. It needs
+    thirteen products if S[2, 2] is zero.
 
     Args:
-        S: (3, 3) second moments of the body's mass.
-        rate: of its rotation.
+        S: (3, 3) second moments of mass of the body.
+        rate: rotation rate of the body.
     """
     pairs = [(rate.U[n, m], rate.U[m, n]) for m, n in ((1, 2), (2, 0), (0, 1))]
     signs = tuple(_relation(a, b) for a, b in pairs)
@@ -189,14 +197,14 @@ def _moment_of_rotation(S: SX, U: SX, s_x: SX, s_y: SX, s_z: SX, signs: tuple[in
 
 
 def _relation(a: SX, b: SX) -> int:
-    """1 where a = -b, -1 where a = b, else 0."""
+    """Return 1 if a = -b, -1 if a = b, else 0."""
     if SX.binary(casadi.OP_ADD, a, b).is_zero():
         return 1
     return -1 if SX.binary(casadi.OP_SUB, a, b).is_zero() else 0
 
 
 def _difference(a: SX, first: SX, b: SX, second: SX, sign: int) -> SX:
-    """A first - b second; one product when a = b or a = -b."""
+    """Return ``a * first - b * second``, with one product if a = b or a = -b."""
     if sign:
         return a * (first + second if sign > 0 else first - second)
     return a * first - b * second
@@ -209,12 +217,12 @@ def _difference(a: SX, first: SX, b: SX, second: SX, sign: int) -> SX:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Acceleration:
-    """What the equations of a link need of its motion.
+    """Angular velocity and accelerations of a link.
 
     Attributes:
         w: (3, 1) angular velocity in frame j [rad/s].
         wd: (3, 1) angular acceleration in frame j [rad/s^2].
-        rate: of rotation, in frame j.
+        rate: rotation rate U in frame j.
         vd: (3, 1) acceleration of the origin of frame j, minus gravity, in frame j [m/s^2].
     """
 
@@ -225,23 +233,29 @@ class Acceleration:
 
 
 def resting_base(gravity: SX) -> Acceleration:
-    """A base at rest; gravity, (3, 1) in its frame, enters as an upward acceleration."""
+    """Return the motion of a fixed base, whose acceleration is minus gravity (3, 1)."""
     return moving_base(zeros(), zeros(), -gravity)
 
 
 def moving_base(w: SX, wd: SX, vd: SX) -> Acceleration:
-    """A base with a given motion, all (3, 1) in its frame; vd is minus gravity."""
+    """Return the motion of a moving base.
+
+    Args:
+        w: (3, 1) angular velocity, in the base frame.
+        wd: (3, 1) angular acceleration, in the base frame.
+        vd: (3, 1) acceleration of the origin minus gravity, in the base frame.
+    """
     return Acceleration(w, wd, rotation_rate(w, wd), vd)
 
 
 def link_accelerations(
     tree: Tree, poses: list[LinkPose], v: SX, a: SX, base: Acceleration
 ) -> list[Acceleration]:
-    """Acceleration of every link.
+    """Return the acceleration of each link in its frame.
 
     Args:
-        tree: the links.
-        poses: each with respect to its antecedent.
+        tree: links of the tree.
+        poses: pose of each link relative to its antecedent.
         v: (nv, 1) joint velocities.
         a: (nv, 1) joint accelerations.
         base: motion of the base; see `resting_base`.
@@ -263,7 +277,10 @@ def link_accelerations(
 def _rotation(
     tree: Tree, poses: list[LinkPose], j: int, v: SX, a: SX, motions: list[Acceleration]
 ) -> tuple[SX, SX, RotationRate]:
-    """w, wd and U of link j; `motions` are those of the links before it and, last, of the base."""
+    """Angular velocity, angular acceleration and rate U of link j.
+
+    `motions` contains the previous links and, as its last element, the base.
+    """
     link, pose = tree.links[j], poses[j]
     before = motions[link.antecedent]
     if link.motion.nv > 1:
@@ -288,10 +305,10 @@ def _rotation(
 
 
 def _run(tree: Tree, poses: list[LinkPose], j: int, motions: list[Acceleration]) -> tuple[int, ...]:
-    """The joints that turn the angular velocity of link j.
+    """Indices of the joints whose summed angles rotate the angular velocity of link j.
 
-    Those of a run of parallel axes turn it once, by the sum of their angles, where it has a zero
-    before the first of them: the zero would be lost from joint to joint.
+    A run of parallel axes is joined if the angular velocity has a zero x or y component before the
+    run, which a rotation at each joint would lose. Otherwise the run is joint j alone.
     """
     run = poses[j].run
     w = poses[run[0]].at_seat(motions[tree.links[run[0]].antecedent].w)
@@ -299,9 +316,9 @@ def _run(tree: Tree, poses: list[LinkPose], j: int, motions: list[Acceleration])
 
 
 def _square_across(before: Acceleration, pose: LinkPose) -> SX | None:
-    """The square of the angular velocity across axis j, where an entry of U_i already holds it.
+    """Squared angular velocity normal to axis j, if an entry of U_i contains it, else None.
 
-    It is the same for both links of the joint. When the axis is coordinate axis k of frame i,
+    It is equal for both links of the joint. If axis j is parallel to coordinate axis k of frame i,
     it is -U_i[k, k].
     """
     axis = vector([0, 0, 1])

@@ -1,4 +1,4 @@
-"""Numerical methods that know Functions and numbers, never mechanisms."""
+"""Numerical methods on CasADi Functions and arrays, independent of mechanisms."""
 
 from mbs.solvers.integrate import integrate, integrate_events
 from mbs.solvers.problem import EventMotion, Events, IntegrationEvent

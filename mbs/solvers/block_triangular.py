@@ -1,9 +1,9 @@
-"""Block triangular form of a square matrix, and what it saves.
+"""Block triangular form of a square matrix, and solutions and determinants that use it.
 
-Rows are matched with columns so that the diagonal has no structural zero; the strongly connected
-parts of the graph of the matched matrix are its diagonal blocks.
+Rows are matched with columns so that the diagonal has no structural zero. The strongly connected
+components of the graph of the matched matrix are its diagonal blocks.
 
-Source: Duff and Reid 1978 for the blocks; Tarjan 1972 for the strongly connected parts.
+Source: Duff and Reid 1978 for the blocks; Tarjan 1972 for the strongly connected components.
 """
 
 from __future__ import annotations
@@ -19,35 +19,35 @@ from numpy.typing import NDArray
 from mbs.solvers.linear import solve_square
 
 _EXPANDED = 7
-"""Largest determinant that is expanded; beyond it is taken of a factorisation."""
+"""Largest size of a determinant that is expanded; larger ones are computed by factorisation."""
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Rows and columns of a diagonal block, of equal number."""
+    """Row and column indices of a diagonal block; both have the same number."""
 
     rows: tuple[int, ...]
     columns: tuple[int, ...]
 
     @property
     def size(self) -> int:
-        """Number of its rows."""
+        """Number of rows of the block."""
         return len(self.rows)
 
     def of(self, A: SX) -> SX:
-        """The block of this matrix."""
+        """Return the block of a matrix, dense."""
         return casadi.densify(A[list(self.rows), list(self.columns)])
 
 
 def block_triangular(pattern: NDArray[np.bool_]) -> tuple[Block, ...] | None:
-    """The diagonal blocks of a square matrix in an order in which equations can be solved.
+    """Return the diagonal blocks of a square matrix, in an order in which they can be solved.
 
     Args:
-        pattern: (n, n) where the matrix may be other than zero.
+        pattern: (n, n) whether an element may be non-zero.
 
     Returns:
-        blocks; the rows of each have entries in its own columns and in those of blocks before
-        it. None when every matrix of this pattern is singular.
+        blocks; the rows of each block have entries only in its own columns and in the columns of
+        previous blocks. None if every matrix with this pattern is singular.
     """
     matched = _matching(pattern)
     if matched is None:
@@ -63,7 +63,7 @@ def block_triangular(pattern: NDArray[np.bool_]) -> tuple[Block, ...] | None:
 
 
 def _matching(pattern: NDArray[np.bool_]) -> list[int] | None:
-    """For each column a row of its own in which it is not zero, by augmenting paths."""
+    """Match each column with a row in which it is non-zero, by augmenting paths."""
     n = len(pattern)
     row_of = [-1] * n
     column_of = [-1] * n
@@ -76,7 +76,7 @@ def _matching(pattern: NDArray[np.bool_]) -> list[int] | None:
 def _augment(
     pattern: NDArray[np.bool_], start: int, row_of: list[int], column_of: list[int]
 ) -> bool:
-    """Match one more column; breadth first, so that no depth of recursion is needed."""
+    """Match one more column, breadth first (without recursion); return whether that succeeds."""
     reached: dict[int, int] = {}
     queue = [start]
     for column in queue:
@@ -96,7 +96,7 @@ def _augment(
 
 
 def _strong_parts(needs: Sequence[Sequence[int]]) -> list[list[int]]:
-    """Strongly connected parts of a graph, those that others need first."""
+    """Return the strongly connected components of a graph; needed components come first."""
     n = len(needs)
     number, low, on_stack = [-1] * n, [0] * n, [False] * n
     stack: list[int] = []
@@ -131,16 +131,16 @@ def _strong_parts(needs: Sequence[Sequence[int]]) -> list[list[int]]:
 
 
 _SMALL = 40
-"""Equations up to which CasADi's QR of the whole matrix is taken: it fills what lies between
-blocks, so that twice the equations take four times the operations."""
+"""Largest number of equations for which the whole matrix is solved by CasADi's QR. QR fills the
+part between blocks: twice the equations need four times the operations."""
 
 
 def solve_large(A: SX, B: SX) -> SX:
-    """The solution X of A X = B, in blocks where there are many equations.
+    """Return the solution X of A X = B, block by block if there are many equations.
 
     Args:
-        A: (n, n) regular.
-        B: (n, m).
+        A: (n, n) regular matrix.
+        B: (n, m) right-hand sides.
     """
     if A.shape[0] > _SMALL:
         A = casadi.sparsify(A)
@@ -153,12 +153,12 @@ def solve_large(A: SX, B: SX) -> SX:
 
 
 def solve_blocks(A: SX, blocks: Sequence[Block], B: SX) -> SX:
-    """The solution X of A X = B, block after block.
+    """Return the solution X of A X = B, block by block.
 
     Args:
-        A: (n, n), zero where the blocks say so.
-        blocks: of `block_triangular`.
-        B: (n, m).
+        A: (n, n) regular matrix in block triangular form.
+        blocks: blocks of A from `block_triangular`.
+        B: (n, m) right-hand sides.
     """
     X = SX.zeros(*B.shape)
     for k, block in enumerate(blocks):
@@ -173,9 +173,9 @@ def solve_blocks(A: SX, blocks: Sequence[Block], B: SX) -> SX:
 
 
 def determinant(A: SX) -> SX:
-    """Determinant of a small square matrix, without a division up to seven rows.
+    """Return the determinant of a small square matrix, without divisions up to seven rows.
 
-    The minors of the first rows are each formed once, from those of one row less.
+    Each minor of the first k rows is formed once, from the minors of the first k - 1 rows.
     """
     n = A.shape[0]
     if n > _EXPANDED:

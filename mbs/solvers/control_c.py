@@ -13,8 +13,8 @@ from types import FrameType
 def control_c() -> Iterator[Callable[[], None]]:
     """Context manager that yields `check()`, which raises KeyboardInterrupt after control-C.
 
-    Python drops a KeyboardInterrupt that is raised in a finalizer: call `check` now and then. An
-    interrupted call of CasADi may return None. An error that leaves the block after control-C
+    Python drops a KeyboardInterrupt that is raised in a finalizer, so call `check` regularly. An
+    interrupted call of CasADi may return None. An error that is raised in the block after control-C
     becomes a KeyboardInterrupt, with that error as its cause. The context manager does nothing if
     SIGINT has another handler, or outside the main thread.
     """

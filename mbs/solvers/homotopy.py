@@ -1,4 +1,4 @@
-"""Roots of equations that are followed while the equations become others, many at once."""
+"""Homotopy continuation: roots are tracked while the equations change, many at once."""
 
 from __future__ import annotations
 
@@ -14,36 +14,37 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 Newton = Callable[[Complex, Real, Complex], tuple[Complex, Complex]]
-"""Newton's step at x (r, n) and t (r,), and the slope of the root by t, both (r, n); the third are
-the roots at the beginning of a step."""
+"""Callable (x (r, n), t (r,), roots at the start of the step (r, n)) -> Newton step and derivative
+of the root by t, both (r, n)."""
 Settle = Callable[[Complex, Complex], tuple[Complex, Complex]]
-"""A root and its slope as those of the next step, such as homogeneous ones of length one."""
+"""Callable that normalises roots and slopes after a step, such as homogeneous roots to length 1."""
 
 TOLERANCE = 1e-4
-"""First correction of Newton's method after a step, of coordinates of the size of one: at 1e-2 a
-tenth of the platforms on six legs lost a path to another one."""
+"""Size of the first Newton correction that steps aim at, for coordinates of size one. At 1e-2 a
+tenth of the platforms with six legs lost a path to another path."""
 _FIRST_STEP, _LEAST_STEP = 0.01, 1e-9
-"""Of t, from 0 to 1: the first is shorter than most that follow; one below the other stands before
-a singular root, to which the steps of a regular path do not come near."""
+"""First and smallest step of t, which runs from 0 to 1. The first is shorter than most later steps.
+Smaller steps than the smallest occur only near a singular root."""
 _SHRINK, _GROW, _SAFETY = 0.2, 3.0, 0.9
-"""Of steps, as in solvers of differential equations: at most by these, and a little less than what
-the fifth power of the step says."""
+"""Step size control, as in ODE solvers: smallest and largest factor of a step, and a safety factor
+on the step that follows from the fifth-order error estimate."""
 _MOST_STEPS = 4000
 
 
 def follow(
     newton: Newton, x: Complex, settle: Settle, tolerance: float = TOLERANCE
 ) -> tuple[Complex, Real]:
-    """The roots (r, n) at t = 1, and how far each came.
+    """Track roots from t = 0 to t = 1; return the roots (r, n) and the t (r,) that each reached.
 
-    That is 1, or less at a singular root or one at infinity, which is approached in ever smaller
-    steps. Runge and Kutta's fourth order predicts, two steps of Newton's method correct.
+    t is 1, or less at a singular root or a root at infinity, where steps become too small. The
+    predictor is the fourth-order Runge-Kutta method. The corrector is two Newton steps.
 
     Args:
-        newton: of the equations.
+        newton: Newton step of the equations.
         x: (r, n) roots at t = 0.
-        settle: after each step.
-        tolerance: first correction of Newton's method after a step.
+        settle: normalisation after each step.
+        tolerance: size of the first Newton correction that steps aim at; up to twice this size is
+            accepted.
     """
     t, h = np.zeros(len(x)), np.full(len(x), _FIRST_STEP)
     x, slope = settle(x.copy(), newton(x, t, x)[1])
@@ -58,7 +59,7 @@ def follow(
             first, _ = newton(y, t0 + step, x0)
             second, along = newton(y + first, t0 + step, x0)
             error, rest = np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
-        # the second correction is about the square of the first where the root is regular
+        # for a regular root the second correction is about the square of the first
         good = (error < 2 * tolerance) & (rest < tolerance**1.5)
         factor = _SAFETY * (tolerance / np.maximum(error, NONZERO)) ** (1 / 5)
         factor = np.where(np.isfinite(factor), factor, _SHRINK)
@@ -70,7 +71,7 @@ def follow(
 
 
 def _predicted(newton: Newton, x: Complex, k1: Complex, t: Real, h: Real) -> Complex:
-    """(r, n) the roots at t + h, from x with slopes k1."""
+    """Return the predicted roots (r, n) at t + h, from x with slopes k1."""
     s = h[:, None]
     _, k2 = newton(x + s / 2 * k1, t + h / 2, x)
     _, k3 = newton(x + s / 2 * k2, t + h / 2, x)
@@ -79,7 +80,7 @@ def _predicted(newton: Newton, x: Complex, k1: Complex, t: Real, h: Real) -> Com
 
 
 def solved(A: Complex, b: Complex) -> Complex:
-    """(r, n, k) solutions of A x = b, NaN where A is singular to the last bit."""
+    """Return the solutions (r, n, k) of A x = b; NaN if A is exactly singular."""
     try:
         return np.asarray(np.linalg.solve(A, b), np.complex128)
     except np.linalg.LinAlgError:

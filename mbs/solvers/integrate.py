@@ -1,4 +1,4 @@
-"""Integration of functions of CasADi by the run-time library."""
+"""Integration of CasADi Functions by the run-time library."""
 
 import ctypes
 import math
@@ -38,8 +38,8 @@ from mbs.solvers.problem import (
 Array = npt.NDArray[np.float64]
 Progress = Callable[[float], None]
 
-_CHUNK = 200  # steps of machine code between two looks at the keyboard
-_FEW = 10  # steps of interpreted functions, after which the compiler may be due
+_CHUNK = 200  # steps of machine code between two checks for control-C
+_FEW = 10  # steps of interpreted functions between two checks whether to compile
 _FIRED, _MORE = -1, 1
 _REASONS = {
     2: "steps",
@@ -61,15 +61,15 @@ _CROWDED = (14, 15)
 
 
 _LONG = 10_000
-"""Lines of CasADi's text beyond which it is written in pieces: compilers need more than
-proportional time for long functions, and pieces of small ones cost time in every step."""
+"""Lines of CasADi's C code beyond which it is split into several functions: compilers need more
+than proportional time for long functions. Splitting short code would cost time in every step."""
 
 
 def _in_pieces(functions: Sequence[casadi.Function]) -> str:
-    """The same functions in pieces that compilers take in linear time, to the last bit the same.
+    """Return C code of functions, split so that compile time is linear; results are bit-identical.
 
     Returns:
-        an empty text where one of them has more than scalar operations.
+        C code; empty if a function does not consist of scalar operations.
     """
     try:
         text, work = plain_source(functions)
@@ -82,7 +82,7 @@ def _in_pieces(functions: Sequence[casadi.Function]) -> str:
 
 
 def _source(equations: Equations) -> str | None:
-    """The C text of the functions of an integration; None if CasADi can only interpret them."""
+    """Return the C code of the functions of an integration; None if they must be interpreted."""
     if calls_machine_code(equations.all):
         return None
     source = generated(equations.all)
@@ -93,24 +93,24 @@ def _source(equations: Equations) -> str | None:
 
 
 _WRITING, _COMPILING = (0.01, 5e-6), (0.2, 1e-4)
-"""Times of writing C text and of compiling it [s]: for a start, and for each instruction. They are
-those of gcc 12 for 1,000 to 20,000 instructions, to a factor of two."""
+"""Times of writing and of compiling C code [s]: constant part, and part per instruction. Measured
+with gcc 12 for 1,000 to 20,000 instructions, accurate to a factor of two."""
 
 
 @dataclass(slots=True, eq=False)
 class IntegrationCode:
-    """Functions of an integration, interpreted until that has cost as much as the compiler.
+    """Functions of an integration; they are compiled once interpretation has cost as much time.
 
-    Both ways give the same bits. The time is therefore at most twice that of the faster way.
-    Machine code that is in the cache is used as soon as interpreting has cost as much as writing
-    the text, which is the key in the cache.
+    Interpreted and compiled functions are bit-identical. The total time is therefore at most twice
+    that of the faster method. Machine code in the cache is used as soon as interpretation has cost
+    as much as writing the C code, which is the key of the cache.
 
     Attributes:
-        equations: the functions.
-        may_compile: False if CasADi interprets them always.
-        library: their machine code; None while CasADi interprets them.
-        spent: time that interpreted runs have taken [s].
-        source: C text; None until it is written.
+        equations: functions of the integration.
+        may_compile: whether the functions may be compiled.
+        library: compiled functions; None while CasADi interprets them.
+        spent: time of the interpreted runs so far [s].
+        source: C code; None until it is written.
         instructions: number of instructions of all functions.
     """
 
@@ -127,22 +127,22 @@ class IntegrationCode:
         self.instructions = sum(g.n_instructions() for g in counted)
 
     def is_worth(self, further: float, cost: tuple[float, float]) -> bool:
-        """Whether interpreted runs have taken as long as some work.
+        """Return whether interpreted runs have taken longer than some work would take.
 
         Args:
             further: time of the present run [s].
-            cost: time of the work, for a start and for each instruction [s].
+            cost: time of the work: constant part, and part per instruction [s].
         """
         return self.spent + further > cost[0] + cost[1] * self.instructions
 
     def compile(self, further: float = math.inf) -> bool:
-        """Compile the functions, if that is worth its time. Return whether they are compiled.
+        """Compile the functions if that is worth its time. Return whether they are compiled.
 
         Args:
             further: time of the present run [s].
 
         Raises:
-            CompilerError: the compiler refused the code.
+            CompilerError: the compiler rejects the code.
         """
         if self.library is not None or not self.may_compile:
             return self.library is not None
@@ -166,7 +166,7 @@ class IntegrationCode:
         return {"system.c": source}, flags_for(source)
 
     def evaluations(self) -> tuple[Any, ...]:
-        """Evaluations in the order of `driver_model` in driver.h; None for a missing function."""
+        """Return evaluations in the order of `driver_model` in driver.h; None if missing."""
         own, library = self.equations, self.library
         through = own.passage
         last = (
@@ -184,7 +184,7 @@ class IntegrationCode:
         return tuple(map(evaluation, (own.rhs, own.project, own.jacobian, *changes, *last)))
 
 
-# Evaluations of the functions of an integration, and its run by the run-time library.
+# Evaluations for the run-time library, and the integration.
 
 
 def _examine(error: BaseException) -> None:
@@ -195,7 +195,7 @@ def _examine(error: BaseException) -> None:
 
 
 def _passage(through: Passage | None) -> tuple[Any, ...] | None:
-    """Sizes, patterns of matrices and typical regularity, as the run-time library takes them."""
+    """Return sizes, sparsity patterns and typical regularity for the run-time library."""
     if through is None:
         return None
     matrices = [(through.rows, number) for number in (1, 2, 5)] + [(through.forces, 0)]
@@ -204,14 +204,14 @@ def _passage(through: Passage | None) -> tuple[Any, ...] | None:
 
 
 def _places(pattern: casadi.Sparsity) -> npt.NDArray[np.intc] | None:
-    """Pattern of a sparse matrix in the form of `passage_patterns`; None for a dense matrix."""
+    """Return the compressed columns of a sparse matrix (`passage_patterns`); None if dense."""
     if pattern.is_dense():
         return None
     return np.array([*pattern.colind(), *pattern.row()], dtype=np.intc)
 
 
 def _integration(given: IntegrationProblem, code: IntegrationCode) -> Any:
-    """The integration in the run-time library, at the first time.
+    """Return an integration object of the run-time library, at the first time.
 
     Raises:
         SolverError: no memory is left.
@@ -238,16 +238,16 @@ def _integration(given: IntegrationProblem, code: IntegrationCode) -> Any:
 def run_problem(
     given: IntegrationProblem, code: IntegrationCode, progress: Progress | None
 ) -> EventMotion:
-    """Return the motion at the times of a problem, as far as it comes.
+    """Integrate a problem; return the motion up to the last time that is reached.
 
     Args:
-        given: the problem.
-        code: its functions.
-        progress: called now and then with the time that was reached [s].
+        given: integration problem.
+        code: functions of the problem.
+        progress: callable that is called repeatedly with the present time [s].
 
     Raises:
         SolverError: no memory is left.
-        CompilerError: the compiler refused the code.
+        CompilerError: the compiler rejects the code.
     """
     x, times = given.x0.copy(), given.times
     table = np.empty((len(times), len(x)))
@@ -307,36 +307,36 @@ def integrate(
     progress: Progress | None = None,
     compiled: bool = True,
 ) -> Array:
-    """States at given times, by a one-step method of order 5(4) with dense output.
+    """Integrate x' = rhs(t, x, p) and return the states at given times.
 
-    Source: Hairer, Norsett and Wanner 1993, II.4 to II.6; projection after each accepted step as
-    in Hairer, Lubich and Wanner 2006, IV.4.
+    One-step methods of order 5(4) with dense output. Source: Hairer, Norsett and Wanner 1993, II.4
+    to II.6; projection after each accepted step as in Hairer, Lubich and Wanner 2006, IV.4.
 
     Args:
         rhs: `rhs(t, x, p) -> xdot`.
         x0: (nx,) state at the first time; it is projected too.
-        times: (m,) s, increasing; the first one is the initial time.
+        times: (m,) increasing times [s]; the first is the initial time.
         p: (np,) parameters; none by default.
-        project: `project(t, x, p) -> (x, residual)`, one Newton step onto the constraints with the
-            largest residual; it is repeated after each step until the residual is below 1e-12.
-        passage: for steps through states where the constraints become dependent; without it the
-            integration stops there.
-        method: "dopri5", Dormand and Prince's explicit pair; or "rodas", the linearly implicit
-            RODAS5P for stiff equations, which uses the exact Jacobian of rhs.
-        rtol: relative tolerance of the error of one step.
-        atol: absolute tolerance of the error of one step, in the units of the states.
-        max_step: the longest step, s; only the error limits it by default.
-        progress: called now and then with the time reached, s.
-        compiled: False if CasADi interprets the functions always, which takes three to six times
-            as long. With a C compiler they are compiled as soon as interpreting them has cost as
-            much as the compiler. The results are the same.
+        project: `project(t, x, p) -> (x, residual)`, a Newton step onto the constraints with the
+            largest residual. It is repeated after each step until the residual is below 1e-12.
+        passage: functions for steps through singular configurations, where the constraints become
+            dependent. Without them the integration stops there.
+        method: "dopri5", the explicit method of Dormand and Prince; or "rodas", the linearly
+            implicit RODAS5P for stiff equations, which uses the exact Jacobian of rhs.
+        rtol: relative tolerance of the error of a step.
+        atol: absolute tolerance of the error of a step, in the units of the states.
+        max_step: maximum step [s]. Only the error limits steps by default.
+        progress: callable that is called repeatedly with the present time [s].
+        compiled: whether functions may be compiled. With a C compiler they are compiled as soon as
+            interpretation has cost as much time as compilation. Interpretation takes three to six
+            times as long. The results are the same.
 
     Returns:
-        (m, nx), a row for each time.
+        (m, nx) states, a row for each time.
 
     Raises:
         ModelError: an argument does not fit the functions.
-        SolverError: the integration cannot go on; the message says when and why.
+        SolverError: the integration cannot continue; the message gives time and reason.
         Interrupted: control-C was pressed.
         CompilerError: the compiler that CC names does not start.
     """
@@ -359,7 +359,7 @@ def integrate(
 
 
 Prepared = dict[tuple[str, bool], IntegrationCode]
-"""Functions of an integration, by method and whether they may be compiled."""
+"""Functions of an integration, by method and by whether they may be compiled."""
 
 
 def integrate_events(
@@ -405,13 +405,13 @@ def integrate_events(
         method: "dopri5" or "rodas".
         rtol: relative tolerance of the error of a step.
         atol: absolute tolerance of the error of a step, in the units of the states.
-        max_step: the longest step [s]. Only the error limits steps by default.
+        max_step: maximum step [s]. Only the error limits steps by default.
         stops: increasing times [s] at which steps end, and for each time whether functions of time
-            may be discontinuous there. If so, the step before uses limits from the left, the step
-            behind limits from the right, and its size is estimated again. None without such times.
-        sizes: (2, nx) factors of the absolute and of the relative tolerance of each state; one if
-            left out.
-        progress: called repeatedly with the present time [s].
+            may be discontinuous there. If so, the previous step uses limits from the left, the next
+            step limits from the right, and its size is estimated again. None without such times.
+        sizes: (2, nx) factors of the absolute and of the relative tolerance of each state; one by
+            default.
+        progress: callable that is called repeatedly with the present time [s].
         compiled: whether functions may be compiled, see `integrate`.
         partial: whether the motion up to an error or control-C is returned, with the error in
             `EventMotion.stop`. Otherwise the error is raised.
@@ -423,8 +423,8 @@ def integrate_events(
 
     Raises:
         ModelError: an argument does not fit the functions.
-        SolverError: the integration cannot go on, see `integrate`; or jumps at one time do not
-            end; or the times of events accumulate.
+        SolverError: the integration cannot continue, see `integrate`; or the jumps at one time do
+            not end; or the times of events accumulate.
         Interrupted: control-C was pressed.
         CompilerError: the compiler that CC names does not start.
     """

@@ -1,4 +1,4 @@
-"""Least squares: smallest solutions, Gauss-Newton and Levenberg-Marquardt iterations."""
+"""Least squares: minimum-norm solutions, Gauss-Newton and Levenberg-Marquardt iterations."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ Array = NDArray[np.float64]
 
 
 def smallest_solution(A: Array, b: Array, gap: float) -> Array:
-    """The shortest x (n,) of those that bring A x (m,) nearest to b, for A of any rank.
+    """Return the minimum-norm least-squares solution x (n,) of A x = b, for A of any rank.
 
-    Householder's QR with column pivoting: what the remaining columns free is then taken out of x.
-    Libraries of linear algebra sum in an order that depends on the processor and on the number of
-    threads, and so do the last digits of their solutions. Here each sum has one order.
+    Householder QR with column pivoting; the null space component is then removed from x. Each sum
+    has a fixed order. The results of linear algebra libraries depend in the last digits on the
+    processor and on the number of threads; results of this function do not.
 
     Source: Golub & Van Loan 2013, section 5.4.
 
     Args:
-        A: (m, n).
-        b: (m,).
-        gap: columns that the ones before leave shorter than this part of the longest count as
-            dependent.
+        A: (m, n) matrix.
+        b: (m,) right-hand side.
+        gap: a column counts as dependent if its part orthogonal to the previous columns is shorter
+            than this fraction of the longest column.
     """
     A, b = (np.ascontiguousarray(given, dtype=float) for given in (A, b))
     x = np.empty(A.shape[1])
@@ -38,28 +38,29 @@ def smallest_solution(A: Array, b: Array, gap: float) -> Array:
 
 
 MANY = 100
-"""Unknowns from which a sparse matrix is worth its own arithmetic: pivots by length fill it."""
+"""Number of unknowns from which sparse matrices are solved by sparse arithmetic."""
 _FULL = 0.1
-"""Part of the elements that are not zero in a matrix that is sparse."""
+"""Largest fraction of non-zero elements of a matrix that is treated as sparse."""
 _DAMPED = 1e-13
-"""What is added to A A', in parts of its largest row: 1e-5 of the square of a singular value that
-is 1e-4 of the largest, and a thousand times the rounding of the sums."""
+"""Damping that is added to A A', relative to its largest row: 1e-5 of the square of a singular
+value that is 1e-4 of the largest, and a thousand times the rounding of the sums."""
 _SOLUTIONS = 4
-"""Solutions that are added up: each leaves 1e-3 of the error, and more of what A hardly sees."""
+"""Number of refinements. Each leaves 1e-3 of the error, and a larger fraction of its components
+with small singular values."""
 _FILTERED = 2
-"""How often what no x can reach is taken from the right side, where it would be divided by the
-damping: each leaves 1e-3 of it."""
+"""Number of filter steps per refinement. They remove the inconsistent part of the right-hand side,
+which the solution would divide by the damping. Each step reduces it to 1e-3."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Entries:
-    """A sparse matrix by its elements, each of which stands there once.
+    """Sparse matrix by elements; each element occurs once.
 
     Attributes:
-        rows: (k,) integers.
-        columns: likewise.
-        values: (k,), zeros among them.
-        shape: of the matrix.
+        rows: (k,) row indices.
+        columns: (k,) column indices.
+        values: (k,) values; zeros are permitted.
+        shape: shape of the matrix.
     """
 
     rows: NDArray[np.int64]
@@ -68,24 +69,24 @@ class Entries:
     shape: tuple[int, int]
 
     def dense(self) -> Array:
-        """The matrix with its zeros."""
+        """Return the dense matrix."""
         full = np.zeros(self.shape)
         full[self.rows, self.columns] = self.values
         return full
 
 
 def sparse_solution(A: Entries, b: Array) -> Array:
-    """The shortest x (n,) of those that bring A x (m,) nearest to b, for large sparse matrices.
+    """Return the minimum-norm least-squares solution x (n,) of A x = b for a large sparse matrix.
 
-    Its time is proportional to the number of unknowns where they are tied to few others, as in
-    chains. Motions that A sees by less than 1e-6 of what it sees most are left where they are.
-    CasADi's factorisation is plain arithmetic, the same on every processor.
+    The time is proportional to the number of unknowns if each is coupled to few others, as in
+    chains. Directions with singular values below 1e-6 of the largest are not moved. The result is
+    equal on every processor, because CasADi factorises by plain arithmetic.
 
     Source: Kryanev 1974, iterated regularisation.
 
     Args:
-        A: (m, n).
-        b: (m,).
+        A: (m, n) matrix.
+        b: (m,) right-hand side.
     """
     there = A.values != 0
     seen, rows = np.unique(A.rows[there], return_inverse=True)
@@ -103,28 +104,29 @@ def sparse_solution(A: Entries, b: Array) -> Array:
     return np.array(x.nonzeros())
 
 
-# Solve r(x) = 0 for more or fewer unknowns than equations, rank-deficient ones included.
+# Solution of r(x) = 0 with any number of unknowns and equations, also if rank-deficient.
 
 
 Vector = NDArray[np.float64]
 Jacobian = Vector | Entries
 Residual = Callable[[Vector], tuple[Vector, Jacobian]]
-"""x -> residual (m,), Jacobian (m, n), as its elements where most of it is zero."""
+"""Callable x -> residual (m,) and Jacobian (m, n), dense or, if mostly zero, as `Entries`."""
 
 _RANK, _ITERATIONS = 1e-9, 100
-"""Part of the largest singular value below which others count as zero: where Newton's method is of
-use none is near to it; and the most iterations, where ten are many."""
-_CONVERGED = 1  # of least_squares.h
+"""Fraction of the largest singular value below which others count as zero (no regular problem has
+singular values near it), and maximum number of iterations (ten are already many)."""
+_CONVERGED = 1  # status of a converged iteration in least_squares.h
 
 
 @dataclass(frozen=True, slots=True)
 class LeastSquaresResult:
-    """Where the iteration ended.
+    """Result of an iteration.
 
     Attributes:
-        x: (n,) the unknowns.
-        residual: Euclidean norm of the residual there.
-        converged: whether every element is below its tolerance.
+        x: (n,) unknowns at the end.
+        residual: Euclidean norm of the residual at x.
+        converged: whether the iteration converged; `gauss_newton` requires that every element of
+            the residual is below its tolerance.
     """
 
     x: Vector
@@ -141,19 +143,20 @@ def gauss_newton(
     rank_tolerance: float = _RANK,
     values: Callable[[Vector], Vector] | None = None,
 ) -> LeastSquaresResult:
-    """Damped Gauss-Newton with the smallest step that solves the linearised equations.
+    """Solve r(x) = 0 by the damped Gauss-Newton method with minimum-norm steps.
 
-    The step is the minimum-norm least-squares solution, so that dependent equations and free
-    unknowns do no harm; it is halved until the residual falls. Its arithmetic is plain, so that
-    the same start leads to the same digits on every processor.
+    Each step is the minimum-norm least-squares solution of the linearised equations, so dependent
+    equations and undetermined unknowns are permitted. The step is halved until the residual
+    decreases. Results are bit-identical on every processor.
 
     Args:
-        function: residual and Jacobian.
-        start: (n,) first guess; the root found is near to it.
-        tolerance: of the absolute residual, one for all elements or one for each.
-        iterations: at most.
-        rank_tolerance: singular values below this part of the largest count as zero.
-        values: the residual alone, where that is less work: most trial steps need no Jacobian.
+        function: callable that returns residual and Jacobian.
+        start: (n,) initial guess; the solution found is near it.
+        tolerance: absolute tolerance of the residual, for all elements or for each.
+        iterations: maximum number of iterations.
+        rank_tolerance: singular values below this fraction of the largest count as zero.
+        values: callable that returns the residual only, if that is cheaper; most trial steps do
+            not need the Jacobian.
 
     Returns:
         The last iterate, converged or not.
@@ -163,7 +166,7 @@ def gauss_newton(
     first = J if isinstance(J, Entries) else _all_entries(J)
     r, e = np.array(r, dtype=float), np.array(first.values, dtype=float)
     limits = np.array(np.broadcast_to(tolerance, r.shape), dtype=float)
-    own, known = x.copy(), [(r, J)]  # the iteration begins with known values
+    own, known = x.copy(), [(r, J)]  # the first evaluation returns the known values
 
     def equations() -> None:
         found, slopes = known.pop() if known else function(own.copy())
@@ -194,7 +197,7 @@ def _indices(numbers: Iterable[int]) -> NDArray[np.intc]:
 
 
 def _all_entries(J: Vector) -> Entries:
-    """All elements of a matrix, zeros included."""
+    """Return all elements of a dense matrix, including zeros."""
     rows, columns = np.indices(J.shape).reshape(2, -1)
     return Entries(rows, columns, J.ravel(), J.shape)
 
@@ -205,13 +208,13 @@ def _sparse_step(
     shape: tuple[int, int],
     filled: int,
 ) -> Any:
-    """Evaluation of the shortest solution of a large sparse matrix; None if it is small or dense.
+    """Return an evaluation of `sparse_solution`; None if the matrix is small or dense.
 
     Args:
         rows: (k,) row of each element.
-        columns: (k,) column of each element; negative for an element that the matrix lacks.
+        columns: (k,) column of each element; negative for elements that are not in the matrix.
         shape: shape of the matrix.
-        filled: number of elements of the matrix that are not zero.
+        filled: number of non-zero elements.
     """
     m, n = shape
     if n < MANY or filled >= _FULL * m * n:
@@ -227,28 +230,28 @@ def _sparse_step(
 
 
 class NewtonEquations:
-    """Equations r(q, p) = 0 that are solved for some of q, again and again."""
+    """Equations r(q, p) = 0, solved repeatedly for some elements of q."""
 
     def __init__(self, equations: Function, values: Function) -> None:
-        """Keep the Functions.
+        """Store the Functions.
 
         Args:
             equations: `equations(q, p) -> r, J`, r dense.
             values: `values(q, p) -> r`.
         """
         self._functions = equations, values
-        self._workspaces: list[_Workspace] = []  # each is for one thread at a time
+        self._workspaces: list[_Workspace] = []  # unused ones; a thread takes one at a time
 
     def near(
         self, q: Vector, p: Vector, free: Sequence[int], tolerance: Vector
     ) -> tuple[Vector, LeastSquaresResult]:
-        """Return the end of the iteration of `gauss_newton`.
+        """Solve by the iteration of `gauss_newton`, starting near q.
 
         Args:
-            q: (nq,) first guess; positions that are not free stay.
-            p: (np,).
+            q: (nq,) initial guess; positions that are not in `free` are constant.
+            p: (np,) parameters.
             free: indices of the unknowns in q.
-            tolerance: of each row.
+            tolerance: absolute tolerance of each equation.
 
         Returns:
             q (nq,) at the end, and the result for the unknowns.
@@ -266,7 +269,7 @@ class NewtonEquations:
 
 
 class _Workspace:
-    """Evaluations of equations, with their own memory."""
+    """Evaluations of equations with their own memory, for one thread at a time."""
 
     def __init__(self, equations: Function, values: Function) -> None:
         pattern = equations.sparsity_out(1)
@@ -278,7 +281,7 @@ class _Workspace:
     def solved(
         self, q: Vector, p: Vector, free: Sequence[int], tolerance: Vector
     ) -> tuple[Vector, LeastSquaresResult]:
-        """The result of `NewtonEquations.near`."""
+        """Return the result of `NewtonEquations.near`."""
         found, unknowns = np.array(q, dtype=float), _indices(free)
         number = np.full(len(q), -1, dtype=np.intc)
         number[unknowns] = np.arange(len(free))
@@ -297,36 +300,37 @@ class _Workspace:
         return found, LeastSquaresResult(found[unknowns], residual, status == _CONVERGED)
 
 
-# The smallest sum of squares, where no root is near.
+# Minimum of a sum of squares without a root nearby.
 
 
 _FIRST, _EASED, _STIFFENED, _STIFFEST = 1e-3, 3.0, 4.0, 1e12
-"""The damping mu at the start, nearly a Gauss-Newton step for Jacobians of size one; what divides
-it after a step that led down and multiplies it after another, unlike so that no cycle arises; and
-the largest, where steps are too short to change the digits of r' r."""
+"""Damping mu at the start (nearly a Gauss-Newton step for Jacobians of size one), its divisor after
+a successful step, its factor after a failed step (different from the divisor to avoid cycles), and
+its largest value, where steps are too short to change the digits of r' r."""
 _LEAST = 1e-15
-"""The smallest damping: J' J has rounding errors of 1e-16, which may leave it without an inverse
-where there are more unknowns than equations."""
+"""Smallest damping: J' J has rounding errors of 1e-16, which may make it singular if there are more
+unknowns than equations."""
 _SETTLED = 1e-16
-"""Part of r' r below which a gain is the rounding of it."""
+"""Fraction of r' r below which a decrease is rounding error."""
 
 
 def levenberg_marquardt(
     function: Callable[[Vector], tuple[Vector, Vector]], start: Vector, *, iterations: int = 300
 ) -> LeastSquaresResult:
-    """A local minimum of r' r; it is reached too where the Jacobian loses rank at it.
+    """Return a local minimum of r' r, even if the Jacobian loses rank at it.
 
-    The step solves (J' J + mu 1) s = -J' r; mu falls where a step leads down and rises where not.
+    The step s solves (J' J + mu 1) s = -J' r. mu decreases after a successful step and increases
+    after a failed one.
 
     Source: Marquardt 1963.
 
     Args:
-        function: residual and Jacobian.
-        start: (n,) first guess.
-        iterations: at most.
+        function: callable that returns residual and Jacobian.
+        start: (n,) initial guess.
+        iterations: maximum number of iterations.
 
     Returns:
-        The last iterate; it has converged when further steps gain nothing.
+        The last iterate. It has converged if further steps do not decrease r' r.
     """
     x, damping = np.array(start, dtype=float), _FIRST
     r, J = function(x)

@@ -1,4 +1,4 @@
-"""Symbolic solution of linear systems: small ones, constrained ones, Newton steps."""
+"""Symbolic solution of linear systems: small systems, constrained systems, Newton steps."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from casadi import MX, SX, Function, Sparsity
 
 
 def solve_square(A: SX, B: SX) -> SX:
-    """The solution X of A X = B for a regular (n, n) matrix A of scalars.
+    """Return the solution X of A X = B for a regular (n, n) matrix A.
 
-    Up to three equations by the adjugate (one division), beyond by QR on the blocks that the
-    sparsity leaves coupled.
+    Up to three equations are solved by the adjugate (one division), larger systems by QR on the
+    blocks that the sparsity couples.
     """
     n = A.shape[0]
     if n == 0:
@@ -40,26 +40,26 @@ def _adjugate(A: SX) -> SX:
     )
 
 
-# L D L' of symmetric matrices some of whose rows nearly depend on the rows before them.
+# L D L' factors of symmetric matrices with nearly dependent rows.
 
 
 def partial_ldl(S: SX, least: SX) -> tuple[SX, SX, list[int], SX]:
-    """L D L' of the rows whose pivot is large enough, as `casadi.ldl` gives it for all rows.
+    """Return L D L' of the rows with sufficiently large pivots, in the form of `casadi.ldl`.
 
-    What is left of a row that the others nearly imply is rounding. If it were divided by its pivot,
-    which is rounding too, numbers of the size of one would pass into every row after it, and these
-    would be solved wrongly. Such a row has no part in L, as if S were without it.
+    The remainder of a nearly dependent row is rounding error, and so is its pivot. A division would
+    spread numbers of the size of one to all later rows and make their solution wrong. Such a row
+    is omitted from L, as if S did not contain it.
 
     Source: Davis 2006, section 4.8, for the order of the sums.
 
     Args:
         S: (n, n) symmetric, positive semidefinite.
-        least: (n, 1) what a pivot must be above, row by row of S.
+        least: (n, 1) lower limit of the pivot of each row of S.
 
     Returns:
-        D (n, 1), L' without its diagonal (n, n), the order p of the rows, so that
-        S[p, p] = L D L', all as `casadi.ldl_solve` takes them; and, in this order, whether the
-        pivot is large enough (n, 1). The D of a row that is left out is what is left of it.
+        D (n, 1), L' without its diagonal (n, n) and the order p of the rows, so that
+        S[p, p] = L D L', as `casadi.ldl_solve` requires; and in this order whether the pivot is
+        large enough (n, 1). For an omitted row, D is the rounding error that remains of it.
     """
     pattern, order = S.sparsity().ldl()
     W, least = S[order, order], casadi.densify(least)[order]
@@ -68,7 +68,7 @@ def partial_ldl(S: SX, least: SX) -> tuple[SX, SX, list[int], SX]:
     LT = SX(pattern)
     D, good, inverse = list[SX](), list[SX](), list[SX]()
     for j, above in enumerate(columns):
-        # row j of L D, then of L, from the columns before; U_ij = L_ji D_i
+        # row j of L D, then of L, from the previous columns; U_ij = L_ji D_i
         U = dict[int, SX]()
         pivot = W[j, j]
         for i in above:
@@ -84,18 +84,18 @@ def partial_ldl(S: SX, least: SX) -> tuple[SX, SX, list[int], SX]:
 
 # Symbolic solution of constrained equations: A x - J' y = b, J x + C y = d.
 #
-# The matrix of both is factorised as L D L' in an order that is fixed once: a row of J comes
-# after the columns that it acts on, so that no pivot vanishes where A is positive definite and
-# the rows are independent; within this rule the element with the fewest neighbours is next, so
-# that what is sparse stays sparse.
+# The matrix of both equations is factorised as L D L' in a fixed order. A row of J comes after the
+# columns in which it is non-zero, so that no pivot vanishes if A is positive definite and the rows
+# are independent. Among the remaining choices, the element with the fewest neighbours is next,
+# which preserves sparsity.
 #
 # Source: Tinney and Walker 1967 for the order; Benzi, Golub and Liesen 2005 for the equations.
 
 
 _SINGULAR = 1e-12
-"""What is added to J A^-1 J', relative to 1 / scale: finite where rows become dependent."""
+"""Regularisation added to J A^-1 J', relative to 1 / scale: finite if rows become dependent."""
 _SHARED = 1e-8
-"""Likewise for rows that are switched, which are dependent as a rule."""
+"""The same regularisation for switched rows, which are usually dependent."""
 
 
 def solve_saddle(
@@ -107,23 +107,24 @@ def solve_saddle(
     corner: SX | None = None,
     penalty: float | None = None,
 ) -> tuple[SX, SX]:
-    """The x and y of A x - J' y = b, J x + C y = d, with a diagonal C that is zero as a rule.
+    """Return x and y of A x - J' y = b, J x + C y = d, with a diagonal C that is usually zero.
 
-    A multiple of J'J is added to A, which changes no solution and is regular where A alone is
-    not, as massless links make it. One refinement restores the digits that nearly dependent rows
-    cost.
-    A row with a structural element in C is a switch: it acts where that is zero, and does not where
-    that is positive and the row of J and d are zero. Switched rows that depend on others share
-    their y.
+    A multiple of J'J is added to A. This does not change the solution and is regular if A alone is
+    singular, for example because of massless links. One refinement restores the digits that are
+    lost by nearly dependent rows.
+    A row with a structural element in C is a switch. It is active if the element is zero. It is
+    inactive if the element is positive and the row of J and d are zero. Switched rows that are
+    linearly dependent share their y.
 
     Args:
-        A: (n, n) symmetric, positive definite where J x = 0, everywhere if the penalty is zero.
+        A: (n, n) symmetric, positive definite on the null space of J; positive definite if the
+            penalty is zero.
         J: (m, n) independent rows.
-        b: (n, 1).
-        d: (m, 1).
-        scale: makes scale * J'J as large as A.
-        corner: (m, 1) the diagonal of C, sparse; the unit of its elements is that of 1 / scale.
-        penalty: how many times J'J is added to A; the scale when left out.
+        b: (n, 1) right-hand side of the first equation.
+        d: (m, 1) right-hand side of the constraints.
+        scale: factor that makes scale * J'J as large as A.
+        corner: (m, 1) diagonal of C, sparse; its elements have the unit of 1 / scale.
+        penalty: multiple of J'J that is added to A. Default: scale.
 
     Returns:
         x (n, 1) and y (m, 1).
@@ -151,14 +152,14 @@ def solve_saddle(
         missing += corner * first[n:]
     second = solve(casadi.vertcat(SX.zeros(n), missing))
     found = first + second
-    return found[:n, :], -found[n:, :]  # (0, 1) where there are no rows
+    return found[:n, :], -found[n:, :]  # y is (0, 1) without constraints
 
 
 def elimination_order(pattern: Sparsity, n: int) -> list[int]:
-    """An order of elimination: fewest neighbours first, a row of J after its columns.
+    """Return an elimination order: fewest neighbours first, a row of J after its columns.
 
     Args:
-        pattern: of the symmetric matrix [A J'; J C].
+        pattern: sparsity of the symmetric matrix [A J'; J C].
         n: size of A.
     """
     columns, rows = pattern.get_triplet()[1], pattern.get_triplet()[0]
@@ -183,19 +184,20 @@ def elimination_order(pattern: Sparsity, n: int) -> list[int]:
     return order
 
 
-# One step of Newton's method as a Function whose derivatives are those of the solution.
+# Step of Newton's method as a Function with the derivatives of the solution.
 
 
 def newton_step(rows: Function, slopes: Function) -> Function:
-    """``closure(x, z, p) -> (z_next, residual)``, z_next = z - J^-1 r.
+    """Return ``closure(x, z, p) -> (z_next, residual)`` with z_next = z - J^-1 r.
 
-    Its derivatives hold J: where r is zero, those of z_next by x and p are the derivatives of the
-    solution, -J^-1 dr, and nothing is spent on how J changes. Elsewhere they are approximate.
+    Its derivatives treat J as constant. At r = 0 the derivatives of z_next by x and p are then the
+    exact derivatives of the solution, -J^-1 dr, without second derivatives. Elsewhere they are
+    approximate.
 
     Args:
-        rows: `rows(x, z, p) -> (r, residual)`, as many equations r (n, 1) as unknowns z, and how
-            far from a solution z is.
-        slopes: `slopes(x, z, p) -> J`, how r changes with z, (n, n).
+        rows: `rows(x, z, p) -> (r, residual)`: n equations r (n, 1) for n unknowns z, and the
+            distance of z from a solution.
+        slopes: `slopes(x, z, p) -> J`: derivative of r by z, (n, n).
     """
     A, b = SX.sym("A", slopes.sparsity_out(0)), SX.sym("b", rows.numel_out(0))
     held: dict[str, Any] = {"cse": True, "is_diff_in": [False, True]}

@@ -1,4 +1,4 @@
-"""An integration, its functions brought into one form and its arguments checked."""
+"""Integration problems: functions in a standard form, checked arguments, results and errors."""
 
 import re
 from collections.abc import Sequence
@@ -11,24 +11,26 @@ import numpy.typing as npt
 from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.text import quoted
 
-# What a motion with constraints that become dependent in single states is integrated with.
+# Functions for motions through singular configurations, where constraints become dependent.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Passage:
-    """Functions of t, x = [q; v; z] and p, for steps in local tangent coordinates.
+    """Functions of t, x = [q; v; z] and p, for steps through singular configurations.
 
-    `core/source/passage.h` describes their use.
+    Near them the integrator uses local tangent coordinates, see `core/source/passage.h`.
 
     Attributes:
-        rows: `rows(t, x, p) -> place, slope, J, b, c, N, bend, rank`: rows of positions and their
-            slopes by q; rows of velocities with J v = b and J a = c; q' = N v and q'' = N a + bend;
-            the rank of J.
-        forces: `forces(t, x, p) -> M, f, rate`: M a = f + J' y, and the rates of z.
-        regularity: `regularity(t, x, p)`, near zero and linear in the distance from where rows
-            become dependent.
-        size: nq, nv and nz; the number of rows of positions, of those that hold a coordinate
-            wherever it is, and of rows of velocities; 1 where rows depend on time.
+        rows: `rows(t, x, p) -> place, slope, J, b, c, N, bend, rank`: residuals of the position
+            constraints and their derivatives by q; velocity constraints J v = b and J a = c; q' =
+            N v and q'' = N a + bend; rank of J.
+        forces: `forces(t, x, p) -> M, f, rate`: M a = f + J' y with constraint forces y, and the
+            rates of z.
+        regularity: `regularity(t, x, p)`: measure of the independence of the constraints. Near a
+            singular configuration it is small and linear in the distance.
+        size: nq, nv, nz; number of position constraints; number of velocity constraints that lock
+            a coordinate at its present value; number of velocity constraints; 1 if constraints
+            depend on time, else 0.
         typical: regularity at a common configuration.
     """
 
@@ -39,7 +41,7 @@ class Passage:
     typical: float
 
 
-# Events of an integration with discrete modes: what a caller gives, and what comes back.
+# Events of an integration with discrete modes: definition and results.
 
 
 Array = npt.NDArray[np.float64]
@@ -47,24 +49,24 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Events:
-    """Where the state and the modes jump, and how.
+    """Event functions: indicators, and the jumps of state and modes that they trigger.
 
-    Modes are numbers that are constant between events. All functions of the integration take them
-    as the last of their parameters.
+    Modes are numbers that are constant between events. They are the last parameters of all
+    functions of the integration.
 
     Attributes:
-        indicators: `indicators(t, x, p) -> g`, positive between events. An event is where one of
-            them is not positive any more. After the jump each must be positive, or leave zero
-            upwards.
-        jump: `jump(t, x, p, fired) -> (x, modes)`, state and modes after an event; fired is 1 for
-            each indicator that is not positive, 0 for the others. Without modes x alone will do.
-        modes: (nm,) at the start.
-        first_step: length of the step after an event [s], from which the steps grow; estimated
-            from the slopes there where zero, which may be too long for what is short.
-        approaches: `approaches(t, x, p) -> a`, (k, 3) for each indicator: the bound of its rate at
-            the present speed; the reciprocal of the shortest time in which it falls to zero and
-            rises again [1/s], zero where two looks a step are enough; and 1 where the equations
-            depend on it. None where all are zero.
+        indicators: `indicators(t, x, p) -> g`, positive between events. An event is a time at
+            which an indicator becomes zero or negative. After the jump each indicator must be
+            positive, or increase from zero.
+        jump: `jump(t, x, p, fired) -> (x, modes)`: state and modes after an event. fired is 1 for
+            indicators that are not positive, else 0. Without modes the result may be x only.
+        modes: (nm,) initial modes.
+        first_step: length of the first step after an event [s]. If zero, it is estimated from the
+            derivatives, which may be too long for short processes.
+        approaches: `approaches(t, x, p) -> a`, (k, 3) for k indicators. Column 1: bound of the rate
+            at the present speed. Column 2: reciprocal of the shortest time in which the indicator
+            falls to zero and rises again [1/s]; zero if two samples per step are enough. Column 3:
+            1 if the equations depend on the indicator, else 0. None if all elements are zero.
     """
 
     indicators: casadi.Function
@@ -76,12 +78,12 @@ class Events:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IntegrationEvent:
-    """One event of a motion.
+    """Event of a motion.
 
     Attributes:
-        time: [s].
-        fired: numbers of the indicators that asked for jumps.
-        modes: (nm,) after it.
+        time: time of the event [s].
+        fired: indices of the indicators that triggered jumps.
+        modes: (nm,) modes after the event.
     """
 
     time: float
@@ -91,16 +93,16 @@ class IntegrationEvent:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EventMotion:
-    """A motion with events.
+    """Result of an integration with events.
 
     Attributes:
-        x: (m, nx) states at the times asked for, those that were reached; at the time of an event,
-            after it.
+        x: (m, nx) states at the requested times that were reached. At the time of an event, the
+            state after the event.
         modes: (m, nm) modes at these times.
-        events: in the order of time.
-        stop: why not all the times were reached; None where they were.
-        first_slope: (nx,) rates at the first time where constraints are dependent there, those of
-            the branch that the motion leaves on; None elsewhere.
+        events: events in order of time.
+        stop: error that ended the integration early; None if all times were reached.
+        first_slope: (nx,) derivative of x at the first time, if the motion starts at a singular
+            configuration, on the branch that it follows; else None.
     """
 
     x: Array
@@ -111,17 +113,17 @@ class EventMotion:
 
 
 def fired_of(flags: npt.ArrayLike) -> tuple[int, ...]:
-    """Numbers of the indicators whose flag is set."""
+    """Return the indices of the indicators whose flag is set."""
     return tuple(np.flatnonzero(flags).tolist())
 
 
 def modes_at(times: Array, first: Array, events: tuple[IntegrationEvent, ...]) -> Array:
-    """(m, nm) modes at given times; at the time of an event, after it.
+    """Return the modes at given times, (m, nm); at the time of an event, the modes after it.
 
     Args:
-        times: (m,) s, increasing.
+        times: (m,) increasing times [s].
         first: (nm,) modes before the first event.
-        events: in the order of time.
+        events: events in order of time.
     """
     values = np.array([first, *(event.modes for event in events)])
     passed = np.searchsorted([event.time for event in events], times, side="right")
@@ -133,19 +135,20 @@ METHODS = ("dopri5", "rodas")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Equations:
-    """The functions of an integration, every input and output dense.
+    """Functions of an integration, with dense inputs and outputs.
 
     Attributes:
         rhs: `mbs_rhs(t, x, p) -> xdot`.
-        jacobian: `mbs_jacobian(t, x, p) -> (d rhs / d x, d rhs / d t)`; None when the method is
-            explicit.
+        jacobian: `mbs_jacobian(t, x, p) -> (d rhs / d x, d rhs / d t)`; None for an explicit
+            method.
         project: `mbs_project(t, x, p) -> (x, residual)`; None without constraints.
-        indicators: `mbs_indicators(t, x, p) -> g`; None, as the next two, without events.
-        rates: `mbs_rates(t, x, p) -> dg/dt` along the motion.
-        jump: `mbs_jump(t, x, p, fired) -> (x, modes)`.
-        approaches: `mbs_approaches(t, x, p) -> a`, as `Events` has them; None where there are none.
-        passage: `mbs_rows`, `mbs_forces` and `mbs_regularity`; None where no rows become dependent.
-        first_step: as `Events` has it.
+        indicators: `mbs_indicators(t, x, p) -> g`; None without events.
+        rates: `mbs_rates(t, x, p) -> dg/dt` along the motion; None without events.
+        jump: `mbs_jump(t, x, p, fired) -> (x, modes)`; None without events.
+        approaches: `mbs_approaches(t, x, p) -> a`, see `Events`; None if all elements are zero.
+        passage: `mbs_rows`, `mbs_forces` and `mbs_regularity`; None if the integration stops at
+            singular configurations.
+        first_step: length of the first step after an event [s], see `Events`.
     """
 
     rhs: casadi.Function
@@ -160,7 +163,7 @@ class Equations:
 
     @property
     def all(self) -> list[casadi.Function]:
-        """Those that there are."""
+        """List of the functions that are not None."""
         through = self.passage
         functions: tuple[casadi.Function | None, ...] = (
             self.rhs,
@@ -178,21 +181,21 @@ class Equations:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IntegrationProblem:
-    """An integration, its arguments checked.
+    """Integration with checked arguments.
 
     Attributes:
-        equations: its functions.
+        equations: functions of the integration.
         x0: (nx,) state at the first time.
-        times: (m,) s, increasing.
+        times: (m,) increasing times [s].
         p: (np + nm,) parameters and modes.
         modes: number of modes, nm.
-        rtol: relative tolerance of the error of one step.
-        atol: absolute tolerance of the error of one step.
-        max_step: the longest step, s.
-        stops: times at which steps end, s, in increasing order; whether laws of time may jump
-            there, so that a step begins anew.
+        rtol: relative tolerance of the error of a step.
+        atol: absolute tolerance of the error of a step.
+        max_step: maximum step [s].
+        stops: increasing times [s] at which steps end, and for each time whether functions of time
+            may be discontinuous there. If so, the step size is estimated again.
         sizes: (2, nx) factors of the absolute and of the relative tolerance of each state; None if
-            all are one.
+            all factors are 1.
     """
 
     equations: Equations
@@ -209,12 +212,12 @@ class IntegrationProblem:
     def motion(
         self, x: Array, log: Sequence[IntegrationEvent], stop: SolverError | Interrupted | None
     ) -> EventMotion:
-        """What an integration came to.
+        """Return the result of an integration as an `EventMotion`.
 
         Args:
             x: (k, nx) states at the first k times.
-            log: events in the order of time.
-            stop: why it came to no more of them.
+            log: events in order of time.
+            stop: error that ended the integration early; None if all times were reached.
         """
         first, events = self.p[len(self.p) - self.modes :], tuple(log)
         return EventMotion(x, modes_at(self.times[: len(x)], first, events), events, stop)
@@ -227,17 +230,17 @@ def equations(
     events: Events | None,
     passage: Passage | None = None,
 ) -> Equations:
-    """The functions under the names that the driver calls.
+    """Return the functions with the names and the form that the integrator requires.
 
     Args:
         rhs: `rhs(t, x, p) -> xdot`.
         project: `project(t, x, p) -> (x, residual)`, or None.
-        method: one of METHODS.
-        events: None when there are none.
-        passage: None where no rows become dependent.
+        method: name in METHODS.
+        events: event functions; None without events.
+        passage: functions for singular configurations; None to stop there.
 
     Raises:
-        ModelError: a function has the wrong inputs or outputs, or there is no such method.
+        ModelError: a function has the wrong inputs or outputs, or the method is unknown.
     """
     if method not in METHODS:
         raise ModelError(
@@ -267,7 +270,7 @@ def equations(
 
 
 def _passage(given: Passage, txp: list[casadi.MX]) -> Passage:
-    """The same under the names that the driver calls; matrices alone may be sparse."""
+    """Return the functions with the names that the integrator requires; vectors become dense."""
 
     def vectors_dense(name: str, function: casadi.Function) -> casadi.Function:
         values = function.call(txp)
@@ -291,10 +294,10 @@ def _dense(name: str, inputs: list[casadi.MX], *outputs: casadi.MX) -> casadi.Fu
 
 
 def _scalar(function: casadi.Function) -> casadi.Function:
-    """The function, expanded to scalar operations if that is possible.
+    """Return the function, expanded to scalar operations if that is possible.
 
-    Machine code in pieces is written from these operations. Interpreted and compiled functions give
-    the same bits if all are evaluated from the same operations.
+    Machine code in several C functions is written from these operations. Interpreted and compiled
+    functions are bit-identical if both evaluate the same operations.
     """
     try:
         return function.expand()
@@ -364,18 +367,18 @@ def problem(
     stops: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
     sizes: npt.ArrayLike | None = None,
 ) -> IntegrationProblem:
-    """The integration of given functions.
+    """Return an integration problem with checked arguments.
 
     Args:
-        functions: what `equations` gave.
+        functions: result of `equations`.
         x0: (nx,) state at the first time.
-        times: (m,) s, increasing.
+        times: (m,) increasing times [s].
         p: (np,) parameters; none by default.
-        modes: (nm,) at the first time.
-        tolerances: relative and absolute tolerance of the error of one step.
-        max_step: the longest step, s; infinite when only the error limits it.
-        stops: as in `IntegrationProblem`; none when left out.
-        sizes: as in `IntegrationProblem`.
+        modes: (nm,) modes at the first time.
+        tolerances: relative and absolute tolerance of the error of a step.
+        max_step: maximum step [s]; infinite if only the error limits it.
+        stops: see `IntegrationProblem`; none by default.
+        sizes: see `IntegrationProblem`.
 
     Raises:
         ModelError: an argument does not fit the functions.
@@ -416,10 +419,10 @@ def problem(
 
 
 def numbers(values: npt.ArrayLike) -> Array:
-    """A vector of numbers.
+    """Return values as a vector of floats.
 
     Raises:
-        ModelError: they are none.
+        ModelError: the values are not numeric.
     """
     try:
         return np.array(values, dtype=float).reshape(-1)
@@ -427,7 +430,7 @@ def numbers(values: npt.ArrayLike) -> Array:
         raise ModelError(f"integrate: {quoted(values)} are not numbers; give real ones") from None
 
 
-# Why an integration stops, in words.
+# Reasons why an integration stops, as error texts.
 
 
 MAX_STEPS = 100_000
@@ -460,17 +463,17 @@ REASONS = {
 
 
 class Failure(Exception):
-    """An evaluation had no answer, so the step must be shortened."""
+    """Exception: an evaluation has no value, so the step must be shortened."""
 
 
 class LawFailure(Exception):
-    """Python code of a law raised an error, so the integration must stop."""
+    """Exception: Python code of a law raised an error, so the integration must stop."""
 
 
 _OF_LAW = re.compile(
     r'Error calling "eval" for object (?P<law>\S+):\n[^\n]*?: (?P<text>.*)', re.DOTALL
 )
-"""Message of CasADi about an error in the `eval` of a Callback."""
+"""Pattern of CasADi's message about an error in the `eval` of a Callback."""
 
 
 def failure_of(error: RuntimeError, reason: str) -> Failure:
@@ -499,14 +502,14 @@ _SINGULAR = ("singular", "near miss", "undetermined", "projection")
 def failed(
     t: float, h: float, reason: str, fired: Sequence[int] = (), state: Sequence[float] = ()
 ) -> SolverError:
-    """The error that says when, with which step and why an integration stopped.
+    """Return the error of an integration that stopped: with time, step and reason.
 
     Args:
-        t: time of the last accepted state, s.
-        h: step that was wanted next, s; 0 when there was none.
-        reason: a key of REASONS.
-        fired: numbers of the event indicators that are to blame.
-        state: the last one that was reached.
+        t: time of the last accepted state [s].
+        h: step that was to be made next [s]; 0 if there was none.
+        reason: key of REASONS.
+        fired: indices of the event indicators that caused the stop.
+        state: last state that was reached.
 
     Returns:
         an error to raise.
@@ -523,12 +526,12 @@ def failed(
 
 
 def stopped_by_law(t: float, failure: LawFailure, state: Sequence[float]) -> SolverError:
-    """Return the error of an integration that a law stopped; its cause is that of the law.
+    """Return the error of an integration that a law stopped, with the cause of the law's error.
 
     Args:
-        t: time of the last accepted state, s.
-        failure: of the law.
-        state: the last one that was reached.
+        t: time of the last accepted state [s].
+        failure: error of the law.
+        state: last state that was reached.
     """
     error = SolverError(f"integration stopped at t = {t:.9g} s: {failure}", state=state, time=t)
     error.__cause__ = failure.__cause__
@@ -536,9 +539,9 @@ def stopped_by_law(t: float, failure: LawFailure, state: Sequence[float]) -> Sol
 
 
 def interrupted(t: float) -> Interrupted:
-    """What says when an integration was interrupted.
+    """Return the exception of an interrupted integration.
 
     Args:
-        t: time of the last accepted state, s.
+        t: time of the last accepted state [s].
     """
     return Interrupted(f"integration interrupted at t = {t:.9g} s", time=t)

@@ -1,4 +1,4 @@
-"""Rank and independent rows of matrices that depend on a configuration."""
+"""Rank, null space and independent rows of matrices that depend on a configuration."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from numpy.typing import NDArray
 Matrix = NDArray[np.float64]
 
 RELATIVE_GAP = 1e-8
-"""Singular values below this part of the largest count as zero: rounding leaves 1e-16 of it, and
-there are as many orders between it and the gap as between the gap and one."""
+"""Fraction of the largest singular value below which others count as zero. It is as many orders
+above the rounding error (1e-16) as below one."""
 
 EQUAL = 1e-6
-"""Relative difference below which two scores are equal, and the first of them is taken.
+"""Relative difference below which two scores are equal; the first of them is then chosen.
 
-It is orders wider than the rounding that scores carry (1e-15, and 1e-12 where configurations closed
-by iteration are behind them), and orders narrower than what makes one choice better than another.
+It is orders of magnitude above the rounding of scores (1e-15, or 1e-12 for configurations that were
+closed by iteration), and orders below differences that matter for the choice.
 """
 
 _FLOOR = 1e-12
-"""Length of a row that counts as none: rounding of rows of about unit length leaves 1e-16."""
+"""Length of a row that counts as zero: rounding of rows of about unit length leaves 1e-16."""
 
 
 def dense(matrix: DM) -> Matrix:
-    """A sparse matrix with its zeros; CasADi's own conversion makes a list of all elements."""
+    """Return a sparse matrix as a dense array; DM.full would make a list of all elements."""
     full = np.zeros(matrix.shape)
     rows, columns = matrix.sparsity().get_triplet()
     full[rows, columns] = matrix.nonzeros()
@@ -34,11 +34,11 @@ def dense(matrix: DM) -> Matrix:
 
 
 def first_best(scores: Sequence[float] | Matrix, equal: float = EQUAL) -> int:
-    """The number of the largest score; of those that are equal but for rounding, the first.
+    """Return the index of the largest score; the first of several that differ by rounding only.
 
     Args:
-        scores: not all of them -inf, none NaN.
-        equal: a score counts as the largest when it is less by this part of it at most.
+        scores: scores without NaN; at least one is finite.
+        equal: relative difference from the largest score below which a score is equal to it.
     """
     values = np.asarray(scores, dtype=float)
     largest = float(values.max())
@@ -46,12 +46,12 @@ def first_best(scores: Sequence[float] | Matrix, equal: float = EQUAL) -> int:
 
 
 def graded(score: float) -> float:
-    """A score without the digits that are rounding, for sorting: six digits are left."""
+    """Return a score rounded to six digits, so that rounding errors do not affect sorting."""
     return float(f"{score:.6g}")
 
 
 def rank(matrix: Matrix, gap: float = RELATIVE_GAP) -> int:
-    """Number of singular values above `gap` times the largest."""
+    """Return the number of singular values above `gap` times the largest."""
     if matrix.size == 0:
         return 0
     values = np.linalg.svd(matrix, compute_uv=False)
@@ -59,28 +59,28 @@ def rank(matrix: Matrix, gap: float = RELATIVE_GAP) -> int:
 
 
 def null_space(matrix: Matrix, gap: float = RELATIVE_GAP) -> Matrix:
-    """(n, n - rank) orthonormal columns that the matrix (m, n) takes to zero."""
+    """Return orthonormal columns (n, n - rank) of the null space of a matrix (m, n)."""
     return null_space_of(matrix, matrix.shape[1] - rank(matrix, gap))
 
 
 def null_space_of(matrix: Matrix, dimension: int) -> Matrix:
-    """(n, dimension) orthonormal columns that the matrix (m, n) shortens most."""
+    """Return orthonormal columns (n, dimension) with the smallest gains of a matrix (m, n)."""
     return np.array(np.linalg.svd(matrix)[2][matrix.shape[1] - dimension :].T)
 
 
 def independent_rows(
     matrices: Sequence[Matrix], count: int, first: tuple[int, ...] = ()
 ) -> list[int]:
-    """The `count` rows that stay independent in every one of the matrices, in increasing order.
+    """Return indices of `count` rows that are independent in all matrices, in increasing order.
 
-    Gram-Schmidt with pivoting on all matrices at once: the next row is the one that the rows
-    before it leave longest, by the geometric mean over the matrices, so that a row which
-    depends on them in a single matrix is avoided.
+    Gram-Schmidt with pivoting on all matrices at once. The next row has the longest part
+    orthogonal to the previous rows, by the geometric mean over the matrices, so that rows which
+    are dependent in a single matrix are avoided.
 
     Args:
         matrices: (m, n) each, the same rows at several configurations.
-        count: how many rows.
-        first: rows to take before all others, in this order.
+        count: number of rows.
+        first: rows to select before all others, in this order.
     """
     rest = [np.array(matrix, dtype=float) for matrix in matrices]
     lengths = np.array([np.linalg.norm(matrix, axis=1) for matrix in rest])
@@ -92,7 +92,7 @@ def independent_rows(
         changed = np.zeros(len(score), dtype=bool)
         for number, matrix in enumerate(rest):
             direction = matrix[pivot] / max(float(lengths[number, pivot]), _FLOOR)
-            # a row without a column in common stays as it is
+            # a row without a column in common remains unchanged
             common = matrix[np.ix_(left, direction.nonzero()[0])].any(axis=1)
             rows = left[common]
             along = np.sum(matrix[rows] * direction, axis=1)
@@ -106,6 +106,6 @@ def independent_rows(
 
 
 def _mean_lengths(lengths: Matrix) -> Matrix:
-    """The geometric mean of each column."""
+    """Return the geometric mean of each column."""
     mean: Matrix = np.exp(np.mean(np.log(lengths + _FLOOR), axis=0))
     return mean

@@ -1,11 +1,10 @@
-"""The command `mbs`: what the package does, from a terminal.
+"""Command line interface `mbs`.
 
-Exit codes: 0 where all went well; 1 with one sentence on the standard error where mbs refused or
-could not go on, and silently where the reader of its output went away; 2 for words that the
-command line does not know; 130 when interrupted.
+Exit codes: 0 on success. 1 after an error, with a message on standard error, or silently if the
+reader of the output has closed it. 2 for unknown commands or options. 130 after an interruption.
 
-A fault of mbs itself is one sentence as well; with MBS_TRACEBACK=1 in the environment Python shows
-where it happened.
+An internal error of mbs is also reported by a single message. With MBS_TRACEBACK=1 in the
+environment, Python prints the traceback.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ _TRACEBACK = "MBS_TRACEBACK"
 
 
 def main() -> None:
-    """Run the command line on the words that the shell gave, then leave with an exit code."""
+    """Run the command line with the arguments of the process, then exit with an exit code."""
     from mbs.app.cli.application import application
 
     for stream in (sys.stdout, sys.stderr):
@@ -46,5 +45,5 @@ def main() -> None:
 
 
 def _close_output() -> None:
-    """Let what is still to be written vanish, so that leaving complains no more."""
+    """Redirect the output to the null device, so that flushing it at exit raises no error."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,4 +1,4 @@
-"""All commands together."""
+"""Command `mbs` with all its subcommands."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ def _start(
     (MJCF) file.
     Units are SI and radians; numbers may be written as pi/2.
 
-    Exit codes: 0 fine; 1 refused, with one sentence on the standard error; 2 words that the
-    command line does not know.
+    Exit codes: 0 success; 1 an error, with a message on the standard error; 2 unknown commands or
+    options.
     """
 
 

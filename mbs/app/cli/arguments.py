@@ -55,10 +55,10 @@ Json = Annotated[
 
 
 def output(what: str) -> Any:
-    """The option --output.
+    """Return the definition of the option --output.
 
     Args:
-        what: is written, for the help.
+        what: help text of the option.
     """
     return typer.Option("--output", "-o", metavar="FILE", help=what, show_default=False)
 
@@ -67,17 +67,17 @@ Output = Annotated[Path | None, output("File to write; it is replaced as a whole
 
 
 def examples(*lines: str) -> str:
-    """The end of a help page: commands that work as they stand."""
+    """Return the examples at the end of a help page."""
     commands = (f"[dim]$[/dim] {_without_markup(line)}" for line in lines)
     return "\n".join(["[bold]Examples[/bold]", *commands])
 
 
 def help_of(command: Callable[..., None]) -> str:
-    """The docstring of a command, each paragraph on one line so that terminals wrap it."""
+    """Return the docstring of a command with a single line per paragraph; terminals wrap it."""
     paragraphs = _without_markup(inspect.getdoc(command) or "").split("\n\n")
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
 
 
 def _without_markup(text: str) -> str:
-    """The text with its brackets kept where rich would take them as markup."""
+    """Return the text with its brackets escaped, which rich would interpret as markup."""
     return text.replace("[", r"\[")

@@ -1,4 +1,4 @@
-"""What the shell offers after a tab: names of robots, robot files, keys of models, languages."""
+"""Completions of the shell: names of robots, robot files, keys of models, languages."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from pathlib import Path
 import typer
 
 SUFFIXES = (".toml", ".par", ".urdf", ".xacro", ".sdf", ".world", ".xml")
-"""Endings of robot files."""
+"""Suffixes of robot files."""
 
 
 def robot_names() -> list[str]:
-    """The names of the catalogue, read from the text of `mbs.robots` without loading CasADi."""
+    """Return the names of the catalogue, read from the source of `mbs.robots` without CasADi."""
     found = importlib.util.find_spec("mbs.robots")
     if found is None or found.origin is None:
         return []
@@ -22,30 +22,30 @@ def robot_names() -> list[str]:
 
 
 def robots(incomplete: str) -> list[str]:
-    """Names of the catalogue, folders and robot files that begin so."""
+    """Return names of the catalogue, folders and robot files that begin with a text."""
     names = [name for name in robot_names() if name.startswith(incomplete)]
     return [*names, *_files(incomplete, SUFFIXES)]
 
 
 def keys(incomplete: str) -> list[tuple[str, str]]:
-    """Keys of models that begin so, with their titles."""
+    """Return keys of models that begin with a text, with their titles."""
     from mbs.app.tasks.equations import entries
 
     return [(e.key, e.title) for e in entries() if e.key.startswith(incomplete)]
 
 
 def options(ctx: typer.Context, incomplete: str) -> list[str]:
-    """NAME= of the options of the model that the line names."""
+    """Return "NAME=" for the options of the model on the command line."""
     from mbs.app.tasks.equations import entries
 
-    words = {ctx.params.get("key"), *ctx.args}  # the latter while the option has no value yet
+    words = {ctx.params.get("key"), *ctx.args}  # ctx.args holds it while the option has no value
     named = [entry for entry in entries() if entry.key in words]
     names = [option.name for entry in named for option in entry.options]
     return [f"{name}=" for name in names if name.startswith(incomplete)]
 
 
 def languages(incomplete: str) -> list[str]:
-    """Languages of generated text that begin so."""
+    """Return languages of generated text that begin with a text."""
     from mbs.export.languages import LANGUAGES
 
     return [name for name in LANGUAGES if name.startswith(incomplete)]

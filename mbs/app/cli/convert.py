@@ -1,4 +1,4 @@
-"""`mbs convert`: a robot file in another format."""
+"""`mbs convert`: convert a robot file to another format."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ def convert(
 ) -> None:
     """Convert a robot to a .par, .toml, .urdf, .sdf or .xml (MJCF) file.
 
-    From .par and .toml to one of them the table of frames is written as it was read, symbols and
-    all. From URDF, SDF, MJCF and the catalogue, link j of the assembled robot is frame j. URDF and
-    SDF files have numbers alone, and a URDF file no loops.
+    Between .par and .toml the table of frames is copied, including symbols. From URDF, SDF, MJCF
+    and the catalogue, link j of the assembled robot is frame j. URDF and SDF files contain numbers
+    only, and a URDF file contains no loops.
     """
     suffix = target.suffix.lower()
     if suffix not in _WRITTEN:
@@ -90,7 +90,7 @@ def convert(
 
 
 def _table(source: str, parameters: list[str] | None) -> RobotTable | None:
-    """The table of frames that a file holds; None where it holds none."""
+    """Return the table of frames in a file; None for other robots."""
     from mbs.formats import read_par, read_toml
     from mbs.robots import catalogue
 

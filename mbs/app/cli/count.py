@@ -1,4 +1,4 @@
-"""`mbs count`: operations of models."""
+"""`mbs count`: operation counts of models."""
 
 from __future__ import annotations
 
@@ -59,10 +59,10 @@ def count(
     mount: Mount = None,
     json: Json = False,
 ) -> None:
-    """Count the operations of models, before the optimizer and after it.
+    """Count the operations of models, before and after the optimizer.
 
-    Signs are not counted, a product by 2 is an addition, and what depends on parameters alone is
-    counted apart, as in the literature.
+    As in the literature, signs are not counted, a product by 2 is an addition, and operations on
+    parameters alone are counted separately.
     """
     from mbs.app.tasks.equations import EVERY_PASS, counts
     from mbs.app.tasks.simulation import assignments
@@ -79,7 +79,7 @@ def count(
 
 
 def _offer(system: System, every: bool) -> list[str]:
-    """Keys of all models that the robot has a function of, or of the usual ones among them."""
+    """Return the keys of all, or of the usual, models that are Functions of the robot."""
     from mbs.app.tasks.equations import entries
 
     having = [e.key for e in entries() if not e.refusal(system) and e.has_function(system)]
@@ -87,10 +87,10 @@ def _offer(system: System, every: bool) -> list[str]:
 
 
 def _with_numbers(rows: Sequence[CountRow]) -> list[CountRow]:
-    """The rows that have numbers; why the others have none is said.
+    """Return the rows with counts; print the reasons of the other rows on standard error.
 
     Raises:
-        ModelError: none has.
+        ModelError: no row has counts.
     """
     counted = [row for row in rows if row.before is not None]
     reasons = [row.reason for row in rows if row.before is None]

@@ -15,14 +15,14 @@ TEN = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 DRIVE = ("Ia", "Fv", "Fs", "stiffness")
 
 Scalar = float | str
-"""A number, or the text of an expression of symbols."""
+"""Number, or text of an expression of symbols."""
 
 
 def described(system: System) -> dict[str, Any]:
-    """A system in numbers, texts, lists and dicts, in SI units and radians.
+    """Return a system as numbers, texts, lists and dicts, in SI units and radians.
 
     Args:
-        system: open or closed.
+        system: open or closed system.
     """
     scalar = _scalars(system)
     closure = system.closure
@@ -114,7 +114,7 @@ def _scalars(system: System) -> Callable[[SX], Scalar]:
             return float(value)
         from casadi import Function
 
-        from mbs.export.languages.one_line import one_line  # with sympy, which is slow to load
+        from mbs.export.languages.one_line import one_line  # imported late: loads sympy, slow
         from mbs.operations.graph import graph_of
 
         return one_line(graph_of(Function("value", [system.p], [value])), names)

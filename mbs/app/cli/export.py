@@ -1,4 +1,4 @@
-"""`mbs export`: files that other programs run or read."""
+"""`mbs export`: files for other programs."""
 
 from __future__ import annotations
 
@@ -161,10 +161,10 @@ def export_fmu(
     gravity: Gravity = "",
     mount: Mount = None,
 ) -> None:
-    """Export an FMU for Model Exchange and Co-Simulation; it needs a C compiler.
+    """Export an FMU for Model Exchange and Co-Simulation; this requires a C compiler.
 
-    Inputs are the efforts of motors, outputs the motion of all joints and the pose of the terminal
-    frame; every symbol of the robot is a parameter.
+    Inputs are the efforts of motors. Outputs are the motion of all joints and the pose of the
+    terminal frame. Every symbol of the robot is a parameter.
     """
     from mbs.app.tasks import exporting
 
@@ -230,7 +230,7 @@ def export_html(
     q: Q = None,
     parameter: Parameters = None,
 ) -> None:
-    """Export a 3-D picture that any browser shows, in one file that loads nothing else."""
+    """Export a 3-D picture as a self-contained HTML file for any browser."""
     from mbs.app.tasks import exporting
 
     assembled = system(robot, parameter)

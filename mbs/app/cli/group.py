@@ -1,4 +1,4 @@
-"""The commands as a group whose errors are one sentence and an exit code."""
+"""Command group that reports errors by a message and an exit code."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ REFUSED = 1
 
 
 class Commands(typer.core.TyperGroup):
-    """Commands that say an `MbsError` as one sentence on the standard error."""
+    """Command group that prints the message of an `MbsError` on standard error and exits with 1."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the chosen command."""
+        """Run the selected command."""
         try:
             answer = super().invoke(ctx)
             sys.stdout.flush()

@@ -90,8 +90,8 @@ def identify(
 ) -> None:
     """Identify a robot from a record: base parameters, deviations, errors, bodies.
 
-    The geometry and the friction law are those of ROBOT; its inertial parameters are not used.
-    --output writes the base parameters as CSV.
+    The geometry and the friction law of ROBOT are used, its inertial parameters are not. --output
+    writes the base parameters as CSV.
     """
     from mbs.app.tasks import identification as task
     from mbs.app.tasks.identification import LARGEST
@@ -119,10 +119,10 @@ def identify(
 
 
 def _content(path: Path, most: int) -> bytes:
-    """The bytes of a record, one more than the most where it is too large.
+    """Return the content of a record; of a too large file only the first `most` + 1 bytes.
 
     Raises:
-        DescriptionError: it cannot be read.
+        DescriptionError: the file cannot be read.
     """
     try:
         with path.open("rb") as stream:

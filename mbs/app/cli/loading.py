@@ -1,4 +1,4 @@
-"""The robot that a command line names."""
+"""Loading of the robot that a command line names."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from mbs.mechanism import Mechanism
 
 _MOST_NOTES = 8
-"""Notes of a file that are said; some files have hundreds."""
+"""Maximum number of reader notes that are printed; some files have hundreds."""
 
 
 def mechanism(
@@ -21,17 +21,17 @@ def mechanism(
     gravity: str = "",
     mount: Sequence[str] | None = None,
 ) -> Mechanism:
-    """The description of a robot; notes of its reader go to the standard error.
+    """Return the description of a robot, and print the notes of its reader on standard error.
 
     Args:
-        robot: name in the catalogue, or a file.
+        robot: name in the catalogue, or file.
         parameters: NAME=VALUE for some of its symbols.
-        gravity: "X,Y,Z" in the world; that of the robot if empty.
+        gravity: "X,Y,Z" in the world [m/s^2]; empty for the gravity of the robot.
         mount: steps of the mount, such as "x=pi" and "position=0,0,2.5".
 
     Raises:
-        DescriptionError: there is no such robot or symbol, the file is malformed, or the gravity or
-            the mount is none.
+        DescriptionError: the robot or a symbol does not exist, the file is malformed, or gravity
+            or mount is invalid.
     """
     from mbs.app.tasks.mounting import mounting_of
     from mbs.robots import load
@@ -51,7 +51,7 @@ def system(
     gravity: str = "",
     mount: Sequence[str] | None = None,
 ) -> System:
-    """The assembled robot; arguments and errors as for `mechanism`.
+    """Return the assembled robot; arguments and errors as for `mechanism`.
 
     Raises:
         AssemblyError: its components do not form a mechanism.
@@ -66,14 +66,14 @@ def system(
 
 
 def numbers(texts: Sequence[str] | None, option: str) -> dict[str, float]:
-    """Numbers by name, of texts such as "L2=0.3" and "j1=pi/2".
+    """Return numbers by name from texts such as "L2=0.3" and "j1=pi/2".
 
     Args:
-        texts: as they were typed.
-        option: that they were given to, for messages.
+        texts: texts as the user typed them.
+        option: name of the option, for error messages.
 
     Raises:
-        DescriptionError: a text is no assignment of a number.
+        DescriptionError: a text is not an assignment of a number.
     """
     from mbs.app.tasks.simulation import assignments
     from mbs.expressions import number
@@ -83,16 +83,16 @@ def numbers(texts: Sequence[str] | None, option: str) -> dict[str, float]:
 
 
 def configuration(system: System, texts: Sequence[str] | None, option: str = "--q") -> list[float]:
-    """Positions q of a robot, its loops closed, the others as in the assembled configuration.
+    """Return positions q with closed loops; positions without a text are as assembled.
 
     Args:
         system: the robot.
         texts: NAME=VALUE for some of its positions.
-        option: that they were given to, for messages.
+        option: name of the option, for error messages.
 
     Raises:
         ModelError: a name is unknown.
-        Unclosable: the loops cannot be closed there.
+        Unclosable: the loops cannot be closed with these positions.
     """
     given = numbers(texts, option)
     q = system.position(given)

@@ -1,4 +1,4 @@
-"""`mbs model`: the text of a model."""
+"""`mbs model`: source text of a model."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def model(
     output: Output = None,
     json: Json = False,
 ) -> None:
-    """Write a model as source text, its operations counted on the standard error."""
+    """Write a model as source text; its operation counts are printed on the standard error."""
     written = equations_of(
         system(robot, parameter, gravity, mount), key, option, language, optimise
     )
@@ -102,17 +102,17 @@ def equations_of(
     language: str | None = None,
     optimise: bool = True,
 ) -> WrittenEquations:
-    """The equations that the words of a command line ask for.
+    """Return the equations of a model for the options of a command line.
 
     Args:
         assembled: the robot.
-        key: of the model.
+        key: key of the model.
         options: NAME=VALUE for some of the options of the model.
-        language: of the text.
-        optimise: whether the optimizer works on them.
+        language: language of the text.
+        optimise: whether to apply the optimizer.
 
     Raises:
-        MbsError: there is no such model, option or language, or the robot does not have it.
+        MbsError: the model, an option or the language is unknown, or the robot lacks the model.
     """
     from mbs.app.tasks import equations as task
     from mbs.app.tasks.simulation import assignments
@@ -170,7 +170,7 @@ def _data(written: WrittenEquations) -> dict[str, Any]:
 
 
 def count_data(count: Count | None) -> dict[str, Any] | None:
-    """The numbers of operations by name, their sum as "total"; None where there are none."""
+    """Return the counts by kind of operation, and their "total"; None if there is no count."""
     if count is None:
         return None
     numbers: dict[str, Any] = {**asdict(count), "total": count.total}

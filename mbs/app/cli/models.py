@@ -1,4 +1,4 @@
-"""`mbs models`: the models that can be asked for, menu by menu."""
+"""`mbs models`: list of the available models by menu."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def models(
     parameter: Parameters = None,
     json: Json = False,
 ) -> None:
-    """List the keys of models, menu by menu; of one robot, those that it has.
+    """List the keys of models by menu; with ROBOT, only the models that it has.
 
-    An option is given to `mbs model` as --option NAME=VALUE.
+    `mbs model` takes the options of a model as --option NAME=VALUE.
     """
     from mbs.app.tasks.equations import entries
 

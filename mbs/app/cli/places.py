@@ -1,4 +1,4 @@
-"""Places where files are to be written, looked at before the work begins."""
+"""Check of output paths before a computation begins."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from mbs.errors import ExportError
 
 
 def require_places(*paths: Path | None) -> None:
-    """Refuse files that cannot be written, so that no long run is lost.
+    """Raise if a file cannot be written, before a long computation starts.
 
     Args:
-        *paths: of files to write; None is no file.
+        *paths: paths of files to write; None for no file.
 
     Raises:
-        ExportError: the folder of a file is missing, or it is a folder itself.
+        ExportError: the folder of a file is missing, or the path is a folder.
     """
     for path in paths:
         if path is None:

@@ -1,4 +1,4 @@
-"""What commands print: tables for people, JSON for programs."""
+"""Output of commands: tables for people, JSON for programs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 import typer
 
 _WIDEST = 10_000
-"""Columns of a terminal that is none: nothing wraps in a pipe or a file."""
+"""Width of the output in characters if it is no terminal, so that nothing wraps."""
 _GAP = 3
 _NARROWEST = 20
 
@@ -23,12 +23,12 @@ class PrintedTable:
     """Rows under a heading.
 
     Attributes:
-        title: above the table, or "".
+        title: title above the table, or "".
         columns: names of the columns.
-        rows: a text for each column.
-        right: names of the columns of numbers, which stand to the right.
-        soft: names of the columns that wrap where a terminal is too narrow; the others are whole.
-        cut: whether the last column ends with dots there.
+        rows: texts of the columns, for each row.
+        right: names of the right-aligned columns of numbers.
+        soft: names of the columns that wrap on a narrow terminal; other columns do not wrap.
+        cut: whether to truncate the last column on a narrow terminal.
     """
 
     title: str
@@ -40,7 +40,7 @@ class PrintedTable:
 
 
 def print_tables(tables: Iterable[PrintedTable]) -> None:
-    """Print tables, with an empty line between them; those without rows are left out."""
+    """Print tables with an empty line between them; tables without rows are omitted."""
     from rich.console import Console
     from rich.text import Text
 
@@ -55,7 +55,7 @@ def print_tables(tables: Iterable[PrintedTable]) -> None:
 
 
 def _widths(table: PrintedTable) -> list[int]:
-    """Columns that each column of a table takes."""
+    """Return the width of each column in characters."""
     widths = [max(map(len, column)) for column in zip(table.columns, *table.rows, strict=True)]
     if table.cut and sys.stdout.isatty():
         left = shutil.get_terminal_size().columns - sum(widths[:-1]) - _GAP * len(widths[:-1])
@@ -83,17 +83,17 @@ def _draw(table: PrintedTable, widths: Sequence[int]) -> Any:
 
 
 def print_json(data: Any) -> None:
-    """Print JSON; what is no number, as infinity, is null."""
+    """Print JSON; infinite and NaN values are null."""
     typer.echo(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
 
 
 def note(text: str) -> None:
-    """Say something beside the output, on the standard error."""
+    """Print a message on standard error, separate from the output."""
     typer.echo(text, err=True)
 
 
 def plain(data: Any) -> Any:
-    """The same of dicts, lists, texts, finite numbers, truth values and None alone."""
+    """Convert data to dicts, lists, texts, finite numbers, booleans and None only."""
     if isinstance(data, Mapping):
         return {str(key): plain(value) for key, value in data.items()}
     if isinstance(data, str | bool | int | None):
@@ -108,5 +108,5 @@ def plain(data: Any) -> Any:
 
 
 def number(value: float | None) -> str:
-    """A number in at most six digits; a dash where there is none."""
+    """Return a number with at most six digits; a dash for NaN or None."""
     return "-" if value is None or math.isnan(value) else f"{value:.6g}"

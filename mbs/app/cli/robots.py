@@ -1,4 +1,4 @@
-"""`mbs robots`: the catalogue."""
+"""`mbs robots`: list of the catalogue."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ def robots(
 ) -> None:
     """List the robots of the catalogue.
 
-    Joints are those that move, with their degrees of freedom together; loops are the closed ones
-    and the couplings of coordinates.
+    Joints are the moving joints, with their total degrees of freedom. Loops are closed loops and
+    couplings of coordinates.
     """
     from mbs.robots import catalogue
 
@@ -52,10 +52,10 @@ def robots(
 
 
 def described(robots: Mapping[str, Callable[[], Mechanism]]) -> list[dict[str, Any]]:
-    """What descriptions say of themselves, without assembling them.
+    """Return kind, counts and source of each robot from its description, without assembly.
 
     Args:
-        robots: name to the function that builds it.
+        robots: name of a robot to the function that builds it.
     """
     return [{"name": name, **_row(build())} for name, build in robots.items()]
 

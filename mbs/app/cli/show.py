@@ -1,4 +1,4 @@
-"""`mbs show`: a robot as tables, and what its assembly says of it."""
+"""`mbs show`: a robot as tables, and the report of its assembly."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def show(
 ) -> None:
     """Show a robot: frames, inertial parameters, coordinates, loops, symbols and the report.
 
-    Frames have Khalil's parameters and inertial parameters are about the origins of these frames,
-    in SI units and radians.
+    Frames are given by Khalil's parameters. Inertial parameters are about the origins of these
+    frames. Units are SI units and radians.
     """
     data = described(system(robot, parameter, gravity, mount))
     if json:

@@ -1,4 +1,4 @@
-"""`mbs simulate`: the motion of a robot from given positions under given efforts."""
+"""`mbs simulate`: motion of a robot from given positions under given efforts."""
 
 from __future__ import annotations
 
@@ -130,10 +130,10 @@ def simulate(
     signal: Signal = None,
     json: Json = False,
 ) -> None:
-    """Simulate a robot; loops stay closed. Of a motion that stops early, what it has is written.
+    """Simulate a robot with closed loops. If the motion stops early, its first part is written.
 
-    The columns are NAME.q, NAME.v, NAME.a and NAME.tau of every coordinate, the energies and the
-    residual of the loops, devices and sensors.
+    The columns are NAME.q, NAME.v, NAME.a and NAME.tau of every coordinate, the energies, the
+    closure residual of the loops, devices and sensors.
     """
     from mbs.app.tasks import simulation as task
 
@@ -156,7 +156,7 @@ def simulate(
     except (SolverError, Interrupted) as error:
         if error.result is None:
             raise
-        result, stop = error.result, error  # what was reached is written all the same
+        result, stop = error.result, error  # the part that was computed is written before the error
     _write(result, file)
     _draw(result, assembled, plot, film, signal)
     if json:
@@ -170,13 +170,13 @@ def simulate(
 
 
 def assigned(**texts: Sequence[str] | None) -> dict[str, Any]:
-    """Values by name for the fields of `SimulationSettings`.
+    """Return the fields of `SimulationSettings` from the texts of options.
 
     Args:
-        **texts: what was given to an option, by its name.
+        **texts: texts NAME=VALUE of each option.
 
     Raises:
-        DescriptionError: a text is no NAME=VALUE.
+        DescriptionError: a text is not NAME=VALUE.
     """
     from mbs.app.tasks.simulation import assignments
 
@@ -207,7 +207,7 @@ def _draw(
 
 
 def data_of(result: Result) -> dict[str, Any]:
-    """A result as JSON has it: columns by name."""
+    """Return a result as data for JSON, with columns by name."""
     return {
         "name": result.name,
         "time": result.time,

@@ -1,4 +1,4 @@
-"""`mbs solve-ik`: every configuration that takes a frame to a pose."""
+"""`mbs solve-ik`: all configurations in which a frame has a given pose."""
 
 from __future__ import annotations
 
@@ -108,10 +108,10 @@ def solve_ik(
     parameter: Parameters = None,
     json: Json = False,
 ) -> None:
-    """Solve the inverse geometry: every configuration that takes a frame to a pose.
+    """Solve the inverse kinematics: all configurations in which a frame has a given pose.
 
-    Say the pose in one way: --pose, --xyz with or without --rpy, or --q. Where no configuration is
-    found the exit code is 1 and the reason stands on the standard error.
+    Specify the pose either by --pose, by --xyz with or without --rpy, or by --q. If there is no
+    solution, the exit code is 1 and the reason is printed on the standard error.
     """
     from mbs.app.tasks.configurations import configurations
 
@@ -137,7 +137,7 @@ def solve_ik(
 
 
 def _counts(texts: list[str] | None) -> dict[str, int] | None:
-    """How many positions joints take, by name."""
+    """Return the number of positions of each redundant joint, by name."""
     counts = dict[str, int]()
     for name, value in numbers(texts, "--redundant").items():
         if value != int(value):
@@ -159,10 +159,10 @@ def _pose(
     rpy: Triple | None,
     q: list[str] | None,
 ) -> Any:
-    """The pose, said in one of the ways.
+    """Return the target pose from the options.
 
     Raises:
-        ModelError: it is said in no way, or in several.
+        ModelError: not exactly one of the options specifies the pose.
     """
     from mbs.app.tasks.configurations import pose_from, pose_from_text, pose_of
 

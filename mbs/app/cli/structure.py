@@ -1,4 +1,4 @@
-"""What kind of mechanism a description is, without assembling it."""
+"""Structure of a mechanism from its description, without assembly."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ _Port = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class StructureRow:
-    """The connection graph of a mechanism in numbers.
+    """Numbers of the connection graph of a mechanism.
 
     Attributes:
         kind: "serial", "tree" or "closed".
-        joints: number of joints that move, and of constraints.
+        joints: number of moving joints and constraints.
         dofs: degrees of freedom of all joints.
         loops: number of joints that must be cut, and of couplings.
     """
@@ -31,7 +31,7 @@ class StructureRow:
 
 
 def structure(mechanism: Mechanism) -> StructureRow:
-    """The numbers of a mechanism: rigid bodies are nodes, joints that move are edges."""
+    """Count joints and loops of a mechanism: rigid bodies are nodes, moving joints are edges."""
     home: dict[_Port, _Port] = {}
     for a, b in mechanism.connections:
         _join(home, (a.owner.name, a.port), (b.owner.name, b.port))

@@ -1,4 +1,4 @@
-"""`mbs sweep`: one simulation for each case of a study."""
+"""`mbs sweep`: a simulation for each case of a parameter sweep."""
 
 from __future__ import annotations
 
@@ -61,10 +61,10 @@ def sweep(
     output: Output = None,
     json: Json = False,
 ) -> None:
-    """Simulate a robot for every case of a study, and write one line a case as CSV.
+    """Simulate a robot for every case of a parameter sweep, and write a CSV line per case.
 
-    A line has what varied, then the last value of every signal, as NAME.q.end. Cases that failed
-    have empty fields, are told on the standard error, and make the exit code 1.
+    A line contains the varied values, then the final value of every signal, as NAME.q.end. Failed
+    cases have empty fields. They are reported on the standard error, and the exit code is 1.
     """
     from mbs.app.tasks import simulation, sweeping
     from mbs.app.tasks.simulation import assignments

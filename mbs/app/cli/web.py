@@ -37,7 +37,7 @@ def app(
 ) -> None:
     """Open the app: robots, equations, simulation and identification on a page.
 
-    It listens on the loopback address only. It needs the extra app: pip install
+    The server listens on the loopback address only. It requires the extra app: pip install
     "casadi-mbs[app]" (or, in a clone, pip install -e ".[app]").
     """
     from mbs.app.web.server import serve

@@ -1,1 +1,1 @@
-"""What the command line and the app do: functions of a System and plain options to plain data."""
+"""Tasks of the command line and the app: functions of a System and plain options to plain data."""

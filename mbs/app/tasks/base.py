@@ -24,13 +24,14 @@ _NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class BaseRow:
-    """A base inertial parameter.
+    """Base inertial parameter.
 
     Attributes:
-        name: of the parameter; R says that others were added to it, as in "XX2R".
-        unit: of the parameter.
-        expression: what it is in the parameters of the links.
-        value: at the values of the description, None where one of them has no value.
+        name: name of the parameter. The suffix R marks a parameter to which others were added,
+            as in "XX2R".
+        unit: unit of the parameter.
+        expression: linear combination of link parameters.
+        value: value with the parameters of the description; None if a parameter has no value.
     """
 
     name: str
@@ -41,17 +42,18 @@ class BaseRow:
 
 @dataclass(frozen=True, slots=True)
 class BaseTable:
-    """The base inertial parameters of a mechanism.
+    """Base inertial parameters of a mechanism.
 
     Attributes:
         system: name of the mechanism.
-        method: that found them, "symbolic" or "numeric".
-        total: number of all parameters.
-        rows: the base parameters.
-        without_effect: parameters that no joint effort depends on.
-        grouped: parameters that left, since they act with others alone.
-        check: what random states say about the set.
-        text: the same as plain lines.
+        method: method that found them, "symbolic" or "numeric".
+        total: number of all inertial parameters.
+        rows: base parameters.
+        without_effect: names of parameters that no joint effort depends on.
+        grouped: names of parameters that were eliminated because they act only in combination
+            with others.
+        check: result of the numeric check at random states.
+        text: the same as plain text.
     """
 
     system: str
@@ -64,7 +66,7 @@ class BaseTable:
     text: str
 
     def csv(self) -> str:
-        """Lines of name, unit, expression and value, a header first."""
+        """Return comma-separated name, unit, expression and value, with a header."""
         stream = io.StringIO()
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(("name", "unit", "expression", "value"))
@@ -77,10 +79,10 @@ class BaseTable:
 def base(
     system: System, method: str = "symbolic", options: Mapping[str, Any] = _NO_OPTIONS
 ) -> BaseTable:
-    """The base inertial parameters of a mechanism.
+    """Compute the base inertial parameters of a mechanism.
 
     Args:
-        system: open or closed.
+        system: open or closed system.
         method: "symbolic" or "numeric".
         options: further arguments of `mbs.identification.base_parameters`, such as moving_base.
 
@@ -106,7 +108,7 @@ def base(
 
 
 def _values(found: BaseParameters) -> list[float | None]:
-    """What the base parameters are worth at the values of the description."""
+    """Return the values of the base parameters with the values of the description."""
     system = found.system
     p = [system.p] if system.parameters else []
     symbolic = found.function(values_of(system, found.columns), *p)

@@ -1,4 +1,4 @@
-"""Every configuration that takes a frame to a pose, as rows of a table."""
+"""Inverse kinematics: all configurations in which a frame has a given pose, as a table."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from mbs.models.inverse_geometry import Solution, Solutions
 from mbs.models.inverse_geometry.solutions import CoordinateLimits, bounds
 from mbs.text import quoted
 
-# Poses as people write them: numbers of a matrix, or a place and three angles.
+# Poses as text: elements of a matrix, or a position and three angles.
 
 
 Array = NDArray[np.float64]
 
 _LONGEST = 2000
 _UPRIGHT = 1e-9
-"""Cosine between the x axis and the ground below which roll and yaw are one angle: rounding of
-poses turns them by 1e-16 over it."""
+"""Cosine between the x axis and the horizontal plane below which roll and yaw are the same angle.
+Rounding errors of a pose, 1e-16, rotate them by 1e-16 divided by this cosine."""
 _FORMS = (
     "write x y z roll pitch yaw, or the 12 or 16 numbers of the matrix row by row, with blanks or"
     " commas between them"
@@ -43,16 +43,16 @@ def pose_of(
     frame: str | int | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Array:
-    """The pose of a frame seen from the base, (4, 4) [m].
+    """Return the pose of a frame relative to the base, (4, 4) [m].
 
     Args:
         system: the mechanism.
         q: positions, (nq,) or by name [rad or m].
-        frame: a body, a named frame, the number of a link, or None for the terminal frame.
-        parameters: values of symbols, the others at their defaults.
+        frame: body, named frame or number of a link; None for the terminal frame.
+        parameters: values of symbols. Default: their default values.
 
     Raises:
-        ModelError: no such frame or coordinate, or a symbol has no value.
+        ModelError: the frame or a coordinate is unknown, or a symbol has no value.
     """
     function = transform(system, terminal_frame(system) if frame is None else frame)
     p = [system.parameter_values(parameters)] if system.parameters else []
@@ -60,16 +60,16 @@ def pose_of(
 
 
 def pose_from(xyz: Sequence[Scalar], rpy: Sequence[Scalar]) -> Array:
-    """The pose (4, 4) of a place and of turns about the fixed axes x, then y, then z.
+    """Return the pose (4, 4) with a position and rotations about the fixed axes x, then y, then z.
 
     R = Rz(yaw) Ry(pitch) Rx(roll).
 
     Args:
-        xyz: (3,) origin [m].
+        xyz: (3,) position of the origin [m].
         rpy: (3,) roll, pitch and yaw [rad].
 
     Raises:
-        ModelError: there are not three of each, or one has no value.
+        ModelError: the lengths are not three, or an element has no value.
     """
     if len(xyz) != 3 or len(rpy) != 3:
         raise ModelError(
@@ -84,7 +84,7 @@ def pose_from(xyz: Sequence[Scalar], rpy: Sequence[Scalar]) -> Array:
 
 
 def rpy_of(T: Array) -> tuple[float, float, float]:
-    """Roll, pitch and yaw [rad] of a pose (4, 4); roll is 0 where the x axis stands upright."""
+    """Return roll, pitch and yaw [rad] of a pose (4, 4); roll is 0 if the x axis is vertical."""
     R = np.asarray(T, dtype=float)[:3, :3]
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
@@ -94,15 +94,15 @@ def rpy_of(T: Array) -> tuple[float, float, float]:
 
 
 def pose_from_text(text: str) -> Array:
-    """The pose (4, 4) that a text writes.
+    """Read a pose (4, 4) from a text.
 
     Args:
-        text: "x y z roll pitch yaw", or 12 or 16 numbers of the matrix row by row, with blanks,
-            commas, semicolons or new lines between them; each may be an expression without
-            blanks, such as pi/2.
+        text: "x y z roll pitch yaw", or 12 or 16 elements of the matrix row by row. Elements are
+            separated by blanks, commas, semicolons or line breaks. Each may be an expression
+            without blanks, such as pi/2.
 
     Raises:
-        ModelError: there are not as many numbers, or one has no value.
+        ModelError: the number of elements is wrong, or an element has no value.
     """
     if len(text) > _LONGEST:
         raise ModelError(f"the text of the pose has {len(text)} characters; {_FORMS}")
@@ -142,23 +142,23 @@ Seed = Sequence[float] | Mapping[str, float] | None
 Values = Mapping[str, float] | None
 
 METHODS = ("auto", "pieper", "paul", "general", "search")
-"""Ways to solve the inverse geometric model."""
+"""Methods of the inverse kinematics; "auto" selects the cheapest that fits the mechanism."""
 
 
 @dataclass(frozen=True, slots=True)
 class Configuration:
-    """One configuration that takes the frame to the pose.
+    """Configuration in which the frame has the pose.
 
     Attributes:
-        q: (nq) positions [rad or m].
-        label: what tells it from the others, such as the side of shoulder, elbow and wrist.
-        residual: largest element of the pose at q less the wanted one [m or 1].
+        q: (nq,) positions [rad or m].
+        label: name of the solution branch, such as the sides of shoulder, elbow and wrist.
+        residual: largest element of the difference between the pose at q and the target [m or 1].
         sigma: smallest singular value of the Jacobian; zero at a singular configuration.
-        multiplicity: how many roots meet in it; 0 where it is one of a self-motion.
-        within_limits: whether whole turns bring every joint within its limits.
-        outside: names of the joints that none brings within.
-        family: the self-motion that it stands for, in words; "" where there is none.
-        windings: how many configurations within limits differ from it by whole turns.
+        multiplicity: number of roots that coincide here; 0 for a point of a self-motion.
+        within_limits: whether all joints can be within their limits, after full rotations.
+        outside: names of the joints that cannot.
+        family: description of the self-motion that it represents; "" for an isolated solution.
+        windings: number of configurations within limits that differ from it by full rotations.
     """
 
     q: tuple[float, ...]
@@ -174,13 +174,13 @@ class Configuration:
 
 @dataclass(frozen=True, slots=True)
 class Near:
-    """The reachable pose that is nearest to the wanted one.
+    """Reachable pose that is nearest to the target.
 
     Attributes:
-        q: (nq) a whole configuration that has it, loops closed [rad or m].
-        distance: between the origins of both poses [m].
-        angle: between their orientations [rad].
-        T: the pose, rows of (4, 4).
+        q: (nq,) configuration with this pose and closed loops [rad or m].
+        distance: distance between the origins of both poses [m].
+        angle: angle between the orientations of both poses [rad].
+        T: pose, rows of (4, 4).
     """
 
     q: tuple[float, ...]
@@ -191,20 +191,20 @@ class Near:
 
 @dataclass(frozen=True, slots=True)
 class ConfigurationList:
-    """Every configuration that takes a frame to a pose.
+    """All configurations in which a frame has a given pose.
 
     Attributes:
         system: name of the mechanism.
-        frame: that was taken there.
-        T: the target pose, rows of (4, 4).
-        names: of the coordinates.
-        units: of the coordinates.
-        locked: joints that stayed, with their positions.
-        redundant: joints that took many positions, with their number.
-        method: that found them.
-        reason: why there is none; "" where there is one.
-        rows: the configurations, those near the seed first.
-        nearest: the reachable pose next to the wanted one, where there is no configuration.
+        frame: frame that has the pose.
+        T: target pose, rows of (4, 4).
+        names: names of the coordinates.
+        units: units of the coordinates.
+        locked: locked joints and their positions.
+        redundant: redundant joints that are sampled, and their numbers of positions.
+        method: method that found the configurations.
+        reason: reason why there is no configuration; "" if there are any.
+        rows: configurations, sorted by distance from the seed.
+        nearest: reachable pose nearest to the target, if there is no configuration.
         text: the same as a plain table.
     """
 
@@ -225,7 +225,7 @@ class ConfigurationList:
 def locked_by_default(
     system: System, frame: str | int | None = None, seed: Seed = None
 ) -> dict[str, float]:
-    """The joints that are locked when nothing is said; none up to six joints."""
+    """Return the positions of the joints that are locked by default; empty up to six joints."""
     name = terminal_frame(system) if frame is None else frame
     return held_at(system, surplus_joints(system, name), system.position(seed))
 
@@ -241,19 +241,20 @@ def configurations(
     redundant: Mapping[str, int] | None = None,
     parameters: Values = None,
 ) -> ConfigurationList:
-    """Every configuration that takes a frame to a pose, with and without loops.
+    """Find all configurations in which a frame has a given pose, with and without loops.
 
     Args:
         system: the mechanism.
-        T: (4, 4) the pose of the frame seen from the base [m].
-        frame: a body, a named frame, the number of a link, or None for the terminal frame.
-        method: one of `METHODS`. The general method is for six joints; of another chain "general"
-            takes the search.
-        seed: a configuration from which distances count and that places joints beside the chain.
-        locked: positions of joints that stay, by name; `locked_by_default` when left out, less
-            one for each redundant joint.
-        redundant: by the name of a joint how many positions it takes, from limit to limit.
-        parameters: values of symbols, the others at their defaults.
+        T: (4, 4) pose of the frame relative to the base [m].
+        frame: body, named frame or number of a link; None for the terminal frame.
+        method: name in `METHODS`. The general method requires six joints; for other chains
+            "general" uses the search.
+        seed: configuration from which distances are measured, and which gives the positions of
+            joints outside the chain.
+        locked: positions of locked joints, by name. Default: `locked_by_default`, with one joint
+            less for each redundant joint.
+        redundant: name of a joint to the number of positions that it takes between its limits.
+        parameters: values of symbols. Default: their default values.
 
     Raises:
         ModelError: T is no pose, or a name or method is unknown.
@@ -263,7 +264,7 @@ def configurations(
     many = dict(redundant or {})
     if locked is None:
         held = locked_by_default(system, name, seed)
-        for _ in many:  # one less for each
+        for _ in many:  # unlock one joint for each redundant joint
             held.pop(next((joint for joint in held if joint in many), next(iter(held), "")), None)
     else:
         held = dict(locked)
@@ -317,7 +318,7 @@ def _row(one: Solution, limits: CoordinateLimits) -> Configuration:
 def _near(
     system: System, found: Solutions, wanted: Any, seed: Seed, parameters: Values
 ) -> Near | None:
-    """The nearest pose: of the chain alone, else with closed loops, from the seed downhill."""
+    """Return the nearest reachable pose; for loops, a local minimum found from the seed."""
     near = found.nearest
     if near is not None and np.all(np.isfinite(near.q)):
         return Near(_tuple(near.q), float(near.distance), float(near.angle), _rows_of(near.T))

@@ -1,4 +1,4 @@
-"""Equations of a model as text, with the operations they take before and after the optimizer."""
+"""Equations of a model as text, with operation counts before and after the optimizer."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from mbs.operations import PASSES, Count, Step, count, simplification, simplify
 from mbs.progress import progress
 from mbs.text import did_you_mean, quoted
 
-# The options of a model: as rows of a form, and from texts.
+# Options of a model: as rows of a form, and read from texts.
 
 
 _FLAGS = {"yes": True, "true": True, "1": True, "on": True}
@@ -32,14 +32,14 @@ _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class OptionRow:
-    """An option of a model as a form shows it.
+    """Option of a model, as data for a form.
 
     Attributes:
-        name: of the option.
-        title: for people.
+        name: name of the option.
+        title: title in the form.
         kind: "frame", "choice", "flag" or "several".
-        values: what there is to choose from.
-        chosen: the value that was given, else the default; a tuple of "several".
+        values: values to choose from.
+        chosen: present value, given or default; a tuple for "several".
     """
 
     name: str
@@ -52,15 +52,15 @@ class OptionRow:
 def option_values(
     system: System, entry: Entry, given: Mapping[str, Any] = _NOTHING
 ) -> tuple[OptionRow, ...]:
-    """The options of a model that make a difference to a mechanism.
+    """Return the options of a model that have an effect for a mechanism.
 
     Args:
         system: the mechanism.
         entry: the model.
-        given: values by the names of options, from which defaults of others may follow.
+        given: values by name of the option; defaults of other options may depend on them.
 
     Raises:
-        ModelError: there is no such option, or the mechanism offers no such value.
+        ModelError: an option is unknown, or a value is not available for the mechanism.
     """
     chosen = entry.choices(system, **given)
     return tuple(
@@ -71,10 +71,10 @@ def option_values(
 
 
 def parsed_options(system: System, entry: Entry, texts: Mapping[str, str]) -> dict[str, Any]:
-    """Values of options from texts such as {"frame": "6", "rows": "Vx, Vy", "f_ext": "yes"}.
+    """Read option values from texts such as {"frame": "6", "rows": "Vx, Vy", "f_ext": "yes"}.
 
     Raises:
-        ModelError: there is no such option, or the mechanism offers no such value.
+        ModelError: an option is unknown, or a value is not available for the mechanism.
     """
     known = {option.name: option for option in entry.options}
     chosen = dict[str, Any]()
@@ -121,10 +121,10 @@ __all__ = [
 ]
 
 WORDS = "words"
-"""The language of entries that have a text of their own."""
+"""Language name for entries that provide their own plain text."""
 
 EVERY_PASS = tuple(one.name for one in PASSES)
-"""Names of the passes of the optimizer, in the order in which they are made."""
+"""Names of the passes of the optimizer, in the order in which they are applied."""
 
 MENUS = ("Geometric", "Kinematic", "Dynamic", "Identification")
 
@@ -133,22 +133,22 @@ _NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class WrittenEquations:
-    """A model written down.
+    """Equations of a model as text.
 
     Attributes:
-        key: of the entry.
-        title: of the entry.
+        key: key of the model.
+        title: title of the model.
         system: name of the mechanism.
-        symbol: what the formula is.
-        language: of the text.
+        symbol: formula symbol of the result.
+        language: language of the text.
         text: the equations.
-        choices: every option and its value.
-        before: operations of the model as its recursion made it: constants are folded and equal
-            parts computed once, no pass of the optimizer was made; None of words.
-        after: operations of the Function whose text it is; None of words.
+        choices: all options and their values.
+        before: operations of the model as its recursion computes it. Constants are folded and equal
+            parts computed once, but the optimizer has not been applied. None for plain text.
+        after: operations of the Function in the text; None for plain text.
         steps: passes of the optimizer.
-        inputs, outputs: of the Function, such as "q (6, 1)".
-        seconds: that it took.
+        inputs, outputs: names and sizes of the inputs and outputs, such as "q (6, 1)".
+        seconds: computing time [s].
     """
 
     key: str
@@ -167,25 +167,25 @@ class WrittenEquations:
 
     @property
     def suffix(self) -> str:
-        """The end of the name of a file for the text."""
+        """File name suffix for the text."""
         return ".txt" if self.language == WORDS else language_of(self.language).suffix
 
     @property
     def file_name(self) -> str:
-        """A name of a file for the text."""
+        """File name for the text."""
         return re.sub(r"\W+", "_", f"{self.system}_{self.key}") + self.suffix
 
 
 def entries() -> tuple[Entry, ...]:
-    """Every model, in the order of the menus."""
+    """Return all models in the order of the menus."""
     return (*catalogue.entries(), *identification_entries())
 
 
 def entry(key: str) -> Entry:
-    """The model of this short name.
+    """Return the model with a key.
 
     Raises:
-        ModelError: there is none.
+        ModelError: no model has this key.
     """
     known = {one.key: one for one in entries()}
     if key not in known:
@@ -194,7 +194,7 @@ def entry(key: str) -> Entry:
 
 
 def languages(one: Entry, system: System) -> tuple[str, ...]:
-    """What `equations` can write the model in, what it takes by default first."""
+    """Return the languages in which `equations` can write a model, the default first."""
     words = (WORDS,) if one.text is not None else ()
     return (*(LANGUAGES if one.has_function(system) else ()), *words)
 
@@ -208,19 +208,20 @@ def equations(
     *,
     name: str | None = None,
 ) -> WrittenEquations:
-    """The equations of a model as text.
+    """Write the equations of a model as text.
 
     Args:
         system: the mechanism.
-        key: of the model.
-        options: values of its options, the others at their defaults.
-        language: one of `languages`; the first of them when left out.
-        passes: names of the passes of the optimizer; none for the model as it was built.
-        name: of the function in the text, the model's own when left out.
+        key: key of the model.
+        options: values of its options. Default: the default values.
+        language: language in `languages`. Default: the first of them.
+        passes: names of the passes of the optimizer; empty for the model as built.
+        name: name of the function in the text. Default: the name of the model.
 
     Raises:
-        ModelError: no such model, option, language or pass, or the mechanism does not have it.
-        NoClosedForm: a closed form was asked for and there is none.
+        ModelError: the model, an option, the language or a pass is unknown, or the mechanism does
+            not have the model.
+        NoClosedForm: the model requires a closed form that does not exist.
     """
     one = entry(key)
     refusal = one.refusal(system)
@@ -248,7 +249,7 @@ def equations(
 
 
 def _optimise(model: Function, passes: Sequence[str]) -> tuple[Function, tuple[Step, ...]]:
-    """The model after the passes, and what each did; itself where there are none."""
+    """Apply passes; return the Function and the pass reports (unchanged if there are none)."""
     if not passes:
         return model, ()
     made = simplification(model, passes)
@@ -292,7 +293,7 @@ def _language(one: Entry, system: System, language: str | None) -> str:
     return spoken
 
 
-# Operations of many models, before and after the optimizer.
+# Operation counts of several models, before and after the optimizer.
 
 
 _NO_COUNT_OPTIONS: Mapping[str, str] = MappingProxyType({})
@@ -300,14 +301,14 @@ _NO_COUNT_OPTIONS: Mapping[str, str] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class CountRow:
-    """The operations of a model.
+    """Operation counts of a model.
 
     Attributes:
-        key: of the model.
-        title: of the model.
-        before: as its recursion made it; None where the mechanism does not have it.
-        after: after the optimizer; None likewise.
-        reason: why there is none, "" where there is one.
+        key: key of the model.
+        title: title of the model.
+        before: operations as its recursion computes it; None if the mechanism lacks the model.
+        after: operations after the optimizer; None if the mechanism lacks the model.
+        reason: reason why there are no counts; "" if there are.
     """
 
     key: str
@@ -323,17 +324,17 @@ def counts(
     passes: Sequence[str] = EVERY_PASS,
     options: Mapping[str, str] = _NO_COUNT_OPTIONS,
 ) -> tuple[CountRow, ...]:
-    """The operations of models.
+    """Count the operations of models.
 
     Args:
         system: the mechanism.
-        keys: of the models; every one that is a Function when left out.
+        keys: keys of the models. Default: all models that are Functions.
         passes: names of the passes of the optimizer.
-        options: texts of options of all these models, as `parsed_options` takes them; the others
-            at their defaults.
+        options: texts of options of all these models, see `parsed_options`. Default: the default
+            values.
 
     Raises:
-        ModelError: there is no such model, option or pass.
+        ModelError: a model, an option or a pass is unknown.
     """
     chosen = [entry(key) for key in keys] or [one for one in entries() if one.function is not None]
     rows = list[CountRow]()

@@ -25,33 +25,33 @@ from mbs.formats import RobotTable, write_toml
 from mbs.text import did_you_mean
 
 SOLVERS: tuple[str, ...] = get_args(Solver)
-"""Methods of integration that an FMU may hold."""
+"""Integration methods that an FMU may contain."""
 
 MODELS = ("idm", "ddm")
-"""Keys of the models of a C library by default."""
+"""Default keys of the models in a C library."""
 
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # equal models give equal files
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # fixed file time in zip archives: equal models give equal files
 _NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9_-]+")
 
 
 @dataclass(frozen=True, slots=True)
 class FmuSettings:
-    """What an FMU holds, as `mbs.export.fmu` takes it.
+    """Settings of an FMU, as arguments of `mbs.export.fmu`.
 
     Attributes:
         fmi: "2.0" or "3.0".
-        inputs: beside the efforts of motors, such as "j1.q" or "tool.wrench".
-        outputs: beside the motion of all joints, such as "energy" or "closure".
+        inputs: inputs in addition to the efforts of motors, such as "j1.q" or "tool.wrench".
+        outputs: outputs in addition to the motion of all joints, such as "energy" or "closure".
         parameters: numbers that become parameters, such as "masses" or "M3".
-        fixed: names of parameters that cannot be tuned during the motion.
-        stop_time: default end [s].
+        fixed: names of parameters that cannot be changed during the simulation.
+        stop_time: default stop time [s].
         step_size: default communication step [s].
         tolerance: default relative tolerance.
-        solver: for co-simulation, one of `SOLVERS`.
-        internal_step: of "rk4" [s].
-        max_step: the longest step of the other solvers [s]; none when empty.
+        solver: integration method of co-simulation, a name in `SOLVERS`.
+        internal_step: step of "rk4" [s].
+        max_step: maximum step of the other solvers [s]; empty for no limit.
         target: "hosted", or "bare" for microcontrollers.
-        platforms: such as "x86_64-windows"; this computer when empty.
+        platforms: platforms such as "x86_64-windows"; empty for this computer.
     """
 
     fmi: str = "2.0"
@@ -74,15 +74,15 @@ def c_library(
     keys: Sequence[str] = MODELS,
     options: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> bytes:
-    """Models as a zip with one folder of C source, a header, CMakeLists.txt and an example.
+    """Return a zip file of C source of models, a header, CMakeLists.txt and an example.
 
     Args:
-        system: open or closed.
-        keys: of the models, as the menus have them.
-        options: key to the options of that model, the others by default.
+        system: open or closed system.
+        keys: keys of the models, as in the menus.
+        options: key to the options of that model. Default: the default options.
 
     Raises:
-        ModelError: a key is unknown, the system does not have the model, or no key is given.
+        ModelError: a key is unknown, the system does not have the model, or `keys` is empty.
     """
     functions = c_functions(system, keys, options)
     name = file_stem(system)
@@ -97,7 +97,7 @@ def c_functions(
     keys: Sequence[str] = MODELS,
     options: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> dict[str, Function]:
-    """Models by their names in a C library; arguments and errors as for `c_library`."""
+    """Return the models by their names in a C library; see `c_library` for the arguments."""
     require_system(system)
     if not keys:
         raise ModelError(f"{system.name}: no model is chosen for the C library; choose one or more")
@@ -112,14 +112,14 @@ def c_functions(
 
 
 def fmu(system: System, settings: FmuSettings | None = None) -> bytes:
-    """The system as an FMU for Model Exchange and Co-Simulation.
+    """Return an FMU of the system for Model Exchange and Co-Simulation.
 
     Args:
-        system: open or closed.
-        settings: what it holds.
+        system: open or closed system.
+        settings: settings of the FMU.
 
     Raises:
-        ModelError, ExportError, CompilerError: as for `mbs.export.fmu`.
+        ModelError, ExportError, CompilerError: see `mbs.export.fmu`.
     """
     require_system(system)
     settings = settings or FmuSettings()
@@ -139,46 +139,46 @@ def fmu(system: System, settings: FmuSettings | None = None) -> bytes:
 
 
 def par(system: System) -> bytes:
-    """The system as a robot file of SYMORO; see `mbs.export.par`.
+    """Return a robot file of SYMORO; see `mbs.export.par`.
 
     Raises:
-        ModelError: the format cannot say it.
+        ModelError: the format cannot express the system.
     """
     return _write(lambda path: export.par(system, path), "robot.par")
 
 
 def urdf(system: System) -> bytes:
-    """The system as a URDF file; see `mbs.export.urdf`.
+    """Return a URDF file of the system; see `mbs.export.urdf`.
 
     Raises:
-        ModelError: the format cannot say it.
+        ModelError: the format cannot express the system.
     """
     return _write(lambda path: export.urdf(system, path), "robot.urdf")
 
 
 def sdf(system: System) -> bytes:
-    """The system as an SDFormat file; see `mbs.export.sdf`.
+    """Return an SDFormat file of the system; see `mbs.export.sdf`.
 
     Raises:
-        ModelError: the format cannot say it.
+        ModelError: the format cannot express the system.
     """
     return _write(lambda path: export.sdf(system, path), "robot.sdf")
 
 
 def toml(system: System) -> bytes:
-    """The system as a table of frames in TOML, its joints under their names.
+    """Return a TOML file of the system: a table of frames with the names of its joints.
 
-    Link j of the system is frame j; bodies that are welded together are one link.
+    Link j of the system is frame j. Bodies that are welded together are a single link.
 
     Raises:
-        ModelError: a table of frames cannot say it.
+        ModelError: a table of frames cannot express the system.
     """
     table = _named(robot_table(system, ".toml"), system)
     return _write(lambda path: write_toml(table, path), "robot.toml")
 
 
 def _named(table: RobotTable, system: System) -> RobotTable:
-    """The table with names and ranges of the system's joints, its name and configuration."""
+    """Return the table with the names and limits of the joints, and name and configuration."""
     joints = zip(system.coordinates, system.speeds, strict=True)
     frames = [
         replace(frame, name=c.name, limits=c.limits, velocity=s.limits, effort=s.effort)
@@ -199,12 +199,12 @@ def html(
     q: Sequence[float] | Mapping[str, float] | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> bytes:
-    """A picture of the system that any browser shows, in one file that loads nothing else.
+    """Return a picture of the system as a self-contained HTML file for any browser.
 
     Args:
-        system: open or closed.
-        q: configuration; the assembled one when left out [rad or m].
-        parameters: values of symbols, the others at their defaults.
+        system: open or closed system.
+        q: configuration [rad or m]. Default: the assembled configuration.
+        parameters: values of symbols. Default: their default values.
     """
     from mbs import view
 
@@ -212,12 +212,12 @@ def html(
 
 
 def file_stem(system: System) -> str:
-    """The name of the system as the beginning of a file's name: letters, digits, - and _."""
+    """Return the name of the system as a file name without suffix: letters, digits, - and _."""
     return _NOT_IN_NAMES.sub("_", system.name).strip("_")[:60] or "robot"
 
 
 def _write(write: Callable[[Path], object], name: str) -> bytes:
-    """What a function writes into a file of this name."""
+    """Return the bytes that a callable writes to a file of this name."""
     with tempfile.TemporaryDirectory(prefix="mbs-export-") as folder:
         path = Path(folder) / name
         write(path)

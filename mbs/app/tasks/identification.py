@@ -1,4 +1,4 @@
-"""Identification from a record that somebody sent: tables and series of plain numbers."""
+"""Identification from an uploaded record: tables and series of plain numbers."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ from mbs.identification.observations import EQUATIONS as _EQUATIONS
 from mbs.identification.record import csv_table
 from mbs.text import did_you_mean
 
-# A measured record from the bytes of a file that somebody sent.
+# A measured record from the content of an uploaded file.
 
 
 LARGEST = 20_000_000
-"""Bytes of the largest record that is read."""
+"""Maximum size of a record in bytes."""
 
 TIME = "time"
 
 
 def record_columns(system: System) -> dict[str, tuple[str, ...]]:
-    """The columns that a record of the system may have, by what they are.
+    """Return the columns that a record of a system may have, by quantity.
 
     Returns:
-        "time", "q", "v" and "tau" to the names of their columns. In a closed system positions and
-        velocities may be of the independent joints alone.
+        the quantities "time", "q", "v" and "tau" to the names of their columns. A record of a
+        closed system may contain only positions and velocities of the independent joints.
     """
     require_system(system)
     return {
@@ -49,19 +49,19 @@ def record_columns(system: System) -> dict[str, tuple[str, ...]]:
 
 
 def record_of(system: System, content: bytes) -> Record:
-    """The record in a file of comma-separated values.
+    """Read a record from the content of a file of comma-separated values.
 
-    Its first line has names: `time` [s], for every joint `NAME.q` [rad or m] and perhaps `NAME.v`
-    [rad/s or m/s], for every independent joint `NAME.tau` [N m or N]; in any order, beside other
-    columns, which are left alone. What `mbs.Result.to_csv` writes is such a file.
+    The first line contains the names of the columns: `time` [s], `NAME.q` [rad or m] and optionally
+    `NAME.v` [rad/s or m/s] for every joint, and `NAME.tau` [N m or N] for every independent joint.
+    The order is free and other columns are ignored. `mbs.Result.to_csv` writes such files.
 
     Args:
-        system: open or closed, its measured joints revolute or prismatic.
-        content: of the file, in UTF-8.
+        system: open or closed system. The measured joints must be revolute or prismatic.
+        content: content of the file in UTF-8.
 
     Raises:
-        ModelError: the file is too large or cannot be read, a column is missing, or its numbers
-            are no record of this system.
+        ModelError: the file is too large or cannot be read, a column is missing, or the values
+            are not a record of this system.
     """
     wanted = record_columns(system)
     if len(content) > LARGEST:
@@ -86,7 +86,7 @@ def record_of(system: System, content: bytes) -> Record:
 
 
 def _positions(system: System, every: Sequence[str], there: Sequence[str]) -> list[str]:
-    """The columns of positions: of all joints, or of the independent ones of a closed system."""
+    """Return the position columns: of all joints, else of the independent joints of loops."""
     missing = [name for name in every if name not in there]
     if not missing:
         return list(every)
@@ -105,28 +105,29 @@ def _without(name: str, there: Sequence[str]) -> str:
 
 
 METHODS = tuple(_METHODS)
-"""Methods of estimation by name."""
+"""Names of the estimation methods."""
 
 EQUATIONS = tuple(_EQUATIONS)
-"""Models that the equations come from by name."""
+"""Names of the models that provide the equations."""
 
 VELOCITIES = ("differences", "measured")
-"""Where velocities come from: differences of positions, or the columns of the record."""
+"""Sources of velocities: differences of positions, or the columns of the record."""
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
 class IdentificationSettings:
-    """How a record is evaluated.
+    """Settings of an identification.
 
     Attributes:
-        bandwidth: of the filters [Hz]; five to ten times the highest frequency of the motion.
-        method: one of `METHODS`.
-        equations: one of `EQUATIONS`.
-        rotors: whether inertias of rotors are looked for.
-        offsets: whether a constant effort of each joint is looked for.
-        velocities: one of `VELOCITIES`.
+        bandwidth: bandwidth of the filters [Hz]; five to ten times the highest frequency of the
+            motion.
+        method: estimation method, a name in `METHODS`.
+        equations: model of the equations, a name in `EQUATIONS`.
+        rotors: whether to estimate rotor inertias.
+        offsets: whether to estimate a constant effort of each joint.
+        velocities: source of velocities, a name in `VELOCITIES`.
     """
 
     bandwidth: float | str = 10.0
@@ -139,16 +140,16 @@ class IdentificationSettings:
 
 @dataclass(frozen=True, slots=True)
 class EstimateRow:
-    """One base parameter.
+    """Estimate of a base parameter.
 
     Attributes:
-        name: such as XX2R.
-        unit: of value and deviation.
-        value: estimated.
+        name: name, such as XX2R.
+        unit: unit of value and deviation.
+        value: estimated value.
         deviation: standard deviation.
         percent: deviation in percent of the value; infinite for a value of zero.
-        grouping: which parameters it stands for, such as "XX2R = XX2 - YY2".
-        essential: whether the record needs it.
+        grouping: linear combination of link parameters, such as "XX2R = XX2 - YY2".
+        essential: whether the parameter is needed to explain the record.
     """
 
     name: str
@@ -162,15 +163,16 @@ class EstimateRow:
 
 @dataclass(frozen=True, slots=True)
 class EffortError:
-    """What the parameters leave unexplained of one effort.
+    """Prediction error of the effort of a joint.
 
     Attributes:
-        name: of the joint.
-        unit: of the effort.
-        rms: root mean square of measured minus predicted.
-        percent: the same in percent of the effort.
-        held_out_rms: in the last quarter of the record, of parameters found from the rest.
-        held_out_percent: the same in percent of the effort there.
+        name: name of the joint.
+        unit: unit of the effort.
+        rms: root mean square of measured minus predicted effort.
+        percent: error in percent of the effort.
+        held_out_rms: rms error in the last quarter of the record, with parameters estimated from
+            the other three quarters.
+        held_out_percent: error in that quarter in percent of the effort.
     """
 
     name: str
@@ -183,21 +185,22 @@ class EffortError:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Identified:
-    """What a record says of a system, as plain data.
+    """Result of an identification as plain data.
 
     Attributes:
-        name: of the system.
-        rows: the base parameters.
-        efforts: errors of prediction.
+        name: name of the system.
+        rows: estimates of the base parameters.
+        efforts: prediction errors of the efforts.
         total_percent: norm of all errors in percent of all efforts.
-        held_out_percent: the same in the last quarter, of parameters found from the rest.
-        time: (n,) [s] of the equations.
-        measured: (n, m) right sides: filtered efforts [N m or N], or what the chosen equations
-            have in their place.
-        predicted: (n, m) the same from the parameters.
-        text: the whole account in plain lines.
-        bodies: mass, centre of mass and inertia of every body in plain lines; empty where none
-            were found.
+        held_out_percent: the same in the last quarter, with parameters estimated from the other
+            three quarters.
+        time: (n,) times of the equations [s].
+        measured: (n, m) right-hand sides: filtered efforts [N m or N], or the equivalent quantity
+            of the chosen equations.
+        predicted: (n, m) right-hand sides predicted by the parameters.
+        text: complete report as plain text.
+        bodies: mass, centre of mass and inertia of every body as plain text; empty if they were
+            not estimated.
     """
 
     name: str
@@ -212,7 +215,7 @@ class Identified:
     bodies: str
 
     def csv(self) -> str:
-        """The base parameters as comma-separated values."""
+        """Return the base parameters as comma-separated values."""
         head = ("name", "value", "deviation", "percent", "unit", "essential", "grouping")
         rows = (
             (r.name, *map(repr, (r.value, r.deviation, r.percent)), r.unit, _yes(r), r.grouping)
@@ -221,7 +224,7 @@ class Identified:
         return _csv(head, rows)
 
     def residuals_csv(self) -> str:
-        """Time, and measured and predicted side of every effort, as comma-separated values."""
+        """Return time, measured and predicted right-hand sides as comma-separated values."""
         names = [effort.name for effort in self.efforts]
         head = ("time", *(f"{n}.{kind}" for n in names for kind in ("measured", "predicted")))
         pairs = np.stack([self.measured, self.predicted], axis=2).reshape(len(self.time), -1)
@@ -235,17 +238,17 @@ def identify(
     *,
     quiet: bool = False,
 ) -> Identified:
-    """Base parameters from the bytes of a record.
+    """Estimate the base parameters of a system from the content of a record file.
 
     Args:
-        system: open or closed; its inertial parameters and friction are not used.
-        content: of a file as `record_of` reads it.
-        settings: of the evaluation.
-        quiet: no progress bar.
+        system: open or closed system; its inertial parameters and friction are not used.
+        content: content of the file, see `record_of`.
+        settings: settings of the identification.
+        quiet: whether to hide the progress bar.
 
     Raises:
-        ModelError: a setting is unknown, the file is no record of this system, or it does not show
-            every base parameter.
+        ModelError: a setting is unknown, the file is no record of this system, or a base
+            parameter is not identifiable from it.
         SolverError: a search for the base parameters did not end.
     """
     settings = settings or IdentificationSettings()
@@ -267,7 +270,7 @@ def identify(
 
 
 def identified(found: Identification) -> Identified:
-    """The plain data of an identification."""
+    """Convert an identification to plain data."""
     residuals = found.estimate.residuals
     return Identified(
         name=found.system.name,

@@ -1,4 +1,4 @@
-"""Gravity and mount of a robot, from the texts of a command line or of a page."""
+"""Gravity and mount of a robot, from texts of the command line or the app."""
 
 from __future__ import annotations
 
@@ -14,13 +14,12 @@ _AXES = ("x", "y", "z")
 def mounting_of(
     gravity: str = "", mount: Sequence[str] = (), *, names: tuple[str, str] = ("gravity", "mount")
 ) -> dict[str, Any]:
-    """Return the arguments gravity and mount of `mbs.load`; those without a text are left out.
+    """Return the arguments `gravity` and `mount` of `mbs.load`; an empty text is omitted.
 
     Args:
         gravity: three numbers or expressions, such as "0, 0, -1.62" [m/s^2].
-        mount: steps such as "x=pi", a rotation about an axis, in their order, and
-            "position=0, 0, 2.5" [m].
-        names: of the two texts, for messages.
+        mount: rotations about axes such as "x=pi", in order, and "position=0, 0, 2.5" [m].
+        names: names of the two texts, for error messages.
 
     Raises:
         DescriptionError: a text has another form.
@@ -53,7 +52,7 @@ def _mount(texts: Sequence[str], where: str) -> dict[str, Any]:
 
 
 def _three(text: str, where: str) -> list[str]:
-    """Three texts between commas."""
+    """Return three texts that are separated by commas."""
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 3 or not all(parts):
         raise DescriptionError(

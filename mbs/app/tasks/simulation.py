@@ -1,4 +1,4 @@
-"""Simulation of a system from the texts and numbers of a form or a command."""
+"""Simulation of a system from the texts and numbers of a form or a command line."""
 
 from __future__ import annotations
 
@@ -31,28 +31,28 @@ from mbs.simulate import run
 from mbs.simulate.run import input_function
 from mbs.text import did_you_mean, quoted
 
-# Laws that a user writes as texts: numbers, and functions of time, positions and velocities.
+# Laws that a user writes as text: numbers, and functions of time, positions and velocities.
 
 
 Laws = Mapping[str, float | str]
-"""Name of a joint or of a quantity, to a number or a text of the grammar of `mbs.expressions`."""
+"""Name of a joint or quantity to a number or a text of the grammar of `mbs.expressions`."""
 
 TIME = "t"
-"""The symbol of time [s] in a law."""
+"""Symbol of time [s] in a law."""
 
 _LONGEST = 1000
 
 
 def number(value: float | str, where: str, known: Mapping[str, float] | None = None) -> float:
-    """The number that a user wrote, such as 0.3 or "pi/4 + A".
+    """Return the value of a number that a user wrote, such as 0.3 or "pi/4 + A".
 
     Args:
-        value: a number or a text.
-        where: what it is of which system, for messages.
-        known: values of the symbols that may stand in it.
+        value: number or text.
+        where: system and quantity, for error messages.
+        known: values of the symbols that the text may contain.
 
     Raises:
-        ExpressionError: it is no text of the grammar, or has no finite value.
+        ExpressionError: the text is not in the grammar, or has no finite value.
     """
     read = _read(value, where)
     _require_known(read, known or {}, where)
@@ -63,24 +63,23 @@ def number(value: float | str, where: str, known: Mapping[str, float] | None = N
 
 
 def numbers(values: Laws, where: str, known: Mapping[str, float]) -> dict[str, float]:
-    """Names to numbers, as `number` reads each.
+    """Convert the values of a mapping to numbers by `number`.
 
     Raises:
-        ExpressionError: one of them is none.
+        ExpressionError: a value is not a number.
     """
     return {name: number(value, f"{where} of {name}", known) for name, value in values.items()}
 
 
 def assignments(texts: Iterable[str], what: str) -> dict[str, str]:
-    """Names and values of texts such as "j1=0.3".
+    """Return names and values of texts such as "j1=0.3".
 
     Args:
-        texts: each NAME=VALUE.
-        what: they are, for messages.
+        texts: texts of the form NAME=VALUE.
+        what: description of the texts, for error messages.
 
     Raises:
-        DescriptionError: there is no "=" in one, a name or a value is empty, or a name is there
-            twice.
+        DescriptionError: a text has no "=", a name or a value is empty, or a name occurs twice.
     """
     found: dict[str, str] = {}
     for text in texts:
@@ -96,20 +95,20 @@ def assignments(texts: Iterable[str], what: str) -> dict[str, str]:
 def law_of_motion(
     system: System, laws: Laws, names: Sequence[str], known: Mapping[str, float], what: str
 ) -> Callable[[SX, SX, SX], SX]:
-    """Values as a function of (t, q, v), zero where no law is given.
+    """Return a vector of values as a function of (t, q, v); values without a law are zero.
 
-    A law may hold t, the positions and velocities of the system as `j1.q` and `j1.v`, and
-    the symbols of the system, as numbers.
+    A law may contain t, the positions and velocities of the system, such as `j1.q` and `j1.v`,
+    and the symbols of the system, which are replaced by numbers.
 
     Args:
-        system: open or closed.
-        laws: by the names of values.
-        names: of all values.
+        system: open or closed system.
+        laws: laws by name of the value.
+        names: names of all values, in the order of the vector.
         known: values of the symbols of the system.
-        what: the laws are, for messages.
+        what: description of the laws, for error messages.
 
     Raises:
-        ExpressionError: a law cannot be read, or holds an unknown symbol.
+        ExpressionError: a law cannot be read, or contains an unknown symbol.
     """
     signals = (
         *(f"{c.name}.q" for c in system.coordinates),
@@ -131,15 +130,15 @@ def law_of_motion(
 def law_of_time(
     law: float | str, known: Mapping[str, float], where: str
 ) -> float | Callable[[SX], SX]:
-    """One value as a number or a function of time.
+    """Return a law of time as a number, or as a function of t if it depends on time.
 
     Args:
-        law: of t and the symbols of the system, as numbers.
+        law: number, or text of t and the symbols of the system.
         known: values of the symbols.
-        where: what it is of which system, for messages.
+        where: system and quantity, for error messages.
 
     Raises:
-        ExpressionError: it cannot be read, or holds an unknown symbol.
+        ExpressionError: the law cannot be read, or contains an unknown symbol.
     """
     read = _law(law, where, (TIME,), known)
     if isinstance(read, Number):
@@ -150,7 +149,7 @@ def law_of_time(
 def _law(
     law: float | str, where: str, signals: Sequence[str], known: Mapping[str, float]
 ) -> Expression:
-    """The law with numbers for the symbols of the system."""
+    """Read a law, with numbers instead of the symbols of the system."""
     values = {name: value for name, value in known.items() if name not in signals}
     read = _read(law, where)
     _require_known(read, [*signals, *values], where)
@@ -181,29 +180,29 @@ def _require_known(read: Expression, known: Iterable[str], where: str) -> None:
 
 
 METHODS = ("dopri5", "rodas")
-"""Methods of integration: an explicit pair, and a linearly implicit one for stiff systems."""
+"""Integration methods: "dopri5" is explicit, "rodas" is linearly implicit for stiff systems."""
 
 
 @dataclass(frozen=True, slots=True)
 class SimulationSettings:
-    """What is simulated, and how; a text may stand wherever a number may.
+    """Settings of a simulation. Every number may also be a text, such as "pi/2".
 
     Attributes:
-        duration: [s].
+        duration: duration [s].
         step: time between rows of the result [s].
-        q0: positions at the start by name of the coordinate [rad or m], the others as in the
+        q0: initial positions by name of the coordinate [rad or m]. Default: the position in the
             assembled configuration.
-        configuration: in place of q0 all positions at the start, which close the loops; none when
-            empty.
-        v0: velocities at the start by name [rad/s or m/s].
-        tau: efforts by name of a joint with a motor [N m or N]: numbers, or laws of t, of
-            positions and velocities such as `j1.q` and `j1.v`, and of symbols of the system.
-        inputs: inputs of devices by name of the device, laws as for tau.
-        motion: laws of t for coordinates that drives move, by names such as "j1.q".
-        parameters: values of symbols of the system, the others at their defaults.
-        tolerance: what the error of the motion should stay near.
-        method: one of `METHODS`.
-        max_step: the longest step of the integration [s]; none when empty.
+        configuration: all initial positions, instead of q0; they must close the loops. Empty to
+            use q0.
+        v0: initial velocities by name [rad/s or m/s].
+        tau: efforts by name of an actuated joint [N m or N]: numbers, or laws of t, of positions
+            and velocities such as `j1.q` and `j1.v`, and of symbols of the system.
+        inputs: inputs of devices by name of the device: numbers or laws, as for tau.
+        motion: laws of t for coordinates with prescribed motion, by names such as "j1.q".
+        parameters: values of symbols of the system. Default: their default values.
+        tolerance: approximate error of the motion.
+        method: method, a name in `METHODS`.
+        max_step: maximum integration step [s]; empty for no limit.
     """
 
     duration: float | str = 2.0
@@ -223,34 +222,34 @@ class SimulationSettings:
 def simulate(
     system: System, settings: SimulationSettings | None = None, *, quiet: bool = False
 ) -> Result:
-    """The motion of a system as `mbs.simulate.run` gives it.
+    """Simulate a system by `mbs.simulate.run`.
 
     Args:
-        system: open or closed.
-        settings: of the simulation.
-        quiet: no progress bar.
+        system: open or closed system.
+        settings: settings of the simulation.
+        quiet: whether to hide the progress bar.
 
     Returns:
-        for every coordinate `name.q`, `name.v`, `name.a`, `name.tau`, then the energies,
-        `closure_residual`, devices and sensors.
+        result with `name.q`, `name.v`, `name.a` and `name.tau` for every coordinate, then the
+        energies, `closure_residual`, devices and sensors.
 
     Raises:
-        ExpressionError: a text cannot be read, or holds an unknown symbol.
-        MbsError: as for `mbs.simulate.run`.
+        ExpressionError: a text cannot be read, or contains an unknown symbol.
+        MbsError: see `mbs.simulate.run`.
     """
     return run(system, **run_arguments(system, settings or SimulationSettings()), quiet=quiet)
 
 
 def run_arguments(system: System, settings: SimulationSettings) -> dict[str, Any]:
-    """The arguments of `mbs.simulate.run` that the settings stand for.
+    """Convert settings to the arguments of `mbs.simulate.run`.
 
     Args:
-        system: open or closed.
-        settings: of the simulation.
+        system: open or closed system.
+        settings: settings of the simulation.
 
     Raises:
-        ExpressionError: a text cannot be read, or holds an unknown symbol.
-        ModelError: a name is unknown or has no motor, or the method is none.
+        ExpressionError: a text cannot be read, or contains an unknown symbol.
+        ModelError: a name is unknown or a joint has no motor, or the method is unknown.
     """
     require_system(system)
     if settings.method not in METHODS:
@@ -279,11 +278,11 @@ def run_arguments(system: System, settings: SimulationSettings) -> dict[str, Any
 
 
 def known_values(system: System, given: Mapping[str, float]) -> dict[str, float]:
-    """Values of the symbols of a system, those that have one.
+    """Return the values of the symbols of a system, by name; symbols without value are omitted.
 
     Args:
-        system: open or closed.
-        given: values by name, the others at their defaults.
+        system: open or closed system.
+        given: values by name. Default: the default values of the symbols.
 
     Raises:
         ModelError: a name is unknown.
@@ -294,7 +293,7 @@ def known_values(system: System, given: Mapping[str, float]) -> dict[str, float]
 
 
 def csv_bytes(result: Result) -> bytes:
-    """The file that `Result.to_csv` writes."""
+    """Return the content of the file that `Result.to_csv` writes."""
     with tempfile.TemporaryDirectory(prefix="mbs-csv-") as folder:
         path = Path(folder) / "result.csv"
         result.to_csv(path)
@@ -321,7 +320,7 @@ def _longest(
 def _positions(
     system: System, settings: SimulationSettings, known: Mapping[str, float]
 ) -> dict[str, float] | list[float] | None:
-    """Positions at the start, those that drives do not move where there are drives."""
+    """Return the initial positions, except of coordinates with prescribed motion."""
     if not settings.configuration:
         return numbers(settings.q0, f"{system.name}: q0", known) or None
     if settings.q0:
@@ -339,19 +338,19 @@ def _positions(
 
 
 def _efforts(system: System, laws: Laws, known: Mapping[str, float]) -> Any:
-    """Laws of the efforts of all joints, None without any."""
+    """Return the laws of the efforts of all joints; None without laws."""
     if not laws:
         return None
-    effort_function(system, dict.fromkeys(laws, 0.0))  # refuses joints that have no motor
+    effort_function(system, dict.fromkeys(laws, 0.0))  # raises for joints that have no motor
     names = [speed.name for speed in system.speeds]
     return law_of_motion(system, laws, names, known, "tau")
 
 
 def _inputs(system: System, laws: Laws, known: Mapping[str, float]) -> Any:
-    """Laws of the inputs of all devices, None without any."""
+    """Return the laws of the inputs of all devices; None without laws."""
     if not laws:
         return None
-    input_function(system, dict.fromkeys(laws, 0.0))  # refuses devices that are not there
+    input_function(system, dict.fromkeys(laws, 0.0))  # raises for unknown devices
     names = [name for name, _ in system.inputs]
     given = {full_name(name, system.inputs): law for name, law in laws.items()}
     return law_of_motion(system, given, names, known, "input")
@@ -361,20 +360,22 @@ def _inputs(system: System, laws: Laws, known: Mapping[str, float]) -> Any:
 
 
 MOST_ROWS = 100_000
-"""Rows of the longest result that a page is given."""
+"""Maximum number of rows of a result that the app simulates."""
 
 _FEWEST_FRAMES, _MOST_FRAMES, _PER_SECOND = 60, 600, 30.0
-"""Frames of a film: as smooth as video, enough of a short motion, and what a page loads at once."""
+"""Minimum and maximum number of frames of a movie, and frames per second: as smooth as a video,
+enough frames of a short motion, and not more than a page can load at once."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Film:
-    """A result, and the configurations of some of its rows.
+    """Movie of a simulation: the result, and the configurations at some of its rows.
 
     Attributes:
-        result: of the simulation.
-        times: (m,) of the frames [s].
-        configurations: (m, nq) of the frames, in the order of `system.coordinates` [rad or m].
+        result: result of the simulation.
+        times: (m,) times of the frames [s].
+        configurations: (m, nq) configurations of the frames, in the order of `system.coordinates`
+            [rad or m].
     """
 
     result: Result
@@ -383,15 +384,15 @@ class Film:
 
 
 def film(system: System, settings: SimulationSettings | None = None) -> Film:
-    """Simulate, and keep about thirty frames a second for the picture, at most 600.
+    """Simulate a system and select about thirty frames per second for a movie, at most 600.
 
     Args:
-        system: open or closed.
-        settings: of the simulation.
+        system: open or closed system.
+        settings: settings of the simulation.
 
     Raises:
-        ModelError: there are more rows than a page is given.
-        MbsError: as for `simulate`.
+        ModelError: the result would have too many rows for a page.
+        MbsError: see `simulate`.
     """
     arguments = run_arguments(system, settings or SimulationSettings())
     duration, step = arguments["duration"], arguments["step"]
@@ -404,11 +405,11 @@ def film(system: System, settings: SimulationSettings | None = None) -> Film:
 
 
 def filmed(system: System, result: Result) -> Film:
-    """The frames of a result.
+    """Select the frames of a movie from a result.
 
     Args:
-        system: that moved.
-        result: of `mbs.simulate.run`.
+        system: system that was simulated.
+        result: result of `mbs.simulate.run`.
     """
     span = float(result.time[-1] - result.time[0])
     wanted = min(max(span * _PER_SECOND, _FEWEST_FRAMES), _MOST_FRAMES, len(result))

@@ -1,4 +1,4 @@
-"""Singular configurations of a frame: the determinant of its Jacobian in factors, each in words."""
+"""Singular configurations of a frame: factors of the determinant of its Jacobian, in words."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from mbs.models import singularities
 from mbs.models.singularities import SingularFactor
 from mbs.solvers.least_squares import gauss_newton
 
-# When a factor of a determinant is zero, in words.
+# Condition under which a factor of a determinant is zero, in words.
 
 
 _SHORT = re.compile(r"([SC])(\d+)")
@@ -29,11 +29,11 @@ _BLOCK = re.compile(r"determinant of the (\d+ x \d+) block of (.*)")
 
 
 def condition(text: str, coordinates: Sequence[tuple[str, bool]]) -> str:
-    """When a factor is zero, such as "q3 is -pi/2 or pi/2 (C3 = 0)".
+    """Return in words when a factor is zero, such as "q3 is -pi/2 or pi/2 (C3 = 0)".
 
     Args:
-        text: of the factor; S23 is sin(q2 + q3).
-        coordinates: name of each position, and whether it turns.
+        text: text of the factor; S23 is sin(q2 + q3).
+        coordinates: name of each position, and whether it is the angle of a revolute joint.
     """
     block = _BLOCK.fullmatch(text)
     if block:
@@ -49,7 +49,7 @@ def condition(text: str, coordinates: Sequence[tuple[str, bool]]) -> str:
 
 
 def _angle(text: str, turning: Sequence[str]) -> tuple[str, str] | None:
-    """Either "s" or "c" and the angle, where the text is one sine or cosine of positions."""
+    """Return "s" or "c" and the angle if the text is a single sine or cosine; else None."""
     short = _SHORT.fullmatch(text)
     if short:
         names = [f"q{digit}" for digit in short[2]]
@@ -63,26 +63,26 @@ Array = NDArray[np.float64]
 _NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
 _TRIES, _SEED = 12, 20260111
 _REACH = 1.0
-"""Largest difference of a position between a start and the configuration at hand [rad or m]."""
+"""Maximum distance of initial guesses from the present configuration, per position [rad or m]."""
 _NUDGE = 1e-3
-"""Of a position from the configuration at hand [rad or m]: there slopes that vanish by symmetry do
-not, and the nearest zero is still the nearest."""
+"""Perturbation of each position [rad or m]: derivatives that vanish by symmetry do not vanish
+there, and the nearest zero is still the nearest."""
 _OPEN = 1e-9
-"""Largest residual of the same configuration by whole turns: some roundings of angles more than
-where the iteration ended, 1e-12; across a gear it is another configuration, open by tenths."""
+"""Largest residual of a configuration that is shifted by full rotations: somewhat above the
+tolerance of the iteration, 1e-12. A shifted configuration of a gear has residuals of tenths."""
 
 
 @dataclass(frozen=True, slots=True)
 class DeterminantFactor:
-    """A factor of the determinant.
+    """Factor of the determinant.
 
     Attributes:
-        text: as one reads it, with its power.
-        power: how often it is a factor.
-        condition: when it is zero, in words.
-        configuration: (nq) a configuration near the one at hand where it is zero, loops closed
-            [rad or m]; None where none was found from there.
-        determinant: at that configuration.
+        text: text of the factor with its power.
+        power: power of the factor.
+        condition: condition under which it is zero, in words.
+        configuration: (nq,) configuration with closed loops near the given one where the factor
+            is zero [rad or m]; None if none was found.
+        determinant: determinant at that configuration.
     """
 
     text: str
@@ -94,16 +94,16 @@ class DeterminantFactor:
 
 @dataclass(frozen=True, slots=True)
 class Singular:
-    """Where a frame loses a direction of motion.
+    """Singular configurations of the Jacobian of a frame.
 
     Attributes:
         system: name of the mechanism.
-        frame: whose Jacobian.
-        rows, columns: names of the square part of it.
+        frame: frame of the Jacobian.
+        rows, columns: names of the rows and columns of its square part.
         determinant: constant and factors in one line.
-        constant: the factor that no position is in.
-        factors: the others.
-        verdict: one sentence: when the Jacobian is singular.
+        constant: factor that does not depend on positions.
+        factors: factors that depend on positions.
+        verdict: sentence that gives the condition of singularity.
     """
 
     system: str
@@ -121,16 +121,17 @@ def singular(
     options: Mapping[str, Any] = _NO_OPTIONS,
     near: Sequence[float] | None = None,
 ) -> Singular:
-    """The determinant of a square part of a Jacobian in factors, and where each is zero.
+    """Factor the determinant of a square part of a Jacobian, and find zeros of the factors.
 
     Args:
-        system: open or closed.
-        options: of the model "determinant": frame, expressed_in, coordinates, rows, columns.
-        near: (nq,) a configuration from which singular ones are looked for, the assembled one when
-            left out.
+        system: open or closed system.
+        options: options of the model "determinant": frame, expressed_in, coordinates, rows,
+            columns.
+        near: (nq,) configuration near which singular configurations are searched. Default: the
+            assembled configuration.
 
     Raises:
-        ModelError: no such frame, row or column, or not as many rows as columns.
+        ModelError: the frame, a row or a column is unknown, or the part is not square.
     """
     chosen = entry("determinant").choices(system, **options)
     found = singularities(system, **chosen)
@@ -175,7 +176,7 @@ def _factor(
 
 
 def _zero(system: System, function: Function, start: Array) -> tuple[float, ...] | None:
-    """The nearest configuration found where a function of it is zero and the loops are closed."""
+    """Return the nearest zero of a function of q that was found with closed loops, or None."""
     residual = _residual(system, function)
     rng = np.random.default_rng(_SEED)
     found = list[Array]()
@@ -194,7 +195,7 @@ def _zero(system: System, function: Function, start: Array) -> tuple[float, ...]
 
 
 def _residual(system: System, function: Function) -> Callable[[Array], tuple[Array, Array]]:
-    """The function and the rows of the loops, (m,), and their slope by q, (m, nq)."""
+    """Return q -> function value and loop residuals (m,), and their Jacobian (m, nq)."""
     p = np.array(system.p_default)
     slope = _value_and_slope(system, function)
     closing = Closing(system, p) if system.is_closed else None

@@ -1,4 +1,4 @@
-"""A parameter study from the texts and numbers of a form or a command, as one table."""
+"""Parameter sweep from the texts and numbers of a form or a command line, as a table."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ _END = ".end"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SweepTable:
-    """A row for each case of a study: what was varied, then the last value of every signal.
+    """Table of a parameter sweep: a row per case with the varied values and the final signals.
 
     Attributes:
-        columns: names; those of last values end with ".end".
-        units: of the columns.
-        rows: (cases, columns) numbers, NaN where a case failed.
-        failures: number of a case that failed, counted from 0, to what it said.
+        columns: names of the columns; the name of a final value ends with ".end".
+        units: units of the columns.
+        rows: (cases, columns) values; NaN for final values of failed cases.
+        failures: case index (0-based) to the error message, for failed cases.
     """
 
     columns: tuple[str, ...]
@@ -42,7 +42,7 @@ class SweepTable:
     failures: Mapping[int, str]
 
     def csv(self) -> str:
-        """A line of names, then one for each case; fields of failed cases are empty."""
+        """Return comma-separated values with a header; empty fields for failed cases."""
         stream = io.StringIO()
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(self.columns)
@@ -52,15 +52,15 @@ class SweepTable:
 
 
 def grid_of(texts: Mapping[str, str]) -> dict[str, list[float]]:
-    """Values of every name of a grid.
+    """Return the list of values of each name of a grid.
 
     Args:
-        texts: name to "FROM:TO:STEP", both ends included, or to values with commas between them,
+        texts: name to "FROM:TO:STEP", with both ends included, or to values separated by commas,
             such as "0, 0.5, pi/2".
 
     Raises:
-        ExpressionError: a value is no number.
-        ModelError: a range has no end, or a name has too many values.
+        ExpressionError: a value is not a number.
+        ModelError: a range does not end, or a name has too many values.
     """
     return {name: _values(text, name) for name, text in texts.items()}
 
@@ -73,19 +73,19 @@ def sweep(
     folder: str | os.PathLike[str] | None = None,
     quiet: bool = False,
 ) -> SweepTable:
-    """Simulate a system for every combination of some values.
+    """Simulate a system for every combination of given values.
 
     Args:
-        system: open or closed.
-        grid: name to its values: parameters, starts such as "j1.q" and "j1.v", and constant
-            efforts such as "j1.tau".
-        settings: of every simulation.
-        folder: where results are kept, so that an interrupted study goes on; nowhere when left
-            out.
-        quiet: no progress bar.
+        system: open or closed system.
+        grid: name to its values. Names are parameters, initial values such as "j1.q" and "j1.v",
+            and constant efforts such as "j1.tau".
+        settings: settings of every simulation.
+        folder: folder of the results, from which an interrupted sweep resumes. Default: results
+            are not stored.
+        quiet: whether to hide the progress bar.
 
     Raises:
-        ModelError: a name is unknown, or as for `mbs.simulate.sweep`.
+        ModelError: a name is unknown, or see `mbs.simulate.sweep`.
     """
     arguments = run_arguments(system, settings or SimulationSettings())
     given = {name: value for name, value in arguments.items() if value is not None}
@@ -119,7 +119,7 @@ def _values(text: str, name: str) -> list[float]:
             f"grid of {name}: {quoted(text)} has no end or more than {_MOST_VALUES} values; give a"
             " step that leads from the first to the last value"
         )
-    # steps of decimal fractions, of which many thousands may add up to the last value
+    # tolerance for steps that are decimal fractions: thousands of them may reach the last value
     whole = round(count) if abs(count - round(count)) < 1e-9 * max(1.0, count) else int(count)
     return [float(f"{start + k * step:.14g}") for k in range(whole + 1)]
 
@@ -130,7 +130,7 @@ def _signal_units(study: Sweep) -> dict[str, str]:
 
 
 def _units(system: System) -> dict[str, str]:
-    """Units of what can be varied."""
+    """Return the units of all quantities that can be varied."""
     positions = ((f"{c.name}.q", c.unit) for c in system.coordinates)
     rates = ((f"{s.name}.v", s.unit) for s in system.speeds)
     efforts = ((f"{s.name}.tau", EFFORT_UNIT[s.unit]) for s in system.speeds)

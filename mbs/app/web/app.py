@@ -1,4 +1,4 @@
-"""The app: what menus and panels get to work with."""
+"""State and operations of a page of the app, used by menus and panels."""
 
 from __future__ import annotations
 
@@ -26,23 +26,23 @@ from mbs.errors import MbsError
 from mbs.view import Scene, scene
 from mbs.view.posed import picture_symbols
 
-# What every part of the app needs: the session, the page, one thread, and words to say.
+# Basis of every part of the app: session, page, graph thread, notifications and listeners.
 
 
 _LOG = logging.getLogger(__name__)
 _ASIDE = ThreadPoolExecutor(max_workers=1, thread_name_prefix="mbs-app")
-"""The one thread that builds graphs: they are not made for several at once."""
+"""Single thread that builds CasADi graphs, so that graphs are never built concurrently."""
 
 Listener = Callable[[], Coroutine[Any, Any, None] | None]
 
 
 async def aside(function: Callable[..., Any], *args: Any) -> Any:
-    """What a short function returns, called in the one thread that builds graphs."""
+    """Call a short function in the thread that builds graphs, and return its result."""
     return await asyncio.get_running_loop().run_in_executor(_ASIDE, function, *args)
 
 
 class AppBase:
-    """The session of a visitor and the page that shows it.
+    """Session of a visitor and the page that shows it.
 
     Attributes:
         session: the robot, its history and its configuration.
@@ -58,29 +58,29 @@ class AppBase:
 
     @property
     def document(self) -> Document:
-        """The robot as typed."""
+        """Description of the robot as typed."""
         return self.session.document
 
     @property
     def q(self) -> Vector:
-        """(nq,) present configuration [rad or m]."""
+        """Present configuration (nq,) [rad or m]."""
         return self.session.q
 
     @property
     def is_left(self) -> bool:
-        """Whether the page was closed for good; nothing can be shown on it any more."""
+        """Whether the page was closed and can no longer show anything."""
         return self._client.is_deleted
 
     def system(self) -> System:
-        """The robot as typed, assembled already.
+        """Return the assembled robot as typed.
 
         Raises:
-            MbsError: something is wrong in it; the sentence says what.
+            MbsError: the description has an error. The message gives it.
         """
         return self.session.require_system()
 
     def checked_system(self) -> System | None:
-        """The robot as typed; None where something is wrong in it, which is told."""
+        """Return the assembled robot; if its description has an error, show it and return None."""
         try:
             return self.system()
         except MbsError as error:
@@ -88,11 +88,11 @@ class AppBase:
             return None
 
     async def aside(self, function: Callable[..., Any], *args: Any) -> Any:
-        """What a short function returns, called in the one thread that builds graphs."""
+        """Call a short function in the thread that builds graphs, and return its result."""
         return await aside(function, *args)
 
     def complain(self, error: Exception | str) -> None:
-        """Show why something was refused."""
+        """Show an error notification."""
         sentence = self._sentence(error)
         if self.is_left:
             return
@@ -130,23 +130,23 @@ class AppBase:
         )
 
     def on_robot(self, listener: Listener) -> None:
-        """Call a function after each robot that could be assembled."""
+        """Add a listener that is called after each successful assembly of a robot."""
         self._on_robot.append(listener)
 
     def on_clear(self, listener: Listener) -> None:
-        """Call a function when another robot is opened, before it is assembled."""
+        """Add a listener that is called when another robot is opened, before its assembly."""
         self._on_clear.append(listener)
 
     def on_configuration(self, listener: Listener) -> None:
-        """Call a function after each change of the configuration."""
+        """Add a listener that is called after each change of the configuration."""
         self._on_configuration.append(listener)
 
     def on_document(self, listener: Listener) -> None:
-        """Call a function after each edit, good or not."""
+        """Add a listener that is called after each edit, valid or not."""
         self._on_document.append(listener)
 
     def on_time(self, listener: Callable[[float], Any]) -> None:
-        """Call a function with the time of the film that is shown, ten times a second."""
+        """Add a listener that is called with the time of the movie [s], ten times per second."""
         ui.on("app-time", lambda event: listener(float(event.args)))
 
     def _tell(self, listeners: Sequence[Listener]) -> None:
@@ -159,11 +159,11 @@ class AppBase:
                     background_tasks.create(answer)
 
 
-# The configuration of the mechanism, and the picture that shows it in the browser.
+# Configuration of the mechanism, and the picture that shows it in the browser.
 
 
 class AppPicture(AppBase):
-    """A app whose picture can be moved."""
+    """App with a picture whose configuration can be changed."""
 
     def __init__(self, session: Session) -> None:
         super().__init__(session)
@@ -175,24 +175,24 @@ class AppPicture(AppBase):
 
     @property
     def is_moving(self) -> bool:
-        """Whether somebody moves a joint at this moment."""
+        """Whether the user is moving a joint at present."""
         return self._is_moving
 
     def _draw(self, drawn: Scene) -> None:
-        """Put another scene in the place of the present one."""
+        """Replace the present scene by another scene."""
         self._scene = drawn
         self._send("mount", VIEW, drawn.as_dict(), self._camera)
         self._camera = None
 
     def _clear(self) -> None:
-        """Take the picture and the joints of the former robot away."""
+        """Remove the picture and the joints of the previous robot."""
         self._robot, self._scene, self._camera = self.session.robot, None, "iso"
         self._wanted.clear()
         self._send("clear")
         self._tell(self._on_clear)
 
     async def set_configuration(self, q: Sequence[float]) -> None:
-        """Show the mechanism at another configuration.
+        """Show the mechanism in another configuration.
 
         Args:
             q: (nq,) positions that close the loops [rad or m].
@@ -208,11 +208,11 @@ class AppPicture(AppBase):
         self._tell(self._on_configuration)
 
     async def move(self, index: int, value: float) -> None:
-        """Move one coordinate by hand; of many moves of it in a row the last one counts.
+        """Move a coordinate by hand; only the last of its pending moves is made.
 
         Args:
-            index: of the coordinate in q.
-            value: where it is to be [rad or m].
+            index: index of the coordinate in q.
+            value: target position [rad or m].
         """
         self._wanted[index] = value
         if self._is_moving:
@@ -237,7 +237,7 @@ class AppPicture(AppBase):
             self._tell(self._on_configuration)
             return
         if self.session.system is system:
-            if self._scene is not None:  # else it says why there is no picture
+            if self._scene is not None:  # else the refusal explains why there is no picture
                 self.session.refusal = ""
             await self.set_configuration(q)
 
@@ -248,12 +248,12 @@ class AppPicture(AppBase):
             self._send("poses", flat)
 
     async def play(self, times: Sequence[float], configurations: Any, speed: float = 1.0) -> None:
-        """Show a motion again and again until `pause`.
+        """Play a motion repeatedly until `pause` is called.
 
         Args:
-            times: (n,) [s].
-            configurations: (n, nq) [rad or m].
-            speed: of the film; 1 is as in reality.
+            times: (n,) times of the configurations [s].
+            configurations: (n, nq) configurations [rad or m].
+            speed: playback speed; 1 is real time.
         """
         drawn = self._scene
         film_of = np.asarray(configurations, dtype=float)
@@ -265,15 +265,15 @@ class AppPicture(AppBase):
         self._send("play", film)
 
     def pause(self) -> None:
-        """Stop the film where it is."""
+        """Pause the movie at its present time."""
         self._send("pause")
 
     def look(self, camera: str) -> None:
-        """Look from "iso", "front", "top", "side", or "fit"."""
+        """Set the camera: "iso", "front", "top", "side", or "fit"."""
         self._send("camera", camera)
 
     def show(self, role: str, shown: bool) -> None:
-        """Show a role of the picture, such as "frame", or hide it."""
+        """Show or hide a kind of elements of the picture, such as "frame"."""
         self.session.shown[role] = shown
         self._send("visible", role, shown)
 
@@ -290,10 +290,10 @@ class AppPicture(AppBase):
 
 
 class App(AppPicture):
-    """One page: the session of its visitor, and what is done with it.
+    """A page of the app: the session of its visitor and all operations on it.
 
     Attributes:
-        drawer: the tabs of results.
+        drawer: tabs of results.
     """
 
     def __init__(self, session: Session) -> None:
@@ -305,11 +305,11 @@ class App(AppPicture):
         self._client.on_delete(self._stop_works)
 
     def build_cards(self) -> None:
-        """Make the corner where running jobs are shown."""
+        """Create the corner that shows running jobs."""
         self._cards.build()
 
     async def start(self) -> None:
-        """Assemble the document of the session and show it, in the configuration of the session."""
+        """Assemble the document of the session and show it in the configuration of the session."""
         await self._settle()
 
     async def edit(self, cell: Cell, text: str) -> None:
@@ -322,15 +322,15 @@ class App(AppPicture):
         await self.change(document)
 
     async def change(self, document: Document) -> None:
-        """Put another document in the place of the present one."""
+        """Replace the present document, and assemble and show the new one."""
         self.session.change(document)
         await self._settle()
 
     async def open_robot(self, make: Callable[..., Document], *args: Any) -> bool:
-        """Show the robot that `make(*args)` describes, without anything of the present robot.
+        """Open the robot that `make(*args)` describes, without any state of the present robot.
 
         Returns:
-            whether there is a document; without one the present robot stays.
+            whether `make` returned a document; if not, the present robot remains.
         """
         document = await self._made(make, *args)
         if document is None:
@@ -343,7 +343,7 @@ class App(AppPicture):
         """Show another description of the same robot, in the present configuration.
 
         Returns:
-            whether there is a document; without one the present description stays.
+            whether `make` returned a document; if not, the present description remains.
         """
         document = await self._made(make)
         if document is None:
@@ -360,17 +360,17 @@ class App(AppPicture):
         return document
 
     async def undo(self) -> None:
-        """Take back the last change."""
+        """Undo the last change."""
         if self.session.undo():
             await self._settle()
 
     async def redo(self) -> None:
-        """Make it again."""
+        """Redo the last change that was undone."""
         if self.session.redo():
             await self._settle()
 
     async def _settle(self) -> None:
-        """Assemble and draw the document; a later edit makes this one stop."""
+        """Assemble and draw the document; a later edit cancels this."""
         self._edit += 1
         edit, document, session = self._edit, self.document, self.session
         if session.robot != self._robot:
@@ -398,7 +398,7 @@ class App(AppPicture):
         self._tell(self._on_document)
 
     def _show(self, document: Document, q: Vector, drawn: Scene | None, why: str) -> None:
-        """Take an assembled document; without a picture the sentence says why."""
+        """Show an assembled document; `why` is the reason if there is no picture."""
         self.session.settle(document, q)
         self.session.refusal = why
         if drawn is not None:
@@ -407,17 +407,17 @@ class App(AppPicture):
         self._tell(self._on_configuration)
 
     async def run(self, label: str, task: Callable[..., Any], *args: Any) -> Any:
-        """What `task(system, *args)` returns, computed in a child process.
+        """Run `task(system, *args)` in a child process, while a card shows its progress.
 
-        Meanwhile a card shows its progress and a button that stops it.
+        The card has a button that stops the task. Errors are shown as a notification.
 
         Args:
-            label: what is done, for people.
-            task: a function of a module; what it takes and returns is plain data.
+            label: description of the task for the user.
+            task: function of a module; its arguments and its result are plain data.
             *args: further arguments.
 
         Returns:
-            the result, or None when it was stopped, or refused with a sentence that was shown.
+            the result; None if the task was stopped or failed.
         """
         try:
             self.system()
@@ -442,30 +442,30 @@ class App(AppPicture):
         return None
 
     def _stop_works(self) -> None:
-        """Stop what runs for a page that nobody looks at any more."""
+        """Stop all running tasks of a page that was closed."""
         for work in tuple(self._works):
             work.cancel()
 
     def open(self, title: str, key: str | None = None) -> AbstractContextManager[Any]:
-        """A tab of results to fill; one with the same key gives it its place."""
+        """Open a tab of results to fill; it replaces a tab with the same key."""
         return self.drawer.open(title, key)
 
 
 async def warm_up() -> None:
-    """Do everything once, so that the first visitor does not wait for what is loaded late."""
+    """Load all modules and caches, so that the first visitor does not have to wait."""
 
     def once() -> None:
         system = Document.of_name("rx90").system()
         _drawn(system, system.configuration)
         loop = Document.of_name("four_bar").system()
-        # any small step along the branch [rad]
+        # [rad] any small step along the branch
         moved(loop, loop.configuration, handles(loop)[0].index, loop.configuration[0] + 0.01)
 
     await aside(once)
 
 
 def _drawn(system: System, q: Vector) -> tuple[Scene | None, str]:
-    """The picture, or None and a sentence."""
+    """Return the picture and "", or None and the reason."""
     needed = picture_symbols(system)
     values = zip(system.parameters, system.parameter_values(needed=()), strict=True)
     unknown = [symbol.name for symbol, value in values if value != value and symbol.name in needed]

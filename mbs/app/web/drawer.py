@@ -1,4 +1,4 @@
-"""The drawer of results: tabs that menus open and their user closes."""
+"""Drawer of results: tabs that menus open and the user closes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class _Tab:
 
 
 class Drawer:
-    """Tabs, of which one is shown; it is built by `build` where it stands in the page."""
+    """Tabs, of which a single tab is visible. `build` creates them at the present position."""
 
     def __init__(self) -> None:
         self._tabs: dict[str, _Tab] = {}
@@ -29,14 +29,15 @@ class Drawer:
         self._on_tabs: Callable[[tuple[str, ...]], Any] = lambda names: None
 
     def on_tabs(self, listener: Callable[[tuple[str, ...]], Any]) -> None:
-        """Call a function with the names of all tabs, the shown one last, after each change."""
+        """Set a listener that gets the names of all tabs, the visible tab last, at each change."""
         self._on_tabs = listener
 
     def build(self, on_fill: Callable[[bool], Any]) -> None:
-        """Make the empty drawer.
+        """Create the empty drawer.
 
         Args:
-            on_fill: called with True when the first tab is opened, False when the last one went.
+            on_fill: callable; called with True when a tab is opened, and with False when the last
+                tab is closed.
         """
         self._on_fill = on_fill
         with ui.element("div").classes("app-drawer"):
@@ -45,11 +46,11 @@ class Drawer:
 
     @contextmanager
     def open(self, title: str, key: str | None = None) -> Iterator[ui.element]:
-        """A tab to fill.
+        """Open a tab and fill it within the block.
 
         Args:
-            title: on its head.
-            key: another tab of this key is replaced; a new tab for each call when left out.
+            title: title of the tab.
+            key: key of the tab; a tab with the same key is replaced. Default: a new tab.
         """
         name = key if key is not None else f"tab {next(self._numbers)}"
         old = self._tabs.get(name)
@@ -65,7 +66,7 @@ class Drawer:
             yield tab.panel
 
     def select(self, name: str) -> None:
-        """Show this tab and hide the others."""
+        """Show a tab and hide the others."""
         for other, tab in self._tabs.items():
             tab.panel.set_visibility(other == name)
             if other == name:
@@ -76,7 +77,7 @@ class Drawer:
         self._on_tabs((*(other for other in self._tabs if other != name), name))
 
     def close(self, name: str) -> None:
-        """Take a tab away; the one before it is shown then."""
+        """Close a tab; the previous tab is shown then."""
         names = list(self._tabs)
         tab = self._tabs.pop(name, None)
         if tab is None:
@@ -108,7 +109,7 @@ class Drawer:
 
 
 def _into_view(head: ui.element) -> None:
-    """Scroll the heads to this one, as soon as the page has drawn it."""
+    """Scroll to the head of a tab, as soon as the page has drawn it."""
     find = f"document.getElementById('{head.html_id}')"
     scroll = f"{find}?.scrollIntoView({{block: 'nearest', inline: 'nearest'}})"
     head.client.run_javascript(f"setTimeout(() => {scroll}, 100)")

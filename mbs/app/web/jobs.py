@@ -1,4 +1,4 @@
-"""Long work in child processes that can be stopped, and the cards that show it."""
+"""Long computations in child processes that can be cancelled, and the cards that show them."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ from mbs.app.web.document.document import Document
 from mbs.errors import MbsError
 from mbs.progress import listen
 
-# Long work in a child process, with progress and a way to stop it.
+# Long computations in a child process, with progress and cancellation.
 
 
 _LOG = logging.getLogger(__name__)
 _PATIENCE = 2.0
-"""Seconds that a stopped child has before it is killed."""
+"""Time [s] that a stopped child process has to end before it is killed."""
 
 _STEP = 0.01
-"""Smallest part of the whole run that is worth a message."""
+"""Smallest increase of the completed fraction for which a progress message is sent."""
 
 
 class Broken(MbsError):
-    """Work that ended in a way that is no mistake of its user."""
+    """Failure of a computation that the user did not cause."""
 
 
 async def run(
@@ -47,19 +47,19 @@ async def run(
     *args: Any,
     progress: Callable[[str, float], None] | None = None,
 ) -> Any:
-    """What `task(system, *args)` returns, computed in a child process.
+    """Run `task(system, *args)` in a child process and return its result.
 
-    Cancelling the call stops the child and what it started, and removes its temporary files.
+    Cancelling the call stops the child and its own child processes, and removes its temporary
+    files.
 
     Args:
-        task: a function of a module, so that a child finds it; what it takes and returns is plain
-            data.
-        document: the robot, assembled in the child.
+        task: function of a module, so that it can be pickled. Arguments and result are plain data.
+        document: description of the robot; it is assembled in the child.
         *args: further arguments of the task.
-        progress: called with the label of a run and the part of it that is done, 0 to 1.
+        progress: callable (label, completed fraction from 0 to 1).
 
     Raises:
-        MbsError: the error of the task, or `Broken` for any other end; it is logged.
+        MbsError: error of the task; `Broken` for any other failure, which is logged.
     """
     folder = tempfile.mkdtemp(prefix="mbs-app-")
     ours, theirs = multiprocessing.Pipe(duplex=False)
@@ -80,7 +80,7 @@ async def run(
 
 
 def _context() -> Any:
-    """A server that children are forked from, where the platform has one."""
+    """Return the multiprocessing context: a fork server if the platform has one, else spawn."""
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
@@ -104,9 +104,9 @@ async def _answer(
 def _read(
     ours: Connection, loop: asyncio.AbstractEventLoop, messages: asyncio.Queue[tuple[Any, ...]]
 ) -> None:
-    """Hand on what the child says, until it ends; an end without a word is a message as well."""
+    """Pass the messages of the child to the event loop; a silent end is reported as a failure."""
     kind = "progress"
-    with ours, contextlib.suppress(RuntimeError):  # the loop may be closed meanwhile
+    with ours, contextlib.suppress(RuntimeError):  # the event loop may be closed already
         while kind == "progress":
             try:
                 message = ours.recv()
@@ -130,10 +130,10 @@ def _refuse(kind: str, name: str, told: str) -> NoReturn:
 def _child(
     theirs: Connection, folder: str, task: Callable[..., Any], document: Document, args: Any
 ) -> None:
-    """The whole life of the child."""
+    """Main function of the child process: assemble the robot, run the task, send the result."""
     tempfile.tempdir = folder
     if hasattr(os, "setpgid"):
-        os.setpgid(0, 0)  # what it starts is stopped with it
+        os.setpgid(0, 0)  # process group: its own child processes are stopped with it
     threading.Thread(target=_end_with_server, args=(folder,), daemon=True).start()
     try:
         with listen(_Teller(theirs)):
@@ -148,7 +148,7 @@ def _child(
 
 
 def _end_with_server(folder: str) -> None:
-    """Stop the child, and what it started, when the process that asked for it is gone."""
+    """Stop this child and its own child processes when the server process ends."""
     server = multiprocessing.parent_process()
     if server is None:
         return
@@ -160,7 +160,7 @@ def _end_with_server(folder: str) -> None:
 
 
 class _Teller:
-    """Sends progress in steps that a reader can see."""
+    """Sender of progress messages, limited to visible changes."""
 
     def __init__(self, theirs: Connection) -> None:
         self._theirs = theirs
@@ -173,9 +173,9 @@ class _Teller:
 
 
 def _end(process: BaseProcess, folder: str) -> None:
-    """Stop the child if it still runs, and take away what it leaves behind."""
+    """Stop the child if it is still running, and remove its temporary files."""
     if process.pid is not None:
-        process.join(0.05)  # [s] one that has sent its answer is about to end by itself
+        process.join(0.05)  # [s] after sending its result, the child is about to end by itself
         if process.is_alive():
             _signal(process, "SIGTERM")
             process.join(_PATIENCE)
@@ -186,21 +186,21 @@ def _end(process: BaseProcess, folder: str) -> None:
 
 
 def _signal(process: BaseProcess, name: str) -> None:
-    """Signal the child and what it started."""
+    """Send a signal to the child and its own child processes."""
     if sys.platform == "win32" or process.pid is None:
         process.terminate()
         return
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(process.pid, getattr(signal, name))
         return
-    process.terminate()  # before it had a group of its own
+    process.terminate()  # the child has no process group yet
 
 
-# Cards of running jobs: what is done, how far it is, and a button that stops it.
+# Cards of running jobs: label, progress, and a button that cancels the job.
 
 
 class JobCard:
-    """One running job."""
+    """Card of a running job: label, progress bar and a button that cancels it."""
 
     def __init__(self, label: str) -> None:
         with ui.element("div").classes("app-job") as self.element:
@@ -211,7 +211,7 @@ class JobCard:
             self._note = ui.label("starting").classes("app-note")
 
     def on_cancel(self, cancel: Callable[[], Any]) -> None:
-        """What the button does."""
+        """Set the action of the cancel button."""
 
         def stop() -> None:
             self._button.disable()
@@ -221,25 +221,25 @@ class JobCard:
         self._button.on_click(stop)
 
     def progress(self, label: str, part: float) -> None:
-        """Show what is running and the part of it that is done, 0 to 1."""
+        """Show the label of the computation and its completed fraction, 0 to 1."""
         self._bar.props(remove="indeterminate")
         self._bar.set_value(part)
         self._note.set_text(f"{label}: {100 * part:.0f} %")
 
 
 class JobCards:
-    """The corner of the page where the cards are."""
+    """Corner of the page that contains the cards."""
 
     def __init__(self) -> None:
         self._corner: ui.element | None = None
 
     def build(self) -> None:
-        """Make the empty corner."""
+        """Create the empty corner."""
         self._corner = ui.element("div").classes("app-jobs")
 
     @contextmanager
     def card(self, label: str) -> Iterator[JobCard]:
-        """A card for as long as the block lasts."""
+        """Show a card while the block runs."""
         assert self._corner is not None, "build comes first"
         with self._corner:
             card = JobCard(label)

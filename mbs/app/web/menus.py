@@ -1,4 +1,4 @@
-"""The menus of models, built from the catalogue, and those of the optimizer, runs and files."""
+"""Menus: models from the catalogue, optimizer, simulation, export and robot files."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ Act = Callable[[], Awaitable[None] | None]
 
 
 def build_menus(app: App) -> None:
-    """The menus, where the slot is; entries that the robot does not have are greyed.
+    """Create the menus at the present position; unavailable models are greyed out.
 
     Args:
-        app: of the page.
+        app: app of the page.
     """
     items = dict[str, _Item]()
     for menu in MENUS:
@@ -63,7 +63,7 @@ def build_menus(app: App) -> None:
 
 
 class _Item:
-    """An entry of a menu that is greyed, with the reason, where the robot does not have it."""
+    """Menu entry of a model. If the robot does not have the model, it is greyed with a reason."""
 
     def __init__(self, entry: Entry, act: Act) -> None:
         self.entry = entry
@@ -73,7 +73,7 @@ class _Item:
         self._why.set_visibility(False)
 
     def refuse(self, reason: str) -> None:
-        """Grey it with a reason, or not with none."""
+        """Grey the entry out and show the reason; enable it if the reason is empty."""
         self._item.set_enabled(not reason)
         self._why.set_text(reason)
         self._why.set_visibility(bool(reason))
@@ -98,14 +98,14 @@ def _plain(title: str, act: Act) -> ui.menu_item:
     return ui.menu_item(title, on_click=act)
 
 
-# The menu Robot: new, open, save, undo.
+# Menu Robot: new, open, save, undo.
 
 
 _SUFFIXES = ",".join(READERS)
 
 
 class FilesMenu:
-    """The menu Robot and its dialogs."""
+    """Menu Robot and its dialogs."""
 
     def __init__(self, app: App) -> None:
         self._app = app
@@ -126,14 +126,14 @@ class FilesMenu:
         self.refresh()
 
     def refresh(self) -> None:
-        """Grey what cannot be done now."""
+        """Grey out the entries that are not available at present."""
         session = self._app.session
         self._undo.set_enabled(bool(session.past))
         self._redo.set_enabled(bool(session.future))
         self._convert.set_visibility(not session.document.is_table)
 
     def choose(self) -> None:
-        """The catalogue as a list to choose from."""
+        """Open a dialog that lists the catalogue to choose from."""
         with ui.dialog() as dialog, ui.card().style("width: 640px; max-width: 92vw"):
             ui.label("From the catalogue").classes("app-robot")
             field = ui.input(placeholder="Search").props("dense outlined autofocus clearable")
@@ -153,7 +153,7 @@ class FilesMenu:
         dialog.open()
 
     def upload(self) -> None:
-        """A dialog that takes a file."""
+        """Open a dialog for uploading a file."""
         with ui.dialog() as dialog, ui.card().style("width: 460px"):
             ui.label("Open a robot file").classes("app-robot")
             ui.label(
@@ -180,7 +180,7 @@ class FilesMenu:
         dialog.open()
 
     async def open_upload(self, name: str, content: bytes) -> None:
-        """Show the robot in a file that was sent; of its name only the suffix is looked at."""
+        """Open the robot in an uploaded file; only the suffix of the file name is used."""
         suffix = PurePath(name.replace("\\", "/")).suffix
         if await self._app.open_robot(Document.of_upload, content, suffix):
             self._app.tell(f"{self._app.document.name} is open")

@@ -1,4 +1,4 @@
-"""After a reload: the tabs that were open, opened again."""
+"""Reopening of tabs after the page is reloaded."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ _OPENERS: Mapping[str, Opener] = {
 
 
 async def open_again(app: App) -> None:
-    """Open what the session had open, the tab that was shown last; from now on it keeps track.
+    """Reopen the tabs of the session, the last visible tab last, and record changes of tabs.
 
     Args:
-        app: of the page, its robot assembled.
+        app: app of the page, with its robot assembled.
     """
     before = cast(tuple[str, ...], app.session.notes.get(_NOTE, ()))
     app.drawer.on_tabs(lambda names: _note(app, names))

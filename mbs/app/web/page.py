@@ -1,4 +1,4 @@
-"""The page: menus above, tables left, the picture right, results below."""
+"""The page: menus at the top, tables at the left, the picture at the right, results below."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from mbs.app.web.tables import TablePanel
 
 _KEY = "app"
 _DRAWER = 58.0
-"""Height of the upper half when results are shown, %."""
+"""Height of the upper half in percent while results are shown."""
 
 
 def page_of(first: Document) -> Callable[[], Awaitable[None]]:
-    """The page function for a robot that new visitors find."""
+    """Return the page function whose new visitors start with a given robot."""
 
     async def app_page() -> None:
         add_head()
@@ -42,12 +42,12 @@ def page_of(first: Document) -> Callable[[], Awaitable[None]]:
 
 
 async def app_page() -> None:
-    """The page with the RX90."""
+    """Build the page with the robot RX90."""
     await page_of(Document.of_name("rx90"))()
 
 
 def session_of(first: Document) -> Session:
-    """The session of this browser tab; a duplicated tab gets a copy of its own."""
+    """Return the session of this browser tab; a duplicated tab gets its own copy."""
     tab = ui.context.client.tab_id
     kept = server.storage.tab.get(_KEY)
     if kept is None:
@@ -84,7 +84,7 @@ def _build(app: App) -> None:
 
 
 class _Head:
-    """The robot's name, what it is, and undo, at the right of the menus."""
+    """Name and size of the robot, with buttons for undo and redo, at the right of the menus."""
 
     def __init__(self, app: App) -> None:
         self._app = app
@@ -96,7 +96,7 @@ class _Head:
         self.refresh()
 
     def refresh(self) -> None:
-        """Say what is open."""
+        """Show the name and size of the present robot."""
         session = self._app.session
         self._name.set_text(session.document.name)
         self._facts.set_text(_facts(session))

@@ -1,4 +1,4 @@
-"""The mechanism in three dimensions: what is shown, from where, and joints to move by hand."""
+"""Picture of the mechanism in three dimensions: visibility, cameras, and sliders of joints."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from mbs.errors import MbsError
 from mbs.loops import Mode
 from mbs.view.scene import COVERED
 
-# Sliders for the coordinates that can be moved, the others as numbers, and the assembly modes.
+# Sliders of the coordinates that can be moved, dependent coordinates, and assembly modes.
 
 
 _PART = 1000
 _THROTTLE = 0.03
-"""Seconds between two messages of a slider that is moved: some thirty pictures a second."""
+"""Time [s] between two messages of a moving slider: about thirty pictures per second."""
 _PAUSE = 0.2
-"""Seconds that a configuration stands before its assembly modes are looked for."""
+"""Time [s] that a configuration must remain unchanged before its assembly modes are computed."""
 
 
 @dataclass(slots=True)
@@ -36,7 +36,7 @@ class _Slider:
 
 
 class JointSliders:
-    """The joints under the picture."""
+    """Sliders of the joints below the picture."""
 
     def __init__(self, app: App) -> None:
         self._app = app
@@ -69,7 +69,7 @@ class JointSliders:
         self.rebuild()
 
     def clear(self) -> None:
-        """Take the joints away."""
+        """Remove all joints."""
         self._sliders, self._follow, self._modes, self._shape = [], {}, (), ()
         self._held = self._typed = None
         self._grid.clear()
@@ -78,7 +78,7 @@ class JointSliders:
         self._kind.set_text("")
 
     def rebuild(self) -> None:
-        """Make the sliders of the present mechanism, unless they are those already."""
+        """Create the sliders of the present mechanism, unless they already exist."""
         system = self._app.session.system
         found = () if system is None else handles(system)
         names = () if system is None else tuple(c.name for c in system.coordinates)
@@ -100,7 +100,7 @@ class JointSliders:
         )
 
     async def refresh(self) -> None:
-        """Show the present configuration, except on what its user moves."""
+        """Show the present configuration, except in the slider or field that the user edits."""
         system, q = self._app.session.system, self._app.q
         if system is None or len(q) != system.nq:
             return
@@ -126,7 +126,7 @@ class JointSliders:
             return
         found = await self._app.aside(assembly_modes, system, q)
         if (system, q) != (self._app.session.system, self._app.q):
-            return  # moved meanwhile; the next refresh is on its way
+            return  # the configuration changed meanwhile; the next refresh is pending
         if isinstance(found, str):
             self._modes = ()
             self._mode.set_visibility(False)
@@ -134,7 +134,7 @@ class JointSliders:
             return
         self._modes = found
         now = self._shown_mode = mode_of(found, q)
-        # modes of loops that are solved together have no labels
+        # modes of loops that are solved together do not have labels
         others = [
             f"number {k + 1}" if len(found) > 1 else "the only one" for k in range(len(found))
         ]
@@ -164,7 +164,7 @@ class JointSliders:
         return made
 
     def _type(self, handle: Handle | None) -> None:
-        """Remember in which field somebody types, so that nothing is written over it."""
+        """Record the field in which the user types, so that it is not overwritten."""
         self._typed = handle
 
     async def _slid(self, handle: Handle, event: events.GenericEventArguments) -> None:
@@ -216,7 +216,7 @@ _CAMERAS: Mapping[str, str] = MappingProxyType(
 
 
 class PicturePanel:
-    """The right half of the app."""
+    """Right half of the app: the picture and the joints."""
 
     def __init__(self, app: App) -> None:
         self._app = app
@@ -233,7 +233,7 @@ class PicturePanel:
         self.refresh()
 
     def refresh(self) -> None:
-        """Say when the picture is not that of the table."""
+        """Show a note if the picture does not correspond to the tables."""
         session = self._app.session
         for paint in self._paints:
             paint()
@@ -262,7 +262,7 @@ class PicturePanel:
             chip.on("click", self._app.screenshot)
 
     def _is_shown(self, role: str, usual: bool) -> bool:
-        """As somebody switched it, else as the scene has it."""
+        """Return whether a kind of elements is visible: as the user set it, else by default."""
         session = self._app.session
         covered = session.system is not None and bool(session.system.shapes) and role in COVERED
         return session.shown.get(role, usual and not covered)

@@ -1,4 +1,4 @@
-"""The server of the app: on this machine only, for browsers of this machine only."""
+"""Server of the app: on this computer only, for browsers on this computer only."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 HOST = "127.0.0.1"
 _PATIENCE = 60.0
-"""Seconds that a page may be without connection, on a busy machine, before it is loaded anew."""
+"""Time [s] that a page may lose its connection, on a busy computer, before it is reloaded."""
 
 _DAY = 86400.0
-"""Seconds that the robot of a closed tab is kept."""
+"""Time [s] for which the session of a closed tab is kept: one day."""
 
 _NAMES = ("127.0.0.1", "localhost", "[::1]")
 
@@ -31,22 +31,22 @@ def serve(
     gravity: str = "",
     mount: Sequence[str] = (),
 ) -> None:
-    """Show the app in a browser until the process is interrupted.
+    """Serve the app and show it in a browser until the process is interrupted.
 
-    The server listens on the loopback address and answers requests that name it so; anything
-    else is refused, so that pages of other sites cannot reach it under a name of their own.
+    The server listens on the loopback address. Requests with other host names or origins are
+    rejected, so that pages of other sites cannot access the server.
 
-    Its address is printed as soon as it answers.
+    The address is printed as soon as the server is ready.
 
     Args:
-        port: a free one when left out.
-        robot: a name of the catalogue, or a file, that new visitors find; the RX90 when left out.
-        open_browser: whether to open the browser of this machine at the page.
-        gravity: of that robot in the world, "X,Y,Z" [m/s^2]; its own if empty.
-        mount: steps of the mount of that robot, such as "x=pi" and "position=0,0,2.5".
+        port: port number. Default: a free port.
+        robot: name in the catalogue, or file, with which new visitors start. Default: the RX90.
+        open_browser: whether to open the page in the browser of this computer.
+        gravity: gravity of this robot in the world, "X,Y,Z" [m/s^2]; empty for its own.
+        mount: steps of the mount of this robot, such as "x=pi" and "position=0,0,2.5".
 
     Raises:
-        MbsError: NiceGUI is not installed, the robot cannot be read, or the port is taken.
+        MbsError: NiceGUI is not installed, the robot cannot be read, or the port is in use.
     """
     require_nicegui()
     from nicegui import app, ui
@@ -79,13 +79,13 @@ def serve(
 
 
 class Guard:
-    """Refuses requests for another host than this machine, or from pages of another one."""
+    """Middleware that rejects requests to other host names or from pages of other sites."""
 
     def __init__(self, app: Any) -> None:
         self._app = app
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
-        """Hand the request on, or answer 403."""
+        """Pass the request to the app, or answer 403."""
         if scope["type"] not in ("http", "websocket") or is_local(scope["headers"]):
             await self._app(scope, receive, send)
         elif scope["type"] == "websocket":
@@ -98,7 +98,7 @@ class Guard:
 
 
 def is_local(headers: Iterable[tuple[bytes, bytes]]) -> bool:
-    """Whether host and origin of a request are this machine."""
+    """Return whether host and origin of a request are this computer."""
     found = {name.lower(): value.decode("latin-1") for name, value in headers}
     origin = found.get(b"origin")
     host = _host(found.get(b"host", ""))
@@ -106,21 +106,21 @@ def is_local(headers: Iterable[tuple[bytes, bytes]]) -> bool:
 
 
 def _host(text: str) -> str:
-    """The name in name:port."""
+    """Return the name in "name:port", in lower case."""
     name, colon, port = text.rpartition(":")
     return name.lower() if colon and port.isdecimal() else text.lower()
 
 
 def robot_document(robot: str, gravity: str = "", mount: Sequence[str] = ()) -> Document:
-    """The document of a robot by its name in the catalogue, or in a file.
+    """Return the document of a robot from the catalogue or a file.
 
     Args:
         robot: name or path.
-        gravity: "X,Y,Z" in place of the gravity of the robot [m/s^2].
-        mount: steps of its mount.
+        gravity: "X,Y,Z" [m/s^2] instead of the gravity of the robot; empty to keep it.
+        mount: steps of the mount of the robot.
 
     Raises:
-        MbsError: there is no such robot, it is malformed, or the gravity or the mount is none.
+        MbsError: the robot does not exist or is malformed, or gravity or mount is invalid.
     """
     from mbs.app.tasks.mounting import mounting_of
     from mbs.app.web.document.tables import GRAVITY_ROWS, MOUNT_ROW, Cell
@@ -151,10 +151,10 @@ def _document(robot: str) -> Document:
 
 
 def free_port(port: int | None) -> int:
-    """The port, or a free one.
+    """Return the port, or a free port if it is None.
 
     Raises:
-        MbsError: it is no port, or taken.
+        MbsError: the port number is invalid, or the port is in use.
     """
     if port is not None and not 0 < port < 65536:
         raise MbsError(f"port {quoted(port)}: a port is a number from 1 to 65535; give another one")
@@ -170,10 +170,10 @@ def free_port(port: int | None) -> int:
 
 
 def require_nicegui() -> None:
-    """Refuse to go on without NiceGUI.
+    """Raise if NiceGUI is not installed.
 
     Raises:
-        MbsError: it is not installed.
+        MbsError: NiceGUI is not installed.
     """
     try:
         import nicegui  # noqa: F401

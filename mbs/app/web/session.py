@@ -1,4 +1,4 @@
-"""What one visitor has in the app: the robot, its history, and the configuration it stands in."""
+"""State of a visitor of the app: the robot, its history and its present configuration."""
 
 from __future__ import annotations
 
@@ -20,28 +20,29 @@ from mbs.loops import Mode, modes
 from mbs.loops.closing import Closing, closure_parameters, follow_configuration
 from mbs.loops.function import independent_names
 
-# Configurations of the picture: joints that can be moved by hand, the others following.
+# Configurations of the picture: coordinates that the user moves, and the dependent coordinates.
 
 
 Vector = tuple[float, ...]
 
 _FULL_TURN = math.pi
 _SAME = 1e-6
-"""Difference of positions [rad or m] below which two configurations are one, and length of a part
-of a quaternion that has no direction: sliders move in steps a thousand times as large."""
+"""Difference of positions [rad or m] below which two configurations are equal, and length of a
+partial quaternion below which it has no direction. The steps of sliders are a thousand times as
+large."""
 _MOST_MODES = 64
 
 
 @dataclass(frozen=True, slots=True)
 class Handle:
-    """A coordinate that can be moved by hand.
+    """Coordinate that the user can move by a slider.
 
     Attributes:
-        name: of the coordinate.
-        index: in q.
-        unit: rad, m, or 1 for the parts of a quaternion.
-        low, high: ends of its slider.
-        limited: whether they are limits of the joint.
+        name: name of the coordinate.
+        index: index in q.
+        unit: rad, m, or 1 for the elements of a quaternion.
+        low, high: ends of the slider.
+        limited: whether the ends are limits of the joint.
     """
 
     name: str
@@ -53,7 +54,7 @@ class Handle:
 
 
 def handles(system: System) -> tuple[Handle, ...]:
-    """The coordinates that can be moved: all of an open chain, the independent ones of loops."""
+    """Return the coordinates that can be moved: all of an open chain, or the independent ones."""
     chosen = set(independent_names(system)) if system.is_closed else None
     reach = _reach(system)
     return tuple(
@@ -73,7 +74,7 @@ def _handle(system: System, index: int, reach: float) -> Handle:
 
 
 def _reach(system: System) -> float:
-    """A length of the size of the mechanism [m], 1 where nothing tells it."""
+    """Return the approximate size of the mechanism [m]; 1 if it is unknown."""
     lengths = [
         abs(value)
         for link in system.links
@@ -87,16 +88,16 @@ def _number(value: object) -> float:
 
 
 def moved(system: System, q: Sequence[float], index: int, value: float) -> Vector:
-    """The configuration with one coordinate elsewhere and the loops closed near the old one.
+    """Return the configuration with one coordinate changed and the loops closed nearby.
 
     Args:
         system: the mechanism.
         q: (nq,) present configuration [rad or m].
-        index: of the coordinate in q.
-        value: where it is to be.
+        index: index of the coordinate in q.
+        value: new value of the coordinate.
 
     Raises:
-        LoopError: the loops cannot be closed there.
+        LoopError: the loops cannot be closed with this value.
     """
     target = list(q)
     target[index] = value
@@ -122,7 +123,7 @@ def _held(system: System) -> tuple[int, ...]:
 
 
 def _unit(system: System, q: list[float], index: int) -> Vector:
-    """The configuration with quaternions of unit length, the moved part kept if it can be."""
+    """Normalise the quaternions of a configuration, keeping the moved element if possible."""
     for part in quaternion_slices(system.tree):
         values = np.array(q[part])
         if part.start <= index < part.stop:
@@ -133,7 +134,7 @@ def _unit(system: System, q: list[float], index: int) -> Vector:
 
 
 def _with_part(values: NDArray[np.float64], kept: int) -> NDArray[np.float64]:
-    """The quaternion whose other parts are scaled so that its length is one."""
+    """Return the unit quaternion with one element kept and the other elements scaled."""
     values = values.copy()
     values[kept] = min(max(values[kept], -1.0), 1.0)
     others = [k for k in range(4) if k != kept]
@@ -145,9 +146,9 @@ def _with_part(values: NDArray[np.float64], kept: int) -> NDArray[np.float64]:
 
 
 def carried(old: System | None, q: Sequence[float], new: System) -> Vector:
-    """The configuration of a changed mechanism nearest to that of the old one.
+    """Return the configuration of a changed mechanism that is nearest to the present one.
 
-    It is the assembled one where the mechanism is another, or cannot be closed there.
+    It is the assembled configuration if the coordinates differ or the loops cannot be closed.
     """
     names = [c.name for c in new.coordinates]
     if old is None or [c.name for c in old.coordinates] != names:
@@ -159,10 +160,10 @@ def carried(old: System | None, q: Sequence[float], new: System) -> Vector:
 
 
 def assembly_modes(system: System, q: Sequence[float]) -> tuple[Mode, ...] | str:
-    """Every way to assemble the mechanism with its independent joints as in q.
+    """Find all assembly modes of the mechanism with its independent joints as in q.
 
     Returns:
-        the modes, or a sentence why they are not known.
+        the modes, or a text that explains why they are not known.
     """
     if not system.is_closed:
         return ()
@@ -179,7 +180,7 @@ def assembly_modes(system: System, q: Sequence[float]) -> tuple[Mode, ...] | str
 
 
 def mode_of(found: Sequence[Mode], q: Sequence[float]) -> int | None:
-    """The number of the mode that a configuration is in, angles being alike after a whole turn."""
+    """Return the index of the mode of a configuration, angles modulo 2 pi; None if not found."""
     for k, mode in enumerate(found):
         apart = np.subtract(mode.q, q)
         turned = np.abs((apart + math.pi) % (2 * math.pi) - math.pi)
@@ -193,20 +194,20 @@ _LONGEST_HISTORY = 200
 
 @dataclass(slots=True)
 class Session:
-    """The state of one browser tab, in the memory of the server only.
+    """State of a browser tab, kept in the memory of the server only.
 
     Attributes:
-        document: as typed last, perhaps with mistakes.
-        good: the last document that could be assembled.
-        system: of `good`; None until the first is assembled.
-        tables: what of `good` is shown in the grids.
+        document: description as last typed, possibly with errors.
+        good: last description that could be assembled.
+        system: system of `good`; None until the first assembly.
+        tables: tables of `good` as displayed in the grids.
         q: (nq,) present configuration of `system` [rad or m].
-        refusal: why `document` could not be assembled, "" if it could.
-        robot: number of the opened robot. Edits of a robot keep it.
-        past: documents before the present one with the numbers of their robots, the oldest first.
-        future: documents that were undone, with the same numbers, the next one last.
-        shown: roles of the picture that were switched, by name.
-        notes: what panels keep for a reload, by names of their own.
+        refusal: reason why `document` could not be assembled; "" if it could.
+        robot: number of the opened robot; edits do not change it.
+        past: previous documents with the numbers of their robots, oldest first.
+        future: undone documents with the numbers of their robots, the next one last.
+        shown: visibility of kinds of picture elements that the user switched, by name.
+        notes: state that panels keep for a reload, by their own names.
     """
 
     document: Document
@@ -222,7 +223,7 @@ class Session:
     notes: dict[str, object] = field(default_factory=dict)
 
     def doubled(self) -> Session:
-        """The same in another tab: what is changed there stays as it is here."""
+        """Return an independent copy for another tab."""
         return replace(
             self,
             past=list(self.past),
@@ -232,14 +233,14 @@ class Session:
         )
 
     def change(self, document: Document) -> None:
-        """Put another document in the place of the present one, which can be had back."""
+        """Replace the present document, which can be restored by undo."""
         if document == self.document:
             return
         self._keep()
         self.document = document
 
     def open(self, document: Document) -> None:
-        """Put another robot in the place of the present one, which can be had back.
+        """Replace the present robot, which can be restored by undo.
 
         The new robot starts in the configuration of its own description.
         """
@@ -247,20 +248,20 @@ class Session:
         self._enter(document, max([self.robot, *(robot for _, robot in self.past)]) + 1)
 
     def _keep(self) -> None:
-        """Remember the present document."""
+        """Add the present document to the history."""
         self.past.append((self.document, self.robot))
         del self.past[:-_LONGEST_HISTORY]
         self.future.clear()
 
     def _enter(self, document: Document, robot: int) -> None:
-        """Take a document; of another robot nothing is carried over."""
+        """Set the document. The state is reset if the document has another robot number."""
         self.document = document
         if robot != self.robot:
             self.robot, self.good, self.system, self.tables = robot, None, None, None
             self.q, self.refusal = (), ""
 
     def undo(self) -> bool:
-        """Take back the last change; whether there was one."""
+        """Undo the last change; return whether there was one."""
         if not self.past:
             return False
         self.future.append((self.document, self.robot))
@@ -268,7 +269,7 @@ class Session:
         return True
 
     def redo(self) -> bool:
-        """Make the last change that was taken back again; whether there was one."""
+        """Redo the last change that was undone; return whether there was one."""
         if not self.future:
             return False
         self.past.append((self.document, self.robot))
@@ -276,21 +277,21 @@ class Session:
         return True
 
     def settle(self, document: Document, q: Vector) -> None:
-        """Take an assembled document as the one that is shown, in the configuration q (nq,)."""
+        """Set the assembled document to show, in the configuration q (nq,)."""
         self.good, self.system, self.tables = document, document.system(), document.shown()
         self.q, self.refusal = q, ""
 
     @property
     def shown_tables(self) -> Tables:
-        """What the grids show: the cells as typed, or the links of a composed mechanism."""
+        """Tables to display: the cells as typed, or the links of an assembled mechanism."""
         known = self.tables is not None and self.document == self.good
         return self.tables if known and self.tables is not None else self.document.tables
 
     def require_system(self) -> System:
-        """The system of the document as typed.
+        """Return the system of the document as typed.
 
         Raises:
-            MbsError: a cell is wrong, or the mechanism cannot be assembled; the sentence says why.
+            MbsError: a cell has an error, or the mechanism cannot be assembled.
         """
         if self.document == self.good and self.system is not None:
             return self.system

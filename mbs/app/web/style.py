@@ -1,4 +1,4 @@
-"""The look of the app, and the scripts that its page loads from this server."""
+"""Styles of the app, and the scripts that its page loads from this server."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mbs.view import assets_folder
 from mbs.view.page import SCRIPTS
 
 VIEW = "app-canvas"
-"""The id of the element that the picture is drawn in."""
+"""HTML id of the element that contains the picture."""
 
 _ASSETS = Path(__file__).parent / "assets"
 _APP, _PICTURE = f"/app/{__version__}", f"/view/{__version__}"
@@ -19,13 +19,13 @@ _AGE = 3600
 
 
 def serve_assets() -> None:
-    """Let the server hand out the scripts and styles of the app."""
+    """Make the server provide the scripts and styles of the app."""
     app.add_static_files(_APP, _ASSETS, max_cache_age=_AGE)
     app.add_static_files(_PICTURE, assets_folder(), max_cache_age=_AGE)
 
 
 def add_head() -> None:
-    """Name scripts and styles in the head of the page."""
+    """Add scripts and styles to the head of the page."""
     lines = [
         f'<link rel="stylesheet" href="{_PICTURE}/viewer.css">',
         f'<link rel="stylesheet" href="{_APP}/app.css">',

@@ -1,4 +1,4 @@
-"""The robot as tables: a grid of texts for each sheet, wrong cells red with their sentence."""
+"""The robot as tables: a grid of texts per table; cells with errors are red with a tooltip."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mbs.app.web.document.document import Document
 from mbs.app.web.document.tables import CHOICES, COLUMNS, GENERAL_ROWS, Cell, CellProblem, Tables
 from mbs.errors import MbsError
 
-# Columns of the grids: titles, widths, and what their cells mean.
+# Columns of the grids: titles, widths, and meanings of the cells.
 
 
 SHEETS: Mapping[str, str] = MappingProxyType(
@@ -25,7 +25,7 @@ SHEETS: Mapping[str, str] = MappingProxyType(
         "general": "General",
     }
 )
-"""Sheets and their titles."""
+"""Titles of the tables."""
 
 _TITLES: Mapping[str, str] = MappingProxyType(
     {
@@ -95,11 +95,11 @@ _TOOLTIP = "(p) => (p.data && p.data.bad && p.data.bad[p.colDef.field]) || null"
 
 
 def columns(sheet: str, *, removable: bool) -> list[dict[str, Any]]:
-    """The column definitions of a sheet's grid.
+    """Return the column definitions of the grid of a table.
 
     Args:
-        sheet: which.
-        removable: whether rows can be taken out.
+        sheet: name of the table.
+        removable: whether rows can be removed.
     """
     first = {"geometry": "frame", "inertia": "body", "loops": "loop"}.get(sheet, "name")
     lead = {
@@ -155,7 +155,7 @@ def _meaning(sheet: str, name: str) -> str:
 def rows(
     tables: Tables, symbols: tuple[str, ...], sheet: str, problems: tuple[CellProblem, ...]
 ) -> list[dict[str, Any]]:
-    """The rows of a sheet's grid, with the sentences of their wrong cells."""
+    """Return the rows of the grid of a table, with the error messages of their cells."""
     made = []
     for k, row in enumerate(_texts(tables, symbols, sheet)):
         bad = {p.column: p.sentence for p in problems if p.sheet == sheet and p.row == k}
@@ -188,7 +188,7 @@ _ROW_ID = "(p) => String(p.data.id)"
 
 
 class TablePanel:
-    """The left half of the app."""
+    """Left half of the app: the tables of the robot."""
 
     def __init__(self, app: App) -> None:
         self._app = app
@@ -216,7 +216,7 @@ class TablePanel:
         self.refresh()
 
     def select(self, sheet: str) -> None:
-        """Show a sheet; its grid is made the first time."""
+        """Show a table; its grid is created at the first call."""
         self._sheet = sheet
         self._app.session.notes["sheet"] = sheet
         for name, tab in self._tabs.items():
@@ -228,7 +228,7 @@ class TablePanel:
                 self._row_bar(sheet)
 
     def refresh(self) -> None:
-        """Show the document as it is, and what is wrong in it."""
+        """Show the present document and its errors."""
         document = self._app.document
         problems = document.problems
         for sheet, grid in self._grids.items():
@@ -248,7 +248,7 @@ class TablePanel:
             self._rebuild()
 
     def _rebuild(self) -> None:
-        """Make the grids anew, for cells that can or cannot be changed."""
+        """Create the grids again, because their cells became editable or read-only."""
         for sheet in self._grids:
             self._panes[sheet].clear()
         self._grids.clear()

@@ -1,6 +1,6 @@
-"""One equation of type 2, or linear, left when other unknowns are eliminated by linear rows.
+"""Steps of type 2 from several linear equations, with other unknowns eliminated.
 
-From k + 1 equations linear in k columns of other unknowns the determinant is free of these.
+For k + 1 equations that are linear in k columns of other unknowns, the determinant is free of them.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _ROWS = 8
 
 
 def eliminated(stage: PaulStage) -> Iterator[Candidate]:
-    """Steps of type 2 from several linear equations."""
+    """Yield steps of type 2 from several linear equations."""
     rows = [equation for equation in stage.equations if equation.linear]
     for variables in dict.fromkeys(e.variables for e in rows if len(e.variables) > 1):
         inside = sorted(
@@ -64,7 +64,7 @@ def _of(
         def build(chosen: tuple[Equation, ...] = chosen) -> SequenceStep:
             return _built(stage, chosen, variable, others)
 
-        # after the equations in one unknown, 4 and 5, and before the pairs of equations, 6
+        # rank between equations in one unknown (4, 5) and pairs of equations (6)
         order = 5.5 if variable.single else 5.7
         yield Candidate((order, unsteady(size), cost), (variable,), build)
 
@@ -74,7 +74,7 @@ def _stack(rows: tuple[Equation, ...], variables: Variables) -> Matrix:
 
 
 def _minors(K: Matrix) -> Matrix:
-    """(samples, k + 1) cofactors of a column beside K."""
+    """Return the cofactors (samples, k + 1) of a column next to K."""
     count = K.shape[-2]
     values = [(-1) ** row * np.linalg.det(np.delete(K, row, axis=-2)) for row in range(count)]
     return np.stack(values, axis=-1)

@@ -1,4 +1,4 @@
-"""Equations of a split loop that have few unknowns, by their terms."""
+"""Equations of a split loop with few unknowns, sorted into terms of the joint positions."""
 
 from __future__ import annotations
 
@@ -31,23 +31,23 @@ from mbs.recursions.chain import Ring
 Key = tuple[int, ...]
 
 PRODUCTS = 2
-"""The most variables of an equation with products of them."""
+"""Largest number of variables in an equation with products of variables."""
 
 _ALIKE = 2
-"""How many equations are kept that are multiples of each other: which of them is cheapest is seen
-once steps are built of them."""
+"""Number of equations kept among multiples of each other: the cheapest one is known only after the
+construction of steps."""
 
 _WEIGHT = (0, 3, 2, 2, 2, 2, 1, 1, 1, 4, 4, 4, 6, 6, 6)
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A term of the joints.
+    """Product of powers of joint positions from which part of an equation originates.
 
     Attributes:
-        term: number of each joint and its power, of an angle the multiple.
-        known: number of each known sum that is taken out of it, and its multiple.
-        conjugate: whether what is left of the angles stands with the opposite sign.
+        term: joint indices and their powers; for angles, the multiple m of e^(i m q).
+        known: index of each known sum that is removed from the term, and its multiple.
+        conjugate: whether the remaining angles have the opposite sign.
     """
 
     term: Members
@@ -57,12 +57,11 @@ class Source:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """What stands with one product of variables.
+    """Coefficient of one product of variables in an equation.
 
     Attributes:
-        values: (samples) G of Re(G e^i(angle)) times the prismatic joints; real where there is no
-            angle.
-        sources: what it is the sum of.
+        values: (samples,) G in Re(G e^i(angle)) times prismatic joints; real without an angle.
+        sources: terms of joints whose sum it is.
     """
 
     values: Values
@@ -71,15 +70,15 @@ class Part:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Equation:
-    """The sum of the parts is zero.
+    """Equation: the sum of its parts is zero.
 
     Attributes:
-        row: where it comes from.
-        variables: its unknowns.
-        parts: by the power of each variable, of angles the multiple; none stands twice, as its
-            conjugate.
-        patterns: every term of joints in it.
-        cost: of its coefficients, by estimate.
+        row: frames and element of w from which the equation originates.
+        variables: unknowns.
+        parts: coefficients by the powers of the variables, for angles the multiples. A key and its
+            conjugate do not both appear.
+        patterns: all terms of joints in the equation.
+        cost: estimated cost of the coefficients.
     """
 
     row: SplitRow
@@ -90,21 +89,22 @@ class Equation:
 
     @property
     def linear(self) -> bool:
-        """Whether it is one in the cosines, the sines and the lengths of its variables."""
+        """Whether the equation is linear in cosines, sines and lengths of its variables."""
         return all(sum(abs(power) for power in key) <= 1 for key in self.parts)
 
     def at(self, key: Key) -> Values:
-        """The values of a part; zero where there is none."""
+        """Return the values of a coefficient; zero if the equation does not have it."""
         part = self.parts.get(key)
         return np.zeros(1, dtype=complex) if part is None else part.values
 
 
 def equations(knowledge: Knowledge, most: int = PRODUCTS) -> tuple[Equation, ...]:
-    """The equations of all splits with few unknowns, the cheapest of those that are equal.
+    """Return the equations of all splits with few unknowns, the two cheapest of equal equations.
 
     Args:
-        knowledge: what is known.
-        most: variables of an equation with products of them, before known sums are taken out.
+        knowledge: known joints and sums.
+        most: largest number of variables in an equation with products of variables, before known
+            sums are removed.
     """
     prismatic = frozenset(
         k for k, joint in enumerate(knowledge.ring.joints) if not joint.is_rotational
@@ -124,7 +124,7 @@ def equations(knowledge: Knowledge, most: int = PRODUCTS) -> tuple[Equation, ...
 
 
 def _mark(equation: Equation) -> object:
-    """The same for equations that are multiples of each other."""
+    """Return a hashable mark that is equal for equations that are multiples of each other."""
     keys = sorted(equation.parts)
     samples = max(len(part.values) for part in equation.parts.values())
     table = np.stack([np.broadcast_to(equation.parts[key].values, samples) for key in keys])
@@ -134,10 +134,10 @@ def _mark(equation: Equation) -> object:
 
 
 def _leading(table: Values) -> NDArray[np.float64]:
-    """At each sample a number that changes sign with the column and is not small."""
+    """Return a number per sample that changes sign with the column and is not small."""
     parts = np.concatenate([table.real, table.imag])
     largest = np.max(np.abs(parts), axis=0)
-    # no nearly zero number decides, and of equal ones but for rounding always the same one
+    # a value near zero must not decide; of values that are equal up to rounding, take the first
     first = np.argmax(np.abs(parts) > 0.3 * largest, axis=0)
     leading: NDArray[np.float64] = np.take_along_axis(parts, first[None], axis=0)[0]
     return leading
@@ -149,7 +149,7 @@ def _equation(
     prismatic: frozenset[int],
     sums: list[tuple[Members, NDArray[np.float64]]],
 ) -> Equation | None:
-    """The equation with its variables, if they are few."""
+    """Return the equation of some terms with its variables; None if they are too many."""
     reduced = dict[Members, tuple[Values, list[Source]]]()
     for term, given in terms.items():
         turns = any(k not in prismatic for k, _ in term)
@@ -181,7 +181,7 @@ def _fold(
     prismatic: frozenset[int],
     sums: list[tuple[Members, NDArray[np.float64]]],
 ) -> tuple[Members, Source, Values]:
-    """What is left of a term when the known sums of angles are taken out of it."""
+    """Remove the known sums of angles from a term; return the remaining term and its values."""
     rest, known = term, list[tuple[int, int]]()
     for number, (members, at) in enumerate(sums):
         powers = dict(rest)
@@ -202,7 +202,7 @@ def _fold(
 
 
 def _variables(terms: list[Members], prismatic: frozenset[int]) -> tuple[Variable, ...]:
-    """The joints, those put together whose angles always come with the same ratio."""
+    """Return the variables: joints, with joints merged whose angles have a constant ratio."""
     columns = dict[int, list[int]]()
     for number, term in enumerate(terms):
         for k, power in term:
@@ -225,17 +225,17 @@ def _key(term: Members, variables: tuple[Variable, ...]) -> Key:
     return tuple(powers.get(variable.members[0][0], 0) for variable in variables)
 
 
-# Coefficients of an equation of a split loop, as expressions of what is known.
+# Coefficients of an equation of a split loop, as expressions of known quantities.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RingMatrices:
-    """The gaps of a ring as (15, 15) matrices, see `represented`; `ring_matrices` alone makes them.
+    """Known transforms of a loop as (15, 15) matrices, see `represented`; from `ring_matrices`.
 
     Attributes:
-        on: from joint to joint.
-        back: in the other direction.
-        length: of the size of the loop [m].
+        on: matrices from joint to joint.
+        back: matrices in the opposite direction.
+        length: typical length of the loop [m].
     """
 
     on: tuple[SX, ...]
@@ -245,27 +245,27 @@ class RingMatrices:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Factor:
-    """X cos(angle) + Y sin(angle), or X alone where there is no angle."""
+    """Coefficients of X cos(angle) + Y sin(angle); X alone without an angle."""
 
     X: SX
     Y: SX
 
 
 def ring_matrices(ring: Ring) -> RingMatrices:
-    """The matrices of the gaps of a ring."""
+    """Return the matrices of the known transforms of a loop."""
     poses = [gap.pose for gap in ring.gaps]
     opposite = [gap.inverse().pose for gap in ring.gaps]
     on = tuple(map(represented_pose, poses, opposite))
     back = tuple(map(represented_pose, opposite, poses))
     squares = [SX(casadi.sumsqr(pose.p)) for pose in poses]
     numbers = [square for square in squares if square.is_constant() and float(square) > 0]
-    # 1e-30 m where all symbolic lengths are zero, so that nothing divides by zero
+    # 1e-30 m if all symbolic lengths are zero, to prevent division by zero
     length = casadi.sqrt(sum(numbers or squares, SX(0 if numbers else 1e-60)))
     return RingMatrices(on, back, SX(length))
 
 
 def factor(knowledge: Knowledge, matrices: RingMatrices, equation: Equation, key: Key) -> Factor:
-    """What stands with a product of the variables of an equation."""
+    """Return the coefficient of a product of the variables (key) of an equation, as expression."""
     total, part = Factor(SX(0), SX(0)), equation.parts.get(key)
     if part is None:
         return total
@@ -281,14 +281,14 @@ def factor(knowledge: Knowledge, matrices: RingMatrices, equation: Equation, key
 
 
 def _rotate(own: Factor, angle: SX, conjugate: bool) -> Factor:
-    """X and Y of G = X - i Y times e^i(angle), or of its conjugate."""
+    """Return X and Y of G = X - i Y times e^i(angle), or of its conjugate."""
     c, s = casadi.cos(angle), casadi.sin(angle)
     X, Y = own.X * c + own.Y * s, own.Y * c - own.X * s
     return Factor(SX(X), SX(-Y if conjugate else Y))
 
 
 def _own(knowledge: Knowledge, matrices: RingMatrices, equation: Equation, term: Members) -> Factor:
-    """X and Y of one product of powers of the joints."""
+    """Return X and Y of one product of powers of the joints."""
     joints = knowledge.ring.joints
     prismatic = {k: power for k, power in term if not joints[k].is_rotational}
     angles = [(k, sign) for k, sign in term if joints[k].is_rotational]
@@ -310,7 +310,7 @@ def _has_partner(
     angles: list[tuple[int, int]],
     term: Members,
 ) -> bool:
-    """Whether the same joints come together with other signs too."""
+    """Whether the equation has a term of the same joints with other signs."""
     pattern = {k for k, _ in angles} | set(prismatic)
     return any(
         other != term
@@ -326,7 +326,7 @@ def _mix(
     row: SplitRow,
     term: tuple[Mapping[int, int], list[tuple[int, int]]],
 ) -> Factor:
-    """G = X - i Y from all products of cosines and sines of the joints."""
+    """Return G = X - i Y from all products of cosines and sines of the joints of a term."""
     prismatic, angles = term
     X, Y = SX(0), SX(0)
     for choice in product((1, 2), repeat=len(angles)):
@@ -342,13 +342,13 @@ def _mix(
 def _coefficient(
     knowledge: Knowledge, matrices: RingMatrices, row: SplitRow, chosen: Mapping[int, int]
 ) -> SX:
-    """What stands with a product of the elementary functions of the joints.
+    """Return the coefficient of a product of elementary functions of the joints.
 
     Args:
-        knowledge: whose known joints are put in.
-        matrices: of the gaps.
-        row: of the equation.
-        chosen: number of the function of each joint of the product: see `joint_basis`.
+        knowledge: known joints, whose positions are inserted.
+        matrices: matrices of the known transforms.
+        row: frames and element of w of the equation.
+        chosen: index of the function of each joint in the product, see `joint_basis`.
     """
     total = SX(0)
     for direction in (1, -1):
@@ -359,7 +359,7 @@ def _coefficient(
 
 
 def _steps(row: SplitRow, n: int, direction: int) -> Iterator[tuple[str, int]]:
-    """The joints and the gaps between two frames, around the loop in one direction."""
+    """Yield joints and known transforms between two frames, around the loop in one direction."""
     point = row.start
     while point != row.end:
         at = point if direction > 0 else (point - 1) % (2 * n)
@@ -373,7 +373,7 @@ def _along(
     path: tuple[SplitRow, list[tuple[str, int]], int],
     chosen: Mapping[int, int],
 ) -> SX:
-    """The element of w at the end of a path."""
+    """Return the element of w at the end of a path."""
     row, steps, direction = path
     r = SX(1, SIZE)
     r[0, row.element] = 1
@@ -389,7 +389,7 @@ def _along(
 
 
 def _joint(knowledge: Knowledge, k: int, number: int, direction: int) -> SX:
-    """One of the factors of an unknown joint, or the whole of a known one."""
+    """Return one basis matrix of an unknown joint, or the matrix of a known joint."""
     joint = knowledge.ring.joints[k]
     sign = direction * joint.sign
     if k not in knowledge.known:
@@ -402,6 +402,6 @@ def _joint(knowledge: Knowledge, k: int, number: int, direction: int) -> SX:
 
 @cache
 def _sparse_basis(turns: bool, sign: int) -> tuple[SX, SX, SX]:
-    """The factors of a joint that moves with or against the direction."""
+    """Return the basis matrices of a joint that moves with or against the path."""
     one, first, second = (SX(casadi.sparsify(DM(matrix))) for matrix in joint_basis(not turns))
     return (one, first, sign * second) if turns else (one, sign * first, second)

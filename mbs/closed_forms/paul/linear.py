@@ -1,4 +1,4 @@
-"""Equations linear in lengths, cosines and sines, as many as there are of these: one root.
+"""Steps from equations linear in lengths, cosines and sines, one per unknown: a single root.
 
 Type 1 is X r = Y; type 3 is two equations X cos q + Y sin q = Z; more unknowns need more rows.
 
@@ -26,14 +26,14 @@ Matrix = NDArray[np.float64]
 Variables = tuple[Variable, ...]
 
 DEPENDENT = 1e-5
-"""Determinant at the samples below which rows count as dependent: coefficients are of about one,
-what rounding leaves of a zero is 1e-12 after closing, and a step by less would lose five digits."""
+"""Determinant at the samples below which rows are dependent: coefficients are of about one, a zero
+is 1e-12 after closing, and a step that divides by less would lose five digits."""
 _CHOICES = 8
 _ROWS = {1: 24, 2: 16, 3: 10, 4: 9, 5: 8, 6: 8}
 
 
 def linear(stage: PaulStage) -> Iterator[Candidate]:
-    """Steps that solve as many linear equations as there are columns."""
+    """Yield steps that solve as many linear equations as unknown columns."""
     rows = [equation for equation in stage.equations if equation.linear]
     for variables in dict.fromkeys(equation.variables for equation in rows):
         inside = [e for e in rows if set(e.variables) <= set(variables)]
@@ -50,14 +50,14 @@ def linear(stage: PaulStage) -> Iterator[Candidate]:
 
 
 def columns(variables: Variables) -> list[tuple[Variable, str]]:
-    """What the equations are linear in."""
+    """Return the columns of linear equations: length, or cosine and sine, of each variable."""
     return [
         (variable, kind) for variable in variables for kind in ("r" if variable.prismatic else "cs")
     ]
 
 
 def key_of(variable: Variable, equation: Equation) -> Key | None:
-    """The key of a variable alone in an equation; None where it does not stand in it."""
+    """Return the key of a variable alone in an equation; None if the equation has no such term."""
     if variable not in equation.variables:
         return None
     at = equation.variables.index(variable)
@@ -65,7 +65,7 @@ def key_of(variable: Variable, equation: Equation) -> Key | None:
 
 
 def row_values(equation: Equation, variables: Variables) -> Matrix:
-    """(samples, columns) of the coefficients."""
+    """Return the coefficients (samples, columns) of an equation."""
     values = []
     for variable, kind in columns(variables):
         key = key_of(variable, equation)
@@ -75,7 +75,7 @@ def row_values(equation: Equation, variables: Variables) -> Matrix:
 
 
 def row_factors(stage: PaulStage, equation: Equation, variables: Variables) -> list[SX]:
-    """The coefficients, then the constant."""
+    """Return the coefficients of an equation and its constant, as expressions."""
     factors = list[SX]()
     for variable in variables:
         key = key_of(variable, equation)
@@ -90,7 +90,7 @@ def row_factors(stage: PaulStage, equation: Equation, variables: Variables) -> l
 def _best(
     rows: list[Equation], variables: Variables
 ) -> list[tuple[tuple[Equation, ...], tuple[float, ...]]]:
-    """The rows to be solved: steady, cheap, well conditioned; the first few choices."""
+    """Return the best selections of rows: constant determinant, cheap, well conditioned."""
     width = len(columns(variables))
     first = sorted(rows, key=lambda e: e.cost)[: _ROWS.get(width, 0)]
     if len(first) < width:
@@ -112,7 +112,7 @@ def _best(
 
 
 def _built(stage: PaulStage, rows: tuple[Equation, ...], variables: Variables) -> SequenceStep:
-    """The step by Cramer's rule."""
+    """Return the step that solves the rows by Cramer's rule."""
     table = [row_factors(stage, row, variables) for row in rows]
     A = casadi.vertcat(*(casadi.horzcat(*row[:-1]) for row in table))
     b = casadi.vertcat(*(-row[-1] for row in table))
@@ -141,7 +141,7 @@ def _kind(variables: Variables) -> str:
 
 
 def _cramer(A: SX, b: SX) -> tuple[SX, list[SX]]:
-    """The determinant, and the solutions times it."""
+    """Return the determinant of A, and the solutions of A x = b times the determinant."""
     n = A.shape[0]
     numerators = []
     for k in range(n):

@@ -1,4 +1,4 @@
-"""One equation in one unknown: X cos q + Y sin q = Z, or a r^2 + b r + c = 0."""
+"""Steps from one equation in one unknown: X cos q + Y sin q = Z, or a r^2 + b r + c = 0."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from mbs.closed_forms.sequence import (
 )
 from mbs.numbers import NONZERO
 
-# Ways to go on at one stage of a search, and how they are told in text.
+# Candidates for the next step at one stage of a search, and their text.
 
 
 STEADY = 1e-9
 """Relative spread over the samples below which a quantity is constant: closing by iteration leaves
-1e-12 or so, and what depends on generic positions changes by about one."""
+1e-12, and a quantity that depends on generic positions changes by about one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PaulStage:
-    """What is known, and the equations in few unknowns that are left.
+    """Known quantities at one stage of a search, and the equations with few unknowns.
 
     Attributes:
-        knowledge: what is known.
-        matrices: of the gaps of the ring.
-        equations: that hold.
+        knowledge: known joints and sums.
+        matrices: matrices of the known transforms of the loop.
+        equations: equations that hold.
     """
 
     knowledge: Knowledge
@@ -45,15 +45,15 @@ class PaulStage:
     equations: tuple[Equation, ...]
 
     def factor(self, equation: Equation, key: Key) -> Factor:
-        """What stands with a product of the variables of an equation."""
+        """Return the coefficient of a product of the variables (key) of an equation."""
         return factor(self.knowledge, self.matrices, equation, key)
 
     def number(self, variable: Variable) -> str:
-        """What tells the coefficients of a variable from others."""
+        """Return the number in the names of the coefficients of a variable."""
         return str(self.knowledge.index(variable) + 1)
 
     def term(self, variable: Variable) -> str:
-        """The variable as an equation shows it."""
+        """Return the text of a variable in an equation."""
         if variable.single:
             return self.knowledge.name(variable)
         signed = [
@@ -65,12 +65,12 @@ class PaulStage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """A step that could be taken.
+    """Possible next step.
 
     Attributes:
-        rank: the lowest is taken first.
-        variables: that it gives.
-        build: of the step.
+        rank: sort key; the lowest is tried first.
+        variables: variables that the step solves.
+        build: callable that builds the step.
     """
 
     rank: tuple[float, ...]
@@ -79,20 +79,20 @@ class Candidate:
 
 
 def unsteady(values: NDArray[np.float64]) -> float:
-    """0 where a quantity is the same at all samples, else 1."""
+    """Return 0 if a quantity is constant over the samples, else 1."""
     spread = float(np.max(values) - np.min(values))
     return float(spread > STEADY * float(np.max(np.abs(values))))
 
 
 def divided(numerator: SX, denominator: SX) -> SX:
-    """The ratio; finite where the denominator is zero."""
+    """Return the ratio; finite for a zero denominator."""
     if denominator.is_constant():
         return SX(numerator / denominator)
     return SX(numerator * denominator / (denominator * denominator + NONZERO))
 
 
 def one_unknown(stage: PaulStage) -> Iterator[Candidate]:
-    """Steps of type 2 and quadratic ones."""
+    """Yield steps of type 2 and quadratic steps, from one equation in one unknown."""
     for equation in stage.equations:
         if len(equation.variables) != 1:
             continue
@@ -104,7 +104,7 @@ def one_unknown(stage: PaulStage) -> Iterator[Candidate]:
 
 def _type_2(stage: PaulStage, equation: Equation) -> Candidate:
     G, Z = equation.at((1,)), equation.at((0,))
-    # after the linear equations, 1 to 3; single joints before sums
+    # rank 4 or 5: after the linear equations (1 to 3), single joints before sums
     order = 4.0 if equation.variables[0].single else 5.0
     shifted = float(np.max(np.abs(Z)) > ZERO)
     rank = (order, shifted, unsteady(np.abs(G)), float(equation.cost), -float(np.min(np.abs(G))))
@@ -124,7 +124,7 @@ def angle_step(
     power: int,
     kind: str = "type 2",
 ) -> SequenceStep:
-    """The step that solves X cos q + Y sin q = Z, of which the unit is a power of a length."""
+    """Return the step of X cos q + Y sin q = Z, whose unit is the given power of a length."""
     X, Y, Z = XYZ
     number, shown = stage.number(variable), stage.term(variable)
     names = {f"X{number}": X, f"Y{number}": Y, f"Z{number}": Z}
@@ -144,7 +144,7 @@ def angle_step(
 
 
 def _roots(index: int, XYZ: tuple[SX, SX, SX], sign: SX, scale: SX) -> Found:
-    """Both roots; where Z is zero they are opposite, and always real."""
+    """Return the roots of X cos q + Y sin q = Z; for Z = 0 they are opposite and always real."""
     X, Y, Z = XYZ
     if not Z.is_zero():
         root = cosine_root(X, Y, Z, sign, scale)
@@ -169,7 +169,7 @@ def _quadratic(stage: PaulStage, equation: Equation) -> Candidate:
 def length_step(
     stage: PaulStage, variable: Variable, abc: list[SX], kind: str = "quadratic"
 ) -> SequenceStep:
-    """The step that solves a r^2 + b r + c = 0."""
+    """Return the step that solves a r^2 + b r + c = 0."""
     a, b, c = abc
     number, shown = stage.number(variable), stage.term(variable)
     middle = divided(b, 2 * a)

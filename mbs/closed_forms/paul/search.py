@@ -1,4 +1,4 @@
-"""Paul's method as a search: at every stage the simplest equation that some split offers."""
+"""Paul's method as a search: at each stage, the simplest equation of all splits is solved."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from mbs.errors import NoClosedForm
 from mbs.recursions.chain import Gap, Ring
 from mbs.spatial import Pose, vector
 
-# The last angle of a sum that is known.
+# Last unknown angle of a known sum.
 
 
 def sums(stage: PaulStage) -> Iterator[Candidate]:
-    """Steps that take known angles away from a known sum, or one sum away from another."""
+    """Yield steps that subtract known angles, or another known sum, from a known sum."""
     for rest, value, text in _alone(stage):
 
         def build(rest: Variable = rest, value: SX = value, text: str = text) -> SequenceStep:
@@ -38,7 +38,7 @@ def sums(stage: PaulStage) -> Iterator[Candidate]:
 
 
 def _alone(stage: PaulStage) -> Iterator[tuple[Variable, SX, str]]:
-    """Single angles, their values, and the equation."""
+    """Yield each single angle that known sums determine, its value, and the equation."""
     knowledge = stage.knowledge
     opened = [
         (rest, value, f"{stage.term(whole)} = {knowledge.problem.x[index]}")
@@ -71,18 +71,18 @@ def _unit(total: dict[int, int]) -> bool:
     return all(abs(sign) <= 1 for sign in total.values())
 
 
-# The frames of a loop put where neighbouring axes are nearest to each other.
+# Frame origins of a loop where neighbouring axes are nearest to each other.
 #
-# Points where axes meet are then origins of frames, however the loop was described.
+# Intersections of axes are then frame origins, for any description of the loop.
 #
-# Source: Khalil & Kleinfinger 1986, whose frames have their origins so.
+# Source: Khalil & Kleinfinger 1986, whose frames have these origins.
 
 
 def at_feet(problem: Problem) -> Ring:
-    """The loop of a problem, the frame of each turning joint moved along its axis.
+    """Return the loop of a problem, with the frame of each rotational joint moved along its axis.
 
-    The foot of the common normal with the axis that follows becomes the origin, where that gap is
-    not the first one of the loop, through the known pose.
+    The new origin is the foot of the common normal with the next axis. The first transform of the
+    loop, which contains the known pose, is not used for this.
     """
     ring = problem.ring
     for k in range(len(ring.joints) - 1):
@@ -93,7 +93,7 @@ def at_feet(problem: Problem) -> Ring:
 
 
 def _moved(problem: Problem, ring: Ring, k: int) -> Ring:
-    """The loop with the origin of joint k at the foot of the normal to the next axis."""
+    """Return the loop with the origin of joint k at the foot of the normal to the next axis."""
     pose = ring.gaps[k + 1].pose
     axis, cosine = pose.R[:, 2], pose.R[2, 2]
     sine2 = axis[0] ** 2 + axis[1] ** 2
@@ -115,23 +115,23 @@ _SIMPLE = (Motion.REVOLUTE, Motion.PRISMATIC)
 
 
 def paul(problem: Problem) -> StepSequence:
-    """The joints of a loop, one after the other, by equations of few unknowns.
+    """Return a solution of a loop, joint by joint, from equations with few unknowns.
 
-    The loop is split in every way. Which equations hold, and what stands in them, is read off at
-    the samples; the cheapest one is then built in symbols, its joints are known from there on, and
-    the search begins again. Equations with one root come first, then those with two, with four.
+    All splits of the loop are considered. The samples show which equations hold and which terms
+    they have. The cheapest equation is built symbolically, its joints become known, and the search
+    starts again. Equations with one root come first, then those with two roots, then with four.
 
     Source: Paul 1981, section 3.7; Khalil & Dombre 2002, section 4.4.
 
     Args:
-        problem: the loop. Its symbols stay symbols.
+        problem: loop with its symbols, which are kept.
 
     Returns:
-        the steps. Every configuration that closes the loop is among its leaves, some of which may
-        not close it.
+        Steps. All configurations that close the loop are among its leaves. Some of
+        the leaves may not close it.
 
     Raises:
-        NoClosedForm: no equation known here gives the joints that are left; names them.
+        NoClosedForm: no supported equation solves the remaining joints. The message names them.
     """
     _require_simple(problem)
     knowledge = beginning(problem, at_feet(problem))
@@ -152,7 +152,7 @@ def paul(problem: Problem) -> StepSequence:
 
 
 def _cheapest(stage: PaulStage) -> tuple[SequenceStep, tuple[Variable, ...]] | None:
-    """The step of the fewest operations among the first of the simplest kind."""
+    """Return the step with the fewest operations among the candidates of the lowest rank."""
     for kernels in _KERNELS:
         every = [
             candidate
@@ -178,7 +178,7 @@ def _require_simple(problem: Problem) -> None:
 
 
 def _refusal(stage: PaulStage, steps: Sequence[SequenceStep]) -> str:
-    """Which joints are left, and what the simplest equations in them are like."""
+    """Return text with the unsolved joints and the simplest equations that contain them."""
     knowledge = stage.knowledge
     left = ", ".join(knowledge.ring.joints[k].name for k in knowledge.unknown)
     given = ", ".join(name for step in steps for name in step.names)

@@ -1,8 +1,8 @@
-"""Every way to split a loop, in numbers: what one side is, seen from each frame of the other.
+"""All splits of a loop into two sides, evaluated numerically at the samples.
 
-Seen from the frame before or after joint i, a point and the axes of joint e are the same whether
-one walks there forwards or backwards: each pair of frames gives a set of equations, left = right,
-that no joint stands on both sides of.
+A point and the axes of joint e, relative to the frame before or after joint i, are the same on both
+paths around the loop. Each pair of frames therefore gives a set of equations, left = right, in
+which each joint appears on one side only.
 
 Source: Paul 1981, section 3.7; the invariants: Raghavan & Roth 1993, section 4.
 """
@@ -23,7 +23,7 @@ from mbs.closed_forms.sequence import ZERO, Problem
 from mbs.recursions.chain import Ring
 from mbs.spatial import Pose
 
-# What a search knows of a loop: joints, and sums of the angles of joints.
+# Known quantities of a search: joints, and sums of joint angles.
 
 
 Matrix = NDArray[np.float64]
@@ -32,11 +32,11 @@ Members = tuple[tuple[int, int], ...]
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A slide, an angle, or a sum of angles with signs.
+    """Unknown of an equation: a prismatic displacement, an angle, or a signed sum of angles.
 
     Attributes:
-        prismatic: whether it is the length of a prismatic joint.
-        members: number of each joint in the ring, and its sign; the first sign is +1.
+        prismatic: whether it is the displacement of a prismatic joint.
+        members: index of each joint in the loop chain, and its sign; the first sign is +1.
     """
 
     prismatic: bool
@@ -44,17 +44,17 @@ class Variable:
 
     @property
     def single(self) -> bool:
-        """Whether it is the variable of one joint."""
+        """Whether the variable is that of a single joint."""
         return len(self.members) == 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoopSamples:
-    """The loop in numbers, lengths divided by one of its own.
+    """Numeric samples of a loop, with lengths divided by a typical length of the loop.
 
     Attributes:
-        gaps: (samples, n, 4, 4) poses of the gaps.
-        q: (samples, n) positions of the joints, in the order of the ring.
+        gaps: (samples, n, 4, 4) poses of the known transforms.
+        q: (samples, n) positions of the joints, in the order of the loop chain.
     """
 
     gaps: Matrix
@@ -63,14 +63,14 @@ class LoopSamples:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Knowledge:
-    """What is known at one stage of the search.
+    """Known quantities at one stage of the search.
 
     Attributes:
-        problem: of the loop, whose joints stand in the order of `ring`.
-        ring: the loop, the origins of its frames where neighbouring axes are nearest.
-        samples: the same in numbers.
-        known: numbers of the known joints in the ring.
-        sums: known sums of angles, and their places in x.
+        problem: problem of the loop, with the joints in the order of `ring`.
+        ring: loop chain, with frame origins where neighbouring axes are nearest to each other.
+        samples: numeric values of the loop chain.
+        known: indices of the known joints in the loop chain.
+        sums: known sums of angles, and their indices in x.
     """
 
     problem: Problem
@@ -81,46 +81,46 @@ class Knowledge:
 
     @property
     def unknown(self) -> list[int]:
-        """Numbers of the unknown joints."""
+        """Indices of the unknown joints."""
         return [k for k in range(len(self.ring.joints)) if k not in self.known]
 
     def index(self, variable: Variable) -> int:
-        """The place of a variable in x; of a sum the next free one."""
+        """Return the index of a variable in x. A sum of angles gets the next free index."""
         if variable.single:
             index = self.ring.joints[variable.members[0][0]].index
             return -1 if index is None else index
         return self.problem.size + len(self.sums)
 
     def can_hold(self, variable: Variable) -> bool:
-        """Whether a variable is new, and there is a place for it."""
+        """Whether a variable is new, and x has a free index for it."""
         held = [known.members for known, _, _ in self.open_sums()]
         return variable.single or (
             variable.members not in held and self.index(variable) < self.problem.x.numel()
         )
 
     def name(self, variable: Variable) -> str:
-        """The name of a variable as an equation shows it."""
+        """Return the name of a variable in an equation."""
         if variable.single:
             return self.ring.joints[variable.members[0][0]].name
         return str(self.problem.x[self.index(variable)])
 
     def with_joint(self, variable: Variable) -> Knowledge:
-        """The same with one more variable."""
+        """Return a copy in which one more variable is known."""
         if variable.single:
             return replace(self, known=self.known | {variable.members[0][0]})
         return replace(self, sums=(*self.sums, (variable, self.index(variable))))
 
     def open_sums(self) -> list[tuple[Variable, SX, Matrix]]:
-        """Known sums of the unknown joints: expression, and values at the samples."""
+        """Return the unknown part of each known sum: variable, expression, values at samples."""
         return [_rest(self, *known) for known in self.sums]
 
     def position(self, k: int) -> SX:
-        """The symbol of joint number k."""
+        """Return the symbol of joint k."""
         return SX(self.problem.x[self.index(Variable(False, ((k, 1),)))])
 
 
 def _rest(knowledge: Knowledge, variable: Variable, index: int) -> tuple[Variable, SX, Matrix]:
-    """What is left of a sum when its known members are taken away."""
+    """Return a known sum without its known members: variable, expression, values at samples."""
     value = SX(knowledge.problem.x[index])
     members = [member for member in variable.members if member[0] not in knowledge.known]
     for k, sign in variable.members:
@@ -135,7 +135,7 @@ def _rest(knowledge: Knowledge, variable: Variable, index: int) -> tuple[Variabl
 
 
 def beginning(problem: Problem, ring: Ring) -> Knowledge:
-    """Nothing is known yet."""
+    """Return the state at the start of a search, with no known joint."""
     return Knowledge(problem, ring, _samples(problem, ring))
 
 
@@ -153,8 +153,8 @@ def _samples(problem: Problem, ring: Ring) -> LoopSamples:
 
 # Rigid transforms as 15 x 15 matrices that act on the invariants of a point and a line.
 #
-# For a point p and a direction l the vector w = (1, p.p, p.l, p, l, p x l, (p.p) l - 2 (p.l) p)
-# is linear in its image under any rigid transform, so that a product of transforms is one of
+# For a point p and a direction l, the vector w = (1, p.p, p.l, p, l, p x l, (p.p) l - 2 (p.l) p)
+# transforms linearly under each rigid transform. A product of transforms is a product of these
 # matrices.
 #
 # Source: Raghavan & Roth 1993, section 4, whose fourteen equations are the rows of w.
@@ -162,13 +162,13 @@ def _samples(problem: Problem, ring: Ring) -> LoopSamples:
 
 SIZE = 15
 POWERS = (0, 2, 1, 1, 1, 1, 0, 0, 0, 1, 1, 1, 2, 2, 2)
-"""The powers of a length in the elements of w."""
+"""Power of a length in each element of w."""
 
 _P, _L, _X, _M = slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15)
 
 
 def represented(T: Matrix) -> Matrix:
-    """(..., 15, 15) of rigid transforms (..., 4, 4)."""
+    """Return the matrices (..., 15, 15) of rigid transforms (..., 4, 4) that act on w."""
     R, t = T[..., :3, :3], T[..., :3, 3]
     tt, cross = np.sum(t * t, axis=-1)[..., None, None], _skew(t)
     back = np.einsum("...ji,...j->...i", R, t)
@@ -184,7 +184,7 @@ def represented(T: Matrix) -> Matrix:
 
 
 def represented_pose(pose: Pose, opposite: Pose) -> SX:
-    """(15, 15) of a pose, sparse; its inverse is given too, which may be shorter to write."""
+    """Return the matrix (15, 15) of a pose, sparse; `opposite` is its inverse, maybe shorter."""
     R, t, back = pose.R, pose.p, -opposite.p
     tt = min((casadi.sumsqr(p) for p in (t, opposite.p)), key=casadi.n_nodes)
     cross = casadi.skew(t)
@@ -201,7 +201,7 @@ def represented_pose(pose: Pose, opposite: Pose) -> SX:
 
 
 def joint_basis(prismatic: bool) -> Matrix:
-    """(3, 15, 15) factors of 1, cos q, sin q of a rotation; of 1, r, r^2 of a translation."""
+    """Return factors (3, 15, 15) of 1, cos q, sin q (rotation), or of 1, r, r^2 (translation)."""
     T = np.broadcast_to(np.eye(4), (3, 4, 4)).copy()
     if prismatic:
         T[1, 2, 3], T[2, 2, 3] = 1.0, -1.0
@@ -214,7 +214,7 @@ def joint_basis(prismatic: bool) -> Matrix:
 
 
 def motion(q: Matrix, prismatic: bool) -> Matrix:
-    """(..., 4, 4) translation along z, or rotation about z."""
+    """Return (..., 4, 4) transforms: translation along z, or rotation about z, by q."""
     T = np.zeros((*q.shape, 4, 4))
     T[..., range(4), range(4)] = 1.0
     if prismatic:
@@ -226,7 +226,7 @@ def motion(q: Matrix, prismatic: bool) -> Matrix:
 
 
 def inverse(T: Matrix) -> Matrix:
-    """(..., 4, 4) inverse of rigid transforms."""
+    """Return the inverses (..., 4, 4) of rigid transforms."""
     back = np.zeros_like(T)
     R = np.swapaxes(T[..., :3, :3], -1, -2)
     back[..., :3, :3], back[..., 3, 3] = R, 1.0
@@ -248,12 +248,12 @@ _DIRECTION = slice(6, 9)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Side:
-    """One side of an equation as a polynomial in the unknown joints on it.
+    """One side of an equation, as a polynomial in its unknown joints.
 
     Attributes:
-        joints: their numbers in the ring.
-        values: (samples, rows, 3^k) its coefficients; each joint has the factors e^-iq, 1, e^iq,
-            or r, 1, r^2, the last joint those that change fastest.
+        joints: indices of the unknown joints in the loop chain.
+        values: (samples, rows, 3^k) coefficients. Each joint has the factors e^-iq, 1, e^iq, or
+            r, 1, r^2; the factors of the last joint change fastest.
     """
 
     joints: tuple[int, ...]
@@ -262,15 +262,15 @@ class Side:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameSplit:
-    """The equations of two frames: left = right, row by row.
+    """Equations from one pair of frames: left = right, row by row.
 
     Attributes:
-        start: the frame from which one looks: 2 k before joint k, 2 k + 1 after it.
-        end: the frame at which one looks.
-        seed: 0, 1, 2: which axis of it; of its point only with the z axis.
-        rows: of the 15 elements of w those that are meant.
-        left: the path forwards.
-        right: the path backwards.
+        start: reference frame: 2 k before joint k, 2 k + 1 after it.
+        end: observed frame, with the same numbering.
+        seed: index 0, 1 or 2 of the observed axis. The origin is observed with the z axis (2) only.
+        rows: indices of the elements of w that give equations.
+        left: path in forward direction.
+        right: path in backward direction.
     """
 
     start: int
@@ -283,7 +283,7 @@ class FrameSplit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pieces:
-    """Matrices of the joints and of the ways between them, of one representation."""
+    """Matrices of the unknown joints and of the transforms between them, in one representation."""
 
     joints: list[int]
     gaps: list[Matrix]
@@ -294,7 +294,7 @@ class _Pieces:
 
 
 def splits(knowledge: Knowledge) -> Iterator[FrameSplit]:
-    """Every split of the loop whose sides have few unknown joints each."""
+    """Yield each split of the loop with few unknown joints on each side."""
     whole = _pieces(knowledge, slice(0, SIZE))
     directions = _pieces(knowledge, _DIRECTION)
     w = np.zeros((SIZE, 1))
@@ -310,13 +310,13 @@ def splits(knowledge: Knowledge) -> Iterator[FrameSplit]:
 def _of_end(
     pieces: _Pieces, seed: Matrix, joint: tuple[int, bool], end: tuple[int, int]
 ) -> Iterator[FrameSplit]:
-    """The splits that look at one frame.
+    """Yield the splits with one observed frame.
 
     Args:
-        pieces: of the loop.
-        seed: what is looked at.
-        joint: its number among the unknown ones, and whether it moves the seed.
-        end: number of the frame and first axis.
+        pieces: matrices of the loop.
+        seed: observed vectors w or axes, as columns.
+        joint: index among the unknown joints, and whether it moves the seed.
+        end: index of the observed frame and index of its first axis.
     """
     (e, moves), (point, axis) = joint, end
     samples = len(pieces.gaps[0])
@@ -334,7 +334,7 @@ def _of_end(
 
 
 def _rows(axis: int, start: int, prismatic: bool) -> tuple[int, ...]:
-    """The elements that are new: a turn of the frame about its z axis leaves the others."""
+    """Return the elements of w that give new equations: those that joint `start` changes."""
     after = start % 2 == 1
     if axis == 2:
         return (3, 4, 6, 7, 9, 10, 12, 13) if after and not prismatic else tuple(range(1, SIZE))
@@ -344,7 +344,7 @@ def _rows(axis: int, start: int, prismatic: bool) -> tuple[int, ...]:
 
 
 def _walk_back(pieces: _Pieces, first: Tensor, e: int, turned: bool) -> Mapping[int, Side]:
-    """What is seen from the frames before joint e, by their numbers."""
+    """Return the observed vectors in the frames before joint e, by frame index."""
     m, found = len(pieces.joints), dict[int, Side]()
     side = Side((), first[..., None])
     if turned:
@@ -362,7 +362,7 @@ def _walk_back(pieces: _Pieces, first: Tensor, e: int, turned: bool) -> Mapping[
 
 
 def _walk_on(pieces: _Pieces, first: Tensor, e: int, turned: bool) -> Mapping[int, Side]:
-    """What is seen from the frames after joint e, by their numbers."""
+    """Return the observed vectors in the frames after joint e, by frame index."""
     m, found = len(pieces.joints), dict[int, Side]()
     side = Side((), first[..., None])
     if turned:
@@ -386,7 +386,7 @@ def _over(side: Side, matrix: Matrix) -> Side:
 
 
 def _through(side: Side, k: int, basis: Tensor) -> Side:
-    """The side with the powers of one more joint, (3, d, d), before it."""
+    """Return the side multiplied by the basis (3, d, d) of a further joint."""
     S, d, columns, K = side.values.shape
     moved = basis[:, None] @ side.values.reshape(S, d, -1)
     values = np.moveaxis(moved.reshape(3, S, d, columns, K), 0, -1)
@@ -405,7 +405,7 @@ def _pieces(knowledge: Knowledge, block: slice) -> _Pieces:
 
 
 def _merge(knowledge: Knowledge, k: int) -> Matrix:
-    """(samples, 4, 4) the transform to joint k from the unknown joint before it."""
+    """Return the transform (samples, 4, 4) from the previous unknown joint to joint k."""
     ring, samples = knowledge.ring, knowledge.samples
     T, n = samples.gaps[:, k], len(ring.joints)
     before = (k - 1) % n
@@ -418,7 +418,7 @@ def _merge(knowledge: Knowledge, k: int) -> Matrix:
 
 
 def _basis(knowledge: Knowledge, k: int, direction: int) -> Tensor:
-    """(3, 15, 15) factors of e^-iq, 1, e^iq, or of r, 1, r^2."""
+    """Return factors (3, 15, 15) of e^-iq, 1, e^iq, or of r, 1, r^2."""
     joint = knowledge.ring.joints[k]
     one, first, second = joint_basis(not joint.is_rotational)
     if not joint.is_rotational:
@@ -427,7 +427,7 @@ def _basis(knowledge: Knowledge, k: int, direction: int) -> Tensor:
     return np.array([up.conj(), one, up])
 
 
-# The rows of a split loop that may have few unknowns, by their terms in the joints.
+# Rows of a split loop that may have few unknowns, sorted into terms of the joints.
 
 
 Values = NDArray[np.complex128]
@@ -438,13 +438,13 @@ _MOST_JOINTS = 4
 
 @dataclass(frozen=True, slots=True)
 class SplitRow:
-    """Where an equation comes from: see `FrameSplit`.
+    """Origin of an equation, see `FrameSplit`.
 
     Attributes:
-        start: the frame from which one looks.
-        end: the frame at which one looks.
-        seed: which axis of it.
-        element: of w.
+        start: reference frame.
+        end: observed frame.
+        seed: index of the observed axis.
+        element: index of the element of w.
     """
 
     start: int
@@ -454,19 +454,19 @@ class SplitRow:
 
     @property
     def power(self) -> int:
-        """The power of a length that its terms are."""
+        """Power of a length that is the unit of its terms."""
         return POWERS[self.element]
 
 
 def simple_rows(
     split: FrameSplit, prismatic: frozenset[int], most: int
 ) -> Iterator[tuple[SplitRow, dict[Members, Values]]]:
-    """The rows that may have few unknowns, and their terms.
+    """Yield the rows that may have few unknowns, and their terms.
 
     Args:
-        split: of the loop.
-        prismatic: numbers of its prismatic joints.
-        most: variables of a row with products of them.
+        split: split of the loop.
+        prismatic: indices of the prismatic joints.
+        most: largest number of variables in a row with products of variables.
     """
     offset = 0 if split.seed == 2 else -6
     rows = [r + offset for r in split.rows]
@@ -487,7 +487,7 @@ def simple_rows(
 
 
 def _counts(table: _Table, mask: NDArray[np.bool_]) -> NDArray[np.int_]:
-    """(3, rows) how many variables, at least, joints, and products there are in each row."""
+    """Return per row (3, rows): minimum number of variables, numbers of joints and products."""
     weights = mask.astype(int)
     joints = (weights @ table.has) > 0
     together = np.zeros(joints.shape, dtype=bool)
@@ -514,14 +514,14 @@ def _collect(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Table:
-    """The terms of a side of given joints.
+    """Terms of a side with given joints.
 
     Attributes:
-        terms: by number; None for those that are conjugates of others.
-        has: (terms, joints) 1 where a joint stands in a term.
-        pairs: of joints.
-        apart: (terms, pairs) 1 where one of the two stands in a term without the other.
-        long: (terms) 1 where there are several joints.
+        terms: terms by index; None for a term that is the conjugate of another one.
+        has: (terms, joints) 1 if the term contains the joint.
+        pairs: pairs of joints.
+        apart: (terms, pairs) 1 if the term contains exactly one joint of the pair.
+        long: (terms,) 1 if the term contains several joints.
     """
 
     terms: list[Members | None]

@@ -1,10 +1,10 @@
-"""Two equations in two unknowns, of which one, an angle, is eliminated: types 4 to 8, and quartics.
+"""Steps from two equations in two unknowns; an angle is eliminated. Types 4 to 8, and quartics.
 
-Both have the form Re(k_i h(y) e^iq) + B_i(y) = 0 with two numbers k_i. They give w = h e^iq as a
-function of y, and |w|^2 = |h|^2 is an equation in y alone: of type 2 or quadratic, or of degree 2
-or 4 otherwise. Then q is found from two equations of type 3.
+Both have the form Re(k_i h(y) e^iq) + B_i(y) = 0 with two numbers k_i. They determine w = h e^iq as
+a function of y. The condition |w|^2 = |h|^2 is an equation in y alone: of type 2 or quadratic, or a
+quartic. Then q is solved from two equations of type 3.
 
-Source: Khalil & Dombre 2002, table 4.1; a product h(y) is that of Pieper 1968.
+Source: Khalil & Dombre 2002, table 4.1; the product h(y) as in Pieper 1968.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from mbs.closed_forms.paul.splits import Variable
 from mbs.closed_forms.sequence import Found, SequenceStep, real_quartic, step, trigonometric_quartic
 
 _SMALL = 1e-7
-"""Factors and shares below it, of equations whose coefficients are of about one, count as zero:
-products of several of them magnify the 1e-12 to which the samples close."""
+"""Largest factor and relative coefficient that counts as zero, for equations with coefficients of
+about one: products of several factors magnify the 1e-12 to which the samples close."""
 _VANISHES = 1e-14
-"""Largest coefficient of a resultant below which all of them are rounding: they are sums of
-products of factors of about one. Above it the shares decide."""
+"""Largest coefficient of a resultant below which all its coefficients are rounding: they are sums
+of products of factors of about one. Above it, `_SMALL` decides."""
 _PARALLEL = 1e-5
-"""Imaginary part of the ratio of two factors, of about one, below which they are parallel: nothing
-is eliminated; a step that divides by less would lose five digits."""
+"""Imaginary part of the ratio of two factors of about one, below which they are parallel and
+nothing can be eliminated: a step that divides by less would lose five digits."""
 _ROWS = 8
 
 Numbers = list[Any]
@@ -46,10 +46,10 @@ Complex = tuple[Any, Any]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Form:
-    """One equation as Re(G(y) e^iq) + B(y) = 0.
+    """Equation in the form Re(G(y) e^iq) + B(y) = 0.
 
     Attributes:
-        G: complex, from the lowest power of y on: of e^-iy, 1, e^iy, or of 1, r, r^2.
+        G: complex factors (real, imaginary) of e^-iy, 1, e^iy, or of 1, r, r^2.
         B: factors of 1, cos y, sin y, or of 1, r, r^2.
     """
 
@@ -59,12 +59,12 @@ class _Form:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pair:
-    """Two equations, the unknown that stays, and the one that goes.
+    """Two equations, their remaining unknown y and their eliminated unknown q.
 
     Attributes:
-        rows: the equations.
-        stays: number of the unknown that stays among the variables.
-        power: of which G is not zero.
+        rows: equations.
+        stays: index of the remaining unknown among the variables.
+        power: index of a factor of G that is not zero.
     """
 
     rows: tuple[Equation, Equation]
@@ -73,12 +73,12 @@ class _Pair:
 
     @property
     def variable(self) -> Variable:
-        """The unknown that stays."""
+        """Remaining unknown."""
         return self.rows[0].variables[self.stays]
 
 
 def two_unknowns(stage: PaulStage) -> Iterator[Candidate]:
-    """Steps that give one of two unknowns."""
+    """Yield steps that solve one of two unknowns from two equations."""
     groups = dict[tuple[Variable, ...], list[Equation]]()
     for equation in stage.equations:
         if len(equation.variables) == 2:
@@ -119,13 +119,17 @@ def _candidate(stage: PaulStage, rows: tuple[Equation, Equation], stays: int) ->
     leading = np.sum(F[1:] ** 2, axis=0)
     cost = float(sum(row.cost for row in rows))
     sums = 0.0 if pair.variable.single else 0.5
-    # 6 to 7.5: quadratics before quartics, single joints before sums; after all in one equation
+    # rank 6 to 7.5, after single equations: quadratics before quartics, joints before sums of
+    # joints
     rank = (6.0 + quartic + sums, unsteady(leading), cost)
     return Candidate(rank, (pair.variable,), lambda: _built(stage, pair, shares))
 
 
 def _common_power(forms: Sequence[_Form]) -> int | None:
-    """A power whose factors are independent, if those of all others are in their ratio."""
+    """Return the index of a factor of G that is independent in both forms, or None.
+
+    The result is None if the other factors do not have the same ratio.
+    """
     first, second = (np.array([re + 1j * im for re, im in _spread(form.G)]) for form in forms)
     sizes = np.min(np.abs(first), axis=1)
     power = 1 if len(sizes) == 3 and sizes[1] > _SMALL else int(np.argmax(sizes))
@@ -151,7 +155,7 @@ def _form_of_values(row: Equation, stays: int) -> _Form:
 
 
 def _form(row: Equation, stays: int, part: Callable[[Key], Complex]) -> _Form:
-    """The form from X and Y of each part."""
+    """Return the form of an equation from X and Y of each part."""
     prismatic = row.variables[stays].prismatic
 
     def key(y: int, q: int) -> Key:
@@ -171,7 +175,7 @@ def _form(row: Equation, stays: int, part: Callable[[Key], Complex]) -> _Form:
 
 
 def _resultant(forms: Sequence[_Form], power: int, prismatic: bool) -> Numbers:
-    """The equation in y alone, from the lowest power on: 1, y .. y^4, or 1, c, s, c2, s2."""
+    """Return the coefficients of the equation in y alone: of 1, y .. y^4, or 1, c, s, c2, s2."""
     (x, y), (u, v) = forms[0].G[power], forms[1].G[power]
     n, a, b = x * x + y * y, u * x + v * y, v * x - u * y
     other = [a * one - n * two for one, two in zip(forms[0].B, forms[1].B, strict=True)]
@@ -201,7 +205,7 @@ def _size(G: list[Complex], prismatic: bool) -> Numbers:
 
 
 def _built(stage: PaulStage, pair: _Pair, shares: Any) -> SequenceStep:
-    """The step."""
+    """Return the step of a pair of equations."""
 
     def forms(row: Equation) -> _Form:
         def part(key: Key) -> Complex:
@@ -223,7 +227,7 @@ def _built(stage: PaulStage, pair: _Pair, shares: Any) -> SequenceStep:
 
 
 def _kind(pair: _Pair) -> str:
-    """The type of the two equations in the table of Khalil."""
+    """Return the type of the two equations in the table of Khalil."""
     goes = 1 - pair.stays
     factors = {abs(key[pair.stays]) for row in pair.rows for key in row.parts if key[goes]}
     if pair.variable.prismatic:
@@ -236,7 +240,7 @@ def _kind(pair: _Pair) -> str:
 
 
 def _quartic(stage: PaulStage, variable: Variable, F: list[SX], unit: int) -> SequenceStep:
-    """The step with four roots."""
+    """Return the step of a quartic, with four roots."""
     number, shown = stage.number(variable), stage.term(variable)
     signs = SX.sym("sign", 2)
     scale = stage.matrices.length**unit if unit else SX(1)

@@ -1,7 +1,8 @@
-"""The matrix in one joint that is singular at a solution, as expressions of the pose.
+"""Symbolic matrix in one joint that is singular at a solution of a six-joint arm (Raghavan-Roth).
 
-The numeric method takes null rows from singular values; here joints 1 and 2 of the loop are
-eliminated with pivots chosen once, at the samples, so that the matrix is plain arithmetic.
+The numeric method computes null rows by singular values. Here joints 1 and 2 of the loop are
+eliminated with pivots that are selected once, at the samples, so that the matrix is an arithmetic
+expression of the pose.
 """
 
 from __future__ import annotations
@@ -32,23 +33,23 @@ from mbs.recursions.chain import ChainJoint, Ring
 from mbs.solvers.rank import first_best, graded
 from mbs.spatial import Pose
 
-# The elimination of joints 1 and 2 of a loop in expressions, with pivots that are chosen once.
+# Symbolic elimination of joints 1 and 2 of a loop, with pivots that are selected once.
 #
 # Source: Raghavan & Roth 1993; Manocha & Canny 1994.
 
 
 _ZERO = 1e-12
-"""Entries, of about one in units of the loop, that vanish at all samples: elimination leaves 1e-14
-of rounding in a zero, and an entry that depends on generic positions is larger at one of them."""
+"""Largest entry, for entries of about one in units of the loop, that counts as zero at all samples:
+a zero has rounding of 1e-14, and other entries are larger at one of the generic samples."""
 
 
 def table(elimination: Elimination, ways: Sequence[Pose]) -> SX:
-    """(s - 1, m + n3 n4 n5) the equations of a loop, a column a monomial.
+    """Return the equations of a loop (s - 1, m + n3 n4 n5), one column per monomial.
 
     Args:
-        elimination: of joints 1 and 2, which have m = n1 n2 - 1 monomials; their columns are first,
-            then those of x4^i x5^j for each part of joint 3.
-        ways: the six ways of the loop.
+        elimination: elimination of joints 1 and 2. Their m = n1 n2 - 1 monomials are the first
+            columns. Then follow the columns of x4^i x5^j for each part of joint 3.
+        ways: six constant transforms of the loop.
     """
     right, left = _right_side(elimination, ways), _left_side(elimination, ways)
     sides = (
@@ -59,16 +60,16 @@ def table(elimination: Elimination, ways: Sequence[Pose]) -> SX:
 
 
 def eliminated(A: SX, values: Array, columns: int, rank: int) -> tuple[SX, Array]:
-    """The rows of equations that are left without the first columns, by Gauss.
+    """Return the rows of equations that remain after Gaussian elimination of the first columns.
 
     Args:
         A: (rows, all columns) expressions.
-        values: (samples, rows, all columns) of A where the loop is generic.
-        columns: the number of columns to be eliminated.
-        rank: of these.
+        values: (samples, rows, all columns) values of A at generic configurations.
+        columns: number of columns to be eliminated.
+        rank: rank of these columns.
 
     Returns:
-        (rows - rank, columns left) expressions, and their values.
+        (rows - rank, other columns) expressions, and their values.
     """
     rows = [A[k, :] for k in range(A.size1())]
     values = values / np.max(np.abs(values), axis=(1, 2), keepdims=True)
@@ -84,7 +85,7 @@ def eliminated(A: SX, values: Array, columns: int, rank: int) -> tuple[SX, Array
 
 
 def independent_rows(values: Array, count: int) -> list[int]:
-    """Numbers of as many rows that are independent in all of (samples, rows, n), ascending."""
+    """Return ascending indices of `count` rows of (samples, rows, n) independent at all samples."""
     left, numbers, found = values, np.arange(values.shape[1]), list[int]()
     for _ in range(count):
         r, c = _pivot(left)
@@ -97,7 +98,7 @@ def independent_rows(values: Array, count: int) -> list[int]:
 
 
 def dialytic(elimination: Elimination, E: SX) -> SX:
-    """(2 k, size) k equations of one part of joint 3, and below them their products by x4 or x5."""
+    """Return k equations of one part of joint 3 and their products by x4 or x5, (2 k, size)."""
     g5, raised = elimination.grid[1], elimination.raised
     n4, n5 = len(elimination.fourth), len(elimination.fifth)
     M = SX(2 * E.size1(), elimination.size)
@@ -109,14 +110,14 @@ def dialytic(elimination: Elimination, E: SX) -> SX:
 
 
 def _pivot(values: Array) -> tuple[int, int]:
-    """The row and the column of the entry that is largest where it is smallest."""
+    """Return row and column of the entry whose smallest absolute value over samples is largest."""
     smallest = np.min(np.abs(values), axis=0)
     r, c = np.unravel_index(first_best(smallest.ravel()), smallest.shape)
     return int(r), int(c)
 
 
 def _clear(row: SX, values: Array) -> SX:
-    """The row with zeros for the entries that vanish at all samples."""
+    """Return the row with zeros for the entries that vanish at all samples."""
     cleared = SX(1, row.size2())
     for k in np.nonzero(np.any(np.abs(values) > _ZERO, axis=0))[0]:
         cleared[0, int(k)] = row[0, int(k)]
@@ -137,7 +138,7 @@ def _left_side(elimination: Elimination, ways: Sequence[Pose]) -> list[SX]:
 
 
 def _moved(parts: Array, columns: SX) -> SX:
-    """The columns under every part, one part after the other."""
+    """Return the columns multiplied by each part, side by side."""
     return SX(casadi.horzcat(*(casadi.mtimes(_constant(part), columns) for part in parts)))
 
 
@@ -161,23 +162,23 @@ def _constant(part: NDArray[np.float64]) -> SX:
     return SX(casadi.sparsify(DM(part)))
 
 
-_ANGLES = (0.3, 1.4, -2.1)  # of joint 3 [rad], at which nothing is special
+_ANGLES = (0.3, 1.4, -2.1)  # generic angles of joint 3 [rad]
 _FOLDED, _TRIED = 10.0, 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Characteristic:
-    """A square matrix of the position of one joint, singular wherever the loop closes.
+    """Square matrix in the position of one joint that is singular if the loop closes.
 
-    It is M_0 + M_1 cos q + M_2 sin q of a joint that turns, and M_0 + M_1 r + M_2 r^2, or without
-    the last term, of one that slides.
+    It is M_0 + M_1 cos q + M_2 sin q for a revolute joint, and M_0 + M_1 r + M_2 r^2, or without
+    the last term, for a prismatic joint.
 
     Attributes:
-        matrices: the parts M_k, (n, n) expressions of the problem's given.
+        matrices: parts M_k, (n, n) expressions of the problem's given quantities.
         joint: name of the joint.
-        index: its index in the problem's x.
-        prismatic: whether it slides.
-        regularity: reciprocal condition of the matrix at positions that are no solutions.
+        index: index of the joint in the problem's x.
+        prismatic: whether the joint is prismatic.
+        regularity: reciprocal condition number of the matrix at positions that are no solutions.
     """
 
     matrices: tuple[SX, ...]
@@ -187,7 +188,7 @@ class Characteristic:
     regularity: float
 
     def matrix(self, q: SX) -> SX:
-        """(n, n) the matrix at a position of the joint [rad or m]."""
+        """Return the matrix (n, n) at a position of the joint [rad or m]."""
         first, *others = self.matrices
         factors = (q, q * q) if self.prismatic else (casadi.cos(q), casadi.sin(q))
         parts = [SX(f * part) for f, part in zip(factors, others, strict=False)]
@@ -196,7 +197,7 @@ class Characteristic:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Loop:
-    """One arrangement of the ring, and its ways at the samples."""
+    """Start and direction of a loop, the construction of its matrix, and its unit of length."""
 
     ring: Ring
     pencil: Pencil
@@ -204,27 +205,28 @@ class _Loop:
 
     @property
     def merit(self) -> float:
-        """More where the pose is not in what is eliminated, which then folds to numbers."""
+        """Merit of the matrix; larger if no eliminated transform contains the pose."""
         constant = all(self.ring.gaps[k].pose.matrix.is_constant() for k in (0, 1, 2))
         return self.pencil.merit * (_FOLDED if constant else 1.0)
 
     @property
     def ways(self) -> list[Pose]:
-        """The ways in units of the length: number k follows joint k."""
+        """Transforms in units of the length: transform k follows joint k."""
         gaps = (*self.ring.gaps[1:], self.ring.gaps[0])
         return [Pose(gap.pose.R, gap.pose.p / self.length) for gap in gaps]
 
 
 def characteristic(problem: Problem) -> Characteristic:
-    """The matrix of the arrangement in which it is farthest from singular.
+    """Return the characteristic matrix of the loop for which it is farthest from singular.
 
     Source: Raghavan & Roth 1993; Manocha & Canny 1994.
 
     Args:
-        problem: of six joints.
+        problem: problem of six joints.
 
     Raises:
-        NoClosedForm: the problem has not six joints, or the matrix is singular at every position.
+        NoClosedForm: the problem does not have six joints, or the matrix is singular at all
+            positions.
     """
     if problem.size != 6:
         raise NoClosedForm(
@@ -243,7 +245,7 @@ def characteristic(problem: Problem) -> Characteristic:
 
 
 def _loops(problem: Problem) -> list[_Loop]:
-    """Every arrangement and elimination whose matrix is not singular."""
+    """Return all loops and eliminations whose matrix is not singular at the samples."""
     length, found = _length(problem), list[_Loop]()
     for ring in (problem.ring, problem.ring.reversed()):
         for first in range(6):
@@ -258,7 +260,7 @@ def _loops(problem: Problem) -> list[_Loop]:
 
 
 def _length(problem: Problem) -> float:
-    """A power of two of about the size of the loop at the samples [m]."""
+    """Return a power of two of about the size of the loop at the samples [m]."""
     indices = casadi.horzcat(*(gap.pose.p for gap in problem.ring.gaps))
     total = [float(np.sum(np.linalg.norm(p, axis=0))) for p in problem.at_samples(SX(indices))]
     mean = float(np.mean(total))
@@ -266,7 +268,7 @@ def _length(problem: Problem) -> float:
 
 
 def _numbers(problem: Problem, ring: Ring, length: float) -> Array:
-    """(samples, 6, 4, 4) the ways of a loop at the samples."""
+    """Return the transforms (samples, 6, 4, 4) of a loop at the samples."""
     gaps = (*ring.gaps[1:], ring.gaps[0])
     stacked = problem.at_samples(SX(casadi.vertcat(*(gap.pose.matrix for gap in gaps))))
     ways = np.array(stacked).reshape(len(stacked), 6, 4, 4)
@@ -293,13 +295,13 @@ def _characteristic(problem: Problem, loop: _Loop) -> Characteristic:
 
 
 def _spread(parts: Array) -> Array:
-    """The matrices at some angles, one after the other."""
+    """Return the matrices at three angles, for each sample."""
     count = len(_ANGLES)
     return at(np.repeat(parts, count, axis=0), np.tile(np.array(_ANGLES), len(parts)))
 
 
 def _in_joint(parts: list[SX], loop: _Loop) -> tuple[SX, ...]:
-    """The parts with 1, cos q, sin q, or with the powers of r in metres."""
+    """Return the parts with 1, cos q, sin q, or with the powers of r in metres."""
     joint = loop.ring.joints[2]
     if joint.is_rotational:
         return parts[0], parts[1], joint.sign * parts[2]

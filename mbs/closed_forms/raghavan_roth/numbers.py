@@ -1,4 +1,4 @@
-"""Configurations for target poses by the general method."""
+"""Numeric elimination for six-joint arms (Raghavan-Roth): loop, matrices, roots."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from mbs.closed_forms.arm import Arm, Field, inverse, motion
 from mbs.errors import ModelError
 from mbs.numbers import NONZERO
 
-# A point and a direction as fifteen numbers that every rigid displacement maps linearly.
+# A point p and a direction l as fifteen numbers w, which each rigid displacement maps linearly.
 #
-# w(p, l) = (1, p.p, p.l, p, l, p x l, p.p l - 2 (p.l) p). A displacement D takes p to R p + t and
-# l to R l, and then w(D p, D l) = rho(D) w(p, l), with rho(D D') = rho(D) rho(D').
+# w(p, l) = (1, p.p, p.l, p, l, p x l, p.p l - 2 (p.l) p). A displacement D maps p to R p + t and
+# l to R l. Then w(D p, D l) = rho(D) w(p, l), with rho(D D') = rho(D) rho(D').
 #
 # Source: Raghavan & Roth 1993, the fourteen equations; here as a representation of the group.
 
@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 
 SIZE = 15
 
-#: Numbers of the elements without p.p and p.p l - 2 (p.l) p: a displacement r is in them without
-# r^2.
+#: Indices of the elements without p.p and p.p l - 2 (p.l) p, in which a displacement r appears
+# without r^2.
 LINEAR = np.array([0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11])
 
 
@@ -33,7 +33,7 @@ def _skew(t: Array) -> Array:
 
 
 def _slope(t: Array) -> Array:
-    """(15, 15) derivative of rho along a translation t."""
+    """Return the derivative (15, 15) of rho along a translation t."""
     X = np.zeros((SIZE, SIZE))
     X[1, 3:6] = 2 * t
     X[2, 6:9] = t
@@ -45,7 +45,7 @@ def _slope(t: Array) -> Array:
 
 
 def _turning() -> Array:
-    """(3, 15, 15) the parts of rho of a rotation about z with 1, its cosine and its sine."""
+    """Return parts (3, 15, 15) of rho of a rotation about z: constant, cosine and sine."""
     Z = np.zeros((3, SIZE, SIZE))
     Z[0, range(3), range(3)] = 1.0
     for k in (3, 6, 9, 12):
@@ -54,21 +54,21 @@ def _turning() -> Array:
     return Z
 
 
-#: (3, 15, 15) slopes X of rho along x, y, z; along a translation rho is 1 + X + X X / 2.
+#: (3, 15, 15) derivatives X of rho along x, y, z. For a translation, rho is 1 + X + X X / 2.
 SLOPES = np.array([_slope(axis) for axis in np.eye(3)])
-#: (3, 15, 15) parts of rho of a turn q about z, with 1, cos q, sin q.
+#: (3, 15, 15) parts of rho of a rotation q about z, with 1, cos q, sin q.
 TURN = _turning()
 #: (3, 15, 15) parts of rho of a displacement r along z, with 1, r, r^2.
 SLIDE = np.array([np.eye(SIZE), SLOPES[2], 0.5 * SLOPES[2] @ SLOPES[2]])
 
-#: (6,) elements that a rotation about z leaves alone, and (6,) those that a prismatic joint along z
-# leaves alone.
+#: (6,) indices of the elements that are invariant under a rotation about z, and (6,) of elements
+# that are invariant under a translation along z.
 KEPT_BY_TURN = np.array([1, 2, 5, 8, 11, 14])
 KEPT_BY_SLIDE = np.array([3, 4, 6, 7, 8, 11])
 
 
 def pair(T: Field) -> Field:
-    """(..., 15) w of the origin and the z axis of the frames T, (..., 4, 4)."""
+    """Return w (..., 15) of the origin and the z axis of frames T (..., 4, 4)."""
     p, z = T[..., :3, 3], T[..., :3, 2]
     pp, pz = np.sum(p * p, axis=-1)[..., None], np.sum(p * z, axis=-1)[..., None]
     bent = pp * z - 2 * pz * p
@@ -76,7 +76,7 @@ def pair(T: Field) -> Field:
 
 
 def rho(T: Array) -> Array:
-    """(..., 15, 15) the linear map of w for displacements T, (..., 4, 4)."""
+    """Return the matrices (..., 15, 15) that act on w, for displacements T (..., 4, 4)."""
     X = np.tensordot(T[..., :3, 3], SLOPES, axes=1)
     turned = np.zeros((*T.shape[:-2], SIZE, SIZE), T.dtype)
     turned[..., range(3), range(3)] = 1.0
@@ -87,35 +87,37 @@ def rho(T: Array) -> Array:
 
 
 def motion_parts(prismatic: bool) -> Array:
-    """(3, 15, 15) parts of rho of a joint, with 1, cos q, sin q or with 1, r, r^2."""
+    """Return parts (3, 15, 15) of rho of a joint, with 1, cos q, sin q or with 1, r, r^2."""
     return SLIDE if prismatic else TURN
 
 
 def back_parts(prismatic: bool) -> Array:
-    """(3, 15, 15) likewise, of the inverse of the joint's motion."""
+    """Return parts (3, 15, 15) of rho of the inverse motion of a joint, as in `motion_parts`."""
     signs = np.array([1.0, -1.0, 1.0] if prismatic else [1.0, 1.0, -1.0])
     back: Array = signs[:, None, None] * motion_parts(prismatic)
     return back
 
 
 def half_parts(prismatic: bool) -> Array:
-    """(3, 15, 15) parts with 1, x, x^2 of rho of a joint: x = tan(q/2), times 1 + x^2, or x = r."""
+    """Return parts (3, 15, 15) of rho of a joint with 1, x, x^2: (1 + x^2) rho for a rotation.
+
+    The variable x is tan(q/2) for a rotation, and the displacement r for a translation.
+    """
     if prismatic:
         return SLIDE
     return np.array([TURN[0] + TURN[1], 2 * TURN[2], TURN[0] - TURN[1]])
 
 
-# The equations of a loop in three of its joints, and the matrix that is singular at a solution.
+# Equations of a loop in three of its joints, and the matrix that is singular at a solution.
 #
 # rho(Z_3) rho(C_3) rho(Z_4) rho(C_4) rho(Z_5) w(C_5)
 #     = rho(C_2^-1) rho(Z_2^-1) rho(C_1^-1) rho(Z_1^-1) w(C_6^-1)
-# is fifteen equations, of which the first is 1 = 1; joint 6 is not in them, for it rotates about
-# the direction of the pair. The right side is a (14, 8) block times eight monomials of joints 1 and
-# 2, and a constant; the left null vectors of the block leave equations in joints 3, 4 and 5. With
-# the half angles x4, x5 they have the nine monomials x4^i x5^j, i, j <= 2; with their products by
-# x4, or
-# by x5, there are twelve equations in twelve monomials. Slides have r^2 in four of the equations
-# only, so that without these the monomials are fewer.
+# are fifteen equations, the first of which is 1 = 1. Joint 6 does not appear, because it rotates
+# about the direction of w. The right side is a (14, 8) matrix times eight monomials of joints 1 and
+# 2, and a constant. The left null vectors of the matrix give equations in joints 3, 4 and 5. In the
+# half angles x4, x5 they have the nine monomials x4^i x5^j, i, j <= 2. Together with their products
+# by x4, or by x5, they are twelve equations in twelve monomials. Prismatic joints have r^2 in four
+# of the equations only, so that without these there are fewer monomials.
 #
 # Source: Raghavan & Roth 1993; Manocha & Canny 1994.
 
@@ -126,18 +128,18 @@ Numbers = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Elimination:
-    """The equations that are used of a loop, and their monomials; s elements of a pair are in them.
+    """Selected equations of a loop, and their monomials; s elements of w are used.
 
     Attributes:
-        elements: (s,) their numbers in w.
+        elements: (s,) indices of the used elements of w.
         first: (n1, s, s) parts of rho of the inverse of joint 1, with 1, cos q, sin q or 1, r, r^2.
-        second: (n2, s, s) of the inverse of joint 2.
-        third: (n3, s, s) of joint 3, with the `weights` of its angle u.
-        fourth: (n4, s, s) of joint 4, with 1, x4, x4^2.
-        fifth: (n5, s, s) of joint 5, with 1, x5, x5^2.
-        one: (n3, n4 n5) what stands for 1 in the terms of the left side.
-        raised: 0 where the equations are multiplied by x4, 1 for x5.
-        slides: whether joint 3 slides.
+        second: (n2, s, s) parts of rho of the inverse of joint 2.
+        third: (n3, s, s) parts of rho of joint 3, with the `weights` of its angle u.
+        fourth: (n4, s, s) parts of rho of joint 4, with 1, x4, x4^2.
+        fifth: (n5, s, s) parts of rho of joint 5, with 1, x5, x5^2.
+        one: (n3, n4 n5) coefficients of the number 1 in the terms of the left side.
+        raised: 0 if the equations are multiplied by x4, 1 for x5.
+        slides: whether joint 3 is prismatic.
     """
 
     elements: NDArray[np.int64]
@@ -152,20 +154,20 @@ class Elimination:
 
     @property
     def grid(self) -> tuple[int, int]:
-        """Numbers of powers of x4 and of x5 in the twelve monomials, or in fewer."""
+        """Numbers of powers of x4 and of x5 in the monomials (twelve at most)."""
         n4, n5 = len(self.fourth), len(self.fifth)
         return (n4, n5 + 1) if self.raised else (n4 + 1, n5)
 
     @property
     def size(self) -> int:
-        """The size of the matrix."""
+        """Size of the square matrix: number of monomials."""
         return self.grid[0] * self.grid[1]
 
     def right_side(self, ways: Array) -> Array:
-        """(N, s - 1, n1 n2) factors of the monomials of joints 1 and 2, of which the first is 1.
+        """Return coefficients (N, s - 1, n1 n2) of the monomials of joints 1 and 2, 1 as the first.
 
         Args:
-            ways: (N, 6, 4, 4) of the loop.
+            ways: (N, 6, 4, 4) constant transforms of the loop.
         """
         u = pair(inverse(ways[:, 5]))[:, self.elements]
         once = self._carry(inverse(ways[:, 0]), np.einsum("jab,nb->naj", self.first, u))
@@ -173,7 +175,7 @@ class Elimination:
         return self._carry(inverse(ways[:, 1]), twice.reshape(*u.shape, -1))[:, 1:]
 
     def left_side(self, ways: Array) -> Array:
-        """(N, n3, s - 1, n4 n5) factors of the monomials x4^i x5^j, for each weight of joint 3."""
+        """Return coefficients (N, n3, s - 1, n4 n5) of x4^i x5^j, for each weight of joint 3."""
         w = pair(ways[:, 4])[:, self.elements]
         once = self._carry(ways[:, 3], np.einsum("jab,nb->naj", self.fifth, w))
         twice = np.einsum("iab,nbj->naij", self.fourth, once)
@@ -182,12 +184,12 @@ class Elimination:
         return left
 
     def equations(self, rows: Array, right: Array, left: Array) -> Array:
-        """(N, n3, k, n4 n5) the equations in joints 3, 4 and 5 of null rows (N, k, s - 1)."""
+        """Return equations (N, n3, k, n4 n5) in joints 3, 4, 5 from null rows (N, k, s - 1)."""
         constant = rows @ right[:, :, :1]
         return rows[:, None] @ left - constant[:, None] * self.one[:, None, :]
 
     def dialytic(self, E: Array) -> Array:
-        """(N, n3, 2 k, size) the equations, and below them their products by x4 or x5."""
+        """Return the equations and their products by x4 or x5, (N, n3, 2 k, size)."""
         count = E.shape[2]
         M = np.zeros((*E.shape[:2], 2 * count, *self.grid))
         E = E.reshape(*E.shape[:3], len(self.fourth), len(self.fifth))
@@ -202,9 +204,10 @@ class Elimination:
 
 
 def weights(u: Array, count: int) -> Array:
-    """(N, count) of joint 3 at angles u: 1, cos u, sin u, or cos(u/2), sin(u/2) where count is 2.
+    """Return weights (N, count) of joint 3 at angles u (N,).
 
-    A turn is at u, a prismatic joint at r = tan(u/2).
+    They are 1, cos u, sin u, or cos(u/2), sin(u/2) for count 2. A revolute joint is at u, a
+    prismatic joint at r = tan(u/2).
     """
     if count == 2:
         return np.stack([np.cos(u / 2), np.sin(u / 2)], axis=-1)
@@ -212,19 +215,19 @@ def weights(u: Array, count: int) -> Array:
 
 
 def at(M: Array, u: Array) -> Array:
-    """(N, n, n) the matrix at angles u, (N,), from its parts (N, n3, n, n)."""
+    """Return the matrices at angles u (N,), from their parts (N, n3, n, n)."""
     value: Array = np.einsum("nk,nkab->nab", weights(u, M.shape[1]), M)
     return value
 
 
 def null_rows(right: Array, rank: int) -> Array:
-    """(N, s - 1 - rank, s - 1) orthonormal rows that the monomials of joints 1 and 2 vanish on."""
+    """Return orthonormal rows (N, s - 1 - rank, s - 1) that cancel the monomials of joints 1, 2."""
     U = np.linalg.svd(right[:, :, 1:])[0]
     return np.swapaxes(U[:, :, rank:], -1, -2)
 
 
 def eliminations(prismatic: Joints) -> list[Elimination]:
-    """The choices there are: the monomial that multiplies, and where joints slide the equations."""
+    """Return all eliminations: products by x4 or x5, and fewer equations with prismatic joints."""
     chosen = [np.arange(SIZE)] + ([LINEAR] if np.any(prismatic) else [])
     return [_elimination(prismatic, elements, k) for elements in chosen for k in (0, 1)]
 
@@ -253,7 +256,7 @@ def _elimination(prismatic: Joints, elements: NDArray[np.int64], raised: int) ->
 
 
 def _third(slides: bool, count: int) -> tuple[Array, Array]:
-    """The parts of joint 3 that go with its `weights`, and what stands for 1."""
+    """Return the parts of joint 3 for its `weights`, and the coefficients of the number 1."""
     parts = motion_parts(slides)[:count]
     if not slides:
         return parts, np.array([1.0, 0.0, 0.0])
@@ -265,23 +268,23 @@ def _third(slides: bool, count: int) -> tuple[Array, Array]:
 
 # Joints 4 and 5 from the null space of the matrix at an angle of joint 3.
 #
-# A null vector holds the monomials x4^i x5^j, i <= 3, j <= 2, or likewise. Where m solutions
-# share the angle, the null space is spanned by m such vectors, and the shifts from x^i to x^(i+1)
-# are m x m matrices with a common basis of eigenvectors.
+# A null vector consists of monomials x4^i x5^j, such as i <= 3, j <= 2. If m solutions share the
+# angle, m such vectors span the null space, and the shifts from x^i to x^(i+1) are m x m matrices
+# with common eigenvectors.
 #
 # Source: Manocha & Canny 1994; Cao, Coutsias & Pollock 2023 for several solutions at one root.
 
 
-_MIX = 0.6180339887  # of X5 with X4, so that eigenvalues of the sum differ
+_MIX = 0.6180339887  # weight of X5 in the sum with X4, such that the sum has different eigenvalues
 
 
 def middle_joints(M: Array, grid: tuple[int, int], count: int) -> tuple[Array, Array]:
-    """The half angles x4 and x5, (N, count) each, of as many solutions as share the angle.
+    """Return half angles x4 and x5 (N, count) of the solutions that share an angle of joint 3.
 
     Args:
-        M: (N, n, n) matrices at the angles of joint 3, real or complex.
-        grid: numbers of powers of x4 and of x5, of which the n monomials are the products.
-        count: of solutions, the dimension of the null space.
+        M: (N, n, n) real or complex matrices at the angles of joint 3.
+        grid: numbers of powers of x4 and of x5. The n monomials are their products.
+        count: number of solutions, the dimension of the null space.
     """
     V = np.linalg.svd(M)[2][:, M.shape[-1] - count :, :].conj()
     basis = np.swapaxes(V, -1, -2).reshape(len(M), *grid, count)
@@ -294,42 +297,42 @@ def middle_joints(M: Array, grid: tuple[int, int], count: int) -> tuple[Array, A
 
 
 def _shift(low: Array, high: Array) -> Array:
-    """(n, m, m) the least-squares solution X of high = low X."""
+    """Return the least-squares solutions X (n, m, m) of high = low X."""
     count = low.shape[-1]
     low, high = (part.reshape(len(low), -1, count) for part in (low, high))
-    # a direction in which no vector goes but by rounding, some 1e-15, gives no shift
+    # directions with singular values of rounding, about 1e-15, give no shift
     return np.linalg.pinv(low, rcond=1e-13) @ high
 
 
 def _rayleigh(vectors: Array, X: Array) -> Array:
-    """(n, m) eigenvalues of X of the vectors in the columns; the real part where X is real."""
+    """Return Rayleigh quotients (n, m) of X for vectors in columns; real parts if X is real."""
     size = np.sum(np.abs(vectors) ** 2, axis=1)
     values: Array = np.sum(np.conj(vectors) * (X @ vectors), axis=1) / size
     return np.real(values) if np.isrealobj(X) else values
 
 
-# A loop of six joints, begun at any of them and walked either way.
+# Loop of six joints, which can start at each joint and run in both directions.
 #
-# The target pose T closes the arm to the loop Z_1 C_1 Z_2 C_2 .. Z_6 C_6 = 1: Z_k is the motion
-# of joint k, C_k the path to the next joint, and the pose is in one of the ways.
+# The target pose T closes the arm to the loop Z_1 C_1 Z_2 C_2 .. Z_6 C_6 = 1. Z_k is the motion of
+# joint k. C_k is the constant transform to the next joint; one of them contains the pose.
 
 
-_TINY_LENGTH = 1e-9  # part of an arm's length that is rounding of lengths between its joints
+_TINY_LENGTH = 1e-9  # relative size of lengths between the joints of an arm that are rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrangement:
-    """The loop of an arm as the elimination takes it, lengths in units of its own.
+    """Loop of an arm for the elimination, with lengths divided by the length of the loop.
 
     Attributes:
-        order: (6,) numbers of the arm's joints in the order of the loop.
-        sign: +1 or -1, of the arm's joint order[k] by the loop's joint k.
-        prismatic: (6,) whether each joint of the loop slides.
-        offsets: (6,) angles from which the loop's joints are counted [rad]; zero for slides.
-        ways: (6, 4, 4) constant ways; the one at `index` ends where the pose begins.
-        index: number of the way with the pose.
-        after: (4, 4) what comes after the pose in its way.
-        length: the unit [m].
+        order: (6,) indices of the arm's joints in the order of the loop.
+        sign: +1, or -1 if the loop runs against the arm.
+        prismatic: (6,) whether each joint of the loop is prismatic.
+        offsets: (6,) angles at which the loop's joints are zero [rad]; 0 for prismatic joints.
+        ways: (6, 4, 4) constant transforms. The transform at `index` ends where the pose begins.
+        index: index of the transform with the pose.
+        after: (4, 4) transform after the pose in that transform.
+        length: unit of lengths [m].
     """
 
     order: NDArray[np.int64]
@@ -342,7 +345,7 @@ class Arrangement:
     length: float
 
     def all_ways(self, T: Array) -> Array:
-        """(N, 6, 4, 4) the ways for target poses T, (N, 4, 4) [m]."""
+        """Return the transforms (N, 6, 4, 4) of the loop for target poses T (N, 4, 4) [m]."""
         T = _scale(T, self.length)
         ways = np.broadcast_to(self.ways, (len(T), 6, 4, 4)).copy()
         ways[:, self.index] = ways[:, self.index] @ self._pose(T) @ self.after
@@ -352,7 +355,7 @@ class Arrangement:
         return inverse(T) if self.sign > 0 else T
 
     def configurations(self, u: Array) -> Array:
-        """(..., 6) configurations of the arm, angles in [-pi, pi), for the loop's joints at u."""
+        """Return arm configurations (..., 6), angles in [-pi, pi), for loop joints at u."""
         u = self.sign * (u + self.offsets)
         wrapped = (u + np.pi) % (2 * np.pi) - np.pi
         q = np.empty_like(u)
@@ -361,11 +364,11 @@ class Arrangement:
 
 
 def arrangements(arm: Arm, offsets: Array) -> list[Arrangement]:
-    """All loops of an arm whose last joint turns: up to twelve.
+    """Return all loops of an arm whose last joint is revolute: up to twelve.
 
     Args:
-        arm: of six joints.
-        offsets: (6,) angles from which the joints of the loop are counted [rad].
+        arm: arm of six joints.
+        offsets: (6,) angles at which the joints of the loop are zero [rad].
     """
     length = loop_length(arm)
     G = _scale(arm.gaps, length)
@@ -388,7 +391,7 @@ def arrangements(arm: Arm, offsets: Array) -> list[Arrangement]:
 
 
 def loop_length(arm: Arm) -> float:
-    """A length of the size of an arm [m], wherever its base stands and whatever its tool is."""
+    """Return a typical length of an arm [m] that does not depend on its base and tool."""
     inner = float(np.sum(np.linalg.norm(arm.gaps[1:6, :3, 3], axis=1)))
     return inner if inner > _TINY_LENGTH * arm.length else arm.length
 
@@ -399,25 +402,25 @@ def _scale(T: Array, length: float) -> Array:
     return T
 
 
-# The matrix of a loop in joint 3 alone, and how far it is from being singular everywhere.
+# Matrix of a loop in joint 3 alone, and its distance from a matrix that is singular everywhere.
 
 
 _SEED = 20260212
-_ANGLES = np.array([0.4137, 2.2691, -1.5283])  # of joint 3 [rad], at which nothing is special
-_RANK = 1e-9  # singular values below it, relatively, are rounding
-_SLIDING, _SPARE = 0.01, 100.0  # merit of a joint 3 that slides; the most of further equations
-_SMALL = 0.1  # a matrix without larger entries is rounding
+_ANGLES = np.array([0.4137, 2.2691, -1.5283])  # generic angles of joint 3 [rad]
+_RANK = 1e-9  # relative singular value below which a value is rounding
+_SLIDING, _SPARE = 0.01, 100.0  # merit factors: of a prismatic joint 3; largest of spare equations
+_SMALL = 0.1  # largest singular value below which a matrix is rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pencil:
-    """What makes the matrix from the ways of a loop.
+    """Construction of the matrix from the constant transforms of a loop.
 
     Attributes:
-        elimination: of joints 1 and 2.
-        rank: of what these joints are in, eight or less, at any pose.
-        mix: (n, 2 k) orthonormal rows that make n equations of the 2 k that are left.
-        regularity: reciprocal condition of the matrix at angles that are no solutions, in [0, 1].
+        elimination: elimination of joints 1 and 2.
+        rank: rank of the matrix of the monomials of joints 1 and 2, eight or less, at any pose.
+        mix: (n, 2 k) orthonormal rows that combine the 2 k remaining equations to n equations.
+        regularity: reciprocal condition number, in [0, 1], at angles that are no solutions.
     """
 
     elimination: Elimination
@@ -427,20 +430,21 @@ class Pencil:
 
     @property
     def merit(self) -> float:
-        """The regularity, and more where equations are left over.
+        """Regularity, multiplied by a factor for spare equations.
 
-        The matrix then keeps its rank near configurations where joints 4 and 6 of the loop align.
-        It is less where joint 3 slides, whose roots at infinity are near real ones.
+        With spare equations, the matrix keeps its rank near configurations in which joints 4 and 6
+        of the loop align. A prismatic joint 3 has a small factor, because its roots at infinity are
+        near real roots.
         """
         size, rows = self.mix.shape
         spare = min(float(rows / size) ** 12, _SPARE)
         return self.regularity * spare * (_SLIDING if self.elimination.slides else 1.0)
 
     def matrices(self, ways: Array) -> Array:
-        """(N, n3, n, n) parts of the matrix that is singular at the solutions.
+        """Return parts (N, n3, n, n) of the matrix that is singular at the solutions.
 
         Args:
-            ways: (N, 6, 4, 4) of the loop.
+            ways: (N, 6, 4, 4) constant transforms of the loop.
         """
         right, left = self.elimination.right_side(ways), self.elimination.left_side(ways)
         E = self.elimination.equations(null_rows(right, self.rank), right, left)
@@ -449,11 +453,11 @@ class Pencil:
 
 
 def pencil(elimination: Elimination, ways: Array) -> Pencil:
-    """The matrix of an elimination, examined at some poses.
+    """Return the matrix construction of an elimination, with its rank and regularity.
 
     Args:
-        elimination: of joints 1 and 2.
-        ways: (N, 6, 4, 4) of the loop at generic poses that it reaches.
+        elimination: elimination of joints 1 and 2.
+        ways: (N, 6, 4, 4) transforms of the loop at generic reachable poses.
     """
     s = np.linalg.svd(elimination.right_side(ways)[:, :, 1:], compute_uv=False)
     rank = int(np.max(np.sum(s > _RANK * s[:, :1], axis=1)))
@@ -465,12 +469,13 @@ def pencil(elimination: Elimination, ways: Array) -> Pencil:
 
 
 def regularity(M: Array) -> float:
-    """Reciprocal condition at angles that are no solutions, of the worst of matrices.
+    """Return the smallest reciprocal condition number of matrices at angles that are no solutions.
 
-    Entries are of the size of one; those that are but rounding count as nothing.
+    For each matrix it is the median over three angles. Entries are of size one; a matrix of smaller
+    entries, which are rounding, counts as singular.
 
     Args:
-        M: (N, n3, n, n) their parts.
+        M: (N, n3, n, n) parts of the matrices.
     """
     count = len(_ANGLES)
     values = at(np.repeat(M, count, axis=0), np.tile(_ANGLES, len(M)))
@@ -480,38 +485,38 @@ def regularity(M: Array) -> float:
 
 
 def _mix(size: int, rows: int) -> Array:
-    """(size, rows) orthonormal rows, the identity where there are as many."""
+    """Return orthonormal rows (size, rows); the identity if size and rows are equal."""
     if rows == size:
         return np.eye(size)
     columns = np.random.default_rng(_SEED).standard_normal((rows, size))
     return np.linalg.qr(columns)[0].T
 
 
-# What the method needs to know of an arm: its best arrangement, chosen once.
+# Preparation of an arm: its best loop, selected once.
 
 
 _PREPARE_SEED, _POSES = 20260211, 2
-# angles of joints 4 and 5 [rad] that no design prefers, so that none has an infinite half angle
+# generic offsets of joints 4 and 5 [rad], so that no usual design has an infinite half angle
 _TRIAL_OFFSETS = np.array([0.0, 0.0, 0.0, 0.7345, -1.1127, 0.0])
 _OTHERS, _WELL = 3, 1e-4
-"""Most other arrangements of an arm, and the least regularity of one."""
+"""Largest number of alternative loops of an arm, and their smallest regularity."""
 _LEAST = 1e-5
-"""Regularity at a pose below which another arrangement is tried: rounding leaves 1e-11 of the
-angles there."""
+"""Regularity at a pose below which an alternative loop is tried: angles are accurate to 1e-11 at
+this value."""
 REGULAR = 1e-10
-"""Regularity above which the method holds: of a matrix that is always singular rounding leaves
-1e-15, and at it six digits of a root are left."""
+"""Smallest regularity for which the method is valid: a matrix that is always singular has 1e-15
+from rounding, and at 1e-10 roots have six digits."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prepared:
-    """An arm, and the arrangement of its loop in which the matrix is farthest from singular.
+    """Arm with the loop whose matrix is farthest from singular.
 
     Attributes:
-        arrangement: of the loop.
-        pencil: that makes the matrix.
-        others: the same from other joints, in the order in which they are tried at poses at which
-            the matrix is nearly singular at every angle.
+        arrangement: loop of the arm.
+        pencil: construction of its matrix.
+        others: alternative loops with other eliminated joints, in order of preference, for poses at
+            which the matrix is nearly singular at all angles.
     """
 
     arrangement: Arrangement
@@ -520,29 +525,30 @@ class Prepared:
 
     @property
     def regularity(self) -> float:
-        """Reciprocal condition of the matrix at angles that are no solutions, in [0, 1]."""
+        """Reciprocal condition number of the matrix at angles that are no solutions, in [0, 1]."""
         return self.pencil.regularity
 
     @property
     def regular(self) -> bool:
-        """Whether the method holds for the arm; where not, use another one.
+        """Whether the method is valid for the arm.
 
-        It may hold for an arm that is redundant in one direction and short of another, such as one
-        with four parallel axes: its configurations make families, of which candidates are samples.
+        It may be valid for an arm that is redundant in one direction and deficient in another, such
+        as an arm with four parallel axes. Its configurations are self-motions, and the candidates
+        are samples of them.
         """
         return self.regularity > REGULAR
 
 
 def prepare(arm: Arm) -> Prepared:
-    """The best arrangement of an arm, by the condition of its matrix at poses that it reaches.
+    """Return the best loop of an arm, by the condition number of its matrix at reachable poses.
 
     Source: Raghavan & Roth 1993; the choice by condition is new here.
 
     Args:
-        arm: of six joints.
+        arm: arm of six joints.
 
     Raises:
-        ModelError: the arm has not six joints, or none that is revolute.
+        ModelError: the arm does not have six joints, or has no revolute joint.
     """
     if arm.size != 6 or bool(np.all(arm.prismatic)):
         raise ModelError(
@@ -557,7 +563,7 @@ def prepare(arm: Arm) -> Prepared:
     ]
     tried.sort(key=lambda prepared: -prepared.pencil.merit)
     others = list[Prepared]()
-    for one in tried[1:]:  # joints 1 and 2 of the loop are eliminated
+    for one in tried[1:]:  # loops that eliminate other joints
         pairs = [_eliminated(other) for other in (tried[0], *others)]
         if one.regularity > _WELL and _eliminated(one) not in pairs and len(others) < _OTHERS:
             others.append(one)
@@ -565,15 +571,15 @@ def prepare(arm: Arm) -> Prepared:
 
 
 def _eliminated(prepared: Prepared) -> frozenset[int]:
-    """The joints of the arm that are eliminated first."""
+    """Return the indices of the two arm joints that are eliminated first."""
     return frozenset(prepared.arrangement.order[:2].tolist())
 
 
 def for_poses(prepared: Prepared, T: Array) -> list[tuple[Prepared, Numbers]]:
-    """The arrangements whose matrices are regular at poses, and the numbers of these poses.
+    """Return the loops whose matrices are regular at poses, and the indices of these poses.
 
     Args:
-        prepared: see `prepare`.
+        prepared: arm from `prepare`.
         T: (N, 4, 4) target poses [m].
     """
     best, most = np.zeros(len(T), dtype=np.int64), np.full(len(T), -1.0)
@@ -589,27 +595,27 @@ def for_poses(prepared: Prepared, T: Array) -> list[tuple[Prepared, Numbers]]:
 
 
 def _reached(arm: Arm) -> Array:
-    """(2, 4, 4) poses of generic configurations."""
+    """Return poses (2, 4, 4) of generic configurations."""
     rng = np.random.default_rng(_PREPARE_SEED)
     turns = rng.uniform(-np.pi, np.pi, (_POSES, 6))
-    # slides of the arm's own size and never near zero, where axes might meet
+    # displacements of the size of the arm and not near zero, where axes might intersect
     slides = loop_length(arm) * rng.uniform(0.2, 0.8, (_POSES, 6))
     return arm.pose(np.where(arm.prismatic, slides, turns))
 
 
-# The angles of joint 3 where the matrix is singular: eigenvalues of a companion matrix.
+# Angles of joint 3 at which the matrix is singular: eigenvalues of a companion matrix.
 #
 # Source: Manocha & Canny 1994.
 
 
-_OFFSETS = 0.2731 + np.arange(8) * np.pi / 4  # of joint 3 [rad], angles that no design prefers
-_ROUNDING = 1e-16  # part of the largest singular value that divides in place of a smaller one
+_OFFSETS = 0.2731 + np.arange(8) * np.pi / 4  # offsets of joint 3 [rad], generic for usual designs
+_ROUNDING = 1e-16  # lower limit of singular values that divide, relative to the largest
 
 
 def complex_roots(M: Array) -> NDArray[np.complex128]:
-    """(N, r) complex angles u where the matrices (N, n3, n, n) are singular.
+    """Return complex angles u (N, r) at which the matrices (N, n3, n, n) are singular.
 
-    Among them are some of large imaginary part, which belong to no configuration.
+    Some angles with a large imaginary part belong to no configuration.
     """
     offset, coefficients = _rotate(M / np.max(np.abs(M), axis=(1, 2, 3), keepdims=True))
     x = np.linalg.eigvals(_companion(coefficients)).astype(complex)
@@ -621,7 +627,7 @@ def complex_roots(M: Array) -> NDArray[np.complex128]:
 
 
 def _companion(coefficients: Array) -> Array:
-    """(N, d n, d n) matrices whose eigenvalues x make a polynomial of degree d in x singular."""
+    """Return companion matrices (N, d n, d n) of matrix polynomials in x of degree d."""
     count, degree, n = len(coefficients), coefficients.shape[1] - 1, coefficients.shape[-1]
     companion = np.zeros((count, degree * n, degree * n))
     companion[:, range((degree - 1) * n), range(n, degree * n)] = 1.0
@@ -633,7 +639,7 @@ def _companion(coefficients: Array) -> Array:
 
 
 def _far_regularities(M: Array) -> Array:
-    """(N, 8) reciprocal conditions of matrices at x = infinity, for each offset."""
+    """Return reciprocal condition numbers (N, 8) of matrices at x = infinity, for each offset."""
     far = np.einsum("ok,nkab->noab", weights(_OFFSETS + np.pi, M.shape[1]), M)
     values = np.linalg.svd(far, compute_uv=False)
     conditions: Array = values[..., -1] / np.maximum(values[..., 0], NONZERO)
@@ -641,15 +647,16 @@ def _far_regularities(M: Array) -> Array:
 
 
 def _regularities(M: Array) -> Array:
-    """(N,) regularities of matrices (N, n3, n, n): nearly singular ones have none."""
+    """Return regularities (N,) of matrices (N, n3, n, n): the best over the offsets."""
     most: Array = np.max(_far_regularities(M), axis=1)
     return most
 
 
 def _rotate(M: Array) -> tuple[Array, Array]:
-    """Offsets (N,), and (N, d + 1, n, n) factors of 1, x, .. for u = offset + 2 atan x.
+    """Return offsets (N,) and coefficients (N, d + 1, n, n) of 1, x, .. for u = offset + 2 atan x.
 
-    Of eight offsets the one where the last factor, the matrix at x = infinity, is best conditioned.
+    The offset is the one of eight at which the last coefficient, the matrix at x = infinity, is
+    best conditioned.
     """
     offset = _OFFSETS[np.argmax(_far_regularities(M), axis=1)]
     if M.shape[1] == 2:

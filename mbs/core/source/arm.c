@@ -7,7 +7,7 @@
 
 static const double REACHED = 1e-12;
 
-/* T = T G, of which G stays. */
+/* T = T G; G is not changed. */
 static void walk(double *T, const double *G) {
     int i;
     for (i = 0; i < 12; i += 4) {

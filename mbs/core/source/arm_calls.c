@@ -1,4 +1,4 @@
-/* The arm's algorithms for callers that hand over plain arrays. */
+/* Exported functions of the arm algorithms, for callers with plain arrays. */
 #include "arm_nearest.h"
 #include "arm_reduce.h"
 #include "arm_search.h"
@@ -10,7 +10,8 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-/* Polishes q (count, n) for target poses (4, 4) that lie `stride` doubles apart; 0: one for all. */
+/* Polishes q (count, n) for target poses (4, 4) with a stride in doubles; stride 0: one pose for
+ * all. */
 EXPORT void mbs_polish(const arm *a, const double *target, long long stride, long long count,
                        double *q, double *residual) {
     long long i;
@@ -18,7 +19,8 @@ EXPORT void mbs_polish(const arm *a, const double *target, long long stride, lon
         residual[i] = arm_polish(a, target + i * stride, q + i * a->n);
 }
 
-/* Corrects x (count, n), with held (count, n) and value (count,), see arm_correct; targets likewise. */
+/* Corrects x (count, n) with held (count, n) and value (count,), see arm_correct; targets as above.
+*/
 EXPORT void mbs_correct(const arm *a, const double *target, long long stride, long long count,
                         const double *held, const double *value, int iterations, double *x) {
     long long i;
@@ -26,7 +28,7 @@ EXPORT void mbs_correct(const arm *a, const double *target, long long stride, lo
         arm_correct(a, target + i * stride, held + i * a->n, value[i], iterations, x + i * a->n);
 }
 
-/* residual (count,) of q (count, n), see arm_residual; targets as above. */
+/* Computes residual (count,) of q (count, n), see arm_residual; targets as above. */
 EXPORT void mbs_residual(const arm *a, const double *target, long long stride, long long count,
                          const double *q, double *residual) {
     double T[16];
@@ -37,7 +39,8 @@ EXPORT void mbs_residual(const arm *a, const double *target, long long stride, l
     }
 }
 
-/* gap (count, 6) and J (count, n, 6) of q (count, n), see configuration; targets as above. */
+/* Computes gap (count, 6) and J (count, n, 6) of q (count, n), see arm_examine; targets as above.
+*/
 EXPORT void mbs_examine(const arm *a, const double *target, long long stride, long long count,
                         const double *q, double *gap, double *J) {
     configuration p;
@@ -58,7 +61,7 @@ EXPORT long long mbs_walk(const arm *a, const double *target, const double *tang
     return arm_walk(a, target, tangent, limit, most, sided, points, closed);
 }
 
-/* Fills q (starts, n), residual and hits (starts,); gives how many configurations were found. */
+/* Fills q (starts, n), residual and hits (starts,). Returns the number of configurations found. */
 EXPORT long long mbs_search(const arm *a, const double *target, long long starts,
                             unsigned long long seed, double *q, double *residual,
                             long long *hits) {
@@ -67,7 +70,7 @@ EXPORT long long mbs_search(const arm *a, const double *target, long long starts
     return found.count;
 }
 
-/* Keeps those of q (count, n) that are distinct, in their order; gives how many they are. */
+/* Keeps the distinct rows of q (count, n), in their order. Returns their number. */
 EXPORT long long mbs_merge(const arm *a, const double *target, long long count, double *q,
                            double *residual, long long *hits) {
     arm_configurations found = {q, residual, hits, 0};
@@ -86,8 +89,9 @@ EXPORT double mbs_nearest(const arm *a, const double *target, long long starts,
     return arm_nearest(a, target, starts, seed, q);
 }
 
-/* All solutions for poses (poses, 4, 4): q (room, 6), which pose each is for and how many configurations
- * it comes from. Stops where there might be no room for another pose; *done poses are solved. */
+/* All solutions for poses (poses, 4, 4): q (room, 6), the index of the pose of each, and the number
+ * of candidates that merged to it. Stops if there may be no room for another pose; *done poses are
+ * solved. */
 EXPORT long long mbs_general(const arm *a, const roth_loop *r, const double *target,
                              long long poses, long long room, double *q, long long *number,
                              long long *hits, long long *done) {
@@ -102,12 +106,13 @@ EXPORT long long mbs_general(const arm *a, const roth_loop *r, const double *tar
     return count;
 }
 
-/* `roth_candidates`; q has room for ROTH_CONFIGURATIONS. */
+/* Exports roth_candidates; q has room for ROTH_CONFIGURATIONS. */
 EXPORT long long mbs_candidates(const roth_loop *r, const double *target, double *q) {
     return roth_candidates(r, target, q);
 }
 
-/* `pose_solve` in CasADi's convention: T and a pose_solver -> q, residual, number, (count, state). */
+/* pose_solve in CasADi's convention: T and a pose_solver -> q, residual, number, (count, result
+ * code). */
 EXPORT int mbs_pose(const double **arg, double **res, long long *iw, double *w, int mem) {
     long long count;
     (void)iw;
@@ -125,14 +130,14 @@ EXPORT int mbs_pose_work(long long *arguments, long long *results, long long *in
     return 0;
 }
 
-/* Which of q (count, n) have a singular value below the bound. */
+/* Marks the rows of q (count, n) whose Jacobian has a singular value below the bound. */
 EXPORT void mbs_singular(const arm *a, double bound, long long count, const double *q,
                          unsigned char *singular) {
     long long i;
     for (i = 0; i < count; i++) singular[i] = (unsigned char)pose_is_singular(a, q + i * a->n, bound);
 }
 
-/* `pose_settle` for a closed form that was evaluated elsewhere; gives what came of the pose. */
+/* Exports pose_settle for an evaluated closed form. Returns POSE_CERTAIN or POSE_DOUBTFUL. */
 EXPORT int mbs_settle(const arm *a, const double *T, long long branches, double *q, double *residual,
                       const double *real, const double *regular, double suspect, double nearly, double *number,
                       long long *count) {
@@ -142,17 +147,18 @@ EXPORT int mbs_settle(const arm *a, const double *T, long long branches, double 
     return doubtful ? POSE_DOUBTFUL : POSE_CERTAIN;
 }
 
-/* `pose_round`. */
+/* Exports pose_round. */
 EXPORT int mbs_round(double *T) { return pose_round(T); }
 
-/* Brings x (count, n) to a sphere, see arm_reach_sphere. */
+/* Moves x (count, n) to a sphere, see arm_reach_sphere. */
 EXPORT void mbs_reach_sphere(const arm *a, const double *target, const double *centre, double radius,
                              long long count, double *x) {
     long long i;
     for (i = 0; i < count; i++) arm_reach_sphere(a, target, centre, radius, x + i * a->n);
 }
 
-/* x (count, n) and g (count, 6 - n + c) for h (count, c), see arm_reduced; whether all were found. */
+/* x (count, n) and g (count, 6 - n + c) for h (count, c), see arm_reduced. Returns 1 if all
+ * converged. */
 EXPORT int mbs_reduced(const arm *a, const double *target, const arm_reduction *r, long long count,
                        const double *h, double *x, double *g) {
     long long i;

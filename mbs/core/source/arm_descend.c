@@ -6,18 +6,19 @@
 #include "rigid.h"
 
 enum { STALLS = 3, ROWS = 7 + ARM_JOINTS };
-static const double SOLUTION = 1e-26;   /* costs below it are those of solutions but for rounding */
-static const double FINEST = 1e-31; /* nothing is left to gain */
-static const double WEAK = 1e-8;    /* pivots of squares below it are taken for rounding */
-static const double LEAST = 1e-31;  /* damping, so that no matrix is singular */
-static const double DEPENDENT = 1e-12; /* singular values below it are rounding, and damped */
-static const double ZERO = 2e-6;       /* those of a self-motion, known to the root of 1e-12 */
-static const double LONGEST = 0.3;     /* step [rad or arm lengths] in which all is nearly linear */
-static const double DEPENDENT_THERE = 1e-10; /* likewise on a sphere, where motions meet */
-static const double STRAIGHT = 0.9;    /* cosine of 26 degrees, by which a step may turn: curves
-                                          hardly ever cross at less */
-static const double FINISHED = 1e-14;  /* step that is rounding of angles of about one */
-static const double SETTLED = 1e-12;   /* step that is hardly more than rounding, likewise */
+static const double SOLUTION = 1e-26;   /* largest cost of a solution, from rounding */
+static const double FINEST = 1e-31; /* cost below which nothing can be gained */
+static const double WEAK = 1e-8;    /* relative pivot of the normal matrix that counts as rounding
+*/ static const double LEAST = 1e-31;  /* smallest damping, so that no matrix is singular */ static
+const double DEPENDENT = 1e-12; /* damping of singular values that are rounding */ static const
+double ZERO = 2e-6;       /* damping of a self-motion's: accurate to the root of 1e-12 */ static
+const double LONGEST = 0.3;     /* longest step of the linear range [rad or arm lengths] */ static
+const double DEPENDENT_THERE = 1e-10; /* DEPENDENT on a sphere, where motions meet */ static const
+double STRAIGHT = 0.9;    /* cosine of 26 degrees, largest change of direction in a step:
+                                          curves hardly ever cross at smaller angles */
+static const double FINISHED = 1e-14;  /* step [rad or arm lengths] that is rounding of angles of 1
+*/ static const double SETTLED = 1e-12;   /* step [rad or arm lengths] that is slightly above
+rounding */
 
 void configuration_copy(const arm *a, configuration *to, const configuration *from) {
     size_t n = (size_t)a->n;
@@ -28,7 +29,7 @@ void configuration_copy(const arm *a, configuration *to, const configuration *fr
     memcpy(to->J, from->J, n * sizeof *to->J);
 }
 
-/* (J' J + shift) dx = J' gap by Cholesky. 0: too close to singular. */
+/* Solves (J' J + shift) dx = J' gap by Cholesky. Returns 0 if the matrix is nearly singular. */
 static int normal_step(const arm *a, const configuration *p, double shift, double *dx) {
     double L[ARM_JOINTS][ARM_JOINTS], most = 0.0;
     int i, j, k, n = a->n;
@@ -57,7 +58,7 @@ static int normal_step(const arm *a, const configuration *p, double shift, doubl
     return 1;
 }
 
-/* Reflects columns j .. n so that column j ends at its element j. */
+/* Reflects columns j .. n so that column j is zero below its element j. */
 static void reflect_rows(double A[ARM_JOINTS + 1][ROWS], int j, int n, int rows) {
     double size = 0.0, scale;
     int i, k;
@@ -74,13 +75,14 @@ static void reflect_rows(double A[ARM_JOINTS + 1][ROWS], int j, int n, int rows)
     A[j][j] = size;
 }
 
-/* Columns 0 .. n of A, with `rows` elements each, become zero. */
+/* Sets columns 0 .. n of A, with `rows` elements each, to zero. */
 static void clear_columns(double A[ARM_JOINTS + 1][ROWS], int n, int rows) {
     int j;
     for (j = 0; j <= n; j++) memset(A[j], 0, (size_t)rows * sizeof **A);
 }
 
-/* The same step by reflections of [J gap; sqrt(shift) 0], which do not square the Jacobian. */
+/* Step of normal_step by reflections of [J gap; sqrt(shift) 0], which do not square the Jacobian.
+*/
 static void orthogonal_step(const arm *a, const configuration *p, double shift, double *dx) {
     double A[ARM_JOINTS + 1][ROWS];
     int j, k, n = a->n, rows = 6 + a->n;
@@ -98,7 +100,8 @@ static void orthogonal_step(const arm *a, const configuration *p, double shift, 
     }
 }
 
-/* Least squares of [J; held] dx = [right; value] by reflections, damped by rows of `damping`. */
+/* Least-squares solution of [J; held] dx = [right; value] by reflections, with rows of `damping`.
+*/
 static void held_step(const arm *a, const configuration *p, const double *right, const double *held,
                       double value, double damping, double *dx) {
     double A[ARM_JOINTS + 1][ROWS];
@@ -157,16 +160,16 @@ void arm_reach_sphere(const arm *a, const double *target, const double *centre, 
         held_step(a, &p, p.gap, away, rest, DEPENDENT_THERE, dx);
         for (k = 0; k < a->n; k++) size += dx[k] * dx[k];
         size = sqrt(size);
-        /* short beside the sphere, so that it is not left for another solution */
+        /* step short relative to the sphere, to stay near the same solution */
         part = size > 0.3 * radius ? 0.3 * radius / size : 1.0;
         for (k = 0; k < a->n; k++) x[k] += part * dx[k];
         if (!(size >= FINISHED)) return;
     }
 }
 
-/* The unit vector nearest `before`, one too, that p->J does not feel; gives the cosine between them.
- * One damped projection leaves a part of what singular values of a few times ZERO feel, three do
- * not. */
+/* Unit vector `along` in the null space of p->J that is nearest to the unit vector `before`.
+ * Returns the cosine between them. One damped projection keeps parts along singular values of a few
+ * times ZERO; three projections remove them. */
 static double null_direction(const arm *a, const configuration *p, const double *before, double *along) {
     static const double none[6] = {0.0};
     double found[ARM_JOINTS], cosine = 0.0;
@@ -183,7 +186,7 @@ static double null_direction(const arm *a, const configuration *p, const double 
     return cosine;
 }
 
-/* The Jacobian at x = q / unit. */
+/* Computes the Jacobian at x = q / unit. */
 static void differentiate(const arm *a, const double *x, configuration *p) {
     static const double home[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
     int k;
@@ -197,8 +200,8 @@ static void transpose(const configuration *p, configuration *turned) {
         for (k = 0; k < 6; k++) turned->J[k][i] = p->J[i][k];
 }
 
-/* From the direction before to that of a self-motion; straight on, and 0, where it has turned by 84
- * degrees. */
+/* Direction `along` of a self-motion at x, continued from `before`. Returns 0 and keeps `before` if
+ * the direction has changed by 84 degrees. */
 static int turn(const arm *a, const double *x, const double *before, double *along) {
     configuration p;
     differentiate(a, x, &p);
@@ -207,9 +210,9 @@ static int turn(const arm *a, const double *x, const double *before, double *alo
     return 0;
 }
 
-/* Which way round a curve is seen at x: the sign of det [[J, left], [along', 0]], with the direction
- * `left` of the equations that the joints do not change, which is continued. It changes where two curves
- * cross, and nowhere else (Allgower and Georg 1990, chapter 8). 0 for fewer than six joints. */
+/* Orientation of a curve at x: sign of det [[J, left], [along', 0]]. `left` is the direction of
+ * equations that the joints do not change; it is continued. The sign changes only at a crossing of
+ * two curves (Allgower and Georg 1990, chapter 8). Returns 0 for fewer than six joints. */
 static int side(const arm *a, const double *x, const double *along, double *left) {
     configuration p, turned;
     double B[7][7];
@@ -224,7 +227,7 @@ static int side(const arm *a, const double *x, const double *along, double *left
         B[6][i] = along[i];
     }
     B[6][6] = 0.0;
-    for (k = 0; k < 7; k++) { /* elimination, rows exchanged */
+    for (k = 0; k < 7; k++) { /* elimination with row exchange */
         int best = k;
         for (i = k + 1; i < 7; i++)
             if (fabs(B[i][k]) > fabs(B[best][k])) best = i;
@@ -242,7 +245,8 @@ static int side(const arm *a, const double *x, const double *along, double *left
     return sign;
 }
 
-/* The equations' direction that the joints do not change at x, from the best of six guesses. */
+/* Direction `left` of equations that the joints do not change at x, from the best of six guesses.
+*/
 static void left_direction(const arm *a, const double *x, double *left) {
     configuration p, turned;
     double most = 0.0;
@@ -261,14 +265,14 @@ static void left_direction(const arm *a, const double *x, double *left) {
 
 long long arm_walk(const arm *a, const double *target, const double *tangent, double limit,
                    long long most, int sided, double *points, int *closed) {
-    /* steps [rad or arm lengths]; where curves that cross are not told, none winds past another */
+    /* steps [rad or arm lengths]; without `sided`, crossing curves are not distinguished */
     const double longest = 0.1, shortest = sided ? 1e-5 : 1e-3;
     double along[ARM_JOINTS], x[ARM_JOINTS], moved[ARM_JOINTS], q[ARM_JOINTS], T[16];
     double step = longest;
     long long count = 1;
     double left[ARM_JOINTS] = {0.0}, beyond[ARM_JOINTS], on[ARM_JOINTS];
     int k, n = a->n, seen = 0, sharp;
-    const int told = sided && n == 6; /* which side the curve is seen from */
+    const int told = sided && n == 6; /* whether the orientation of the curve is tracked */
     *closed = 0;
     memcpy(along, tangent, (size_t)n * sizeof(double));
     if (told) {
@@ -300,8 +304,8 @@ long long arm_walk(const arm *a, const double *target, const double *tangent, do
         sharp = sided && (sharp || cosine < STRAIGHT);
         memcpy(beyond, left, sizeof beyond);
         k = told ? side(a, x, on, beyond) : 0;
-        /* onto another curve that passes close by: straight on its side changes, and to either
-         * hand the direction does */
+        /* a step onto another close curve changes the orientation if it is straight, and the
+         * direction if it is to a side */
         if ((sharp || k != seen) && step > 2.0 * shortest) {
             step *= 0.5;
             continue;
@@ -312,13 +316,13 @@ long long arm_walk(const arm *a, const double *target, const double *tangent, do
         memcpy(points + count * n, x, (size_t)n * sizeof(double));
         count++;
         step = fmin(2.0 * step, longest);
-        for (k = 0; k < n; k++) { /* the way home */
+        for (k = 0; k < n; k++) { /* vector back to the start */
             moved[k] = points[k] - x[k];
             if (!a->prismatic[k]) moved[k] = remainder(moved[k], 2.0 * PI);
             away += moved[k] * moved[k];
             ahead += moved[k] * along[k];
         }
-        /* the start lies within the next step, and a tenth for the bend of the curve */
+        /* the start is within the next step, with 10 % for the curvature */
         if (count > 3 && sqrt(away) <= 1.1 * step && ahead > 0.0 && ahead <= step) {
             for (k = 0; k < n; k++) points[count * n + k] = x[k] + moved[k];
             *closed = 1;
@@ -328,7 +332,7 @@ long long arm_walk(const arm *a, const double *target, const double *tangent, do
     return count;
 }
 
-/* The configuration after one step. */
+/* Configuration after a damped Gauss-Newton step. */
 static void attempt(const arm *a, const double *target, const configuration *from, double damping,
                     configuration *to) {
     double dx[ARM_JOINTS], shift = damping * from->cost + LEAST;
@@ -338,8 +342,8 @@ static void attempt(const arm *a, const double *target, const configuration *fro
     arm_examine(a, target, to);
 }
 
-/* The damping is proportional to the cost, which makes the last steps those of Newton
- * (Yamashita and Fukushima 2001), even where the Jacobian loses rank. */
+/* The damping is proportional to the cost, so that the last steps are Newton steps, even if the
+ * Jacobian loses rank (Yamashita and Fukushima 2001). */
 void arm_descend(const arm *a, const double *target, configuration *p) {
     double damping = 0.1;
     int stalls = 0, step;

@@ -6,16 +6,16 @@
 #include "arm_search.h"
 
 enum { KEPT = 8, REFINEMENTS = 60 };
-static const double NUDGE = 1e-5;   /* of joints, for differences of the slope */
-static const double FLAT = 1e-15;   /* slopes below it are rounding */
-static const double FINEST = 1e-31; /* costs below it leave nothing to gain */
+static const double NUDGE = 1e-5;   /* joint step of finite differences of the slope */
+static const double FLAT = 1e-15;   /* slope that is rounding */
+static const double FINEST = 1e-31; /* cost below which nothing can be gained */
 static const double ALIKE = 1e-14;  /* relative rounding of costs */
-static const double EQUAL = 1e-6;   /* costs that are closer, relatively, are of one valley */
+static const double EQUAL = 1e-6;   /* relative difference of costs of the same minimum */
 
 typedef double matrix[ARM_JOINTS][ARM_JOINTS];
 
-/* Half the gradient of the cost; exact although J is the motion of the frame and not of the
- * rotation vector, because that vector is the axis of its own rotation. */
+/* Half the gradient of the cost. It is exact, although J has the angular velocity and not the rate
+ * of the rotation vector, because that vector is the axis of its own rotation. */
 static void slope(const arm *a, const configuration *p, double *g) {
     int j, k;
     for (j = 0; j < a->n; j++) {
@@ -31,7 +31,7 @@ static double norm(const double *v, int n) {
     return sqrt(sum);
 }
 
-/* Differences of the slope. */
+/* Hessian H by finite differences of the slope. */
 static void curvature(const arm *a, const double *target, const configuration *p, matrix H) {
     double ahead[ARM_JOINTS], behind[ARM_JOINTS];
     configuration near;
@@ -49,7 +49,7 @@ static void curvature(const arm *a, const double *target, const configuration *p
     }
 }
 
-/* -(H + shift)^-1 g by Cholesky. 1: not positive. */
+/* Solves (H + shift) dx = -g by Cholesky. Returns 1 if the matrix is not positive definite. */
 static int newton_step(const matrix H, int n, double shift, const double *g, double *dx) {
     matrix L;
     int i, j, k;
@@ -71,13 +71,14 @@ static int newton_step(const matrix H, int n, double shift, const double *g, dou
     return 0;
 }
 
-/* Near the bottom costs are alike but for rounding, and the slope is more exact. */
+/* Whether a step is an improvement. Near a minimum costs differ by rounding, and the slope decides.
+*/
 static int lower(double cost, double slope, double old_cost, double old_slope) {
     return cost < old_cost * (1.0 - ALIKE) ||
            (cost < old_cost * (1.0 + ALIKE) && slope < 0.5 * old_slope);
 }
 
-/* Newton's method to the bottom of the valley that p is in. */
+/* Newton's method to the local minimum near p. */
 static void refine(const arm *a, const double *target, configuration *p) {
     double g[ARM_JOINTS], next_g[ARM_JOINTS], dx[ARM_JOINTS], shift = 1e-9;
     int k, step, known = 0;
@@ -104,7 +105,7 @@ static void refine(const arm *a, const double *target, configuration *p) {
     }
 }
 
-/* Keeps the best ones apart, in the order of their costs. */
+/* Inserts p into the list of the best different minima, sorted by cost. Returns their number. */
 static int keep(const arm *a, const configuration *p, configuration *best, int count) {
     int i, rank = 0;
     while (rank < count && best[rank].cost <= p->cost) rank++;

@@ -6,8 +6,8 @@
 
 enum { STEPS = 12 };
 static const double CONVERGED = 1e-11; /* step and equations: rounding, magnified by the inverse */
-static const double FINISHED = 1e-14;  /* step that leaves nothing to gain [rad or arm lengths] */
-static const double FARTHEST = 0.5;    /* of a joint in a step, likewise */
+static const double FINISHED = 1e-14;  /* step [rad or arm lengths] that gains nothing */
+static const double FARTHEST = 0.5;    /* largest step of a joint [rad or arm lengths] */
 
 static double dot(const double *x, const double *y, int n) {
     double sum = 0.0;
@@ -16,7 +16,7 @@ static double dot(const double *x, const double *y, int n) {
     return sum;
 }
 
-/* The step from x: the equations that are solved, and the place along the others. */
+/* Newton step from x for the solved equations and given coordinates h along the null directions. */
 static int step_from(const arm *a, const configuration *p, const arm_reduction *r, const double *h,
                      double *x, double *longest) {
     double A[ARM_JOINTS * ARM_JOINTS], b[ARM_JOINTS], away[ARM_JOINTS], most = 0.0;

@@ -1,6 +1,6 @@
-/* All configurations that reach a pose, from random starts.
+/* All configurations that reach a pose, by descents from random starts.
  *
- * Re-entrant: no globals and no allocation. The starts depend on the seed alone.
+ * Re-entrant: no globals and no allocation. The starts depend on the seed only.
  */
 #ifndef MBS_ARM_SEARCH_H
 #define MBS_ARM_SEARCH_H
@@ -10,24 +10,25 @@
 typedef struct {
     double *q;        /* (room, n) distinct configurations */
     double *residual; /* (room,) their relative residuals */
-    long long *hits;  /* (room,) how many configurations were found to be this one */
+    long long *hits;  /* (room,) number of results that are equal to each configuration */
     long long count;
 } arm_configurations;
 
-/* A configuration to start from, the same for the same numbers: angles in (-pi, pi], lengths as far
- * as the arm and the target pose reach. */
+/* Random start, reproducible by seed and number: angles in (-pi, pi], displacements within the
+ * reach of the arm and of the target pose. */
 void arm_start(const arm *a, const double *target, unsigned long long seed, long long number,
                double *q);
 
-/* Whether two solutions are one: closer than 1e-9, or closer than 1e-2 with a solution midway,
- * to 1e-14 or as good as they are, as between copies of a multiple root. Angles that differ by
- * angles modulo 2 pi are equal; lengths are measured in arm lengths. */
+/* Whether two solutions are the same: closer than 1e-9, or closer than 1e-2 if their mean is a
+ * solution too, to 1e-14 or as exact as they are, as for copies of a multiple root. Angles are
+ * compared modulo * 2 pi, lengths in arm lengths. */
 int arm_same(const arm *a, const double *target, const double *q, const double *other);
 
-/* Puts a solution among the others, the better of two that are one. q is none of theirs. */
+/* Adds a solution to the list; of two equal solutions, the better one is kept. q must not alias
+ * them. */
 void arm_add(const arm *a, const double *target, const double *q, arm_configurations *found);
 
-/* Solutions found from `starts` starts; there must be room for as many. */
+/* Solutions from `starts` starts. The list must have room for `starts` configurations. */
 void arm_search(const arm *a, const double *target, long long starts, unsigned long long seed,
                 arm_configurations *found);
 

@@ -6,15 +6,15 @@
 #include "dense.h"
 #include "rigid.h"
 
-static const double SKEWED = 1e-6;     /* by how much an element may miss a rigid transform */
-static const double SOLVED = 1e-12;    /* residual of a solution, of max(1 m, the length) */
-static const double EXACT = 1e-14;     /* one that polishing hardly betters, likewise */
-static const double DOUBTFUL = 1e-6;   /* one beside which a solution may stand, likewise */
-static const double FOLD = 1e-9;       /* radicand below zero of a root real but for rounding */
-static const double DEGENERATE = 1e-12; /* squared, of a step that leaves a joint undetermined */
-static const double EQUAL = 1e-9;      /* between configurations that are one [rad or lengths] */
-static const double MEETING = 1e-5;    /* between those near a double root, likewise */
-static const double FLAT_PIVOT = 1e-15; /* pivots of a Jacobian that are but rounding */
+static const double SKEWED = 1e-6;     /* largest error of an element of a rigid transform */
+static const double SOLVED = 1e-12;    /* largest residual of a solution, times max(1 m, length) */
+static const double EXACT = 1e-14;     /* residual that polishing hardly reduces, same unit */
+static const double DOUBTFUL = 1e-6;   /* residual with a solution possibly near, same unit */
+static const double FOLD = 1e-9;       /* negative radicand of a real root, from rounding */
+static const double DEGENERATE = 1e-12; /* squared measure of a step that determines no joint */
+static const double EQUAL = 1e-9;      /* distance of equal configurations [rad or arm lengths] */
+static const double MEETING = 1e-5;    /* distance near a double root [rad or arm lengths] */
+static const double FLAT_PIVOT = 1e-15; /* pivot of a Jacobian that is rounding */
 
 /* Source: Higham 2008, chapter 8, the Newton-Schulz iteration for the polar factor. */
 int pose_round(double *T) {
@@ -60,7 +60,8 @@ int pose_round(double *T) {
     return 1;
 }
 
-/* Whether J'J - bound^2 is not positive definite, by Cholesky: a singular value is smaller. */
+/* Whether J'J - bound^2 is not positive definite, by Cholesky: a singular value is below the bound.
+*/
 static int is_near_singular(const arm *a, const configuration *p, double bound) {
     double L[ARM_JOINTS][ARM_JOINTS];
     int i, j, k, n = a->n;
@@ -88,7 +89,7 @@ int pose_is_singular(const arm *a, const double *q, double bound) {
     return is_near_singular(a, &p, bound);
 }
 
-/* The largest difference of a joint between two configurations [rad or arm lengths]. */
+/* Largest difference of a joint between two configurations [rad or arm lengths]. */
 static double apart(const arm *a, const double *q, const double *other) {
     double farthest = 0.0;
     int k;
@@ -101,7 +102,7 @@ static double apart(const arm *a, const double *q, const double *other) {
     return farthest;
 }
 
-/* Whether a configuration is far enough from all singular ones, and its residual. */
+/* Whether a configuration is far enough from all singular ones. Also computes its residual. */
 static int is_certain(const arm *a, const double *T, const double *q, double nearly,
                       double *residual) {
     configuration p;
@@ -146,7 +147,7 @@ long long pose_settle(const arm *a, const double *T, long long branches, double 
     return count;
 }
 
-/* The branches of the closed form; the number of solutions, -1 where it could not be evaluated. */
+/* Solutions by the closed form. Returns their number, or -1 if the evaluation failed. */
 static long long by_closed_form(const pose_solver *s, const double *T, double *q, double *residual,
                                 double *number, double *w, int *doubtful) {
     const long long branches = s->branches;
@@ -164,7 +165,7 @@ static long long by_closed_form(const pose_solver *s, const double *T, double *q
     out[1] = residual;
     out[2] = real;
     out[3] = real + branches;
-    out[4] = real + 2 * branches; /* the marks, of no use for one pose */
+    out[4] = real + 2 * branches; /* marks, which are not used for a single pose */
     failed = s->evaluate(in, out, integers, reals, memory);
     if (s->release) s->release(memory);
     return failed ? -1
@@ -172,7 +173,7 @@ static long long by_closed_form(const pose_solver *s, const double *T, double *q
                                 s->nearly, number, doubtful);
 }
 
-/* The solutions of the general method, in no order. */
+/* Solutions by the general method, in any order. Returns their number. */
 static long long by_elimination(const pose_solver *s, const double *T, double *q, double *residual,
                                 double *number, double *w, int *doubtful) {
     const arm *a = s->robot;
@@ -187,7 +188,7 @@ static long long by_elimination(const pose_solver *s, const double *T, double *q
     return found.count;
 }
 
-/* From (count, n) joints of the arm to (count, nq) coordinates, in place. */
+/* Expands (count, n) joints of the arm to (count, nq) coordinates, in place. */
 static void fill_coordinates(const pose_solver *s, long long count, double *q) {
     const long long n = s->robot->n, nq = s->nq;
     double own[ARM_JOINTS];
@@ -199,7 +200,8 @@ static void fill_coordinates(const pose_solver *s, long long count, double *q) {
     }
 }
 
-/* T (4, 4) of CasADi, column by column, row by row; 0 where it is no rigid transform. */
+/* Converts T (4, 4) of CasADi from column to row order and rounds it. Returns 0 if T is not rigid.
+*/
 static int read_pose(const double *columns, double *T) {
     int i, j;
     for (i = 0; i < 4; i++)
@@ -232,7 +234,7 @@ int pose_all(const pose_solver *s, const double **arg, double **res, double *w) 
     int certain = pose_solve(s, arg[0], q, residual, number, work, &found) == POSE_CERTAIN;
     for (i = 0; i < found; i++) {
         if (!(residual[i] <= bound)) continue;
-        if (count == POSE_COLUMNS) { /* samples of a motion with the pose held */
+        if (count == POSE_COLUMNS) { /* samples of a self-motion */
             certain = 0;
             break;
         }
@@ -247,8 +249,8 @@ int pose_all(const pose_solver *s, const double **arg, double **res, double *w) 
     return 0;
 }
 
-/* What six elements of a gap, in arm lengths and rad, are for a change of T in row r and column c: of
- * R the part that is no rotation is lost, see pose_round. */
+/* Derivative of the gap (6,), in arm lengths and rad, by element T[r][c]. Changes of R that are no
+ * rotation have no effect, see pose_round. */
 static void gap_of_element(const arm *a, const double *T, int r, int c, double *gap) {
     int x = (r + 1) % 3, y = (r + 2) % 3;
     memset(gap, 0, 6 * sizeof(double));

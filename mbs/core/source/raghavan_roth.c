@@ -29,7 +29,7 @@ void roth_weights(int parts, double u, double *weights) {
     weights[2] = parts == 2 ? 0.0 : sin(u);
 }
 
-/* Parts with 1, x, x^2 of what a joint makes of w: x = tan(q/2), times 1 + x^2, or x = r. */
+/* Parts of rho(joint) w with 1, x, x^2: times 1 + x^2 for x = tan(q/2), or x = r if prismatic. */
 static void half_parts(int prismatic, const double *w, double *parts) {
     int i;
     pair_parts(prismatic, w, parts);
@@ -41,7 +41,8 @@ static void half_parts(int prismatic, const double *w, double *parts) {
     }
 }
 
-/* Parts with the weights of joint 3; a translation by r = tan(u/2), times cos(u/2) or its square. */
+/* Parts with the weights of joint 3; a translation by r = tan(u/2), times cos(u/2) or its square.
+*/
 static void third_parts(int prismatic, int count, const double *w, double *parts) {
     int i;
     pair_parts(prismatic, w, parts);
@@ -54,7 +55,7 @@ static void third_parts(int prismatic, int count, const double *w, double *parts
     }
 }
 
-/* Parts with 1, cos q, sin q or 1, r, r^2 of what the inverse motion of a joint makes of w. */
+/* Parts of rho(inverse motion of a joint) w with 1, cos q, sin q or 1, r, r^2. */
 static void back_parts(int prismatic, const double *w, double *parts) {
     double *odd = parts + (prismatic ? 1 : 2) * PAIR;
     int i;
@@ -62,7 +63,7 @@ static void back_parts(int prismatic, const double *w, double *parts) {
     for (i = 0; i < PAIR; i++) odd[i] = -odd[i];
 }
 
-/* (columns, rows) factors of the monomials of joints 1 and 2, of which the first is 1. */
+/* Coefficients (columns, rows) of the monomials of joints 1 and 2; the first monomial is 1. */
 static void right_side(const roth_loop *r, const double transforms[6][16], double *right) {
     double w[PAIR], first[3 * PAIR], second[3 * PAIR], back[16];
     int i, j, k, n1 = r->powers[0], n2 = r->powers[1], rows = r->count - 1;
@@ -82,7 +83,7 @@ static void right_side(const roth_loop *r, const double transforms[6][16], doubl
     }
 }
 
-/* (weights, monomials, rows) factors of the monomials x4^i x5^j for each weight of joint 3. */
+/* Coefficients (weights, monomials, rows) of the monomials x4^i x5^j for each weight of joint 3. */
 static void left_side(const roth_loop *r, const double transforms[6][16], double *left) {
     double w[PAIR], fifth[3 * PAIR], fourth[3 * PAIR], third[3 * PAIR];
     int i, j, k, e, n4 = r->powers[3], n5 = r->powers[4], rows = r->count - 1;
@@ -102,7 +103,7 @@ static void left_side(const roth_loop *r, const double transforms[6][16], double
     }
 }
 
-/* How much of the number 1 is in a term of the left side. */
+/* Coefficient of the number 1 in a term of the left side. */
 static double unit(const roth_loop *r, int weight, int i, int j) {
     double third = weight ? 0.0 : 1.0;
     if (r->prismatic[2] && r->powers[2] == 3) third = weight < 2 ? 0.5 : 0.0;
@@ -110,7 +111,7 @@ static double unit(const roth_loop *r, int weight, int i, int j) {
     return (i == 2 && r->prismatic[3]) || (j == 2 && r->prismatic[4]) ? 0.0 : third;
 }
 
-/* One part of the equations, left - unit * constant, and below them their products by x4 or x5. */
+/* A part of the equations, left - unit * constant, and the products of its rows by x4 or x5. */
 static void spread(const roth_loop *r, int weight, const double *left, const double *constant,
                    double *rows) {
     int n4 = r->powers[3], n5 = r->powers[4], all = r->count - 1, count = all - r->rank;

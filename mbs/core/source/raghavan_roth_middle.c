@@ -5,13 +5,13 @@
 #include "eigenvalues.h"
 #include "raghavan_roth.h"
 
-static const double MIX = 0.6180339887; /* of x5 with x4, so that sums of solutions differ */
-static const double ROUNDING = 1e-13;   /* of pivots */
+static const double MIX = 0.6180339887; /* weight of x5 in x4 + MIX x5, generic: different sums */
+static const double ROUNDING = 1e-13;   /* relative pivot that is rounding */
 
 typedef double block[ROTH_SHARED * ROTH_SHARED];
 
-/* V (size, count): an orthonormal basis of what the matrix A (size, size), row by row, maps to
- * zero. A is overwritten. */
+/* Orthonormal basis V (size, count) of the null space of A (size, size), row by row. A is
+ * overwritten. */
 static void null_space(double *A, int size, int count, double *V) {
     dense_qr f;
     f.rows = f.columns = size;
@@ -21,8 +21,8 @@ static void null_space(double *A, int size, int count, double *V) {
     dense_complement(&f, V, count);
 }
 
-/* X (count, count), column by column, such that low X is as near to high as it can be; both are
- * made of the rows of V where the power of one unknown is not the last, or not the first. */
+/* Least-squares solution X (count, count), column by column, of low X = high. `low` has the rows of
+ * V without the highest power of an unknown, `high` those without the lowest power. */
 static void shift(const double *V, int size, int count, int block_size, int step, double *X) {
     double low[ROTH_SIZE * ROTH_SHARED], high[ROTH_SIZE * ROTH_SHARED];
     int i, j, rows = 0;
@@ -45,7 +45,7 @@ static void shift(const double *V, int size, int count, int block_size, int step
         memcpy(X + j * count, high + j * rows, (size_t)count * sizeof(double));
 }
 
-/* The mean of v' X v over the columns of V (n, count), which are orthonormal. */
+/* Mean of v' X v over the columns of V (n, count), which are orthonormal. */
 static double rayleigh(const double *X, const double *V, int n, int count) {
     double sum = 0.0;
     int i, j, k;
@@ -55,8 +55,8 @@ static double rayleigh(const double *X, const double *V, int n, int count) {
     return sum / count;
 }
 
-/* The directions that X (n, n), column by column, only stretches by a, or rotates within their plane
- * by eigenvalues a + ib and a - ib; V (n, 1 or 2). */
+/* Invariant subspace V (n, 1 or 2) of X (n, n), column by column, for the real eigenvalue a or the
+ * pair a + ib, a - ib. Returns its dimension. */
 static int directions(const double *X, int n, double a, double b, double *V) {
     block shifted, square;
     int i, j, k;

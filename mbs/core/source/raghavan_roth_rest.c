@@ -7,12 +7,12 @@
 
 enum { KEPT = 6 };
 static const int REVOLUTE[KEPT] = {1, 2, 5, 8, 11, 14}, PRISMATIC[KEPT] = {3, 4, 6, 7, 8, 11};
-static const double FLAT = 1e-4;     /* ratio of singular values below which there are two roots too */
-static const double NONE = 1e-9;     /* and below which there is no single root */
-static const double NOTHING = 1e-12; /* singular values, in arm lengths, that are rounding */
+static const double FLAT = 1e-4;     /* ratio of singular values below which two roots are added */
+static const double NONE = 1e-9;     /* ratio of singular values below which no single root exists
+*/ static const double NOTHING = 1e-12; /* singular value, in arm lengths, that is rounding */
 
-/* Singular values s, left vectors in the place of A's columns and right vectors V of A (KEPT, 2),
- * column by column. Source: Hestenes 1958, which for two columns is one rotation. */
+/* Singular values s of A (KEPT, 2), column by column, and right vectors V; the left vectors replace
+ * A. Source: Hestenes 1958, which for two columns is one rotation. */
 static void decompose(double A[2][KEPT], double *s, double V[2][2]) {
     double a = 0.0, b = 0.0, c = 0.0, angle, x, y;
     int i, k;
@@ -42,7 +42,8 @@ static void decompose(double A[2][KEPT], double *s, double V[2][2]) {
     }
 }
 
-/* Both roots of x cos q + y sin q = g, or of x r + y r^2 = g; the fold where they are not real. */
+/* Both roots of x cos q + y sin q = g, or of x r + y r^2 = g; the double root if they are complex.
+*/
 static void crossings(int prismatic, const double *n, double g, double *roots) {
     double size = hypot(n[0], n[1]), middle = atan2(n[1], n[0]), half, larger, root;
     if (!prismatic) {
@@ -57,7 +58,7 @@ static void crossings(int prismatic, const double *n, double g, double *roots) {
     roots[1] = fabs(n[1]) > 1e-9 * fabs(n[0]) ? larger / n[1] : roots[0];
 }
 
-/* A (KEPT, 2) times (cos q, sin q) or (r, r^2) of joint 2 is to be b. */
+/* Equations A (KEPT, 2) (cos q, sin q)' = b or A (r, r^2)' = b of joint 2. */
 static void second_equations(const roth_loop *r, const double transforms[6][16],
                              const double *beyond, const double *goal, double A[2][KEPT], double *b) {
     const int *kept = r->prismatic[0] ? PRISMATIC : REVOLUTE;
@@ -74,7 +75,7 @@ static void second_equations(const roth_loop *r, const double transforms[6][16],
     }
 }
 
-/* Positions of joint 2: one, and two more where the equations are, or nearly are, but one. */
+/* Positions of joint 2: a single root, and two more if there is only one equation, or nearly so. */
 static int second_joint(const roth_loop *r, const double transforms[6][16], const double *beyond,
                         const double *goal, double *q2) {
     double A[2][KEPT], V[2][2], b[KEPT], s[2], g[2] = {0.0, 0.0}, f[2];
@@ -93,7 +94,7 @@ static int second_joint(const roth_loop *r, const double transforms[6][16], cons
     return count + 2;
 }
 
-/* The position of joint 1 that takes the origin and the z axis of `near` to those of the goal. */
+/* Position of joint 1 that moves the origin and the z axis of `near` to the goal. */
 static double first_joint(int prismatic, const double *near, const double *goal) {
     double across, along;
     if (prismatic) return goal[11] - near[11];

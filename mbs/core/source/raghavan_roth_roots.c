@@ -7,12 +7,13 @@
 #include "rigid.h"
 
 enum { OFFSETS = 8 };
-static const double FIRST_OFFSET = 0.2731; /* [rad], an angle that no design prefers */
-static const double WELL = 1e-3;           /* a regularity with which no other offset is tried */
-static const double FAR_ROUNDING = 1e-15;  /* of pivots */
-static const double OFF_CIRCLE = 0.5;      /* |log| of the size of e^(iu) of roots that are kept */
+static const double FIRST_OFFSET = 0.2731; /* generic angle [rad] for usual designs */
+static const double WELL = 1e-3;           /* regularity at which no other offset is tried */
+static const double FAR_ROUNDING = 1e-15;  /* relative pivot that is rounding */
+static const double OFF_CIRCLE = 0.5;      /* largest |log |e^(iu)|| of a candidate for a real root
+*/
 
-/* The matrix where x = tan((u - offset) / 2) is infinite. */
+/* Matrix A at infinite x = tan((u - offset) / 2). */
 static void far_matrix(const roth_matrix *m, double offset, double *A) {
     double weights[3];
     int i, k;
@@ -47,7 +48,7 @@ double roth_regularity(const roth_matrix *m, double *best) {
     return most;
 }
 
-/* The factors of 1, x of the polynomial, or of 1 alone where its degree is one. */
+/* Coefficients of 1, x of the matrix polynomial, or of 1 alone for degree one. */
 static void lower_factors(const roth_matrix *m, double offset, double *lower) {
     double weights[3];
     int i, count = m->size * m->size;
@@ -63,7 +64,7 @@ static void lower_factors(const roth_matrix *m, double offset, double *lower) {
     }
 }
 
-/* The companion matrix, its rows being unknowns 1, x; the polynomial is taken transposed. */
+/* Companion matrix of the transposed polynomial; its row blocks are the unknowns 1, x. */
 static int companion(const roth_matrix *m, double offset, double *A) {
     double far[ROTH_SIZE * ROTH_SIZE], lower[2 * ROTH_SIZE * ROTH_SIZE];
     int i, j, n = m->size, degree = m->parts - 1, all = degree * n;
@@ -92,7 +93,7 @@ static int ascending(double *u, int count) {
 int roth_roots(const roth_matrix *m, double offset, double *u) {
     double A[ROTH_ROOTS * ROTH_ROOTS], real[ROTH_ROOTS], imaginary[ROTH_ROOTS];
     int i, count = 0, all = companion(m, offset, A), failed = eigenvalues(all, A, real, imaginary);
-    /* the steps may go round without end where many roots are one, as of three translations */
+    /* the eigenvalue steps may not converge for multiple roots, as with three translations */
     for (i = 0; failed && i < OFFSETS; i++) {
         offset = FIRST_OFFSET + i * PI / 4.0;
         all = companion(m, offset, A);

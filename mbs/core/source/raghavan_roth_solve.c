@@ -4,24 +4,24 @@
 #include "raghavan_roth.h"
 #include "rigid.h"
 
-/* Gaps between angles that may be one root [rad]: of a multiple one, spread by rounding; of a
- * double one, so that neighbours of its kind are tried apart too. */
+/* Largest gaps [rad] in a group of angles that may be one root: COARSE for a multiple root, spread
+ * by rounding; FINE for a double root, so that close roots are tried separately too. */
 static const double COARSE = 1e-3, FINE = 1e-6;
-/* Regularity of the matrix below which another loop is tried: rounding leaves 1e-11 of the angles
- * there. */
+/* Regularity of the matrix below which another loop is tried: angles are accurate to 1e-11 at this
+ * value. */
 static const double LEAST_REGULARITY = 1e-5;
-static const double FAR = 1e3; /* translations, in reaches, that are taken for infinite */
+static const double FAR = 1e3; /* displacement, in reaches, that counts as infinite */
 
 typedef struct {
     const roth_loop *loop;
     double transforms[6][16];
     roth_matrix matrix;
-    double reach; /* [arm lengths] */
-    double *q;    /* (ROTH_CONFIGURATIONS, 6) configurations of the arm so far */
+    double reach; /* reach of the arm and of the pose [arm lengths] */
+    double *q;    /* (ROTH_CONFIGURATIONS, 6) configurations of the arm found so far */
     int count;
 } solution;
 
-/* From the joints of the loop to those of the arm. */
+/* Adds the configuration of the arm for positions u of the loop's joints, if it is finite. */
 static void add_configuration(solution *s, const double *u) {
     const roth_loop *r = s->loop;
     double *q = s->q + 6 * s->count;
@@ -35,7 +35,7 @@ static void add_configuration(solution *s, const double *u) {
     s->count++;
 }
 
-/* The solutions at one angle of joint 3 that `count` of them share. */
+/* Adds the `count` solutions that share the angle u of joint 3. */
 static void add_shared(solution *s, double u, int count) {
     const roth_loop *r = s->loop;
     double x[3][ROTH_SHARED], middle[3], configurations[3][6];
@@ -49,7 +49,7 @@ static void add_shared(solution *s, double u, int count) {
     }
 }
 
-/* Where a group of ascending angles ends whose neighbours are no farther apart than the gap. */
+/* End index of a group of ascending angles whose neighbours are not farther apart than the gap. */
 static int group_end(const double *u, int start, int count, double gap) {
     int end = start + 1;
     while (end < count && u[end] - u[end - 1] <= gap) end++;
@@ -63,7 +63,7 @@ static double mean(const double *u, int start, int end) {
     return u[start] + sum / (end - start);
 }
 
-/* Around the circle, from the widest gap on. */
+/* Rotates the order of angles on the circle so that they start after the widest gap. */
 static void begin_after_gap(double *u, int count) {
     double sorted[ROTH_ROOTS], widest = u[0] + 2.0 * PI - u[count - 1];
     int i, start = 0;
@@ -77,7 +77,7 @@ static void begin_after_gap(double *u, int count) {
     memcpy(u, sorted, (size_t)count * sizeof(double));
 }
 
-/* The matrix of a loop at a pose; its regularity, and an offset of the angles. */
+/* Computes the matrix of a loop at a pose and an offset of the angles. Returns the regularity. */
 static double set_loop(solution *s, const roth_loop *r, const double *T, double *offset) {
     s->loop = r;
     roth_transforms(r, T, s->transforms);
@@ -85,7 +85,7 @@ static double set_loop(solution *s, const roth_loop *r, const double *T, double 
     return roth_regularity(&s->matrix, offset);
 }
 
-/* The first loop whose matrix is regular at the pose, or the one whose matrix is the most regular. */
+/* Sets the first loop with a regular matrix at the pose, or else the loop of highest regularity. */
 static void choose_loop(solution *s, const roth_loop *r, const double *T, double *offset) {
     const roth_loop *best = r;
     double most = -1.0;

@@ -1,12 +1,12 @@
-/* The motion of a mechanism by the classical Runge-Kutta method of order 4, loops closed at every
- * evaluation. Nothing is allocated and nothing is kept but in the state, which the caller owns.
+/* Motion of a mechanism by the classical Runge-Kutta method of order 4, with loops closed at every
+ * evaluation. No memory is allocated. All data of a run are in the state, which the caller owns.
  *
- * The numbers are those of co-simulation of an FMU with solver="rk4" whose steps are as long.
+ * Results equal those of co-simulation of an FMU with solver="rk4" and steps of the same length.
  *
  * Source: Kutta 1901; Hairer, Norsett and Wanner 1993, II.1.
  */
 
-/* The parts of the scratch memory, the first for the generated functions. */
+/* Offsets in the scratch memory w. The generated functions use its beginning. */
 enum {
     SLOPES = WORK,
     RATE = SLOPES + WATCH_WORK,
@@ -18,10 +18,10 @@ enum {
     W_SIZE = CONFIGURATION + NX + NZ
 };
 
-/* SYSTEM(SZ_W) of the header is as large. */
+/* Compile-time check that the scratch size in the header is large enough. */
 typedef char scratch_is_large_enough[W_SIZE <= STEP_SZ_W ? 1 : -1];
 
-/* The equations of one call. */
+/* Arguments of the generated functions in one call, and the loops. */
 typedef struct {
     const real *arg[5];
     real *res[3];
@@ -59,7 +59,7 @@ static int status_of(int closure) {
     return closure == CLOSURE_OPEN ? MBS_OPEN : MBS_UNDETERMINED;
 }
 
-/* z and the derivative of x; what is no number, has no result. */
+/* Compute z and the derivative xdot of x at time t. MBS_NO_RESULT if a derivative is not finite. */
 static int rates(equations *e, real t, const real *x, real *z, const real *u, real *xdot) {
     int status = status_of(closure_solve(&e->loop, x, z));
     if (status) return status;
@@ -70,7 +70,7 @@ static int rates(equations *e, real t, const real *x, real *z, const real *u, re
 }
 
 #if NB > 0
-/* What is watched at an accepted configuration. */
+/* Compute the data of the check for singular configurations (watch.h) at an accepted state. */
 static int look(equations *e, real t, const real *x, const real *u, watched *now, real *w) {
     real *z = w + CONFIGURATION + NX;
     int status = status_of(closure_solve(&e->loop, x, z));
@@ -104,7 +104,7 @@ static int within_bounds(const real *p) {
     return 1;
 }
 
-/* s->x and s->z are the configuration from which the loops are closed. */
+/* Check and store the start values, and close the loops. Steps continue from s->x and s->z. */
 static int begin(SYSTEM(state) *s, const real *x, const real *guess, real *w) {
     equations e = {0};
     real *z = w + NEXT_Z;
@@ -139,7 +139,7 @@ static int same(const real *a, const real *b, int n) {
     return 1;
 }
 
-/* The slope that opens a step; the last step has it where nothing has jumped. */
+/* Compute the slope at the start of a step. The last step stored it, unless inputs have changed. */
 static int open_step(SYSTEM(state) *s, equations *e, const real *u, real *w) {
     int status;
     if (s->known && same(u, s->u, NU)) return MBS_OK;
@@ -154,7 +154,7 @@ static int open_step(SYSTEM(state) *s, equations *e, const real *u, real *w) {
     return status;
 }
 
-/* The state at the end, and its slope: NEXT_X, NEXT_Z, RATE. */
+/* Compute the state at the end and its slope, in NEXT_X, NEXT_Z and RATE of w. */
 static int advance(const SYSTEM(state) *s, equations *e, real end, real h, real *w) {
     static const real PLACE[] = {REAL(0.0), REAL(0.5), REAL(0.5), REAL(1.0)};
     static const real WEIGHT[] = {REAL(1.0), REAL(2.0), REAL(2.0), REAL(1.0)};
@@ -184,7 +184,7 @@ int SYSTEM(step)(SYSTEM(state) *s, const real *u, real h, real *w) {
     real end = s->t + h;
     int status;
     if (!all_finite(u, NU) || !(h > REAL(0.0)) || !real_finite(end)) return MBS_NOT_FINITE;
-    if (!all_finite(s->x, NX)) return MBS_NO_RESULT; /* it was not started */
+    if (!all_finite(s->x, NX)) return MBS_NO_RESULT; /* the state was not started */
     use(&e, s->x, s->z, MODEL_START + DEPENDENTS, s->p, w);
     status = open_step(s, &e, u, w);
     if (status) return status;

@@ -1,4 +1,4 @@
-"""Variables of FMI 3.0 that are arrays: q, v, a and tau in place of one variable for each joint."""
+"""Array variables of FMI 3.0: q, v, a and tau instead of scalar variables for each joint."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from mbs.export.fmu.xml import KINDS, DependencyKind, Known
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Variables of one kind that are to be one array.
+    """Request to combine consecutive variables of the same kind into an array.
 
     Attributes:
-        name: of the array.
-        kind: of its elements.
-        first: which of that kind is its first element, from 0.
-        size: number of elements; nothing is done where it is 0.
-        text: what they are, in front of their names.
+        name: name of the array.
+        kind: kind of its elements.
+        first: index of its first element among the variables of that kind, 0-based.
+        size: number of elements. A group of size 0 is skipped.
+        text: beginning of the description, before the names of the joints.
     """
 
     name: str
@@ -30,13 +30,14 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """A variable as the model description lists it.
+    """Variable of the model description: a scalar or an array.
 
     Attributes:
-        reference: value reference, of its first element.
-        entry: the variable; of an array with what all elements share.
-        elements: one for a scalar.
-        array: whether it has a dimension.
+        reference: value reference of the variable, which is that of its first element.
+        entry: the variable. An array has the attributes of its first element, its own name and
+            description, the largest nominal value and no bounds.
+        elements: variables of the elements, a single variable for a scalar.
+        array: whether the variable is an array.
     """
 
     reference: int
@@ -46,21 +47,23 @@ class Listed:
 
     @property
     def start(self) -> str:
-        """The start values, one after the other."""
+        """Start values of all elements, separated by spaces."""
         return " ".join(repr(float(v.start)) for v in self.elements)
 
     @property
     def united(self) -> bool:
-        """Whether all elements have one unit, as an attribute of the whole says."""
+        """Whether all elements have the same unit, so that the variable can have it."""
         return len({v.unit for v in self.elements}) == 1
 
 
 def in_arrays(model: FmuModel, groups: Iterable[Group]) -> FmuModel:
-    """The same model, its elements named `q[1]` and so on, listed as arrays.
+    """Return a copy of a model in which groups of variables are arrays.
+
+    Elements are renamed to `q[1]`, `q[2]`, .... Terminals with a renamed member are dropped.
 
     Args:
-        model: without arrays.
-        groups: states bring their derivatives with them.
+        model: model without arrays.
+        groups: arrays to form. An array of states also makes an array of their derivatives.
     """
     changed: dict[Kind, list[FmuVariable]] = {
         "state": list(model.states),
@@ -99,7 +102,7 @@ def in_arrays(model: FmuModel, groups: Iterable[Group]) -> FmuModel:
 
 
 def list_variables(model: FmuModel) -> list[Listed]:
-    """The variables of a model, arrays as one, in the order of the value references."""
+    """Return the variables of a model by value reference, each array as a single variable."""
     entries, arrays = model.entries, {array.first: array for array in model.arrays}
     found, place = [], 0
     while place < len(entries):
@@ -122,13 +125,16 @@ def list_variables(model: FmuModel) -> list[Listed]:
 
 
 def of_arrays(model: FmuModel, references: Iterable[int]) -> list[int]:
-    """References of elements as those of the variables that hold them, each once."""
+    """Replace value references of array elements by that of their array, without duplicates."""
     owner = _owners(model)
     return list(dict.fromkeys(owner.get(reference, reference) for reference in references))
 
 
 def dependencies_of_arrays(model: FmuModel, known: Mapping[int, Known]) -> dict[int, Known]:
-    """What arrays depend on: whatever one of their elements does, of the widest kind."""
+    """Merge dependencies of array elements into dependencies of arrays.
+
+    An array depends on all variables on which an element depends, with the greatest kind.
+    """
     owner, found = _owners(model), dict[int, dict[int, DependencyKind]]()
     for reference, row in known.items():
         into = found.setdefault(owner.get(reference, reference), {})
@@ -139,5 +145,5 @@ def dependencies_of_arrays(model: FmuModel, known: Mapping[int, Known]) -> dict[
 
 
 def _owners(model: FmuModel) -> dict[int, int]:
-    """The reference of the array of each element."""
+    """Return dict from the value reference of each array element to that of its array."""
     return {a.first + k: a.first for a in model.arrays for k in range(a.size)}

@@ -1,4 +1,4 @@
-"""A controller inside an FMU: it replaces the inputs of the motors that it drives."""
+"""Controller inside an FMU. It replaces the inputs of the motors that it drives."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from mbs.models.state.signals import effort_function
 from mbs.native.compiler import cached_library, flags_for
 from mbs.text import quoted
 
-# A control law that a user wrote in C, as a casadi.Function and as sources of an FMU.
+# Control law in C from the user, as a casadi.Function and as source files of the FMU.
 
 
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
@@ -33,27 +33,27 @@ _PREFIXES = ("fmi2", "fmi3", "mbs_")
 _C_ARGUMENTS = "double t, const double *q, const double *v, const double *w"
 
 Sources = tuple[tuple[str, str], ...]
-"""File names and texts."""
+"""Pairs of file name and text."""
 
 
 @dataclass(frozen=True, slots=True)
 class CController:
-    """A C function that gives the joint efforts, and the inputs that it has beside the motion.
+    """C function that computes the joint efforts, with optional further inputs.
 
-    Its prototype, with w the further inputs one after the other, is
+    Its prototype, where w holds the further inputs in order, is
 
         void NAME(double t, const double *q, const double *v, const double *w, double *tau);
 
-    and that of the derivatives, J (nv, 1 + nq + nv + nw) by t, q, v and w, column by column,
+    and the prototype of the Jacobian J (nv, 1 + nq + nv + nw) by t, q, v and w, column-major, is
 
         void NAME(double t, const double *q, const double *v, const double *w, double *J);
 
-    Both are called at any time in any order: they keep nothing from one call to the next.
+    Both may be called at any time in any order, so they must not keep data between calls.
 
     Attributes:
         function: name of the function.
-        inputs: name and number of values of every further input, in order.
-        jacobian: name of the function for the derivatives; central differences when left out.
+        inputs: dict from the name of every further input to its number of values, in order.
+        jacobian: name of the function of the Jacobian. Central differences if None.
     """
 
     function: str
@@ -73,11 +73,11 @@ class CController:
 
 
 def read_sources(paths: Sequence[PathLike]) -> Sources:
-    """The user's C files.
+    """Read the C files of the user.
 
     Raises:
-        ExportError: one cannot be read, is given twice, is no C file, or is called as a part of
-            the FMU is or defines a function that is.
+        ExportError: a file cannot be read, is given twice or is no C file, or its name or a
+            function in it has a name that the FMU itself uses.
     """
     if not isinstance(paths, Iterable) and not isinstance(paths, os.PathLike):
         raise ExportError(f"sources: {quoted(paths)} is no list of paths; name C files")
@@ -102,13 +102,13 @@ def read_sources(paths: Sequence[PathLike]) -> Sources:
 
 
 def _own_files() -> dict[str, str]:
-    """The files that FMUs have in their folder of sources."""
+    """Return the source files that every FMU contains: dict from name to text."""
     fixed = (face.fixed(solver) for face in FACES.values() for solver in get_args(Solver))
     return {"model.c": "", "model.h": "", **{k: v for files in fixed for k, v in files.items()}}
 
 
 def _functions(texts: Iterable[str]) -> set[str]:
-    """The functions that C files define for other files."""
+    """Return the names of the functions with external linkage that C files define."""
     return {
         found["name"]
         for text in texts
@@ -118,7 +118,7 @@ def _functions(texts: Iterable[str]) -> set[str]:
 
 
 def _check_functions(file: str, found: set[str], taken: set[str]) -> None:
-    """Refuse what a linker would confuse with a part of the FMU."""
+    """Raise ExportError if a function of the user has the name of a function of the FMU."""
     for name in sorted(found):
         if name in taken or name.startswith(_PREFIXES):
             raise ExportError(
@@ -129,16 +129,16 @@ def _check_functions(file: str, found: set[str], taken: set[str]) -> None:
 def c_function(
     system: System, law: CController, sources: Sources
 ) -> tuple[Function, tuple[str, str]]:
-    """The law as `law(t, q, v, w) -> tau`, and the C file that lets CasADi call it.
+    """Return the law as Function `law(t, q, v, w) -> tau`, and the C file by which CasADi calls it.
 
     Args:
-        system: whose efforts it gives.
-        law: the functions in the sources.
+        system: mechanism that the controller drives.
+        law: names of the C functions and their inputs.
         sources: C files and headers.
 
     Raises:
-        ExportError: there are no sources.
-        CompilerError: there is no C compiler, or it refused the sources.
+        ExportError: the sources contain no C file.
+        CompilerError: no C compiler is installed, or the sources do not compile.
     """
     if not any(name.endswith(".c") for name, _ in sources):
         raise ExportError(
@@ -148,7 +148,7 @@ def c_function(
     name = f"mbs_law_{law.function}"
     glue = f"{name}.c", _glue(name, law, (system.nq, system.nv, sum(law.inputs.values())))
     files = dict((*sources, glue))
-    complete = ("-Wl,-z,defs",) if sys.platform == "linux" else ()  # refuses what is not defined
+    complete = ("-Wl,-z,defs",) if sys.platform == "linux" else ()  # undefined symbols are errors
     library = cached_library(files, (*flags_for("".join(files.values())), *complete))
     return casadi.external(name, str(library)), glue
 
@@ -256,20 +256,21 @@ def _glue(name: str, law: CController, sizes: tuple[int, int, int]) -> str:
 
 
 Law = Function | Callable[[Any, Any, Any], Any] | CController | str | None
-"""A law as a user gives it."""
+"""Types of a control law in the arguments of `fmu`."""
 
 _POINT = ("t", "q", "v")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Controller:
-    """A control law with inputs of its own.
+    """Control law with its inputs w.
 
     Attributes:
-        effort: `effort(t, q, v, w, p) -> tau`, (nv, 1); None where the motors are inputs.
-        device: `device(t, q, v, w, p) -> u`, one input for each device; None likewise.
-        inputs: w.
-        sources: further C files that the FMU needs.
+        effort: `effort(t, q, v, w, p) -> tau`, (nv, 1). None if the motor efforts are inputs.
+        device: `device(t, q, v, w, p) -> u`, inputs of the components (such as motors). None if
+            they are inputs of the FMU.
+        inputs: variables of w.
+        sources: further C files of the FMU.
     """
 
     effort: Function | None = None
@@ -279,17 +280,17 @@ class Controller:
 
 
 def controller_of(system: System, law: Law, sources: Sources = ()) -> Controller:
-    """The controller of an FMU.
+    """Convert a control law to the controller of an FMU.
 
     Args:
-        system: that it drives.
-        law: a function of (t, q, v) that returns tau, as `mbs.simulate.run` takes it; a Function
-            with inputs t, q, v and further ones, and outputs "tau" (nv, 1), "u" (one input for
-            each device) or both; a C function of the sources.
+        system: mechanism that the controller drives.
+        law: a function of (t, q, v) that returns tau, as in `mbs.simulate.run`; a casadi.Function
+            with inputs t, q, v and optional further inputs, and outputs "tau" (nv, 1), "u" (inputs
+            of the components) or both; or a C function of the sources.
         sources: C files and headers.
 
     Raises:
-        ExportError: it has other inputs or outputs, or is no law.
+        ExportError: the law has other inputs or outputs, or another type.
         ModelError: a Python function cannot be traced or returns no efforts.
         CompilerError: C sources do not compile.
     """
@@ -339,7 +340,7 @@ def _of_function(system: System, law: Function, sources: Sources) -> Controller:
 
 
 def _symbols(system: System, law: Function, nw: int) -> list[Any]:
-    """t, q, v, w and p: SX where the law is made of scalars, else MX."""
+    """Return symbols t, q, v, w and p: SX if the law is an SX function, else MX."""
     kind = SX if law.is_a("SXFunction") else MX
     sizes = {"t": 1, "q": system.nq, "v": system.nv, "w": nw, "p": len(system.parameters)}
     return [kind.sym(name, size) for name, size in sizes.items()]
@@ -373,7 +374,7 @@ def _check_inputs(system: System, law: Function) -> None:
 
 
 def _outputs(system: System, law: Function) -> dict[str, int]:
-    """Which output gives the efforts, and which the inputs of the devices."""
+    """Return the output index of the efforts "tau" and of the component inputs "u"."""
     names = law.name_out()
     columns = {name: k for k, name in enumerate(names)}
     if len(names) == 1 and names != ["u"]:

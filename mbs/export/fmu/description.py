@@ -1,4 +1,4 @@
-"""The one description of an FMU, from which both its XML file and its C tables are written."""
+"""Description of an FMU, from which its XML files and its C tables are generated."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from mbs.text import quoted
 from mbs.units import UNITS
 from mbs.view.drawing import Drawing
 
-# What is refused in the description of an FMU, before anything is written.
+# Checks of the description of an FMU, before a file is written.
 
 
 TIME = "time"
-"""What the independent variable is called, in FMI 3.0 and in results."""
+"""Name of the independent variable, in FMI 3.0 and in results."""
 
 SOLVERS = ("dopri5", "rodas", "rk4")
 
 
 def check(model: FmuModel) -> None:
-    """Refuse a description that is no FMU.
+    """Check that a description is a valid FMU.
 
     Raises:
-        ExportError: a name, a number or the size of a function is wrong.
+        ExportError: a name, a number or the size of a function is invalid.
     """
     _check_names(model)
     _check_texts(model)
@@ -57,7 +57,7 @@ def _check_names(model: FmuModel) -> None:
 
 
 def _check_texts(model: FmuModel) -> None:
-    """What people read in the description, where other characters are lost or invalid."""
+    """Raise ExportError if a text of the description contains characters that are not printable."""
     for what, text in {"description": model.description, **asdict(model.origin)}.items():
         if not isinstance(text, str) or not text.isprintable():
             raise ExportError(
@@ -116,7 +116,7 @@ def _check_functions(model: FmuModel) -> None:
 
 
 def _check_target(model: FmuModel) -> None:
-    """What bare C has: steps of a fixed length, of equations without events."""
+    """Raise ExportError if target="bare" is invalid: it needs fixed steps and no events."""
     if model.target not in get_args(Target):
         raise ExportError(
             f"FMU {model.name}: target is {quoted(model.target)}; use 'hosted' or 'bare'"
@@ -157,18 +157,18 @@ def _check_shape(
         )
 
 
-# What people read and see of an FMU beside its variables.
+# Documentation of an FMU in addition to its variables.
 
 
 @dataclass(frozen=True, slots=True)
 class PageTable:
-    """A table of the documentation.
+    """Table of the documentation.
 
     Attributes:
-        title: what it shows.
-        columns: heads of the columns.
-        rows: a text for each column.
-        note: a sentence below the title.
+        title: heading of the table.
+        columns: column headings.
+        rows: rows of cell texts, each with one text per column.
+        note: sentence below the title.
     """
 
     title: str
@@ -179,18 +179,19 @@ class PageTable:
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """What the documentation shows beside text and variables.
+    """Tables and drawing of the documentation.
 
     Attributes:
-        tables: in the order of the page.
-        drawing: of it at the start configuration, or None; the icon is made of it too.
+        tables: tables in the order of the page.
+        drawing: drawing of the mechanism at the start configuration, or None. The icon shows it
+            too.
     """
 
     tables: tuple[PageTable, ...] = ()
     drawing: Drawing | None = None
 
 
-# Names: those that a user gives of what an FMU is to hold, and those of its variables.
+# Names: lists of names from the user, and names of the variables of an FMU.
 
 
 _INDEX = r"(?:\[\d+(?:,\d+)*\])?"
@@ -204,10 +205,15 @@ _ESCAPED = str.maketrans({mark: f"\\{mark}" for mark in "'\"\\"})
 
 
 def once(system: System, what: str, names: Sequence[str]) -> list[str]:
-    """Names as a list.
+    """Return names as a list, after checking that each is a text and occurs once.
+
+    Args:
+        system: mechanism, for error messages.
+        what: name of the argument, for error messages.
+        names: one name or several names.
 
     Raises:
-        ModelError: one is no text or is given twice.
+        ModelError: a name is not a text or is given twice.
     """
     found = (names,) if isinstance(names, str) else elements_of(() if names is None else names)
     if found is None:
@@ -222,14 +228,14 @@ def once(system: System, what: str, names: Sequence[str]) -> list[str]:
 
 
 def structured_name(name: str) -> str:
-    """A name as the naming convention `structured` of FMI has it, such as `'left-arm'.q`.
+    """Convert a name to the naming convention `structured` of FMI, such as `'left-arm'.q`.
 
-    A path of identifiers stays as it is. A part between two dots that is no identifier is put in
-    single quotes. A name with characters beyond ASCII, for which the convention has no place, stays
-    too: see `is_structured`.
+    A part between two dots that is no identifier is put in single quotes. A path of identifiers is
+    unchanged. A name with characters beyond ASCII is unchanged too, because the convention does not
+    allow such names: see `is_structured`.
 
     Args:
-        name: of a variable or terminal.
+        name: name of a variable or terminal.
     """
     if is_structured(name) or not (name.isascii() and name.isprintable()):
         return name
@@ -238,12 +244,12 @@ def structured_name(name: str) -> str:
 
 
 def is_structured(name: str) -> bool:
-    """Whether the naming convention `structured` of FMI knows such a name."""
+    """Whether a name conforms to the naming convention `structured` of FMI."""
     return _STRUCTURED.fullmatch(name) is not None
 
 
 def _part(text: str) -> str:
-    """A part of a path, quoted where it is no identifier; its indices stay behind the quotes."""
+    """Quote a part of a path if it is no identifier. Indices such as `[1]` follow the quotes."""
     if not text or _WHOLE_PART.fullmatch(text):
         return text
     found = _STEM_AND_INDEX.fullmatch(text)
@@ -269,26 +275,27 @@ Kind = Literal[
 
 
 WITH_START: tuple[Kind, ...] = ("state", "input", "parameter", "dependent", "slot")
-"""What has a start value."""
+"""Kinds of variables that have a start value."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FmuVariable:
-    """An input, an output, a parameter or a dependent coordinate of an FMU.
+    """Input, output, parameter or dependent coordinate of an FMU.
 
     Attributes:
-        name: as other tools show it; a part that is no identifier gets quotes, as
-            `mbs.export.fmu.description.structured_name` has it.
-        unit: a name of `mbs.units.UNITS`.
-        start: value at the start; of a dependent coordinate, a guess that chooses the
-            configuration.
+        name: name of the variable in other tools. It is converted by
+            `mbs.export.fmu.description.structured_name`.
+        unit: unit, a name of `mbs.units.UNITS`.
+        start: value at the start. For a dependent coordinate it is a guess that selects the
+            assembly mode.
         nominal: typical size, positive.
-        min: least value; a parameter below it is refused. The smallest normal number stands for
-            more than zero.
-        max: greatest value; a parameter above it is refused.
-        description: one line for people.
-        fixed: a parameter that keeps its value once the motion has begun.
-        guess: an output whose start, where it is set, chooses the branch.
+        min: smallest value, or None. A parameter below it is an error. The smallest normal number
+            means "positive".
+        max: largest value, or None. A parameter above it is an error.
+        description: one-line description.
+        fixed: whether the parameter is constant after the initialization.
+        guess: whether the variable is an output whose start value, if it is set, selects the
+            branch.
     """
 
     name: str
@@ -307,13 +314,13 @@ class FmuVariable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FmuState(FmuVariable):
-    """A continuous state and its derivative.
+    """Continuous state and its derivative.
 
     Attributes:
-        derivative: name of the derivative; `der(name)` by default.
-        derivative_unit: a name of `mbs.units.UNITS`.
-        derivative_description: one line for people.
-        output: the state is an output of the FMU too.
+        derivative: name of the derivative, `der(name)` by default.
+        derivative_unit: unit of the derivative, a name of `mbs.units.UNITS`.
+        derivative_description: description of the derivative, one line.
+        output: whether the state is also an output of the FMU.
     """
 
     derivative: str = ""
@@ -324,23 +331,23 @@ class FmuState(FmuVariable):
 
 @dataclass(frozen=True, slots=True)
 class Jumps:
-    """Where an FMU's states and modes jump, and how; m counts its modes, k its indicators.
+    """Events of an FMU, which change its states and modes. k: number of event indicators.
 
-    All functions take the parameters with the modes behind them as p, as `FmuModel.rhs` does then.
+    In all functions p holds the parameters, then the modes, as in `FmuModel.rhs`.
 
     Attributes:
-        modes: integers that are constant between events.
-        first: `first(t, x, z, u, p) -> (modes, beyond)` before the first event, of the modes in p
-            nothing; beyond (k, 1) is positive where x is outside what the model allows.
-        indicators: `indicators(t, x, z, u, p) -> g`, (k, 1), positive between events. An event is
-            where one of them is not positive any more.
-        jump: `jump(t, x, z, u, p, fired) -> (x, modes)` after an event; fired (k, 1) is 1 for each
+        modes: integer variables that are constant between events.
+        first: `first(t, x, z, u, p) -> (modes, beyond)`, modes at the start, independent of the
+            modes in p. beyond (k, 1) is positive if x violates the limit of an indicator.
+        indicators: `indicators(t, x, z, u, p) -> g`, (k, 1), positive between events. An event
+            occurs when an indicator is no longer positive.
+        jump: `jump(t, x, z, u, p, fired) -> (x, modes)` after an event. fired (k, 1) is 1 for each
             indicator that is not positive.
-        names: (k) what each indicator watches, for messages.
-        approaches: `approaches(t, x, z, u, p) -> a`, (k, 3) as `mbs.solvers.Events` has them, for
-            steps of Co-Simulation; None where two looks a step are enough.
-        optional: whether the functions of the model do not depend on the modes, as where all events
-            are of contacts: integrators outside need none of them.
+        names: names of the indicators (k,), for error messages.
+        approaches: `approaches(t, x, z, u, p) -> a`, (k, 3) as in `mbs.solvers.Events`, for steps
+            of Co-Simulation. None if two evaluations of the indicators per step are enough.
+        optional: whether the functions of the model are independent of the modes, as if all events
+            are contacts. An external integrator then needs no events.
     """
 
     modes: tuple[FmuVariable, ...]
@@ -354,12 +361,12 @@ class Jumps:
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """A variable of a terminal.
+    """Variable of a terminal.
 
     Attributes:
-        name: in the terminal, such as "torque".
-        variable: its name in the FMU.
-        kind: "signal"; "inflow" or "outflow" for a force or torque that two terminals share.
+        name: name in the terminal, such as "torque".
+        variable: name of the variable in the FMU.
+        kind: "signal", or "inflow" or "outflow" for a force or torque between two terminals.
     """
 
     name: str
@@ -372,14 +379,14 @@ class Member:
 
 @dataclass(frozen=True, slots=True)
 class Terminal:
-    """Variables that are connected together, as at a flange.
+    """Group of variables that are connected together, as at a flange (FMI 3.0).
 
     Attributes:
-        name: unique among terminals.
-        kind: what it may be connected to.
-        members: its variables.
-        matching: rule by which members of two terminals find each other.
-        description: one line for people.
+        name: name of the terminal, unique in the FMU.
+        kind: kind of the terminal. Terminals of the same kind can be connected.
+        members: variables of the terminal.
+        matching: rule that pairs the members of two connected terminals.
+        description: one-line description.
     """
 
     name: str
@@ -394,13 +401,13 @@ class Terminal:
 
 @dataclass(frozen=True, slots=True)
 class Array:
-    """Variables that follow each other and are one array in FMI 3.0.
+    """Array variable of FMI 3.0, made of variables with consecutive value references.
 
     Attributes:
-        name: of the array.
-        first: value reference of its first element, and its own.
+        name: name of the array.
+        first: value reference of the array and of its first element.
         size: number of elements.
-        description: one line for people.
+        description: one-line description.
     """
 
     name: str
@@ -411,13 +418,13 @@ class Array:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
-    """Whose a model is, each in words of its own; empty where nothing is said.
+    """Author and licence of a model. Empty texts are left out of the FMU.
 
     Attributes:
         author: person or organisation.
-        version: of the model.
-        copyright: such as "(c) 2026 Example Ltd.".
-        license: its name, text or address.
+        version: version of the model.
+        copyright: copyright notice, such as "(c) 2026 Example Ltd.".
+        license: name, text or address of the licence.
     """
 
     author: str = ""
@@ -428,7 +435,7 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class FmuEntry:
-    """A variable at its place: the value reference is the index in the table of entries."""
+    """Variable with its kind. Its value reference is its index in `FmuModel.entries`."""
 
     kind: Kind
     variable: FmuVariable
@@ -436,12 +443,12 @@ class FmuEntry:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rules:
-    """What states at the start, and parameters, must fulfil beside the bounds of each.
+    """Conditions on the start states and the parameters, in addition to the bounds of each.
 
     Attributes:
-        excess: `excess(x, p) -> (k, 1)`, more than zero where a rule is broken.
-        sentences: for each what is wrong and what to do.
-        at_start: how many of them, the first ones, are of states at the start.
+        excess: `excess(x, p) -> (k, 1)`, positive for each violated condition.
+        sentences: error message of each condition: the error and its remedy.
+        at_start: number of conditions on the start states. They come first.
     """
 
     excess: casadi.Function
@@ -451,51 +458,54 @@ class Rules:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FmuModel:
-    """All that an FMU says and computes; nx, nz, nu, np, ny count the variables below.
+    """Description of an FMU: variables, equations, events, default experiment and documentation.
 
-    Where there are jumps, p is followed by their modes in rhs, not in closure.
+    nx, nu, ny, np and nz are the numbers of states, inputs, outputs, parameters and dependents. If
+    the model has events, p in rhs holds the parameters, then the modes. p in closure, slopes and
+    sines holds the parameters only.
 
     Attributes:
-        name: of the model; letters, digits and underscores of it make the file names inside.
-        description: one line for people.
-        origin: whose it is.
-        states: x.
-        inputs: u.
-        outputs: y, those that are not states.
-        parameters: p, tunable or fixed.
-        dependents: z, the coordinates that closed loops determine.
-        loop_size: size of the mechanism, by which distances of displacements from guesses are
-            divided [m].
+        name: name of the model. Its letters, digits and underscores form the file names in the FMU.
+        description: one-line description.
+        origin: author, version, copyright and licence.
+        states: variables of x.
+        inputs: variables of u.
+        outputs: variables of y: the outputs that are not states.
+        parameters: variables of p, tunable or fixed.
+        dependents: variables of z, the coordinates that closed loops determine.
+        loop_size: size of the mechanism [m], the unit of distances of displacements from guesses.
         rhs: `rhs(t, x, z, u, p) -> (xdot, y)`.
         closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step of z and the largest
-            absolute closure row at z; None when there is no z.
-        slopes: `slopes(x, z, p) -> J`, how the equations of the closure change with z; the signs of
-            the determinants of its diagonal blocks show on which side of a singular configuration
-            z is. None when nothing watches them.
+            absolute closure residual at z. None if the model has no z.
+        slopes: `slopes(x, z, p) -> J`, Jacobian of the closure equations by z. A sign change of the
+            determinant of a diagonal block reveals a step across a singular configuration. None if
+            it is not checked.
         sines: `sines(x, z, p) -> (2, 1)`, squared sines that measure the distance from singular
-            configurations: of the rows of the dependent joints and of all rows of the loops, see
-            `mbs.loops.examine`. Derivatives are refused where they are too small. None if nothing
-            is checked.
-        passive: the first output that is a velocity of a dependent joint, the first that is an
-            acceleration of one, and how many of each there are.
-        tree: the same motion in all coordinates, which "dopri5" and "rodas" integrate, and
-            integrators outside where nothing jumps: it passes configurations in which the states
-            determine nothing. None where there is none.
-        jumps: events; None when the motion is smooth.
-        rules: what is asked of states and parameters; None where their bounds say all.
-        stop_time: default end of a simulation, s.
+            configurations: the first for the closure rows of the dependent joints, the second for
+            all closure rows, see `mbs.loops.examine`. Derivatives are an error if the sine is too
+            small. None if it is not checked.
+        passive: index in y of the first velocity of a dependent joint, index of the first
+            acceleration, and number of each.
+        tree: equations of motion in the coordinates of all joints, for "dopri5" and "rodas", and
+            for an external integrator if its events allow it. Their solution passes through
+            singular configurations, in which the states do not determine the motion. None if the
+            model has no such equations, as for open chains.
+        jumps: events, None if the motion is smooth.
+        rules: conditions on states and parameters, None if their bounds are sufficient.
+        stop_time: default end of a simulation [s].
         tolerance: default relative tolerance of the integration.
-        step_size: default communication step, s.
-        solver: of co-simulation: "dopri5", explicit with error control; "rodas", the same for stiff
-            equations; "rk4", with the fixed step `internal_step`.
-        internal_step: length of the steps of "rk4", s.
-        max_step: the longest step of the other solvers, s; None for no limit.
-        target: "hosted", or "bare" for co-simulation alone, by C without heap and files.
-        documentation: text for `documentation/index.html`; a blank line starts a paragraph.
-        terminals: variables that belong together.
-        sources: name and text of further C files, which are compiled with the FMU.
-        arrays: variables that are listed as one; see `mbs.export.fmu.arrays`.
-        about: what people read and see of it; None where only its variables are known.
+        step_size: default communication step [s].
+        solver: solver of co-simulation: "dopri5", explicit with error control; "rodas", linearly
+            implicit with error control, for stiff equations; "rk4", with the fixed step
+            `internal_step`.
+        internal_step: step of "rk4" [s].
+        max_step: longest step of the other solvers [s], None for no limit.
+        target: "hosted", or "bare" for co-simulation only, in C without heap and files.
+        documentation: text for `documentation/index.html`. A blank line starts a paragraph.
+        terminals: groups of variables that are connected together.
+        sources: names and texts of further C files, which are compiled with the FMU.
+        arrays: array variables of FMI 3.0, see `mbs.export.fmu.arrays`.
+        about: tables and drawing of the documentation, or None.
     """
 
     name: str
@@ -533,15 +543,15 @@ class FmuModel:
 
     @property
     def charted(self) -> bool:
-        """Whether integrators outside pass singular configurations: charts.h."""
+        """Whether an external integrator can pass singular configurations, see charts.h."""
         return self.tree is not None and self.tree.passes
 
     @property
     def slots(self) -> tuple[FmuState, ...]:
-        """The states where the integrator is outside and loops are closed.
+        """Continuous states of closed loops for an external integrator, see charts.h.
 
-        They are the states of the independent joints but near singular configurations, so joints
-        are outputs and no states there; see charts.h.
+        They are the states of the independent joints, or tangent coordinates near singular
+        configurations. The joint coordinates themselves are therefore outputs in model exchange.
         """
         if not self.charted:
             return ()
@@ -558,36 +568,36 @@ class FmuModel:
 
     @property
     def identifier(self) -> str:
-        """The name as an identifier of C, which names the files inside the FMU."""
+        """Name as a C identifier, for the file names in the FMU."""
         text = re.sub(r"\W", "_", self.name, flags=re.ASCII)
         return text if text[:1].isalpha() else f"model_{text}"
 
     @property
     def entries(self) -> tuple[FmuEntry, ...]:
-        """Every variable in the order of the value references."""
+        """All variables in the order of the value references."""
         return tuple(_entries(self))
 
     @property
     def modes(self) -> tuple[FmuVariable, ...]:
-        """The modes of its events."""
+        """Modes of the events, empty without events."""
         return self.jumps.modes if self.jumps else ()
 
     @property
     def derived(self) -> dict[int, int]:
-        """Value references of the derivatives of states to those of the states."""
+        """Dict from the value reference of each state derivative to that of its state."""
         state, rate = self.first("state"), self.first("derivative")
         if self.slots:
             state, rate = self.first("slot"), self.first("rate")
         return {rate + k: state + k for k in range(len(self.states))}
 
     def first(self, kind: Kind) -> int:
-        """Value reference of the first variable of a kind.
+        """Return the value reference of the first variable of a kind.
 
         Args:
-            kind: which variables.
+            kind: kind of variables.
 
         Returns:
-            its index in `entries`, also where there is none of that kind.
+            Index in `entries`. If no variable has this kind, the index of the next kind.
         """
         order: tuple[tuple[Kind, int], ...] = (
             ("state", len(self.states)),
@@ -611,13 +621,13 @@ class FmuModel:
 
 
 def derivative_of(state: FmuState) -> FmuVariable:
-    """The derivative of a state, as a variable.
+    """Return the derivative of a state as a variable.
 
     Args:
-        state: a state.
+        state: continuous state.
 
     Returns:
-        its derivative, without start value.
+        Variable of the derivative.
     """
     return FmuVariable(
         name=state.derivative or f"der({state.name})",

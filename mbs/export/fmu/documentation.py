@@ -83,13 +83,13 @@ _LICENCE = (
 
 
 def documentation(model: FmuModel) -> str:
-    """The page: the text of the model, its drawing and tables, its variables.
+    """Return the HTML page of an FMU: text of the model, drawing, tables and variables.
 
     Args:
-        model: what the FMU is.
+        model: description of the FMU.
 
     Returns:
-        HTML that needs no other file.
+        Self-contained HTML.
     """
     text = model.documentation or model.description or model.name
     tables = model.about.tables if model.about else ()
@@ -179,7 +179,7 @@ def _simulation(model: FmuModel) -> PageTable:
 
 
 def _operations(model: FmuModel) -> PageTable:
-    """How many operations the equations take, where they are a graph of scalars."""
+    """Return a table of the scalar operations of the equations. Functions in MX are left out."""
     rows = []
     for title, attribute in _FUNCTIONS.items():
         function = getattr(model, attribute)
@@ -192,18 +192,18 @@ def _operations(model: FmuModel) -> PageTable:
     return PageTable("Operations of the equations", columns, tuple(rows), note)
 
 
-# What the documentation of an FMU says of a mechanism: its drawing and its tables.
+# Drawing and tables of a mechanism for the documentation of its FMU.
 
 
 _LONGEST = 24
-"""Letters of an expression that a cell of a table holds."""
+"""Greatest length of an expression in a table cell, in characters."""
 
 
 def about(system: System) -> About:
-    """The drawing at the assembled configuration, and tables of joints, links, bodies and loops.
+    """Return the drawing at the assembled configuration and tables of joints, links and loops.
 
     Args:
-        system: open or closed; every symbol has a value.
+        system: assembled mechanism, open or closed, in which every symbol has a value.
     """
     tables = (
         _joints(system),
@@ -254,7 +254,7 @@ def _geometry(system: System) -> PageTable:
 
 
 def _placements(system: System, row: LinkRow) -> Iterator[tuple[str, ...]]:
-    """The fixed frames on the path to a link, then the link."""
+    """Yield the table rows of the fixed frames before a link, then the row of the link."""
     before = _place(row.antecedent - 1)
     for number, fixed in enumerate(row.via, 1):
         name = f"{row.number}.{number}"
@@ -304,7 +304,7 @@ def _loops(system: System) -> PageTable:
 
 
 def _texts(system: System, values: Iterable[SX]) -> list[str]:
-    """Numbers, or short expressions of symbols with their value."""
+    """Format values as numbers, and short symbolic expressions as `expression = number`."""
     every = list(values)
     found = casadi.Function("values", [system.p], [casadi.vertcat(*every)])
     numbers = casadi.DM(found(system.parameter_values())).full().ravel()
@@ -319,7 +319,7 @@ def _symbolic(value: SX, number: float) -> str:
     return f"{text} = {number:.6g}" if len(text) <= _LONGEST else f"{number:.6g}"
 
 
-# The licences of what an FMU contains beside its equations.
+# Licences of the files that an FMU contains in addition to its equations.
 
 
 MBS = """\
@@ -345,7 +345,7 @@ LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM,
 OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE
 SOFTWARE.
 """
-"""Of the C files of this package."""
+"""Licence of the C files of this package."""
 
 _START, _END = "Copyright (C)", "*/"
 
@@ -360,10 +360,10 @@ _OWN = "                   {name}: see there, it came with the model\n"
 
 
 def licence_files(standard_header: str, own: list[str]) -> dict[str, str]:
-    """The files of the folder of licences: name to text.
+    """Return the files of the folder documentation/licenses: dict from name to text.
 
     Args:
-        standard_header: text of a header of the FMI standard, which carries its licence.
+        standard_header: text of a header of the FMI standard, which contains its licence.
         own: names of the C files that came with the model.
     """
     start = standard_header.index(_START)

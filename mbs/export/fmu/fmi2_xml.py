@@ -27,15 +27,15 @@ _STEPPING = {
 
 
 def model_description(model: FmuModel, guid: str, sources: Iterable[str]) -> str:
-    """The file modelDescription.xml.
+    """Return the text of the file modelDescription.xml of FMI 2.0.
 
     Args:
-        model: what the FMU is.
-        guid: identity of the library that belongs to it.
-        sources: C files to compile, in the folder `sources`.
+        model: description of the FMU.
+        guid: identifier that the compiled library checks.
+        sources: names of the C files to compile, in the folder `sources`.
 
     Returns:
-        its text.
+        Text of the XML file.
     """
     found = structure(model)
     attributes = {
@@ -80,7 +80,7 @@ def _interface(root: Element, tag: str, model: FmuModel, files: list[str]) -> No
     }
     if tag == "CoSimulation":
         attributes |= _STEPPING
-    else:  # loops and events remember accepted steps, and none may pass the stop time
+    else:  # the closure of loops and events need each accepted step; no step may pass the stop time
         attributes["completedIntegratorStepNotNeeded"] = "false"
     listed = SubElement(SubElement(root, tag, attributes), "SourceFiles")
     for name in files:
@@ -99,9 +99,9 @@ def _structure(root: Element, model: FmuModel, found: ModelStructure) -> None:
 
 
 def _without(references: Sequence[int], known: Known) -> Known:
-    """Without parameters, which do not change while a model runs, and time, which is no variable.
+    """Remove references, such as parameters, which are constant in a run, and time.
 
-    The standard takes it that everything depends on time where no variable is it.
+    FMI 2.0 assumes that all values depend on time if no variable is the time.
     """
     return {ref: kind for ref, kind in known.items() if ref not in references}
 

@@ -33,14 +33,14 @@ _SEEN_WITHIN_STEPS = ("state", "derivative", "output", "rate")
 
 
 def model_description(model: FmuModel, token: str) -> str:
-    """The file modelDescription.xml.
+    """Return the text of the file modelDescription.xml of FMI 3.0.
 
     Args:
-        model: what the FMU is.
-        token: identity of the library that belongs to it.
+        model: description of the FMU.
+        token: instantiation token that the compiled library checks.
 
     Returns:
-        its text.
+        Text of the XML file.
     """
     attributes = {
         "fmiVersion": "3.0",
@@ -72,11 +72,11 @@ def model_description(model: FmuModel, token: str) -> str:
 
 
 def build_description(model: FmuModel, sources: Iterable[str]) -> str:
-    """The file buildDescription.xml: how to compile the sources.
+    """Return the text of the file buildDescription.xml, which lists the sources to compile.
 
     Args:
-        model: what the FMU is.
-        sources: C files to compile, in the folder `sources`.
+        model: description of the FMU.
+        sources: names of the C files to compile, in the folder `sources`.
     """
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     build = SubElement(root, "BuildConfiguration", modelIdentifier=model.identifier)
@@ -98,7 +98,7 @@ def _interface(root: Element, tag: str, model: FmuModel) -> None:
         attributes |= _STEPPING
         if model.solver == "rk4":
             attributes["fixedInternalStepSize"] = repr(float(model.internal_step))
-    else:  # loops and events remember accepted steps, and none may pass the stop time
+    else:  # the closure of loops and events need each accepted step; no step may pass the stop time
         attributes["needsCompletedIntegratorStep"] = "true"
     SubElement(root, tag, attributes)
 

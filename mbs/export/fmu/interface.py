@@ -1,4 +1,4 @@
-"""What drives a mechanism's FMU from outside, and the terminals that group its variables."""
+"""Inputs, outputs on request and terminals of the FMU of a mechanism."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ from mbs.spatial import zeros
 from mbs.text import did_you_mean, quoted
 
 MOTION = tuple(f"{kind}{axis}" for kind in ("v", "w", "a", "wd") for axis in "xyz")
-"""Elements of velocity, angular velocity and accelerations of a frame."""
+"""Names of the elements of a frame's velocity, angular velocity and their time derivatives."""
 
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """What is asked for beside the efforts of motors.
+    """Inputs of an FMU in addition to the motor efforts.
 
     Attributes:
-        wrenches: names of the frames on which wrenches act.
-        motions: names of velocities, and whether position or acceleration is given.
-        flanges: names of frames where another part of a mechanism is coupled.
+        wrenches: names of the frames on which external wrenches act.
+        motions: pairs of a velocity name and "q" or "a": position or acceleration is an input.
+        flanges: names of the frames at which another part of a mechanism is coupled.
     """
 
     wrenches: tuple[str, ...]
@@ -47,7 +47,7 @@ class Interface:
     flanges: tuple[str, ...]
 
     def drive(self, system: System, controller: Controller) -> DriveInputs:
-        """What drives the state equation."""
+        """Return the inputs of the state equation of a system with this controller."""
         frames = tuple(frame_of(system, label) for label in self.wrenches)
         return DriveInputs(
             wrenches=frames,
@@ -58,10 +58,10 @@ class Interface:
 
 
 def frame_of(system: System, label: str) -> str | int:
-    """The frame that a label names: "tool" is the terminal frame.
+    """Return the frame with a name. "tool" is the terminal frame.
 
     Raises:
-        ModelError: there is none of that name.
+        ModelError: no frame has that name.
     """
     if label == "tool":
         return terminal_frame(system)
@@ -74,15 +74,15 @@ def frame_of(system: System, label: str) -> str | int:
 
 
 def interface_of(system: System, inputs: Sequence[str], flanges: Sequence[str]) -> Interface:
-    """The interface that a user names.
+    """Convert names of inputs and flanges to an Interface.
 
     Args:
-        system: open or closed.
-        inputs: such as "j1.q", "j1.a", "tool.wrench".
+        system: assembled mechanism, open or closed.
+        inputs: names of inputs, such as "j1.q", "j1.a", "tool.wrench".
         flanges: names of frames.
 
     Raises:
-        ModelError: something is unknown, does not move, or is given twice.
+        ModelError: a name is unknown or given twice, or a frame cannot move.
     """
     given, frames = once(system, "inputs", inputs), once(system, "flanges", flanges)
     wrenches, motions = list(frames), list[tuple[str, Literal["q", "a"]]]()
@@ -118,11 +118,11 @@ def _possible(system: System) -> Iterator[str]:
 def terminals(
     system: System, interface: Interface, variables: Sequence[FmuVariable]
 ) -> tuple[Terminal, ...]:
-    """A terminal for every joint with a drive, and for every flange.
+    """Return a terminal for every driven joint and every flange.
 
     Args:
-        system: open or closed.
-        interface: what drives it.
+        system: assembled mechanism, open or closed.
+        interface: wrenches, prescribed motions and flanges.
         variables: states, inputs and outputs of the FMU.
     """
     names = {variable.name for variable in variables}
@@ -160,7 +160,7 @@ def _flange(label: str) -> Terminal:
     return Terminal(label, "mbs.flange", (*signals, *flows), description=text)
 
 
-# What an FMU shows on request: sensors, energies, poses, wrenches of joints, open loops.
+# Outputs on request: sensors, energies, poses, joint wrenches, closure residuals.
 
 
 Labels = Sequence[str]
@@ -168,13 +168,13 @@ Labels = Sequence[str]
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """A kind of outputs, each of them known by a label, such as the name of a frame.
+    """Kind of outputs on request. Each output group has a label, such as the name of a frame.
 
     Attributes:
-        labels: all that a system has.
-        variables: of one label.
-        values: of the variables of some labels, one after the other.
-        group: name for all of them together; empty where each is asked for alone.
+        labels: function (system) -> all labels of this kind.
+        variables: function (system, label) -> variables of a label.
+        values: function (system, seen, labels) -> expressions of the variables of these labels.
+        group: name that requests all labels of this kind, empty if there is no such name.
     """
 
     labels: Callable[[System], list[str]]
@@ -184,19 +184,19 @@ class Shown:
 
 
 Request = Mapping[str, Labels]
-"""Labels of every kind of `KINDS`, each once."""
+"""Requested labels of each kind of `KINDS`, without duplicates."""
 
 
 def make_request(system: System, names: Sequence[str], flanges: Labels = ()) -> Request:
-    """What is shown on request, each once.
+    """Convert names of outputs to labels by kind, without duplicates.
 
     Args:
-        system: open or closed.
-        names: groups such as "poses", or single ones such as "pose:tool".
-        flanges: frames whose pose and motion is shown.
+        system: assembled mechanism, open or closed.
+        names: names of groups such as "poses", or of single outputs such as "pose:tool".
+        flanges: names of frames whose pose and motion are outputs.
 
     Raises:
-        ModelError: there is nothing of that name, or it is given twice.
+        ModelError: a name is unknown or given twice.
     """
     labels_by_kind: dict[str, dict[str, None]] = {kind: {} for kind in KINDS}
     groups = {shown.group: kind for kind, shown in KINDS.items() if shown.group}
@@ -218,7 +218,7 @@ def make_request(system: System, names: Sequence[str], flanges: Labels = ()) -> 
 
 
 def observed_variables(system: System, request: Request) -> tuple[FmuVariable, ...]:
-    """The variables of a request."""
+    """Return the variables of the requested outputs."""
     return tuple(
         variable
         for kind, labels in request.items()
@@ -228,7 +228,7 @@ def observed_variables(system: System, request: Request) -> tuple[FmuVariable, .
 
 
 def observed_values(system: System, request: Request, seen: Seen) -> list[SX]:
-    """Their values."""
+    """Return the expressions of the requested outputs, in the order of `observed_variables`."""
     return [
         value
         for kind, labels in request.items()
@@ -375,7 +375,10 @@ def _wrench_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
 
 
 def _check_weld(system: System, seen: Seen, number: int) -> None:
-    """Refuse the wrench of a Fixed joint where it is not known on which side a wrench acts."""
+    """Raise if the wrench of a Fixed joint is ambiguous.
+
+    An external wrench on its rigid link may act on either side of the joint.
+    """
     joint = system.joints[number]
     if joint.part is not None and joint.frame_b[0] in seen.external:
         raise ModelError(
@@ -389,7 +392,7 @@ def _load(
     seen: Seen,
     make: Callable[[ModelSymbols, SX, SX, Surroundings], list[SX]],
 ) -> list[SX]:
-    """What is made of positions, velocities, accelerations, efforts and outer wrenches."""
+    """Evaluate make(symbols, a, tau, surroundings) at the motion, efforts and wrenches of seen."""
     s = symbols_of(system, "tree")
     a, tau = SX.sym("a", system.nv), SX.sym("tau", system.nv)
     pushes = {link: (SX.sym("f", 3), SX.sym("m", 3)) for link in seen.external}

@@ -1,4 +1,4 @@
-"""The inverse geometric model of an arm as an FMU: a pose comes in, positions of joints go out."""
+"""Inverse geometric model (inverse kinematics) of an arm as an FMU: pose to joint positions."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from mbs.models.inverse_geometry.closed_form import (
 )
 
 _MEMORY = 0.01
-"""Time constant [s] with which the joints that choose the branch follow the solution: some times
-shorter than what arms do, and some times longer than the steps of a simulation."""
+"""Time constant [s] with which the states that select the branch follow the solution: shorter than
+the motions of arms, and longer than the steps of a simulation."""
 _HOPELESS = 1e6
-"""Added to the square of the distance [rad or m] of a branch that does not hold."""
+"""Penalty added to the squared distance [rad or m] of a branch that does not reach the pose."""
 _MISSED = 1e-9
-"""Largest difference of an element from the pose, lengths in those of the arm, of a branch that
-holds: rounding of inputs in other tools."""
+"""Largest error of an element of the pose of a valid branch, lengths relative to the size of the
+arm: rounding of inputs in other tools."""
 
 
 def inverse_geometry_fmu(
@@ -50,36 +50,36 @@ def inverse_geometry_fmu(
     fmi: str = "2.0",
     platforms: Sequence[str] | None = None,
 ) -> Path:
-    """Write an arm's inverse geometric model as an FMU: its closed form, else the general method.
+    """Write the inverse geometric model (inverse kinematics) of an arm as an FMU.
 
-    Inputs are the pose of the frame in the base, `tool.x`, `tool.y`, `tool.z` and the rotation
-    matrix `tool.R11` .. `tool.R33`, whose columns are made orthonormal. Outputs are the positions
-    `name.q` of the joints on the branch that is nearest to where the joints were, without leaps by
-    whole turns, and `valid`, which is 0 where no branch takes the pose; the joints then stay.
-    States `name.last` follow the outputs with the time constant `memory`; their start values choose
-    the first branch. Symbols of the system are parameters. By the general method there is one more
-    output, `certain`, which is 0 where a configuration may be missing, next to a singular one.
+    Inputs are the pose of the frame in the base: origin `tool.x`, `tool.y`, `tool.z` and rotation
+    matrix `tool.R11` .. `tool.R33`, whose columns are orthonormalised. Outputs are the joint
+    positions `name.q` on the branch nearest to the previous positions, without jumps by whole
+    revolutions, and `valid`. If no branch reaches the pose, `valid` is 0 and the positions stay.
+    States `name.last` follow the outputs with the time constant `memory`. Their start values select
+    the first branch. Symbols of the system are parameters. The general method has the additional
+    output `certain`. It is 0 if solutions may be missing, near singular configurations.
 
     Args:
-        system: an open chain that has a closed form, or six joints without symbols.
-        path: of the file to write.
-        method: "pieper", "paul", "general", or "auto" for the cheaper of the first two, else the
-            third.
-        frame: a body, a named frame, the number of a link, or None for the terminal frame.
-        locked: positions of joints that stay where they are, by name [rad or m].
-        start: configuration at the start, (nq,) or by name; the assembled one when left out.
-        fmi: "2.0" or "3.0".
-        platforms: what computers it is for; this computer when left out.
+        system: open chain that has a closed form, or six joints without symbols.
+        path: file to write.
+        method: "pieper", "paul", "general", or "auto". "auto" takes the cheaper of the first two
+            closed forms, or the general method if both fail.
+        frame: body, named frame, index of a link, or None for the terminal frame.
+        locked: fixed positions of joints, by name [rad or m].
+        start: configuration at the start, (nq,) or by name. By default the assembled one.
+        fmi: version of FMI, "2.0" or "3.0".
+        platforms: names of target platforms. By default this computer.
 
     Returns:
-        The path written.
+        Path of the file.
 
     Raises:
-        NoClosedForm: no closed form is known, and the general method does not hold.
-        ExportError: the system is closed, the file cannot be written, or another FMI version was
-            asked for.
+        NoClosedForm: no closed form is known, and the general method does not apply.
+        ExportError: the system is closed, the file cannot be written, or the FMI version is
+            unknown.
         ModelError: a name is unknown, a parameter has no value, or more than six joints are free.
-        CompilerError: there is no C compiler, or there is no such platform.
+        CompilerError: no C compiler is installed, or a platform is unknown.
     """
     require_system(system)
     require_version(system.name, fmi)
@@ -152,7 +152,7 @@ def _model(chain: FrameChain, every: StepSequence | Function, start: np.ndarray)
 
 
 def _rhs(chain: FrameChain, every: StepSequence | Function) -> Function:
-    """``rhs(t, x, z, u, p) -> xdot, y`` of the configuration nearest to x."""
+    """Return ``rhs(t, x, z, u, p) -> xdot, y``. y: the solution nearest to x, and its validity."""
     n, system = len(chain.names), chain.system
     kind: Any = MX if isinstance(every, Function) else SX
     t, z, x = kind.sym("t"), kind.sym("z", 0), kind.sym("x", n)
@@ -179,7 +179,7 @@ def _rhs(chain: FrameChain, every: StepSequence | Function) -> Function:
 
 
 def _of_closed_form(chain: FrameChain, sequence: StepSequence, T: SX, p: SX) -> list[tuple[SX, SX]]:
-    """The joints of every branch, and whether it holds."""
+    """Return the joint positions of every branch of a closed form, and whether it is valid."""
     system = chain.system
     given = [T, p] if system.parameters else [T]
     q, residual, real, _, _ = all_branches(chain, sequence).call(given)
@@ -191,10 +191,10 @@ def _of_closed_form(chain: FrameChain, sequence: StepSequence, T: SX, p: SX) -> 
 def _of_general(
     chain: FrameChain, every: Function, T: MX, x: MX
 ) -> tuple[list[tuple[MX, MX]], list[MX]]:
-    """Likewise of the general method, and whether none may be missing."""
+    """Return positions and validity of every solution of the general method, and `certain`."""
     q, valid, _, certain = every.call([T])
     columns = [
-        # NaN must not come near sums, whose derivatives it would spoil
+        # replace NaN of invalid solutions, which would spoil derivatives of sums
         (casadi.if_else(valid[b], q[list(chain.indices), b], x), valid[b])
         for b in range(q.size2())
     ]
@@ -202,7 +202,7 @@ def _of_general(
 
 
 def _rotation(rows: Any) -> Any:
-    """(3, 3) the rotation beside nine elements, row by row: interpolated inputs are none."""
+    """Orthonormalise nine elements by rows, such as interpolated inputs. Returns (3, 3)."""
     R = casadi.reshape(rows, 3, 3).T
     first = R[:, 0] / casadi.norm_2(R[:, 0])
     second = R[:, 1] - first * casadi.dot(first, R[:, 1])

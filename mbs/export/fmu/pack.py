@@ -1,4 +1,4 @@
-"""An FMU as one file: sources, libraries, description and documentation, zipped."""
+"""FMU file: zip archive of sources, libraries, model description and documentation."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from mbs.native.scalar_source import Target, plain_flags
 from mbs.text import quoted
 from mbs.view.drawing_files import icon, standalone
 
-# The versions of FMI that are written, and the C files of each.
+# Supported versions of FMI, and the C files of each version.
 
 
 _CORE = (
@@ -64,23 +64,23 @@ _CORE_HEADERS = (
 _HOSTED = ("charts.c",)
 _RUNTIME = ("stepper", "events", "dense", "passage", "projection")
 _TABLEAU = "dopri5"
-"""What steps through singular configurations take, whichever the solver is."""
+"""Integrator for steps through singular configurations, independent of the solver."""
 
 _BARE_RUNTIME = ("stepper", "projection")
 _MEMORY = "memory.c"
-"""Instances and saved states from the heap of C."""
+"""File that allocates instances and saved states on the C heap."""
 
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """A version of FMI, as a thin face over the core.
+    """Version of FMI: the files of its interface to the common core.
 
     Attributes:
-        sources: C files of the face.
-        headers: its own.
-        standard: headers of the standard, which fmpy brings with their licence inside.
-        adjoint: it has calls for adjoint derivatives.
-        callbacks: importers hand functions that give memory to each instance.
+        sources: C files of the interface.
+        headers: headers of the interface.
+        standard: headers of the standard, from the package fmpy, with their licence inside.
+        adjoint: whether the version has functions for adjoint derivatives.
+        callbacks: whether importers pass memory allocation callbacks to each instance.
     """
 
     sources: tuple[str, ...]
@@ -90,11 +90,11 @@ class Face:
     callbacks: bool
 
     def compiled(self, solver: Solver, target: Target = "hosted") -> tuple[str, ...]:
-        """The C files to compile with a solver, in the folder `sources` of the FMU."""
+        """Return the names of the C files to compile, in the folder `sources` of the FMU."""
         return ("model.c", *self._own(solver, target))
 
     def together(self, solver: Solver, target: Target = "hosted") -> tuple[str, ...]:
-        """Those of the C files that are compiled as one: all but the run-time, which is common."""
+        """Return the C files that are compiled as one unit: all except model.c and the run-time."""
         runtime = {f"{name}.c" for name in _runtime(solver, target)}
         return tuple(name for name in self._own(solver, target) if name not in runtime)
 
@@ -105,7 +105,7 @@ class Face:
         return (*core, *runtime, *self.sources, *heap)
 
     def fixed(self, solver: Solver, target: Target = "hosted") -> dict[str, str]:
-        """The files that do not depend on the equations: name to text."""
+        """Return the files that do not depend on the equations: dict from name to text."""
         own = resources.files("mbs.export.fmu") / "c"
         standard = resources.files("fmpy") / "c-code"
         parts = tuple(f"{name}.{end}" for name in _runtime(solver, target) for end in "ch")
@@ -148,10 +148,10 @@ FACES = {
 
 
 def require_version(name: str, fmi: object) -> None:
-    """Refuse a version of FMI that is not written.
+    """Check that a version of FMI is supported. name: name of the model, for the message.
 
     Raises:
-        ExportError: says which ones are.
+        ExportError: the version is not supported. The message lists the supported versions.
     """
     if fmi not in FACES:
         known = " or ".join(f"fmi={version!r}" for version in FACES)
@@ -159,21 +159,21 @@ def require_version(name: str, fmi: object) -> None:
 
 
 def folder_of(platform: Platform, fmi: str) -> str:
-    """The folder of a platform's library among the binaries."""
+    """Return the folder of a platform's library in the folder `binaries`."""
     return platform.fmi2 if fmi == "2.0" else platform.name
 
 
-# The files of an FMU that no compiler reads: descriptions, documentation, icon, licences.
+# Files of an FMU that are not compiled: descriptions, documentation, icon, licences.
 
 
 def description(model: FmuModel, fmi: str, identity: str, compiled: Sequence[str]) -> str:
-    """The file modelDescription.xml.
+    """Return the text of the file modelDescription.xml.
 
     Args:
-        model: what the FMU is.
+        model: description of the FMU.
         fmi: version of the standard.
-        identity: what its library asks for.
-        compiled: C files to compile.
+        identity: identifier that the compiled library checks.
+        compiled: names of the C files to compile.
     """
     if fmi == "2.0":
         return fmi2_xml.model_description(model, identity, compiled)
@@ -183,13 +183,13 @@ def description(model: FmuModel, fmi: str, identity: str, compiled: Sequence[str
 def plain_files(
     model: FmuModel, fmi: str, standard_header: str, compiled: Sequence[str]
 ) -> dict[str, bytes]:
-    """All other files beside sources and libraries: name in the FMU to content.
+    """Return documentation, licences, icons and other XML files: dict from path to content.
 
     Args:
-        model: what the FMU is.
+        model: description of the FMU.
         fmi: version of the standard.
-        standard_header: text of a header of the standard.
-        compiled: C files to compile.
+        standard_header: text of a header of the standard, which contains its licence.
+        compiled: names of the C files to compile.
     """
     files = {"documentation/index.html": documentation(model).encode()}
     own = [name for name, _ in model.sources]
@@ -209,11 +209,11 @@ def plain_files(
 
 
 def standard_header(fmi: str) -> str:
-    """Name of the header of the standard that declares its functions."""
+    """Return the name of the header of the standard that declares its functions."""
     return FACES[fmi].standard[0]
 
 
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # equal models give equal files
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # date of all files, so that equal models give equal archives
 
 
 def write_fmu(
@@ -227,21 +227,21 @@ def write_fmu(
     """Write an FMU for model exchange and co-simulation, with sources and libraries.
 
     Args:
-        model: what the FMU is.
-        path: file to write; it is replaced as a whole, or left alone.
+        model: description of the FMU.
+        path: file to write. An existing file is replaced only if the export succeeds.
         fmi: version of the standard, "2.0" or "3.0".
-        platforms: names of `mbs.native.compiler.PLATFORMS`, made with ziglang; this computer when
-            left out, with its own compiler.
-        reference: whether to put in the results of the default experiment, see
+        platforms: names of `mbs.native.compiler.PLATFORMS`, compiled with ziglang. By default this
+            computer, with its own compiler.
+        reference: whether to include the results of the default experiment, see
             `mbs.export.fmu.reference`.
 
     Returns:
-        the file.
+        Path of the file.
 
     Raises:
-        ExportError: the file cannot be written, a function cannot be written as C, there is no
-            such version, or the default experiment does not reach its end.
-        CompilerError: there is no C compiler, or no such platform.
+        ExportError: the file cannot be written, a function cannot be written as C, the version is
+            not supported, or the default experiment fails before its end.
+        CompilerError: no C compiler is installed, or a platform is unknown.
     """
     require_version(f"FMU {model.name}", fmi)
     goals = None if platforms is None else _platforms(model, platforms)
@@ -269,20 +269,20 @@ def write_fmu(
 
 
 def _compile(model: FmuModel, fmi: str) -> tuple[str, ...]:
-    """The C files to compile, those of the user last."""
+    """Return the names of the C files to compile, the files of the user last."""
     own = (name for name, _ in model.sources if name.endswith(".c"))
     return (*FACES[fmi].compiled(model.solver, model.target), *own)
 
 
 def _identify(unnamed: str, guid: str) -> str:
-    """The model description with its identity: the first attribute that is empty."""
+    """Insert the identifier into a model description, as the first empty attribute."""
     return unnamed.replace('=""', f'="{guid}"', 1)
 
 
 def _binaries(
     model: FmuModel, fmi: str, texts: Mapping[str, str], goals: Sequence[Platform] | None
 ) -> dict[str, bytes]:
-    """The libraries: name in the FMU to content."""
+    """Compile the libraries. Returns dict from path in the FMU to content."""
     flags = (*plain_flags(texts["model.c"]), "-fvisibility=hidden", "-std=gnu99")
     common = tuple(f"{name}.c" for name in _runtime(model.solver, model.target))
     together = FACES[fmi].together(model.solver, model.target)
@@ -315,16 +315,16 @@ def _platforms(model: FmuModel, names: Sequence[str]) -> list[Platform]:
 
 
 def _guid(*texts: str) -> str:
-    """An identity made of what the FMU says and computes, so that equal models share it."""
+    """Return an identifier from a hash of the contents, so that equal models have the same one."""
     h = hashlib.sha256("".join(texts).encode()).hexdigest()
     return "{" + "-".join((h[:8], h[8:12], h[12:16], h[16:20], h[20:32])) + "}"
 
 
 def require_writable(target: Path) -> None:
-    """Refuse a place where no FMU can be written.
+    """Check that a file can be written.
 
     Raises:
-        ExportError: its folder is missing or closed, or it is a folder itself.
+        ExportError: the folder is missing or not writable, or the path is a folder.
     """
     if not target.parent.is_dir():
         raise ExportError(f"folder {target.parent} does not exist; create it or choose another one")

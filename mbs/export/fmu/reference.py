@@ -1,8 +1,7 @@
-"""Results of the default experiment inside an FMU, to compare an importer's with.
+"""Reference results of the default experiment in an FMU, for comparison with an importer.
 
-They come from the equations and the integrators of `mbs.solvers`, not from the FMU.
-
-The files and the manifest are those of the layered standard FMI-LS-REF 1.0.0-alpha.1.
+They are computed from the equations by the integrators of `mbs.solvers`, not by the FMU itself.
+The files and the manifest follow the layered standard FMI-LS-REF 1.0.0-alpha.1.
 """
 
 from __future__ import annotations
@@ -27,25 +26,25 @@ from mbs.solvers.problem import Events
 Array = npt.NDArray[np.float64]
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
-"""Where the files stand in the FMU."""
+"""Folder of the files in the FMU."""
 
 _MANIFEST = "http://fmi-standard.org/fmi-ls-manifest"
-_TIGHTEST = 1e-10  # relative tolerance of a reference: below what users compare with it
+_TIGHTEST = 1e-10  # largest relative tolerance of the reference: below the errors of importers
 _DIGITS = ".13g"
 _AFTER_CONTACT = 1e-9
-"""Step behind an event [s] where bodies touch, as in `c/solver.c`."""
+"""First step after an event [s] if the model has contacts, as in `c/solver.c`."""
 
 
 @dataclass(frozen=True, slots=True)
 class _File:
-    """A file of the layered standard.
+    """File of the layered standard.
 
     Attributes:
-        name: in the folder.
-        type: its MIME type.
-        role: what it is for, a word of the standard.
-        description: one line for people.
-        content: its text.
+        name: file name in the folder.
+        type: MIME type.
+        role: purpose of the file, a term of the standard.
+        description: one-line description.
+        content: text of the file.
     """
 
     name: str
@@ -56,15 +55,15 @@ class _File:
 
 
 def reference_files(model: FmuModel) -> dict[str, bytes]:
-    """The default experiment and its results: names in the FMU to content.
+    """Return the files of the default experiment and its results: dict from path to content.
 
-    Every input keeps its start value; all outputs are there at each communication point.
+    Inputs keep their start values. The results contain all outputs at each communication point.
 
     Args:
-        model: what the FMU computes.
+        model: description of the FMU.
 
     Raises:
-        ExportError: the motion does not reach the end.
+        ExportError: the simulation fails before the stop time.
     """
     times = np.linspace(0, model.stop_time, round(model.stop_time / model.step_size) + 1)
     results = _csv(times, *_results(model, times))
@@ -90,7 +89,7 @@ def reference_files(model: FmuModel) -> dict[str, bytes]:
 
 
 def _results(model: FmuModel, times: Array) -> tuple[list[FmuVariable], Array]:
-    """The outputs and their values, a row for each time."""
+    """Return the outputs and their values, one row per time."""
     states, modes = _motion(model, times)
     nx, count = len(model.states), len(times)
     p = casadi.vertcat(_starts(model.parameters), DM(0, 1))
@@ -105,7 +104,7 @@ def _results(model: FmuModel, times: Array) -> tuple[list[FmuVariable], Array]:
 
 
 def _motion(model: FmuModel, times: Array) -> tuple[Array, Array]:
-    """States with the dependent coordinates behind them, and modes, a row for each time."""
+    """Return states followed by dependent coordinates, and modes, one row per time."""
     t, x = MX.sym("t"), MX.sym("x", len(model.states) + len(model.dependents))
     p = MX.sym("p", len(model.parameters) + len(model.modes))
     start = casadi.vertcat(_starts(model.states), _starts(model.dependents))
@@ -135,13 +134,13 @@ def _starts(variables: Sequence[FmuVariable]) -> DM:
 
 
 def _split(model: FmuModel, t: MX, x: MX, p: MX) -> list[MX]:
-    """The arguments (t, x, z, u, p) of the functions of the model."""
+    """Return the arguments t, x, z, u, p of the model functions; x holds states and dependents."""
     nx = len(model.states)
     return [t, x[:nx], x[nx:], MX(_starts(model.inputs)), p]
 
 
 def _rhs(model: FmuModel, t: MX, x: MX, p: MX) -> Function:
-    """The rates of states and dependent coordinates, which follow through the closure."""
+    """Return rhs(t, x, p): derivatives of states and, through the closure, of dependents."""
     point = _split(model, t, x, p)
     rate = model.rhs.call(point)[0]
     if model.closure is None:
@@ -199,7 +198,7 @@ def _events(model: FmuModel, t: MX, x: MX, p: MX) -> Events:
 
 
 def _csv(times: Array, variables: Sequence[FmuVariable], table: Array) -> str:
-    """A row of names and a row for each time, as in RFC 4180."""
+    """Return CSV text (RFC 4180): a header row, then one row per time."""
     names = ",".join('"' + name.replace('"', '""') + '"' for name in _names(variables))
     rows = np.column_stack((times, table))
     return "\n".join([names, *(",".join(format(x, _DIGITS) for x in row) for row in rows)]) + "\n"

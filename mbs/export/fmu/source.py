@@ -1,4 +1,4 @@
-"""The generated C of an FMU: its tables and the functions that it evaluates."""
+"""Generated C files of an FMU: model.h and model.c with tables and functions."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -17,32 +17,29 @@ from mbs.native.compiled import generated, unwritten
 from mbs.native.scalar_source import Work, plain_source
 from mbs.solvers.block_triangular import Block, block_triangular
 
-# The functions that an FMU evaluates, under the names that its C calls.
+# Functions that an FMU evaluates, under the names that its C files call.
 
 
 def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
-    """The functions under the names that core.c calls, every input and output dense.
+    """Return the functions that the C files of an FMU call, with dense inputs and outputs.
 
     Args:
-        model: what the FMU computes.
-        adjoint: with `mbs_adjoint`, which FMI 2.0 cannot call.
+        model: description of the FMU.
+        adjoint: whether to include `mbs_adjoint`, which only FMI 3.0 can call.
 
     Returns:
-        `mbs_rhs(t, x, z, u, p) -> (xdot, y)`, p with the modes at its end;
-        `mbs_tangent(t, x, z, u, p, dt, dx, du, dp) -> (dxdot, dy, dz, dg)`, g the indicators and dp
-        of the parameters alone; `mbs_adjoint(t, x, z, u, p, wxdot, wy, wz, wg) -> (gt, gx, gu,
-        gp)`.
-        Where loops are closed, `mbs_closure(x, z, p) -> (z, residual)` and
-        `mbs_sensitivity(x, z, p) -> steepness`, `mbs_slopes(x, z, p) -> J` where J is watched, and
-        `mbs_sines(x, z, p)` where `FmuModel.sines` is given.
-        Of a tree, `mbs_tree_rhs` and others as `TreeState` has them. Where there are events,
-        `mbs_first`, `mbs_indicators`, `mbs_jump` and, where there are any, `mbs_approaches` as
-        `Jumps` has them, and
-        `mbs_rates(t, x, z, u, p, du) -> dg/dt` along the motion, du the rates of the inputs; the
-        last three also of a tree, as `mbs_tree_indicators` and so on. Where states and parameters
-        have rules, `mbs_excess(x, p)`. For an implicit solver
-        `mbs_jacobian(t, x, z, u, p, du) -> (d xdot / d x, d xdot / d t)`, where there is a tree
-        `mbs_tree_jacobian` of its states instead.
+        Functions with the names below. p holds the parameters, then the modes. g: indicators.
+        Always `mbs_rhs(t, x, z, u, p) -> (xdot, y)` and `mbs_tangent(t, x, z, u, p, dt, dx, du, dp)
+        -> (dxdot, dy, dz, dg)`, with dp for the parameters only. On request
+        `mbs_adjoint(t, x, z, u, p, wxdot, wy, wz, wg) -> (gt, gx, gu, gp)`.
+        For closed loops `mbs_closure(x, z, p) -> (z, residual)`, `mbs_sensitivity(x, z, p) ->
+        steepness`, and `mbs_slopes(x, z, p) -> J` and `mbs_sines(x, z, p)` if the model has slopes
+        and sines. For tree equations `mbs_tree_rhs` and others of `TreeState`. For events
+        `mbs_first`, `mbs_indicators`, `mbs_jump` and, if available, `mbs_approaches` of `Jumps`,
+        and `mbs_rates(t, x, z, u, p, du) -> dg/dt` along the motion, where du are the derivatives
+        of the inputs. Events on tree equations have `mbs_tree_indicators` and so on, without first.
+        If the model has rules, `mbs_excess(x, p)`. For an implicit solver `mbs_jacobian(t, x, z, u,
+        p, du) -> (d xdot / d x, d xdot / d t)`, or `mbs_tree_jacobian` for tree equations.
     """
     t, x = casadi.MX.sym("t"), casadi.MX.sym("x", len(model.states))
     z, u = casadi.MX.sym("z", len(model.dependents)), casadi.MX.sym("u", len(model.inputs))
@@ -81,7 +78,7 @@ def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
 
 
 def _loops(model: FmuModel, whole: list[casadi.MX]) -> list[casadi.Function]:
-    """The functions of x, z and p of closed loops."""
+    """Return the functions of closed loops, with arguments x, z and p."""
     if model.closure is None:
         return []
     x, z, p = whole
@@ -95,9 +92,9 @@ def _loops(model: FmuModel, whole: list[casadi.MX]) -> list[casadi.Function]:
 
 
 def _tree(tree: TreeState, symbols: list[casadi.MX]) -> list[casadi.Function]:
-    """The functions `mbs_tree_..(t, X, z, u, p)` of the tree, z ignored.
+    """Return the functions `mbs_tree_..(t, X, z, u, p)` of the tree equations; z has no effect.
 
-    Beside them `mbs_tree_start(t, x, z, u, p)` and `mbs_tree_rate(X) -> q'`.
+    They include `mbs_tree_start(t, x, z, u, p) -> X` and `mbs_tree_rate(X) -> q'`.
     """
     t, X, x, z, u, p = symbols
     through = tree.passage
@@ -120,7 +117,7 @@ def _tree(tree: TreeState, symbols: list[casadi.MX]) -> list[casadi.Function]:
 def _tree_events(
     model: FmuModel, tree: TreeState, point: list[casadi.MX], du: casadi.MX
 ) -> list[casadi.Function]:
-    """The functions of events `mbs_tree_..(t, X, z, u, p)`, z ignored."""
+    """Return the event functions `mbs_tree_..(t, X, z, u, p)` of the tree; z has no effect."""
     t, X, _, u, p = point
     events, own = tree.events, [t, X, casadi.MX(0, 1), u, p]
     assert events is not None
@@ -140,16 +137,16 @@ def _tree_events(
 
 
 def watched(model: FmuModel) -> tuple[str, ...]:
-    """What its event indicators watch, for messages.
+    """Return the names of the event indicators of a model, for error messages.
 
     Args:
-        model: what the FMU computes.
+        model: description of the FMU.
     """
     return model.jumps.names if model.jumps else ()
 
 
 def _jacobian(model: FmuModel, point: list[casadi.MX], du: casadi.MX) -> list[casadi.MX]:
-    """How xdot changes with x, column by column and through the closure, and with t."""
+    """Return d xdot / d x, dense and through the closure of the loops, and d xdot / d t."""
     t, x, z, u, p = point
     xdot = model.rhs.call(point)[0]
     J = casadi.densify(casadi.jacobian(xdot, x))
@@ -175,7 +172,7 @@ def _events(jumps: Jumps, point: list[casadi.MX]) -> list[casadi.Function]:
 
 
 def _names_of_events(events: Jumps | MinimalEvents | None, prefix: str = "mbs_") -> tuple[str, ...]:
-    """The functions of events that an FMU has."""
+    """Return the names of the event functions of an FMU."""
     if events is None:
         return ()
     names = _EVENTS if prefix == "mbs_" else _TREE_EVENTS
@@ -183,7 +180,7 @@ def _names_of_events(events: Jumps | MinimalEvents | None, prefix: str = "mbs_")
 
 
 def _rates(model: FmuModel, point: list[casadi.MX], du: casadi.MX) -> casadi.MX:
-    """How fast the indicators rise along the motion."""
+    """Return the time derivatives of the indicators along the motion."""
     xdot, p = model.rhs.call(point)[0], casadi.MX(len(model.parameters), 1)
     return _directions(model, point, [casadi.MX(1), xdot, du, p])[3]
 
@@ -200,10 +197,10 @@ def _tangent(model: FmuModel, point: list[casadi.MX]) -> casadi.Function:
 def _directions(
     model: FmuModel, point: list[casadi.MX], seeds: list[casadi.MX]
 ) -> tuple[casadi.MX, casadi.MX, casadi.MX, casadi.MX]:
-    """dxdot, dy, dz and dg along a direction, the modes constant.
+    """Return the directional derivatives dxdot, dy, dz and dg, with constant modes.
 
-    At a solution of the closure, the derivative of one Newton step z - J^-1 r is -J^-1 dr: that
-    of the dependent coordinates themselves.
+    At a solution of the closure, the derivative of a Newton step z - J^-1 r is -J^-1 dr. It equals
+    the derivative of the dependent coordinates.
     """
     _, x, z, _, p = point
     dt, dx, du, dp = seeds
@@ -218,7 +215,7 @@ def _directions(
 
 
 def _adjoint(model: FmuModel, point: list[casadi.MX]) -> casadi.Function:
-    """The transpose of the tangent, by first derivatives: a foreign function has no others."""
+    """Return the transpose of the tangent, by first derivatives only, which user functions have."""
     _, x, z, _, p = point
     sizes = (len(model.states), len(model.outputs), z.numel(), len(watched(model)))
     names = ("wxdot", "wy", "wz", "wg")
@@ -238,7 +235,7 @@ def _adjoint(model: FmuModel, point: list[casadi.MX]) -> casadi.Function:
 
 
 def _own(model: FmuModel, p: casadi.MX) -> casadi.MX:
-    """The parameters, without the modes behind them."""
+    """Return the parameters in p, without the modes after them."""
     own: casadi.MX = casadi.vertsplit(p, [0, len(model.parameters), p.numel()])[0]
     return own
 
@@ -253,14 +250,15 @@ def steepness(
     loop: list[casadi.MX],
     variables: tuple[Sequence[FmuVariable], Sequence[FmuVariable], Sequence[FmuVariable]],
 ) -> casadi.MX:
-    """How many nominal sizes z moves when x and p change by about their own size.
+    """Return the largest change of z, in nominal sizes, for changes of x and p by about their size.
 
-    It is huge where rank is lost; p is there for configurations where x and z lose it together.
+    It is very large near a loss of rank of the closure Jacobian. The change of p reveals
+    configurations in which the rank is lost for x and z together.
 
     Args:
-        closure: `closure(x, z, p)` as `FmuModel` has it.
-        loop: x, z and p.
-        variables: of x, p and z.
+        closure: `closure(x, z, p)` as in `FmuModel`.
+        loop: symbols x, z and p.
+        variables: variables of x, p and z.
     """
     _, z, p = loop
     states, parameters, dependents = variables
@@ -272,7 +270,7 @@ def steepness(
 
 
 def _weights(variables: Sequence[FmuVariable]) -> list[float]:
-    """Unequal numbers about one, so that effects of the variables do not cancel."""
+    """Return unequal weights from 1 to 2, so that effects of the variables do not cancel."""
     return [1 + k / len(variables) for k in range(len(variables))]
 
 
@@ -307,7 +305,7 @@ _TREE_EVENTS = ("mbs_tree_indicators", "mbs_tree_rates", "mbs_tree_jump")
 
 
 def _names_of_loops(model: FmuModel) -> tuple[str, ...]:
-    """The functions of closed loops that an FMU has."""
+    """Return the names of the functions of closed loops of an FMU."""
     if model.closure is None:
         return ()
     watched = ("mbs_slopes",) if model.slopes is not None else ()
@@ -366,16 +364,16 @@ int {name}(const double **arg, double **res, long long *iw, double *w, int mem);
 
 
 def header(model: FmuModel, guid: str, work: Work, *, adjoint: bool) -> str:
-    """The file model.h.
+    """Return the text of the file model.h.
 
     Args:
-        model: what the FMU is.
-        guid: identity that the library asks for.
-        work: what the functions of model.c need.
-        adjoint: the version of FMI calls adjoint derivatives.
+        model: description of the FMU.
+        guid: identifier that the compiled library checks.
+        work: sizes of the work arrays of the functions in model.c.
+        adjoint: whether the FMI version has adjoint derivatives.
 
     Returns:
-        its text.
+        Text of the header.
     """
     names: tuple[str, ...] = _OPEN
     options = ""
@@ -427,21 +425,22 @@ def header(model: FmuModel, guid: str, work: Work, *, adjoint: bool) -> str:
 
 
 _LEAST = Work(arg=9, res=8)
-"""What the C of an FMU sets of arg and res, whichever functions there are."""
+"""Smallest sizes of arg and res: the C files of an FMU always set these elements."""
 
 
 def source(model: FmuModel, *, adjoint: bool) -> tuple[str, Work]:
-    """The file model.c.
+    """Return the text of the file model.c and the work sizes of its functions.
 
     Args:
-        model: what the FMU is.
-        adjoint: the version of FMI calls adjoint derivatives.
+        model: description of the FMU.
+        adjoint: whether the FMI version has adjoint derivatives.
 
     Returns:
-        its text, and what its functions need.
+        Text of the C file, and sizes of the work arrays.
 
     Raises:
-        ExportError: a function holds a node that CasADi cannot write as C, or that bare C has not.
+        ExportError: a function contains a node that CasADi cannot write as C, or that
+            target="bare" does not support.
     """
     code, work = _code(model, functions(model, adjoint=adjoint))
     if problem := unwritten(code):
@@ -492,7 +491,7 @@ def _tree_sizes(model: FmuModel, tree: TreeState) -> str:
 
 
 def _tree_tables(model: FmuModel) -> list[str]:
-    """Where the states, and the dependents, of the FMU stand among the states of its tree."""
+    """Return the C tables of indices of states and dependents of the FMU in the tree state."""
     if (tree := model.tree) is None:
         return []
     return [
@@ -505,7 +504,7 @@ def _tree_tables(model: FmuModel) -> list[str]:
 
 
 def _sentences(model: FmuModel) -> list[str]:
-    """What is said where a rule is broken."""
+    """Return the C table of error messages of violated rules."""
     if model.rules is None:
         return []
     return [_table("const char *const MODEL_SENTENCES", map(_quote, model.rules.sentences))]
@@ -523,7 +522,7 @@ def _lead_tables(model: FmuModel) -> list[str]:
 
 
 def leading_states(closure: casadi.Function) -> list[int]:
-    """1 for each state that dependents follow from, as positions do, 0 for the others.
+    """Return 1 for each state on which the dependents depend, such as positions, else 0.
 
     Args:
         closure: `closure(x, z, p)`, one Newton step of z.
@@ -533,7 +532,7 @@ def leading_states(closure: casadi.Function) -> list[int]:
 
 
 def _size_tables(model: FmuModel) -> list[str]:
-    """How many elements a variable has, where some are arrays."""
+    """Return the C table of numbers of elements of the variables, if some are arrays."""
     if not model.arrays:
         return []
     sizes = [1] * len(model.entries)
@@ -547,7 +546,7 @@ def _blocks(model: FmuModel) -> tuple[Block, ...]:
 
 
 def diagonal_blocks(slopes: casadi.Function | None) -> tuple[Block, ...]:
-    """The diagonal blocks of the slopes of a closure; none where they are not watched."""
+    """Return the diagonal blocks of the closure Jacobian, empty if slopes is None."""
     if slopes is None:
         return ()
     pattern = np.array(casadi.DM(slopes.sparsity_out(0), 1)) != 0
@@ -566,12 +565,15 @@ def _block_tables(blocks: Sequence[Block]) -> list[str]:
 
 
 def _code(model: FmuModel, functions: Iterable[casadi.Function]) -> tuple[str, Work]:
-    """Scalar operations in short pieces, which compile fast; the rest as CasADi has it."""
+    """Return C code and work sizes of functions.
+
+    SX functions are written in short pieces, which compile fast, other functions by CasADi.
+    """
     pieces, others, most = [], [], Work()
     for function in functions:
         try:
             piece, work = plain_source([function])
-        except ModelError as error:  # it calls a foreign function, say
+        except ModelError as error:  # for example, it calls a user function
             if model.target == "bare":
                 raise ExportError(
                     f"FMU {model.name}: an equation is not made of scalar operations ({error});"

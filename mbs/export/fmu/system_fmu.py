@@ -1,4 +1,4 @@
-"""A mechanism as an FMU."""
+"""Export of a mechanism as an FMU."""
 
 from __future__ import annotations
 
@@ -73,74 +73,75 @@ def fmu(
 ) -> Path:
     """Write a mechanism as an FMU for Model Exchange and Co-Simulation.
 
-    Inputs are the efforts of the actuated joints, `name.tau`, or where the motor or torque of a
-    drive line drives one its own input, such as `motor.voltage`. Outputs are positions, velocities
-    and accelerations of all joints, `name.q`, `name.v`, `name.a`, the terminal frame in the base,
-    `tool.x`, `tool.y`, `tool.z` and the rotation matrix `tool.R11` .. `tool.R33`, and efforts and
-    modes of rigid stops and Coulomb friction, `stop.effort`, `stop.mode`. States are the
-    independent joints; in a closed system the others are solved for at every evaluation, so that
-    loops cannot drift. Every symbol of the system is a parameter. A solver for Co-Simulation is
-    inside. Directional derivatives, and in FMI 3.0 adjoint ones, are exact through closed loops.
+    Inputs are the efforts `name.tau` of the actuated joints. A joint that a drive line with its own
+    motor drives has the input of the motor instead, such as `motor.voltage`. Outputs are the
+    positions `name.q`, velocities `name.v` and accelerations `name.a` of all joints. Further
+    outputs are the pose of the terminal frame in the base (origin `tool.x`, `tool.y`, `tool.z`,
+    rotation matrix `tool.R11` .. `tool.R33`), and the efforts and modes of rigid stops and Coulomb
+    friction, `stop.effort`, `stop.mode`. States are the independent joints. In a closed system the
+    other joints are solved for at every evaluation, so that loops cannot drift. Every symbol of the
+    system is a parameter. The FMU contains a solver for Co-Simulation. Directional derivatives, and
+    adjoint derivatives in FMI 3.0, are exact also for closed loops.
 
     Args:
-        system: open or closed.
-        path: of the file to write.
-        fmi: "2.0" or "3.0".
-        inputs: what else drives it: "j1.a" for the acceleration of a joint, "j1.q" for its
-            position, with the rates as inputs `j1.v` and `j1.a`, in place of the effort, which
-            becomes an output; "tool.wrench" for a force and a moment on a frame at its origin, in
-            axes of the base, `tool.fx` .. `tool.mz`.
-        outputs: what else to show: "sensors" for what they read, such as `tip.p.x`; "energy" for
-            `energy.kinetic` and `energy.potential`; "closure" for the largest closure row; "poses"
-            for the frames of all bodies; "cut_forces" for the wrenches that joints transmit,
-            `j1.f.x` .. `j1.m.z`; or single ones, such as "sensor:tip", "pose:arm", "motion:arm",
-            "wrench:j2".
-        parameters: numbers that are to be parameters too, as `mbs.assembly.symbolic` takes them:
+        system: assembled mechanism, open or closed.
+        path: file to write.
+        fmi: version of FMI, "2.0" or "3.0".
+        inputs: names of further inputs. "j1.a": acceleration of a joint. "j1.q": position of a
+            joint, with its derivatives as inputs `j1.v` and `j1.a`. Both replace the effort, which
+            becomes an output. "tool.wrench": force and moment on a frame at its origin, expressed
+            in the base, `tool.fx` .. `tool.mz`.
+        outputs: names of further outputs. "sensors": values of the sensors, such as `tip.p.x`.
+            "energy": `energy.kinetic` and `energy.potential`. "closure": largest closure residual.
+            "poses": frames of all bodies. "cut_forces": wrenches that joints transmit, `j1.f.x` ..
+            `j1.m.z`. Single outputs: "sensor:tip", "pose:arm", "motion:arm", "wrench:j2".
+        parameters: numeric values to convert to parameters, as in `mbs.assembly.symbolic`:
             "masses", "inertias", "lengths", "friction", "M3", "d4".
-        fixed: names of parameters that keep their values once the motion has begun; all others may
-            be tuned.
-        flanges: frames where another part of a mechanism is coupled: their poses, velocities and
-            accelerations are outputs, the wrenches on them inputs; in FMI 3.0 a terminal holds
-            them.
-        controller: law that gives the efforts in place of the inputs: a function of (t, q, v) as
-            `mbs.simulate.run` takes it, a casadi.Function with further inputs, which become
-            inputs of the FMU, or a C function of `sources` by its name or as a `CController`.
-        sources: C files and headers that the controller needs; they are compiled with the FMU.
-        platforms: what computers it is for, such as ["x86_64-linux", "x86_64-windows"], made with
-            ziglang; this computer when left out, with its own compiler.
+        fixed: names of parameters that are constant after the initialization. All other parameters
+            are tunable.
+        flanges: names of frames at which another part of a mechanism is coupled. Their poses,
+            velocities and accelerations are outputs, and the wrenches on them are inputs. In FMI
+            3.0 each flange is a terminal.
+        controller: control law that computes the efforts, which are then no inputs. Either a
+            function of (t, q, v) as in `mbs.simulate.run`, or a casadi.Function, whose further
+            inputs become inputs of the FMU, or a C function of `sources` by its name or as a
+            `CController`.
+        sources: C files and headers of the controller, which are compiled with the FMU.
+        platforms: names of target platforms, such as ["x86_64-linux", "x86_64-windows"], compiled
+            with ziglang. By default this computer, with its own compiler.
         stop_time: default end of a simulation [s].
         step_size: default communication step [s].
         tolerance: default relative tolerance.
-        solver: of co-simulation: "dopri5", Dormand and Prince's explicit pair; "rodas", the
-            linearly implicit RODAS5P for stiff systems; "rk4", with a fixed step, for real time.
-        internal_step: length of the steps of "rk4" [s].
-        max_step: the longest step of "dopri5" and "rodas" [s]; only the error and events limit it
-            by default.
-        target: "hosted", or "bare" for what has no operating system: co-simulation alone, with
-            solver="rk4", of a system without events, by C99 without heap, files and variables that
-            change outside of functions. In FMI 2.0 its memory comes from the callbacks of the
-            importer; in FMI 3.0 from two functions in memory.c, which may be replaced. The numbers
-            are those of the same FMU with target="hosted", to the last bit.
-        reference: whether to put in the results of the default experiment.
-        arrays: whether positions, velocities, accelerations and efforts of the joints are arrays
-            q, v, a and tau, in FMI 3.0; what loops determine is `q_dependent` and so on.
-        description: one line about the model; by default what the report of the system begins with.
-        author: person or organisation, as the model description is to name it.
-        version: of the model.
-        copyright: such as "(c) 2026 Example Ltd.".
-        license: its name, text or address.
+        solver: solver of Co-Simulation: "dopri5", the explicit pair of Dormand and Prince; "rodas",
+            the linearly implicit RODAS5P for stiff systems; "rk4", with a fixed step, for real
+            time.
+        internal_step: step of "rk4" [s].
+        max_step: longest step of "dopri5" and "rodas" [s]. By default only the error and events
+            limit the step.
+        target: "hosted", or "bare" for systems without an operating system: Co-Simulation only,
+            with solver="rk4" and no events, in C99 that uses no heap, files or global variables. In
+            FMI 2.0 the callbacks of the importer allocate its memory, in FMI 3.0 two functions in
+            memory.c, which may be replaced. Results are bit-identical to target="hosted".
+        reference: whether to include the results of the default experiment.
+        arrays: whether positions, velocities, accelerations and efforts of the joints are the
+            arrays q, v, a and tau of FMI 3.0. Dependent joints are in `q_dependent` and so on.
+        description: one-line description. By default the first line of the report of the system.
+        author: person or organisation, for the model description.
+        version: version of the model.
+        copyright: copyright notice, such as "(c) 2026 Example Ltd.".
+        license: name, text or address of the licence.
 
     Returns:
-        The path written.
+        Path of the file.
 
     Raises:
-        ExportError: the file cannot be written, another FMI version was asked for, the controller
-            does not fit the system, a text is no line of printable characters, or the target cannot
-            have the solver, the events or the controller.
+        ExportError: the file cannot be written, the FMI version is unknown, the controller
+            does not fit the system, a text has characters that are not printable, or the target
+            does not support the solver, the events or the controller.
         ModelError: a parameter has no value, an input, output, parameter or frame is unknown or
-            named twice, or the system has no minimal state.
-        CompilerError: there is no C compiler, it refused the sources, or there is no such
-            platform.
+            given twice, or the system has no minimal state.
+        CompilerError: no C compiler is installed, the sources do not compile, or the platform is
+            unknown.
     """
     require_system(system)
     require_version(system.name, fmi)
@@ -159,7 +160,7 @@ def fmu(
 
 @dataclass(frozen=True, slots=True)
 class Contents:
-    """What an FMU is to hold beside the defaults; attributes as the arguments of `fmu`."""
+    """Contents of an FMU in addition to the defaults. The attributes are arguments of `fmu`."""
 
     inputs: Sequence[str] = ()
     outputs: Sequence[str] = ()
@@ -172,7 +173,7 @@ class Contents:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How an FMU is simulated by default; attributes as the arguments of `fmu`."""
+    """Default experiment and solver of an FMU. The attributes are arguments of `fmu`."""
 
     stop_time: float = 10.0
     step_size: float = 0.01
@@ -191,14 +192,14 @@ def fmu_model(
     *,
     arrays: bool = False,
 ) -> FmuModel:
-    """The description of a mechanism's FMU.
+    """Return the description of the FMU of a mechanism.
 
     Args:
-        system: open or closed.
-        wished: what it holds.
-        settings: how it is simulated.
-        words: a description in place of that of the report, and whose the model is.
-        arrays: q, v, a and tau are arrays.
+        system: assembled mechanism, open or closed.
+        wished: contents in addition to the defaults.
+        settings: default experiment and solver.
+        words: one-line description (empty for that of the report), and author of the model.
+        arrays: whether q, v, a and tau are arrays of FMI 3.0.
 
     Raises:
         ExportError, ModelError, CompilerError: as for `fmu`.
@@ -211,7 +212,7 @@ def fmu_model(
     interface = interface_of(system, wished.inputs, wished.flanges)
     request = make_request(system, wished.outputs, interface.flanges)
     controller = controller_of(system, wished.controller, read_sources(wished.sources))
-    # a solver with fixed steps meets no events
+    # a solver with fixed steps cannot locate events
     crossings = settings.solver != "rk4" and settings.target != "bare"
     state = minimal_state(
         system,
@@ -261,7 +262,7 @@ def fmu_model(
 
 
 def _rules(system: System, state: MinimalState) -> Rules | None:
-    """Quaternions of unit length at the start, and bounds of what parameters make together."""
+    """Return conditions: unit quaternions at the start, and bounds on parameter expressions."""
     x, q = SX.sym("x", state.rhs.size1_in(1)), SX.sym("q", system.nq)
     q[list(state.positions)] = x[: len(state.positions)]
     own = [part for part in quaternion_slices(system.tree) if part.start in state.positions]
@@ -278,7 +279,7 @@ def _rules(system: System, state: MinimalState) -> Rules | None:
 
 
 def _sines(system: System, state: MinimalState) -> Function | None:
-    """`FmuModel.sines` of a closed system; None if its state has no dependent positions."""
+    """Return `FmuModel.sines`, or None if the state has no dependent positions."""
     if state.closure is None or system.closure is None:
         return None
     x, z, p = (SX.sym(name, state.closure.size1_in(k)) for k, name in enumerate("xzp"))
@@ -290,7 +291,7 @@ def _sines(system: System, state: MinimalState) -> Function | None:
 
 
 def _arrays(state: MinimalState) -> tuple[Group, ...]:
-    """The variables of joints that follow each other, in the order of x, u, y and z."""
+    """Return the arrays of consecutive joint variables, in the order of x, u, y and z."""
     m, k, n = len(state.accelerations), len(state.dependents), len(state.passive)
     return (
         Group("q", "state", 0, len(state.positions), "positions of"),
@@ -305,6 +306,6 @@ def _arrays(state: MinimalState) -> tuple[Group, ...]:
 
 
 def _passive(state: MinimalState) -> tuple[int, int, int]:
-    """Where velocities and accelerations of dependent joints stand in y, and their number."""
+    """Return the first index in y of velocities and of accelerations of dependent joints, and n."""
     first, count = len(state.accelerations) + len(state.shown), len(state.passive)
     return first, first + count, count

@@ -1,4 +1,4 @@
-"""The variables of a mechanism's FMU: names, units, starts, typical sizes and bounds."""
+"""Variables of the FMU of a mechanism: names, units, start values, nominal values and bounds."""
 
 from __future__ import annotations
 
@@ -23,14 +23,17 @@ from mbs.text import did_you_mean
 from mbs.units import rate_unit
 
 POSE = ("x", "y", "z", *(f"R{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)))
-"""Elements of the pose of a frame in the base."""
+"""Names of the elements of a frame's pose in the base: origin, and rotation matrix by rows."""
 
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
-"""Elements of a wrench."""
+"""Names of the elements of a wrench: force, then moment."""
 
 
 def states(system: System, state: MinimalState, start: Sequence[float]) -> tuple[FmuState, ...]:
-    """Positions and velocities of the independent joints, and states of devices."""
+    """Return the states: positions and velocities of independent joints, and component states.
+
+    start: start values of the positions [rad or m].
+    """
     rates = {speed.name: speed.unit for speed in system.speeds}
     positions = [
         FmuState(
@@ -75,7 +78,7 @@ def states(system: System, state: MinimalState, start: Sequence[float]) -> tuple
 def dependents(
     system: System, state: MinimalState, start: Sequence[float]
 ) -> tuple[FmuVariable, ...]:
-    """The positions that loops determine, whose starts are guesses."""
+    """Return the positions that closed loops determine. Their start values are guesses."""
     return tuple(
         _position(system.coordinates[k], f"{system.coordinates[k].name}.solved", value)
         for k, value in zip(state.dependents, start, strict=True)
@@ -83,14 +86,17 @@ def dependents(
 
 
 def loop_size(system: System) -> float:
-    """The size of the mechanism [m], with the default values of its parameters."""
+    """Return the size of the mechanism [m] at the default values of its parameters, 1 if open."""
     if not system.is_closed:
         return 1.0
     return Closing(system, closure_parameters(system)).size
 
 
 def inputs(system: System, state: MinimalState, labels: Sequence[str]) -> Iterator[FmuVariable]:
-    """The elements of u but those of a controller; labels name the frames of the wrenches."""
+    """Yield the variables of u, except inputs of a controller.
+
+    labels: names of the frames on which external wrenches act.
+    """
     for k in state.inputs:
         name = system.speeds[k].name
         yield _effort(system.speeds[k], f"effort of the motor of {name}")
@@ -119,12 +125,13 @@ def _prescribe(system: System, motion: InputMotion) -> Iterator[FmuVariable]:
 def outputs(
     system: System, state: MinimalState, *, branches: bool = False
 ) -> Iterator[FmuVariable]:
-    """The elements of y but those that are observed.
+    """Yield the variables of y, except outputs on request.
 
     Args:
-        system: open or closed.
-        state: its state equation.
-        branches: where branches of motion meet, velocities of dependent joints choose one.
+        system: assembled mechanism, open or closed.
+        state: state equation of the mechanism.
+        branches: whether start velocities of dependent joints select a branch of motion in a
+            singular configuration.
     """
     speeds = system.speeds
     yield from (_acceleration(speeds[k]) for k in state.accelerations)
@@ -148,7 +155,7 @@ def outputs(
 
 
 def pose(label: str, where: str) -> Iterator[FmuVariable]:
-    """Origin, and orientation by rows, of a frame in the base."""
+    """Yield the variables of a frame's pose in the base: origin, and rotation matrix by rows."""
     for name in POSE:
         text = f"{name} of {where} in the base frame"
         if name.startswith("R"):
@@ -159,19 +166,19 @@ def pose(label: str, where: str) -> Iterator[FmuVariable]:
 
 
 def frame_text(frame: str | int) -> str:
-    """A frame in words."""
+    """Return the name of a frame for descriptions, such as "link 3"."""
     return f"link {frame}" if isinstance(frame, int) else frame
 
 
 def parameters(system: System, fixed: Sequence[str] = ()) -> Iterator[FmuVariable]:
-    """Every symbol of the system, with a value.
+    """Yield a parameter for every symbol of the system, with its value as start value.
 
     Args:
-        system: open or closed.
-        fixed: names of those that keep their values once the motion has begun.
+        system: assembled mechanism, open or closed.
+        fixed: names of parameters that are constant after the initialization.
 
     Raises:
-        ModelError: there is no parameter of such a name, or it is given twice.
+        ModelError: a name in `fixed` is unknown or given twice, or a symbol has no value.
     """
     kept = once(system, "fixed", fixed)
     _check_known(system, kept)
@@ -200,13 +207,13 @@ def _check_known(system: System, fixed: Sequence[str]) -> None:
 
 
 def _size(coordinate: Coordinate) -> float:
-    """A typical size of a position: the larger limit of its joint, 1 where there is none."""
+    """Return the nominal value of a position: the larger joint limit, or 1 without limits."""
     largest = max(map(abs, coordinate.limits or (1.0,)))
     return largest if largest > 0 and math.isfinite(largest) else 1.0
 
 
 def _limits(coordinate: Coordinate) -> str:
-    """The limits in words: nothing in the model enforces them, so they are no min and max."""
+    """Return the joint limits as text. The model does not enforce them as min and max."""
     if coordinate.limits is None:
         return ""
     low, high = coordinate.limits
@@ -240,7 +247,7 @@ def _effort(speed: Coordinate, text: str) -> FmuVariable:
     return FmuVariable(name=f"{speed.name}.tau", unit=EFFORT_UNIT[speed.unit], description=text)
 
 
-# Events of a mechanism's FMU: its rigid stops and Coulomb friction.
+# Events of the FMU of a mechanism: rigid stops, Coulomb friction and other crossings.
 
 
 _CROSSING = {
@@ -249,15 +256,15 @@ _CROSSING = {
     "row": "number of changes in a row",
     "time": "time of the last change in units of 10 us",
 }
-"""What the modes of crossings are."""
+"""Descriptions of the modes of crossings, by the last part of their name."""
 
 
 def jumps(system: System, state: MinimalState) -> Jumps | None:
-    """Modes, indicators and jumps of a state equation; None where nothing jumps.
+    """Return modes, indicators and jumps of a state equation, or None without events.
 
     Args:
-        system: open or closed.
-        state: its state equation.
+        system: assembled mechanism, open or closed.
+        state: state equation of the mechanism.
     """
     events = state.events
     if events is None:
@@ -276,7 +283,7 @@ def jumps(system: System, state: MinimalState) -> Jumps | None:
     for name in events.modes[len(modes) :]:
         text = f"of a law that jumps: {_CROSSING[name.rpartition('.')[2]]}"
         modes.append(FmuVariable(name=name, description=text))
-    # laws of users may jump where they have crossings
+    # user-defined laws with crossings may be discontinuous
     smooth = all(
         isinstance(part.element, Contact) or not part.element.has("crossings")
         for part in system.parts

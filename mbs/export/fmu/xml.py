@@ -1,4 +1,4 @@
-"""What the model descriptions of FMI 2.0 and 3.0 have in common."""
+"""Common parts of the model descriptions of FMI 2.0 and 3.0."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from mbs.export.fmu.description import WITH_START, FmuEntry, FmuModel, FmuState,
 from mbs.units import UNITS
 from mbs.version import __version__
 
-# How the outputs of a function depend on each of its inputs: by a constant factor, or by others.
+# Kind of the dependence of each function output on each input: a constant factor, or another kind.
 #
-# Every scalar operation hands on which inputs its result depends on, and of what kind the factor
-# is.
+# The sets of inputs on which a result depends, and the kinds of their factors, are propagated
+# through the scalar operations of the function.
 
 
 DependencyKind = Literal["constant", "fixed", "tunable", "discrete", "dependent"]
 KINDS: tuple[DependencyKind, ...] = ("constant", "fixed", "tunable", "discrete", "dependent")
-"""Least to greatest: a sum has the greatest kind of its terms."""
+"""Kinds of FMI from least to greatest. A sum has the greatest kind of its terms."""
 
 _WORST = len(KINDS) - 1
 _Masks = tuple[int, ...]
-"""For each kind the inputs of that kind or a greater one, as bits; the first holds all."""
+"""Bit masks of inputs, one per kind: the inputs of that kind or a greater kind."""
 
 _NONE: _Masks = (0,) * len(KINDS)
 _SUMS = (casadi.OP_ADD, casadi.OP_SUB)
@@ -36,18 +36,19 @@ _SCALED = (casadi.OP_NEG, casadi.OP_TWICE, casadi.OP_ASSIGN)
 def linearity(
     function: casadi.Function, levels: Sequence[DependencyKind]
 ) -> list[list[dict[int, DependencyKind]]]:
-    """What every element of every output depends on, and how.
+    """Return the dependencies of each output element of a function on the input elements.
 
-    An input that enters by a factor is as "constant", "fixed", "tunable" or "discrete" as the
-    factor; otherwise it is "dependent". Where the function is no graph of scalars, all
-    that the sparsity shows is "dependent".
+    If an output is linear in an input, the dependence has the kind of the factor: "constant",
+    "fixed", "tunable" or "discrete". Otherwise it is "dependent". For a function that is not an
+    SX graph, all dependencies of the sparsity pattern are "dependent".
 
     Args:
-        function: any.
-        levels: for each element of all inputs, in order, what it is as a factor of others.
+        function: CasADi function.
+        levels: kind of each input element, in order, when it is a factor of another input.
 
     Returns:
-        for each output and each element of it, numbers of the elements of all inputs, and kinds.
+        For each output, a list with a dict for each element: index of the input element, counted
+        over all inputs, to kind.
     """
     if not function.is_a("SXFunction"):
         return _by_sparsity(function)
@@ -98,12 +99,15 @@ def _sum(a: _Masks, b: _Masks) -> _Masks:
 
 
 def _bend(a: _Masks) -> _Masks:
-    """All of it as through a function that is not linear."""
+    """Dependence after a nonlinear function: every input is "dependent"."""
     return (a[0],) * len(KINDS)
 
 
 def _product(a: _Masks, b: _Masks, level: Callable[[int], int]) -> _Masks:
-    """Each factor is as constant as the other one; what is in both is not linear."""
+    """Dependence of a product: the kind follows from the other factor.
+
+    An input on which both factors depend is "dependent", because the product is nonlinear in it.
+    """
     both = a[0] & b[0]
     raised = _sum(_raise_order(a, level(b[0])), _raise_order(b, level(a[0])))
     return tuple(mask | both for mask in raised)
@@ -114,7 +118,7 @@ def _raise_order(a: _Masks, kind: int) -> _Masks:
 
 
 def _levels_of(weights: Sequence[int]) -> Callable[[int], int]:
-    """What a set of inputs is as a factor: the greatest of its members."""
+    """Return a function that gives the kind index of a factor: the greatest kind of its inputs."""
     groups = [sum(1 << k for k, w in enumerate(weights) if w == kind) for kind in range(len(KINDS))]
 
     def level(mask: int) -> int:
@@ -124,7 +128,7 @@ def _levels_of(weights: Sequence[int]) -> Callable[[int], int]:
 
 
 def _places(pattern: casadi.Sparsity) -> list[int]:
-    """The element that each nonzero is, counted column by column."""
+    """Return the column-major element index of each structural nonzero."""
     rows, columns = pattern.get_triplet()
     return [r + c * pattern.size1() for r, c in zip(rows, columns, strict=True)]
 
@@ -153,25 +157,26 @@ def _by_sparsity(function: casadi.Function) -> list[list[dict[int, DependencyKin
     return answer
 
 
-# Which calculated values of an FMU depend on which states, inputs, parameters and on time.
+# Dependencies of the calculated values of an FMU on states, inputs, parameters and time.
 
 
 Known = Mapping[int, DependencyKind]
-"""Value references of what a value depends on, in increasing order, and of what kind each is."""
+"""Dict from the value references on which a value depends, in increasing order, to the kind."""
 
 _ORDER: tuple[Kind, ...] = ("state", "dependent", "input", "parameter", "mode")
 
 
 @dataclass(frozen=True, slots=True)
 class Dependencies:
-    """What depends on states, inputs, parameters, modes and time, through the loops too.
+    """Dependencies on states, inputs, parameters, modes and time, also through closed loops.
 
-    The reference of time is the number of entries.
+    All are dicts from value references to dependencies. The reference of time is the number of
+    entries.
 
     Attributes:
-        running: of each derivative, output and indicator, by its value reference.
-        first: of each mode, when the initialization finds it.
-        jumping: of each state, its value after an event by those before it.
+        running: dependencies of each derivative, output and event indicator.
+        first: dependencies of the initial value of each mode.
+        jumping: dependencies of the value of each state after an event on the values before it.
     """
 
     running: Mapping[int, Known]
@@ -180,13 +185,13 @@ class Dependencies:
 
 
 def dependencies(model: FmuModel) -> Dependencies:
-    """What each calculated value of a model depends on.
+    """Return the dependencies of all calculated values of a model.
 
-    A dependent coordinate stands for what moves it: through the block of its own loop, not
-    through all loops.
+    A dependent coordinate is replaced by the states and parameters that determine it through its
+    own loop, not through all loops.
 
     Args:
-        model: what the FMU computes.
+        model: description of the FMU.
     """
     through = _through_loops(model)
     running = _rows(model, model.rhs, ("derivative", "output"), through)
@@ -204,7 +209,10 @@ def _rows(
     kinds: Sequence[Kind],
     through: Sequence[Known],
 ) -> dict[int, Known]:
-    """The first outputs of a function of (t, x, z, u, p), which are variables of these kinds."""
+    """Return the dependencies of the first outputs of function(t, x, z, u, p), by value reference.
+
+    kinds: kind of variables of each output.
+    """
     references = [len(model.entries)]
     levels: list[DependencyKind] = ["dependent"]
     for kind in _ORDER:
@@ -235,7 +243,7 @@ def _references(model: FmuModel, kind: Kind) -> range:
 
 
 def _level(model: FmuModel, kind: Kind, reference: int) -> DependencyKind:
-    """What a variable is as a factor of others."""
+    """Return the kind of a variable when it is a factor."""
     if kind == "mode":
         return "discrete"
     if kind != "parameter":
@@ -248,7 +256,7 @@ def _is_fixed(model: FmuModel, reference: int) -> bool:
 
 
 def _resolve(direct: Known, z: range, through: Sequence[Known]) -> Known:
-    """Dependent coordinates replaced by what moves them."""
+    """Replace dependent coordinates by the states and parameters that determine them."""
     known = {reference: how for reference, how in direct.items() if reference not in z}
     for reference in direct:
         if reference in z:
@@ -257,7 +265,7 @@ def _resolve(direct: Known, z: range, through: Sequence[Known]) -> Known:
 
 
 def _through_loops(model: FmuModel) -> list[Known]:
-    """The states and parameters that move each dependent coordinate."""
+    """Return the states and parameters that determine each dependent coordinate."""
     if model.closure is None:
         return []
     moved = [set[int]() for _ in model.dependents]
@@ -272,7 +280,7 @@ def _through_loops(model: FmuModel) -> list[Known]:
 
 
 def _reached(closure: casadi.Function) -> list[set[int]]:
-    """For each element of z, those of z that its Newton step reads, at first or second hand."""
+    """Return for each element of z the elements on which its Newton step depends (transitively)."""
     reads = [{k} for k in range(closure.numel_out(0))]
     for row, column in zip(*closure.jac_sparsity(0, 1).get_triplet(), strict=True):
         reads[row].add(column)
@@ -309,19 +317,20 @@ CATEGORIES = {
 
 @dataclass(frozen=True, slots=True)
 class ModelStructure:
-    """Which calculated values there are, and what they depend on; all by value references.
+    """Content of the XML element ModelStructure, by value references.
 
-    That of time is the number of entries.
+    The reference of time is the number of entries.
 
     Attributes:
-        outputs: every output, states and modes among them.
-        derivatives: of the states.
-        indicators: of events.
-        initial: what initialization calculates.
-        running: what each output, derivative and indicator needs, without what is frozen between
-            events: modes, which need nothing then, and fixed parameters.
-        starting: likewise of `initial`, and how modes begin; only "constant" and "dependent".
-        reset: the states that events set anew.
+        outputs: outputs, including states and modes that are outputs.
+        derivatives: derivatives of the states.
+        indicators: event indicators.
+        initial: values that the initialization calculates.
+        running: dependencies of each output, derivative and indicator between events, without
+            modes and fixed parameters, which are constant then. Modes depend on nothing.
+        starting: dependencies of each value of `initial` at the start, of kind "constant" or
+            "dependent".
+        reset: states that an event may change.
     """
 
     outputs: list[int]
@@ -334,7 +343,7 @@ class ModelStructure:
 
 
 def structure(model: FmuModel) -> ModelStructure:
-    """The structure of a model."""
+    """Return the ModelStructure of a model."""
     found = dependencies(model)
     modes = range(model.first("mode"), model.first("dependent"))
     numbered = enumerate(model.parameters, start=model.first("parameter"))
@@ -374,7 +383,10 @@ def structure(model: FmuModel) -> ModelStructure:
 
 
 def _by_joints(model: FmuModel, running: Mapping[int, Known]) -> dict[int, Known]:
-    """Of derivatives of the states and of their indicator: all that moves derivatives of joints."""
+    """Dependencies of the states in charts.h: their derivatives, and the indicator of a change.
+
+    Each depends on all variables on which a derivative of the joint states depends.
+    """
     n, every = len(model.states), dict[int, DependencyKind]()
     for known in (running[n + k] for k in range(n)):
         every |= dict.fromkeys(known, KINDS[-1])
@@ -382,7 +394,10 @@ def _by_joints(model: FmuModel, running: Mapping[int, Known]) -> dict[int, Known
 
 
 def _through_all(model: FmuModel, known: Known) -> Known:
-    """Near singular configurations every state moves what one of the joints moves."""
+    """Replace a dependence on a joint state by one on all states of the external integrator.
+
+    Near a singular configuration these states are tangent coordinates, which move all joints.
+    """
     states, slots = range(len(model.states)), model.derived.values()
     if not any(ref in states for ref in known):
         return known
@@ -395,9 +410,9 @@ def _without(references: Container[int], known: Known) -> dict[int, DependencyKi
 
 
 def _starting(known: Known, found: Dependencies, modes: range, whole: bool) -> Known:
-    """What a value depends on at the start, where modes stand for what finds them.
+    """Return the dependencies of a value at the start, with modes replaced by their dependencies.
 
-    An integer, such as a mode, is never said to be linear in something.
+    whole: whether the value is an integer, such as a mode. An integer is linear in no variable.
     """
     direct: dict[int, DependencyKind] = {
         ref: "constant" if kind == "constant" and not whole else "dependent"
@@ -410,19 +425,19 @@ def _starting(known: Known, found: Dependencies, modes: range, whole: bool) -> K
 
 
 def texts(model: FmuModel) -> dict[str, str]:
-    """What people read of a model: description, author, version, copyright and license."""
+    """Return the texts of a model that are not empty: description, author, version, ...."""
     said = {"description": model.description, **asdict(model.origin)}
     return {name: text for name, text in said.items() if text}
 
 
 def naming_convention(model: FmuModel) -> str:
-    """Whether names are paths such as `j1.q`, which tools show as a tree, or flat."""
+    """Return "structured" if all names are paths such as `j1.q`, else "flat"."""
     fits = all(is_structured(entry.variable.name) for entry in model.entries)
     return "structured" if fits else "flat"
 
 
 def variable_attributes(reference: int, entry: FmuEntry) -> dict[str, str]:
-    """Name, reference, causality, variability, description and initial of a variable."""
+    """Return name, reference, causality, variability, description and initial of a variable."""
     v = entry.variable
     attributes = {
         "name": v.name,
@@ -440,7 +455,7 @@ def variable_attributes(reference: int, entry: FmuEntry) -> dict[str, str]:
 
 
 def real_attributes(entry: FmuEntry) -> dict[str, str]:
-    """Units, bounds, nominal and start of a variable."""
+    """Return the XML attributes unit, bounds, nominal and start of a variable."""
     v = entry.variable
     real = {"unit": v.unit}
     display = UNITS[v.unit].display
@@ -456,13 +471,13 @@ def real_attributes(entry: FmuEntry) -> dict[str, str]:
 
 
 def integer_attributes(entry: FmuEntry) -> dict[str, str]:
-    """Bounds of a mode, which is an integer."""
+    """Return the XML attributes min and max of a mode, which is an integer."""
     bounds = (("min", entry.variable.min), ("max", entry.variable.max))
     return {name: str(int(bound)) for name, bound in bounds if bound is not None}
 
 
 def add_units(root: Element, model: FmuModel) -> None:
-    """The definitions of all units that occur, by base units."""
+    """Append the definitions, by base units, of all units that occur in the model."""
     definitions = SubElement(root, "UnitDefinitions")
     for name in sorted({entry.variable.unit for entry in model.entries} | {"s"}):
         unit = UNITS[name]
@@ -474,7 +489,7 @@ def add_units(root: Element, model: FmuModel) -> None:
 
 
 def add_categories_and_experiment(root: Element, model: FmuModel) -> None:
-    """The log categories, and how long, how exact and in which steps one simulates by default."""
+    """Append the log categories, and the times and tolerance of the default experiment."""
     categories = SubElement(root, "LogCategories")
     for name, text in CATEGORIES.items():
         SubElement(categories, "Category", name=name, description=text)
@@ -489,25 +504,25 @@ def add_categories_and_experiment(root: Element, model: FmuModel) -> None:
 
 
 def text_of(root: Element) -> str:
-    """An XML file."""
+    """Return the indented text of an XML file with this root element."""
     indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="unicode") + "\n"
 
 
-# terminalsAndIcons.xml of FMI 3.0: what is connected together, and the icon.
+# terminalsAndIcons.xml of FMI 3.0: terminals (variables that are connected together) and the icon.
 
 
 _EXTENT = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
 
 
 def terminals_and_icons(model: FmuModel) -> str:
-    """The file terminalsAndIcons.xml.
+    """Return the text of the file terminalsAndIcons.xml.
 
     Args:
-        model: what the FMU is.
+        model: description of the FMU.
 
     Returns:
-        its text.
+        Text of the XML file.
     """
     root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
     if model.about is not None and model.about.drawing is not None:

@@ -1,4 +1,4 @@
-"""The languages that functions are written in; each is loaded, with sympy, when it is used."""
+"""Output languages for functions. A language, and sympy, is imported when it is first used."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ LANGUAGES = (*_CLASSES, *_ALIASES)
 
 
 def language_of(name: object) -> Language:
-    """The language of a name, in lower or upper case; a language of the user's own as it is.
+    """Return the language with a name (case-insensitive). A `Language` is returned unchanged.
 
     Raises:
-        ModelError: there is no such language.
+        ModelError: the language is unknown.
     """
     if isinstance(name, Language):
         return name

@@ -1,4 +1,4 @@
-"""From a Function to its lines: the graph, the names, the expressions."""
+"""Conversion of a Function to lines of code: graph, names and expressions."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ from mbs.export.languages.plan import LEAVES, LinePlan, arrange, plan_of
 from mbs.export.languages.symbolic import SympyWriter, number_of, symbol
 from mbs.operations.graph import Graph, Node, Port, graph_of
 
-# Who bears which name in a text: arguments, their elements, and lines.
+# Names of arguments, their elements, and lines.
 
 
 _Key = tuple[str, int, int]
-"""What bears a name: an argument, an element of it, or a node; zero where a number is spare."""
+"""Key of a named item: ("argument", k, 0), ("element", k, e) or ("node", number, 0)."""
 
 _FUNCTION: _Key = ("function", 0, 0)
 
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Every name of a text, as its language takes it.
+    """Names in a text, valid in its language.
 
     Attributes:
-        function: of the function.
-        arguments: of inputs and outputs.
-        elements: of every element of them that is not zero.
-        nodes: of lines and of elements of inputs, by node.
+        function: name of the function.
+        arguments: names of inputs, then of outputs.
+        elements: names of the elements of each argument that are not zero.
+        nodes: dict from node index to name, for lines and elements of inputs.
     """
 
     function: str
@@ -51,16 +51,16 @@ class Names:
 def spelled_names(
     graph: Graph, language: Language, lines: Mapping[int, str], elements: Sequence[Sequence[str]]
 ) -> Names:
-    """The names as the language takes them; where two meet, an argument keeps its own first.
+    """Return valid, distinct names. In a conflict, an argument keeps its name.
 
-    An input or output that is called like its only element is one variable with it, and so is an
-    element of an output with the line that computes it.
+    An input or output with the name of its only element is the same variable as the element. An
+    output element with the name of the line that computes it is the same variable as the line.
 
     Args:
-        graph: arranged.
-        language: takes the names.
-        lines: desired name of every line, by node.
-        elements: desired names of the elements of every input, then of every output.
+        graph: graph from `arrange`.
+        language: language of the text.
+        lines: desired name of each line, by node index.
+        elements: desired names of the elements of each input, then of each output.
     """
     inside = [port.name for port in graph.inputs]
     outside = [f"{p.name}_out" if p.name in inside else p.name for p in graph.outputs]
@@ -99,7 +99,7 @@ def _unite(
     keys: list[list[_Key]],
     nodes: dict[int, _Key],
 ) -> None:
-    """Give nodes the keys of the elements that they are, and elements those of their lines."""
+    """Unify keys: input nodes with input elements, and output elements with their lines."""
     for number, node in enumerate(graph.nodes):
         if node.op == casadi.OP_INPUT:
             nodes[number] = keys[node.args[0]][node.args[1]]
@@ -122,7 +122,7 @@ def _pairs(
     ]
 
 
-# Scalars computed with the opposite sign, where it is the opposite that has a name.
+# Nodes that are computed with the opposite sign, because the model names the opposite.
 
 
 NEGATABLE = frozenset(
@@ -131,19 +131,19 @@ NEGATABLE = frozenset(
         *(casadi.OP_MUL, casadi.OP_DIV),
     }
 )
-"""Operations whose opposite takes the same operations and signs, which are free."""
+"""Operations whose negative needs no additional operation except signs, which cost nothing."""
 
 
 def negate_nodes(graph: Graph, numbers: Iterable[int]) -> tuple[Graph, dict[int, int]]:
-    """The same results, some nodes computed with the opposite sign.
+    """Return an equivalent graph in which some nodes are computed with the opposite sign.
 
     Args:
-        graph: any.
-        numbers: nodes whose opposites are to be computed, all of operations in `NEGATABLE`.
+        graph: graph of scalar operations.
+        numbers: indices of nodes to negate, with operations in `NEGATABLE`.
 
     Returns:
-        the graph, in which the sign that such a node lost stands in front of it wherever it is
-        used, and the new number of every node: of those, that of the opposite.
+        Graph in which uses of a negated node are preceded by a sign, and dict from old to new node
+        index. For a negated node it is the index of the negative.
     """
     wanted = set(numbers)
     nodes: list[Node] = []
@@ -176,7 +176,10 @@ _PARAMETERS = ("p",)
 
 
 def build(function: Function, language: Language, name: str) -> CodeUnit:
-    """The function in lines, named for a language and under a name of its own."""
+    """Convert a Function to lines of code with names that are valid in a language.
+
+    name: name of the function in the text.
+    """
     graph, given, reserved = _graph(function, name)
     inputs, outputs = (
         [_element_names(function, port, language) for port in ports]
@@ -212,7 +215,7 @@ def build(function: Function, language: Language, name: str) -> CodeUnit:
 
 
 def _graph(function: Function, name: str) -> tuple[Graph, dict[int, str], set[str]]:
-    """The operations of a Function, the nodes that the model has named, and all its names."""
+    """Return the graph of a Function, the names of its nodes in the model, and all these names."""
     annotated = getattr(function, "annotated", None)
     named = annotated() if annotated is not None else None
     graph = graph_of(function if named is None else named)
@@ -230,7 +233,7 @@ def _graph(function: Function, name: str) -> tuple[Graph, dict[int, str], set[st
 
 
 def _named(graph: Graph, pairs: Sequence[tuple[int, str]]) -> tuple[Graph, dict[int, str]]:
-    """The graph and its nodes that have a name, those of opposite sign negated."""
+    """Return the graph and the names of its nodes; nodes whose negative has a name are negated."""
     alive = graph.live()
     given: dict[int, str] = {}
     opposite: dict[int, str] = {}
@@ -259,7 +262,10 @@ def _is_scalar(function: Function, port: Port) -> bool:
 
 
 def _result_names(graph: Graph, outputs: Sequence[Sequence[str]]) -> Iterator[tuple[int, str]]:
-    """Elements of outputs row by row, so that the upper half names a symmetric matrix."""
+    """Yield node and name of output elements by rows.
+
+    A symmetric matrix thus gets the names of its upper triangle.
+    """
     for port, result, names in zip(graph.outputs, graph.results, outputs, strict=True):
         rows = zip(places(port), result, names, strict=True)
         for _, number, name in sorted(rows, key=lambda row: row[0]):
@@ -268,7 +274,7 @@ def _result_names(graph: Graph, outputs: Sequence[Sequence[str]]) -> Iterator[tu
 
 
 def _line_names(plan: LinePlan, wanted: dict[int, str], reserved: set[str]) -> dict[int, str]:
-    """What every line is called; Z and a number where nothing names it."""
+    """Return the name of each line by node index: its own name, or Z1, Z2, ...."""
     names: dict[int, str] = {}
     taken = reserved.union(wanted.values())
     free = (name for k in itertools.count(1) if (name := f"Z{k}") not in taken)

@@ -1,4 +1,4 @@
-"""C: a function of pointers to numbers, matrices column by column."""
+"""Output language C: a function of pointers to doubles, with column-major matrices."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class C(Language):
     squares_as_products = True
 
     def printer(self) -> Any:
-        """A printer of sympy."""
+        """Return a printer that writes sympy expressions in this language."""
         return printer_of(C99CodePrinter, self.title, repr, _FORMS, "pow({0}, {1})")
 
     def is_reserved(self, name: str) -> bool:
@@ -46,7 +46,7 @@ class C(Language):
         return parameter_names([name], ["k"]) != [name]
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """The text of a function, line by line."""
+        """Yield the lines of the text of a function."""
         yield "/*"
         yield from (f" * {line}".rstrip() for line in kept_inside(unit.header, in_c_comment))
         yield from (" */", "#include <math.h>", "")
@@ -73,5 +73,5 @@ class C(Language):
             yield from (f"    {store};" for store in self.stores(unit, out, printer))
 
     def place(self, argument: Argument, row: int, column: int) -> str:
-        """An element of an input or output in the text."""
+        """Return the text of an element of an input or output. row, column: 0-based."""
         return f"{argument.name}[{row + argument.rows * column}]"

@@ -1,4 +1,4 @@
-"""Fortran 90: a subroutine, free form."""
+"""Output language Fortran 90: a subroutine in free form."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _FORMS = {
     **{name: f"{name}({{0}})" for name in _SAME.split()},
     **{"atan2": "atan2({0}, {1})", "Abs": "abs({0})", "hypot": "hypot({0}, {1})"},
     **{"fmod": "mod({0}, {1})", "copysign": "sign({0}, {1})"},
-    # what `min` and `max` make of NaN is left open by the standard
+    # the standard does not define the result of `min` and `max` with NaN
     "fmin": "merge({0}, {1}, {0} <= {1} .or. {1} /= {1})",
     "fmax": "merge({0}, {1}, {0} >= {1} .or. {1} /= {1})",
     "step": "merge(sign(1.0d0, {0}), {0}, abs({0}) > 0.0d0)",
@@ -50,7 +50,7 @@ result return rewind save select sequence stop subroutine target then to type us
 
 
 class Fortran(Language):
-    """Fortran 90; hyperbolic inverses, erf and hypot are of 2008."""
+    """Fortran 90. Inverse hyperbolic functions, erf and hypot need Fortran 2008."""
 
     title = "Fortran"
     suffix = ".f90"
@@ -59,12 +59,12 @@ class Fortran(Language):
     longest_name = 31
 
     def printer(self) -> Any:
-        """A printer of sympy."""
+        """Return a printer that writes sympy expressions in this language."""
         signs = {"Unequality": "/="}
         return printer_of(FCodePrinter, self.title, _number, _FORMS, "{0}**{1}", signs, _JOINS)
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """The text of a function, line by line."""
+        """Yield the lines of the text of a function."""
         yield from comment_lines(unit.header, "!")
         arguments = [*unit.inputs, *unit.outputs]
         names = ", ".join(argument.name for argument in arguments)

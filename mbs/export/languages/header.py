@@ -1,4 +1,4 @@
-"""What stands above the text of a function: what it is, its inputs and outputs, its cost."""
+"""Header comment of a written function: signature, inputs, outputs, operations. Scalar names."""
 
 from __future__ import annotations
 
@@ -16,50 +16,50 @@ from mbs.operations.graph import Graph, Port
 from mbs.text import ascii_line
 from mbs.version import __version__
 
-# Names of scalars: those that the classic notation has, and those that the models give.
+# Names of scalars from the classic notation and from the models.
 #
 # Source: the names of SYMORO+, Khalil & Creusot 1997.
 
 
 _PREFIX = {"v": "QP", "a": "QDP", "tau": "GAM"}
-"""Quantities whose elements belong to a joint: QP2 is the velocity of joint 2."""
+"""Prefixes of the names of joint velocities, accelerations and efforts, such as QP2."""
 
 Elements = Sequence[tuple[str, str]]
 """Name and unit of every element of an input or output."""
 
 
 class MatrixElement(NamedTuple):
-    """An element of a matrix; rows and columns count from 0."""
+    """Position of a matrix element, 0-based."""
 
     row: int
     column: int
 
 
 class Term(NamedTuple):
-    """A joint angle in a sum of them."""
+    """Joint angle, with sign +1 or -1, in a sum of joint angles."""
 
     sign: int
     label: str
 
 
 def elements_of(function: Function, name: str) -> Elements:
-    """What the Function knows of the elements of an input or output; empty for a plain one."""
+    """Return names and units of the elements of an input or output, empty if it has none."""
     known = getattr(function, "elements", None)
     return list(known(name)) if known is not None else []
 
 
 def places(port: Port) -> list[MatrixElement]:
-    """Where the non-zero elements of an input or output are."""
+    """Return the positions of the structural nonzeros of an input or output."""
     rows, columns = port.sparsity.get_triplet()
     return [MatrixElement(int(row), int(column)) for row, column in zip(rows, columns, strict=True)]
 
 
 def element_names(port: Port, elements: Elements) -> list[str]:
-    """A name for each non-zero element of an input or output.
+    """Return a name for each structural nonzero of an input or output.
 
-    Coordinates and parameters have their own, velocities are QP1, QP2 .., accelerations QDP1 ..,
-    efforts GAM1 ..; the others are named by their place, such as A12 and H3, or by row and column
-    where the columns have names: D3_XX6.
+    Coordinates and parameters keep their names. Velocities are QP1, QP2, ..., accelerations QDP1,
+    ..., efforts GAM1, .... Other elements are named by row and column, such as A12 and H3, or by
+    row and column name if the columns have names, such as D3_XX6.
     """
     rows, columns = port.sparsity.shape
     if (rows, columns) == (1, 1) and not elements:
@@ -80,22 +80,22 @@ def element_names(port: Port, elements: Elements) -> list[str]:
 
 
 def joint_label(name: str) -> str:
-    """What stands for a coordinate in other names: 2 for q2, the name itself for others."""
+    """Return the part of a coordinate name for derived names: "2" for q2, else the name itself."""
     return name[1:] if re.fullmatch(r"q\d+", name) else name
 
 
 def angle_names(graph: Graph, inputs: Sequence[Sequence[str]]) -> dict[int, str]:
-    """Sines and cosines of joint angles: S2, C2, S23 of q2 + q3, S2m3 of q2 - q3.
+    """Return names of the sines and cosines of joint angles and of their sums.
 
-    A constant added to the angle shows as `off`. From ten joints on, S1_2 is of q1 + q2: S12 is
-    of q12.
+    Examples: S2, C2, S23 for sin(q2 + q3), S2m3 for sin(q2 - q3). A constant offset of the angle
+    adds `off`. With ten or more joints, S1_2 is sin(q1 + q2), because S12 is sin(q12).
 
     Args:
-        graph: any.
-        inputs: names of the elements of every input.
+        graph: graph of scalar operations.
+        inputs: names of the elements of each input.
 
     Returns:
-        the name of each such node, joint by joint, sums after single angles.
+        Dict from node index to name, single angles in the order of the joints, then sums.
     """
     return dict(sorted(_angle_names(graph, inputs), key=lambda pair: _angle_order(pair[1])))
 
@@ -127,7 +127,7 @@ def _sum_of_angles(
     sums: Mapping[int, tuple[Term, ...] | None],
     inputs: Sequence[Sequence[str]],
 ) -> tuple[Term, ...] | None:
-    """The angles that a node adds up, or None when it does something else."""
+    """Return the joint angles of which a node is the sum, or None if it is no such sum."""
     node = graph.nodes[number]
     if node.op == casadi.OP_INPUT:
         return (Term(1, joint_label(inputs[node.args[0]][node.args[1]])),)
@@ -146,11 +146,13 @@ def _sum_of_angles(
 
 
 def _join(terms: Sequence[Term], apart: bool) -> str:
-    """The labels in order, `m` before one that is subtracted; the offset comes last, unsigned.
+    """Join the labels of a sum of angles, sorted, with `m` before subtracted angles.
+
+    The offset comes last, without sign.
 
     Args:
-        terms: the angles that are added up.
-        apart: whether every two labels are kept apart, and not long ones alone.
+        terms: angles of the sum.
+        apart: whether labels are always separated by `_`, else only if a label is longer than 1.
     """
     joints = sorted((t for t in terms if t.label != _OFFSET), key=_order)
     long = apart or any(len(term.label) > 1 for term in joints)
@@ -180,13 +182,13 @@ _KINDS = {
 def header(
     function: Function, graph: Graph, arguments: Sequence[Argument], names: Sequence[Sequence[str]]
 ) -> tuple[str, ...]:
-    """The header, line by line.
+    """Return the lines of the header comment.
 
     Args:
-        function: what is written.
-        graph: of its true outputs.
+        function: Function that is written.
+        graph: graph of its operations, without outputs for intermediate quantities.
         arguments: inputs, then outputs.
-        names: of the elements of every argument.
+        names: names of the elements of each argument.
     """
     inside, outside = ", ".join(function.name_in()), ", ".join(function.name_out())
     system = getattr(function, "system", None)
@@ -225,7 +227,7 @@ def _argument(
 
 
 def _meaning(name: str, element: str) -> str:
-    """The user's name of an element where the text has another one that does not show it."""
+    """Return ` = element` if the name in the text does not show the name of the element."""
     label = re.sub(r"\W", "_", joint_label(element))
     return "" if name.endswith(label) else f" = {element}"
 
@@ -251,9 +253,10 @@ def _paragraph(text: str) -> list[str]:
 
 
 def tables(function: Function) -> tuple[str, ...]:
-    """The geometric parameters of the links, as the classic output lists them.
+    """Return the lines of the table of geometric parameters, as in the listings of SYMORO.
 
-    A fixed frame on the path to link 4 is numbered 4.1 and has sigma 2.
+    The table is empty for a Function without a system. A fixed frame on the path to link 4 has the
+    number 4.1 and sigma 2.
     """
     system = getattr(function, "system", None)
     if system is None:

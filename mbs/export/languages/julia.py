@@ -1,4 +1,4 @@
-"""Julia: a function of vectors that returns arrays; any kind of number goes through it."""
+"""Output language Julia: a function of vectors that returns arrays, for any number type."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ class Julia(Language):
     brackets = "[", "]"
 
     def printer(self) -> Any:
-        """A printer of sympy."""
+        """Return a printer that writes sympy expressions in this language."""
         return printer_of(JuliaCodePrinter, self.title, repr, _FORMS, "{0}^{1}")
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """The text of a function, line by line."""
+        """Yield the lines of the text of a function."""
         yield from comment_lines(unit.header, "#")
         arguments = ", ".join(argument.name for argument in unit.inputs)
         yield from wrap(f"function {unit.name}({arguments})")

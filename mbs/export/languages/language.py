@@ -1,4 +1,4 @@
-"""What a language must say about itself so that functions can be written in it."""
+"""Base class of output languages, and the parts of a function that is written in a language."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from typing import Any
 
 from mbs.text import in_line_comment
 
-# A function ready to be written in a language: its arguments and its lines, names chosen.
+# Parts of a function with names that are valid in the language: arguments and lines.
 
 
 Expr = Any
-"""An expression of sympy."""
+"""Expression of sympy."""
 
 
 @dataclass(frozen=True, slots=True)
 class Argument:
-    """An input or output.
+    """Input or output of a function.
 
     Attributes:
-        name: in the text.
-        rows, columns: its shape.
-        scalar: whether it is one number, and not a vector that has one element.
+        name: name in the text.
+        rows, columns: shape.
+        scalar: whether it is a scalar, in contrast to a vector with a single element.
     """
 
     name: str
@@ -39,13 +39,13 @@ class Argument:
 
     @property
     def is_vector(self) -> bool:
-        """Whether it has one column."""
+        """Whether the argument has a single column."""
         return self.columns == 1
 
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """An element of an input that gets a name."""
+    """Assignment of an input element to a name. row, column: 0-based position of the element."""
 
     name: str
     argument: Argument
@@ -55,13 +55,13 @@ class Load:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """An element of an output and the name or constant that is its value.
+    """Assignment of a name or constant to an output element.
 
     Attributes:
-        argument: the output.
-        row, column: of the element.
-        value: a name or a constant.
-        label: what the element is called where outputs are no arrays.
+        argument: output.
+        row, column: position of the element, 0-based.
+        value: name (sympy symbol) or constant.
+        label: name of the element in languages in which outputs are not arrays.
     """
 
     argument: Argument
@@ -73,7 +73,7 @@ class Store:
 
 @dataclass(frozen=True, slots=True)
 class CodeLine:
-    """name = value, or, under a condition, value where it holds and otherwise the other one."""
+    """Assignment name = value, or name = value if condition else otherwise."""
 
     name: str
     value: Expr
@@ -83,17 +83,17 @@ class CodeLine:
 
 @dataclass(frozen=True, slots=True)
 class CodeUnit:
-    """A function in lines.
+    """Function as a sequence of lines, independent of the syntax of the language.
 
     Attributes:
-        name: of the function in the text.
-        header: what to say about it, line by line.
-        tables: what the classic output lists before its equations.
-        inputs, outputs: its arguments.
-        loads: the elements of inputs that are used.
-        fixed: lines that depend on parameters alone.
-        changing: the other lines.
-        stores: the elements of outputs that are not zero, column by column.
+        name: name of the function in the text.
+        header: lines of the header comment.
+        tables: lines of the table of geometric parameters, for SYMORO listings.
+        inputs, outputs: arguments.
+        loads: assignments of the input elements that are used.
+        fixed: lines that depend only on parameters.
+        changing: all other lines.
+        stores: assignments of the output elements that are not zero, column by column.
     """
 
     name: str
@@ -108,21 +108,21 @@ class CodeUnit:
 
     @property
     def locals(self) -> list[str]:
-        """The names that lines and elements of inputs give, arguments left out."""
+        """Names of local variables: assigned names that are not arguments."""
         arguments = {argument.name for argument in (*self.inputs, *self.outputs)}
         named: list[Load | CodeLine] = [*self.loads, *self.fixed, *self.changing]
         return [item.name for item in named if item.name not in arguments]
 
     def stores_of(self, argument: Argument) -> Sequence[Store]:
-        """The elements of one output."""
+        """Return the assignments of the elements of an output."""
         return [store for store in self.stores if store.argument is argument]
 
     def has_zeros(self, argument: Argument) -> bool:
-        """Whether some element of an output is always zero."""
+        """Whether an element of an output is structurally zero."""
         return len(self.stores_of(argument)) < argument.size
 
     def grid(self, argument: Argument) -> list[list[Expr]]:
-        """The elements of an output row by row, None where it is zero."""
+        """Return the values of an output as a list of rows, None for zeros."""
         grid: list[list[Expr]] = [[None] * argument.columns for _ in range(argument.rows)]
         for store in self.stores_of(argument):
             grid[store.row][store.column] = store.value
@@ -130,27 +130,27 @@ class CodeUnit:
 
 
 WIDTH = 100
-"""Columns of a line of text where the language sets no other limit."""
+"""Largest line length in characters, if the language has no other limit."""
 
 _BREAK = re.compile(r"(?<=[-+*/,&|<>=]) ")
-"""A blank after an operator: what comes before it cannot end a statement."""
+"""Blank after an operator. A line break there cannot end a statement."""
 
 
 class Language(ABC):
-    """A language: its words, its names, its numbers and the frame of a function.
+    """Base class of an output language: reserved words, names, numbers and frame of a function.
 
     Attributes:
-        title: for messages and headers.
-        suffix: the end of the name of a file.
-        reserved: names that mean something else.
-        folds_case: whether names that differ in case only are the same.
-        longest_name: in characters, or None.
-        tail: what makes a name differ from a reserved one.
-        scalars_by_name: whether an input or output that is one number is a variable, and not an
-            array with one element.
+        title: name of the language, for messages and headers.
+        suffix: file extension.
+        reserved: reserved names.
+        folds_case: whether names are case-insensitive.
+        longest_name: greatest length of a name in characters, or None.
+        tail: suffix that makes a name differ from a reserved or used name.
+        scalars_by_name: whether a scalar input or output is a variable, in contrast to an array
+            with a single element.
         squares_as_products: whether x^2 is written x*x.
-        brackets: around the place of an element.
-        first: number of the first row and column.
+        brackets: brackets around the indices of an element.
+        first: index of the first row and column.
     """
 
     title: str
@@ -166,18 +166,18 @@ class Language(ABC):
 
     @abstractmethod
     def printer(self) -> Any:
-        """A printer of sympy."""
+        """Return a printer that writes sympy expressions in this language."""
 
     @abstractmethod
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """The text of a function, line by line."""
+        """Yield the lines of the text of a function."""
 
     def text(self, unit: CodeUnit) -> str:
-        """The text of a function."""
+        """Return the text of a function."""
         return "\n".join(self.lines(unit, self.printer())) + "\n"
 
     def place(self, argument: Argument, row: int, column: int) -> str:
-        """An element of an input or output in the text."""
+        """Return the text of an element of an input or output. row, column: 0-based."""
         if argument.scalar and self.scalars_by_name:
             return argument.name
         row, column = row + self.first, column + self.first
@@ -185,30 +185,30 @@ class Language(ABC):
         return inside.join((argument.name + self.brackets[0], self.brackets[1]))
 
     def loads(self, unit: CodeUnit) -> Iterator[str]:
-        """`name = element` for the elements of inputs that are used."""
+        """Yield `name = element` for the input elements that are used."""
         for load in unit.loads:
             place = self.place(load.argument, load.row, load.column)
             if place != load.name:
                 yield f"{load.name} = {place}"
 
     def stores(self, unit: CodeUnit, out: Argument, printer: Any) -> Iterator[str]:
-        """`element = value` for the elements of an output that are not zero."""
+        """Yield `element = value` for the elements of an output that are not zero."""
         for store in unit.stores_of(out):
             place, value = self.place(out, store.row, store.column), printer.text(store.value)
             if place != value:
                 yield f"{place} = {value}"
 
     def legal(self, name: str) -> str:
-        """The name with what the language does not take replaced."""
+        """Return the name with invalid characters replaced."""
         name = re.sub(r"\W", "_", name, flags=re.ASCII).lstrip("_")
         return name if name[:1].isalpha() else f"x{name}"
 
     def is_reserved(self, name: str) -> bool:
-        """Whether the name means something else."""
+        """Whether the language reserves the name."""
         return self._fold(name) in self.reserved
 
     def distinct(self, names: Iterable[str]) -> list[str]:
-        """The names as the language takes them, no two the same; the first keep theirs."""
+        """Return valid, distinct names. Of equal names the first is kept, the next get a tail."""
         used: set[str] = set()
         result = []
         for wanted in names:
@@ -233,18 +233,18 @@ class Language(ABC):
 
 
 def plain_number(value: float) -> str:
-    """A constant in all its digits; whole numbers without a point."""
+    """Write a constant with all digits, whole numbers without a decimal point."""
     return repr(value).removesuffix(".0")
 
 
 def wrap(text: str, indent: str = "", mark: str = "", width: int = WIDTH) -> list[str]:
-    """A statement broken after operators, its continuation indented.
+    """Break a statement after operators into indented lines.
 
     Args:
-        text: the statement.
-        indent: before its first line.
-        mark: what the language needs at the end of a line that goes on.
-        width: columns.
+        text: statement.
+        indent: indentation of the first line.
+        mark: continuation mark of the language at the end of a line.
+        width: largest line length in characters.
     """
     lines, line = [], indent
     for piece in _BREAK.split(text):
@@ -256,16 +256,16 @@ def wrap(text: str, indent: str = "", mark: str = "", width: int = WIDTH) -> lis
 
 
 def comment_lines(header: Sequence[str], mark: str) -> Iterator[str]:
-    """A header as comments to the end of the line."""
+    """Yield header lines as line comments that begin with `mark`."""
     yield from (f"{mark} {line}".rstrip() for line in kept_inside(header, in_line_comment))
 
 
 def kept_inside(header: Sequence[str], rule: Callable[[str], str]) -> Iterator[str]:
-    """The lines of a header, indented as they are, for a comment.
+    """Yield header lines that are safe inside a comment, with their indentation.
 
     Args:
-        header: what to say.
-        rule: of `mbs.text`, for the syntax of the comment.
+        header: lines of the header.
+        rule: function of `mbs.text` that escapes text for this kind of comment.
     """
     for line in header:
         text = line.lstrip(" ")
@@ -273,12 +273,13 @@ def kept_inside(header: Sequence[str], rule: Callable[[str], str]) -> Iterator[s
 
 
 def value_text(line: CodeLine, printer: Any, choice: str) -> str:
-    """What a line assigns.
+    """Return the text of the value that a line assigns.
 
     Args:
-        line: what to write.
-        printer: of its expressions.
-        choice: how the language chooses, `{0}` being the condition, `{1}` and `{2}` the values.
+        line: line to write.
+        printer: printer of expressions.
+        choice: format of a conditional expression: `{0}` is the condition, `{1}` the value if it
+            holds, `{2}` the other value.
     """
     value = str(printer.text(line.value))
     if line.condition is None:
@@ -287,7 +288,7 @@ def value_text(line: CodeLine, printer: Any, choice: str) -> str:
 
 
 def sections(unit: CodeUnit) -> Iterator[tuple[str, Sequence[CodeLine]]]:
-    """The lines in two groups, each with what to say about it."""
+    """Yield a comment with its lines: lines that depend on parameters only, then the others."""
     if unit.fixed:
         yield "Parameters only: these may be computed once.", unit.fixed
         yield "The model.", unit.changing
@@ -296,11 +297,11 @@ def sections(unit: CodeUnit) -> Iterator[tuple[str, Sequence[CodeLine]]]:
 
 
 def grid_texts(unit: CodeUnit, out: Argument, printer: Any, zero: str) -> list[list[str]]:
-    """The elements of an output as texts, row by row."""
+    """Return the texts of the elements of an output as a list of rows, `zero` for zeros."""
     return [[zero if e is None else printer.text(e) for e in row] for row in unit.grid(out)]
 
 
-# Lines that depend on a condition, in languages that need statements for it.
+# Conditional lines in languages that need if statements.
 
 
 def branches(
@@ -310,14 +311,15 @@ def branches(
     statement: Callable[[str, str], list[str]],
     end: str = "",
 ) -> Iterator[str]:
-    """`name = value`, or the two of them between if, else and end.
+    """Yield the lines of an assignment, or of an if statement with two assignments.
 
     Args:
-        line: what to write.
-        printer: of its expressions.
-        words: how the branches begin and end, the first with `{0}` for the condition.
-        statement: breaks a statement, given with its indentation, into lines.
-        end: of a statement.
+        line: line to write.
+        printer: printer of expressions.
+        words: lines that begin, separate and end the two branches. `{0}` in the first is the
+            condition.
+        statement: function (statement, indentation) that breaks a statement into lines.
+        end: text at the end of a statement.
     """
     value = f"{line.name} = {printer.text(line.value)}{end}"
     if line.condition is None:

@@ -1,4 +1,4 @@
-"""LaTeX: a document with one equation a line."""
+"""Output language LaTeX: a document with one equation per line."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _DEEPER, _SHALLOWER = ("{", r"\left", r"\begin"), ("}", r"\right", r"\end")
 
 
 class _Printer(LatexPrinter):  # type: ignore[misc]
-    """A printer of sympy that keeps numbers and knows the names of mechanics."""
+    """Printer of sympy with all digits of numbers, dotted q for QP and QDP, and Gamma for GAM."""
 
     def text(self, expr: Any) -> str:
         return str(self._print(expr))
@@ -68,11 +68,11 @@ class Latex(Language):
     suffix = ".tex"
 
     def printer(self) -> Any:
-        """A printer of sympy."""
+        """Return a printer that writes sympy expressions in this language."""
         return _Printer({"order": "none", "mul_symbol": r" \, ", "fold_short_frac": False})
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """The text of a function, line by line."""
+        """Yield the lines of the text of a function."""
         yield from comment_lines(unit.header, "%")
         yield from (r"\documentclass{article}", r"\usepackage{amsmath}", r"\allowdisplaybreaks")
         yield r"\begin{document}"
@@ -90,7 +90,7 @@ class Latex(Language):
 
 
 def symbol_text(name: str) -> str:
-    """A name as people write it: QP2 is the rate of q2, S23 has the index 23."""
+    """Return a name in LaTeX notation: a dotted q for QP2, index 23 for S23."""
     rate = re.fullmatch(r"(QP|QDP|GAM)(\w+)", name)
     if rate:
         return f"{_ACCENTS[rate[1]]}_{{{_escape(rate[2])}}}"
@@ -130,7 +130,7 @@ def _value(line: CodeLine, printer: Any) -> str:
 
 
 def _break_lines(equation: str) -> Iterator[str]:
-    """An equation on several lines, broken before signs that no bracket encloses."""
+    """Break a long equation before + and - outside brackets. Yields the lines."""
     line, depth = "", 0
     for piece in re.split(r"(?= [+-] )", equation):
         if len(line) + len(piece) > _LONGEST and line and depth == 0:

@@ -1,4 +1,4 @@
-"""Maple: a procedure of vectors; symbols go through it as well as numbers."""
+"""Output language Maple: a procedure of vectors, for symbols and numbers."""
 
 from __future__ import annotations
 
@@ -57,14 +57,14 @@ class Maple(Language):
     brackets = "[", "]"
 
     def printer(self) -> Any:
-        """A printer of sympy."""
+        """Return a printer that writes sympy expressions in this language."""
         signs = {"Equality": "=", "Unequality": "<>"}
         return printer_of(
             MapleCodePrinter, self.title, plain_number, _FORMS, "{0}^{1}", signs, _JOINS
         )
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """The text of a function, line by line."""
+        """Yield the lines of the text of a function."""
         yield from comment_lines(unit.header, "#")
         arguments = ", ".join(argument.name for argument in unit.inputs)
         yield from wrap(f"{unit.name} := proc({arguments})")

@@ -1,4 +1,4 @@
-"""Mathematica: a function of lists; symbols go through it as well as numbers."""
+"""Output language Mathematica: a function of lists, for symbols and numbers."""
 
 from __future__ import annotations
 
@@ -58,16 +58,16 @@ class Mathematica(Language):
     tail = "x"
 
     def printer(self) -> Any:
-        """A printer of sympy."""
+        """Return a printer that writes sympy expressions in this language."""
         return printer_of(MCodePrinter, self.title, _number, _FORMS, "{0}^{1}")
 
     def legal(self, name: str) -> str:
-        """The name without underscores, which are patterns: a_b is aB, and A1_12 is A1x12."""
+        """Return the name without _, which marks patterns: a_b becomes aB, A1_12 becomes A1x12."""
         parts = re.sub(r"(?<=\d)_(?=\d)", "x", super().legal(name)).split("_")
         return parts[0] + "".join(part[:1].upper() + part[1:] for part in parts[1:])
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """The text of a function, line by line."""
+        """Yield the lines of the text of a function."""
         first, *others = kept_inside(unit.header, in_wolfram_comment)
         yield f"(* {first}"
         yield from (f"   {line}".rstrip() for line in others)

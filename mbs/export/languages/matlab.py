@@ -1,4 +1,4 @@
-"""Matlab and Octave: a function file."""
+"""Output language Matlab and Octave: a function file."""
 
 from __future__ import annotations
 
@@ -52,12 +52,12 @@ class Matlab(Language):
     longest_name = 63
 
     def printer(self) -> Any:
-        """A printer of sympy."""
+        """Return a printer that writes sympy expressions in this language."""
         signs = {"Unequality": "~="}
         return printer_of(OctaveCodePrinter, self.title, plain_number, _FORMS, "{0}^{1}", signs)
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """The text of a function, line by line."""
+        """Yield the lines of the text of a function."""
         inside = ", ".join(argument.name for argument in unit.inputs)
         outside = ", ".join(argument.name for argument in unit.outputs)
         outside = outside if len(unit.outputs) == 1 else f"[{outside}]"

@@ -1,4 +1,4 @@
-"""A scalar as one expression, in the grammar that descriptions of mechanisms are written in."""
+"""Text of a scalar in the grammar of mechanism files."""
 
 from __future__ import annotations
 
@@ -15,12 +15,15 @@ from mbs.operations.graph import Graph
 _FORMS = {
     **{name: f"{name}({{0}})" for name in ("sin", "cos", "tan", "sqrt")},
     "atan2": "atan2({0}, {1})",
-    "Abs": "sqrt({0}^2)",  # CasADi makes it of a root of a square; the grammar has none
+    "Abs": "sqrt({0}^2)",  # the grammar has no abs, and CasADi simplifies sqrt(x^2) to it
 }
 
 
 def one_line(graph: Graph, names: Sequence[str]) -> str:
-    """The only result of a graph; names are those of the elements of its only input."""
+    """Return the text of the single result of a graph.
+
+    names: names of the elements of its single input.
+    """
     graph, _ = arrange(graph)
     inputs = {
         number: names[node.args[1]]

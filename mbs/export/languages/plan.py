@@ -1,4 +1,4 @@
-"""Which scalars of a graph become lines of text, and which stand inside of others."""
+"""Division of a graph into lines of code: nodes with a line, and nodes inside expressions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import casadi
 from mbs.operations.graph import Graph, Node
 
 LONGEST = 72
-"""Characters of an expression, about, beyond which a part of it gets a line of its own."""
+"""Approximate length of an expression [characters] above which a part of it gets its own line."""
 
 LEAVES = frozenset({casadi.OP_CONST, casadi.OP_INPUT})
 COMPARISONS = frozenset({casadi.OP_LT, casadi.OP_LE, casadi.OP_EQ, casadi.OP_NE})
@@ -27,13 +27,13 @@ _PLAIN = frozenset(
         *CONDITIONS,
     }
 )
-"""Operations that take any expression as operand; those of others are names or constants."""
+"""Operations with arbitrary expressions as operands. Others need names or constants."""
 
 _NAME, _NUMBER, _SIGNS = 4, 8, 3
 
 
 class Choice(NamedTuple):
-    """A scalar that depends on a condition; without `otherwise` it is zero where that fails."""
+    """Conditional value: `value` if the condition holds, else `otherwise` (None: zero). Nodes."""
 
     condition: int
     value: int
@@ -42,13 +42,13 @@ class Choice(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class LinePlan:
-    """A graph cut into lines.
+    """Graph with the nodes that become lines of code.
 
     Attributes:
-        graph: no two of its nodes are the same operation.
-        fixed: nodes that are lines and that constants and parameters alone determine.
-        changing: the other nodes that are lines.
-        choices: those of them that depend on a condition.
+        graph: graph without duplicate nodes.
+        fixed: nodes of lines that depend only on constants and parameters.
+        changing: nodes of all other lines.
+        choices: dict from node to conditional value, for lines with a condition.
     """
 
     graph: Graph
@@ -58,14 +58,14 @@ class LinePlan:
 
 
 def arrange(graph: Graph, first: Iterable[int] = ()) -> tuple[Graph, dict[int, int]]:
-    """The same results from nodes that differ, in the order in which they are needed.
+    """Remove duplicate and unused nodes, and order nodes by their first use.
 
     Args:
-        graph: any.
-        first: nodes to compute first, each after what it needs; the results follow.
+        graph: graph of scalar operations.
+        first: nodes to compute first, each after its operands. Results follow.
 
     Returns:
-        the graph without dead nodes, and the new number of every old one that is in it.
+        New graph, and dict from old to new node index of the nodes in it.
     """
     roots = [*first, *(number for result in graph.results for number in result)]
     nodes: list[Node] = []
@@ -97,13 +97,16 @@ def arrange(graph: Graph, first: Iterable[int] = ()) -> tuple[Graph, dict[int, i
 
 
 def plan_of(graph: Graph, named: Iterable[int], parameters: Iterable[str] = ("p",)) -> LinePlan:
-    """Decide what is a line: what has a name, is used twice, is a choice, or grew too long.
+    """Choose the nodes that become lines of code.
+
+    These are nodes with a name, nodes used more than once, conditional values, and parts of long
+    expressions.
 
     Args:
-        graph: arranged; its results are lines, unless they are inputs or constants.
+        graph: graph from `arrange`. Results are lines, unless they are inputs or constants.
         named: nodes that have a name.
-        parameters: inputs that do not change from call to call; what they determine gets lines
-            apart from the others.
+        parameters: names of inputs that are constant between calls. Expressions of parameters only
+            get separate lines.
     """
     choices = {n: c for n in range(len(graph.nodes)) if (c := _choice(graph, n))}
     results = {number for result in graph.results for number in result}
@@ -122,7 +125,10 @@ def plan_of(graph: Graph, named: Iterable[int], parameters: Iterable[str] = ("p"
 
 
 def _choice(graph: Graph, number: int) -> Choice | None:
-    """The choice that a node makes; the sum of two opposite ones is a single choice."""
+    """Return the conditional value of a node, or None.
+
+    CasADi writes if-else as the sum of two values with opposite conditions.
+    """
     node = graph.nodes[number]
     if node.op == casadi.OP_IF_ELSE_ZERO:
         return Choice(node.args[0], node.args[1], None)
@@ -139,15 +145,15 @@ def _choice(graph: Graph, number: int) -> Choice | None:
 
 @dataclass(slots=True)
 class _LinesSoFar:
-    """The lines found so far.
+    """State of the search for lines.
 
     Attributes:
-        graph: arranged.
-        choices: nodes that depend on a condition.
-        fixed: for each node, whether parameters alone determine it.
-        cuts: nodes that are lines.
-        uses: how many times the text of each node is needed.
-        tests: how many times a node stands as a condition.
+        graph: graph from `arrange`.
+        choices: conditional values by node.
+        fixed: whether each node depends only on parameters.
+        cuts: nodes that become lines.
+        uses: number of uses of each node as a value.
+        tests: number of uses of each node as a condition.
     """
 
     graph: Graph
@@ -158,7 +164,7 @@ class _LinesSoFar:
     tests: list[int] = field(default_factory=list)
 
     def count_uses(self, results: Iterable[int]) -> None:
-        """Count from the results down; what is needed more than once becomes a line."""
+        """Count the uses from the results to the inputs. Nodes used more than once become lines."""
         self.uses = [0] * len(self.graph.nodes)
         self.tests = [0] * len(self.graph.nodes)
         for number in results:
@@ -201,7 +207,7 @@ class _LinesSoFar:
         tally[number] += times
 
     def _stands_alone(self, number: int, operand: int) -> bool:
-        """Whether an operand must be a line: the operation takes names, or it can be hoisted."""
+        """Whether an operand must be a line: the operation needs a name, or it can be hoisted."""
         bare = self._bare(operand)
         if self.graph.nodes[bare].op in LEAVES:
             return False
@@ -209,13 +215,13 @@ class _LinesSoFar:
         return hoisted or (self.graph.nodes[number].op not in _PLAIN and number not in self.choices)
 
     def _bare(self, number: int) -> int:
-        """The node without its sign."""
+        """Return the node without leading negations."""
         while self.graph.nodes[number].op == casadi.OP_NEG and number not in self.cuts:
             number = self.graph.nodes[number].args[0]
         return number
 
     def shorten(self) -> None:
-        """Cut expressions until each is short enough to read."""
+        """Make parts of long expressions lines until each expression is at most LONGEST."""
         length = [0] * len(self.graph.nodes)
         for number, node in enumerate(self.graph.nodes):
             if not (self.uses[number] or self.tests[number]):

@@ -1,4 +1,4 @@
-"""Python: a function of arrays; arrays with more axes are many states at once."""
+"""Output language Python: a function of arrays. Additional axes evaluate many states at once."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ class Python(Language):
     first = 0
 
     def printer(self) -> Any:
-        """A printer of sympy."""
+        """Return a printer that writes sympy expressions in this language."""
         return printer_of(
             PythonCodePrinter, self.title, plain_number, _FORMS, "{0}**{1}", joins=_JOINS
         )
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """The text of a function, line by line."""
+        """Yield the lines of the text of a function."""
         body = list(self._body(unit, printer))
         if any("math." in line for line in body):
             yield "import math"

@@ -1,4 +1,4 @@
-"""Rust: a function of slices, matrices column by column."""
+"""Output language Rust: a function of slices, with column-major matrices."""
 
 from __future__ import annotations
 
@@ -52,16 +52,16 @@ class Rust(Language):
     squares_as_products = True
 
     def printer(self) -> Any:
-        """A printer of sympy."""
+        """Return a printer that writes sympy expressions in this language."""
         return printer_of(RustCodePrinter, self.title, repr, _FORMS, "f64::powf({0}, {1})")
 
     def place(self, argument: Argument, row: int, column: int) -> str:
-        """An element of an input or output in the text."""
+        """Return the text of an element of an input or output. row, column: 0-based."""
         return f"{argument.name}[{row + argument.rows * column}]"
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """The text of a function, line by line."""
-        # No `///`: examples in the documentation of Rust are compiled and run by its tests.
+        """Yield the lines of the text of a function."""
+        # Not `///`: cargo test compiles and runs examples in Rust documentation.
         yield from comment_lines(unit.header, "//")
         arguments = [f"{argument.name}: &[f64]" for argument in unit.inputs]
         arguments += [f"{argument.name}: &mut [f64]" for argument in unit.outputs]

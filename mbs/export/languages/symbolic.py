@@ -1,4 +1,4 @@
-"""Nodes of a graph as expressions of sympy, in the order and with the numbers that they have."""
+"""Conversion of graph nodes to sympy expressions without reordering or rounding, and printers."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ _OURS = {
         for name in ("fmod", "copysign", "fmin", "fmax", "hypot", "log1p", "expm1")
     },
 }
-"""Functions that sympy has under other meanings, or not at all; see `Forms`."""
+"""Functions that sympy does not have, or has with another meaning. See `Readable.forms`."""
 
 _JOINS = {casadi.OP_AND: "both", casadi.OP_OR: "either"}
-"""Conditions that are joined; those of sympy drop, sort and simplify what they are given."""
+"""Logical operations. `And` and `Or` of sympy are not used, because they reorder and simplify."""
 
 _UNDEFINED = {name: sympy.Function(name) for name in (*_OURS.values(), *_JOINS.values(), "denied")}
 _COMPARE = {
@@ -58,7 +58,7 @@ _OPPOSITE = {
     casadi.OP_AND: casadi.OP_OR,
     casadi.OP_OR: casadi.OP_AND,
 }
-"""What denies an operation; that of a < b is not a >= b, since NaN is neither."""
+"""Negation of operations. The negation of a < b is not a >= b, because both are false for NaN."""
 
 _MIRRORED = {
     sympy.Lt: sympy.Gt,
@@ -71,12 +71,12 @@ _LARGEST_INTEGER_POWER = 64
 
 @dataclass(frozen=True, slots=True)
 class SympyWriter:
-    """What writes the lines of a plan as expressions.
+    """Writer of the lines of a plan as sympy expressions.
 
     Attributes:
-        plan: the lines.
-        names: name of every line and of every element of an input, by node.
-        squares_as_products: whether x^2 is x*x.
+        plan: division of the graph into lines.
+        names: dict from node index to name, for all lines and elements of inputs.
+        squares_as_products: whether x^2 is written x*x.
     """
 
     plan: LinePlan
@@ -84,7 +84,7 @@ class SympyWriter:
     squares_as_products: bool
 
     def line(self, number: int) -> CodeLine:
-        """The line of a node."""
+        """Return the line that assigns a node."""
         name, node = self.names[number], self.plan.graph.nodes[number]
         choice = self.plan.choices.get(number)
         if choice:
@@ -95,13 +95,13 @@ class SympyWriter:
         return CodeLine(name, self._operation(node))
 
     def value(self, number: int) -> Expr:
-        """A node inside of an expression: its name where it has one."""
+        """Return the text of a node as an operand: name of the node, or expression without name."""
         if number in self.names:
             return symbol(self.names[number])
         return self._operation(self.plan.graph.nodes[number])
 
     def condition(self, number: int, denied: bool = False) -> Expr:
-        """A node as a condition, or its denial; a number is one where it is not zero."""
+        """Return a node as a condition, or the negation. A number is true if it is not zero."""
         node = self.plan.graph.nodes[number]
         if node.op == casadi.OP_NOT:
             return self.condition(node.args[0], not denied)
@@ -129,7 +129,7 @@ class SympyWriter:
         if node.op in _SYMPY:
             return _SYMPY[node.op](*values, evaluate=False)
         if node.op == casadi.OP_FMOD and values[1].is_zero:
-            values[1] = product(values[1], values[0])  # Fortran refuses to divide by a literal zero
+            values[1] = product(values[1], values[0])  # division by literal 0 fails in Fortran
         if node.op in _OURS:
             return _UNDEFINED[_OURS[node.op]](*values)
         raise ModelError(
@@ -144,15 +144,15 @@ class SympyWriter:
 
 
 def symbol(name: str) -> Expr:
-    """The symbol of a name."""
+    """Return the real sympy symbol of a name."""
     return Symbol(name, real=True)
 
 
 def number_of(value: float) -> Expr:
-    """A constant.
+    """Return a constant as a sympy number.
 
     Raises:
-        ModelError: it is infinite or not a number.
+        ModelError: the value is infinite or NaN.
     """
     if not math.isfinite(value):
         raise ModelError(
@@ -163,7 +163,7 @@ def number_of(value: float) -> Expr:
 
 
 def total(*values: Expr) -> Expr:
-    """Their sum, its numbers added up, a positive term first where there is one."""
+    """Return the sum of values, with numbers added up and a positive term first if possible."""
     every = [term for value in values for term in Add.make_args(value)]
     terms = _gather(every, math.fsum, 0.0)
     first = next((k for k, term in enumerate(terms) if _factors(term)[0] > 0), 0)
@@ -172,13 +172,13 @@ def total(*values: Expr) -> Expr:
 
 
 def product(a: Expr, b: Expr) -> Expr:
-    """Their product, the sign and its numbers, multiplied, first."""
+    """Return the product of a and b, with the sign and the product of its numbers first."""
     (sign_a, of_a), (sign_b, of_b) = _factors(a), _factors(b)
     return _product(sign_a * sign_b, _gather([*of_a, *of_b], math.prod, 1.0))
 
 
 def _gather(parts: list[Expr], join: Callable[[list[float]], float], neutral: float) -> list[Expr]:
-    """The parts of a sum or product with one number at most, which comes last."""
+    """Combine the numbers among the parts of a sum or product into a single number, placed last."""
     numbers = [float(part) for part in parts if part.is_Float]
     others = [part for part in parts if not part.is_Float]
     if len(numbers) < 2:
@@ -190,18 +190,18 @@ def _gather(parts: list[Expr], join: Callable[[list[float]], float], neutral: fl
 
 
 def negative(value: Expr) -> Expr:
-    """The opposite."""
+    """Return -value."""
     sign, factors = _factors(value)
     return _product(-sign, factors)
 
 
 def difference(a: Expr, b: Expr) -> Expr:
-    """A - b, term by term."""
+    """Return a - b, term by term."""
     return total(a, *(negative(term) for term in Add.make_args(b)))
 
 
 def _factors(value: Expr) -> tuple[int, list[Expr]]:
-    """Sign and factors of a product; numbers among them are positive."""
+    """Return sign and factors of a product. A leading number becomes positive."""
     factors = list(value.args) if value.is_Mul else [value]
     head = factors[0]
     if head is S.NegativeOne and len(factors) > 1:
@@ -224,7 +224,7 @@ def _pow(base: Expr, exponent: Expr) -> Expr:
 
 
 def _join(join: str, conditions: list[Expr]) -> Expr:
-    """Conditions joined, those that are joined alike in one row."""
+    """Join conditions by "both" or "either". Nested joins of the same kind are flattened."""
     parts = (c.args if type(c).__name__ == join else (c,) for c in conditions)
     return _UNDEFINED[join](*(part for some in parts for part in some))
 
@@ -235,13 +235,13 @@ def _inverse(value: Expr) -> Expr:
 
 
 def _flip(factor: Expr) -> Expr:
-    """1 / factor; a factor that stands below a fraction line comes up."""
+    """Return 1 / factor. The inverse of 1/x is x."""
     below = factor.is_Pow and factor.exp is S.NegativeOne
     return factor.base if below else _pow(factor, S.NegativeOne)
 
 
 def _power(base: Expr, exponent: Expr) -> Expr:
-    """A power; an exponent that is a small whole number is written as one."""
+    """Return a power. Small integer exponents (absolute value 2 to 64) become integers."""
     whole = exponent.is_Float and float(exponent).is_integer()
     if whole and 2 <= abs(float(exponent)) <= _LARGEST_INTEGER_POWER:
         positive = _pow(base, Integer(abs(int(exponent))))
@@ -263,7 +263,7 @@ _RULES: Mapping[int, Callable[..., Expr]] = {
 }
 
 
-# Printers of sympy that keep expressions as they are: no reordering, every digit of numbers.
+# Printers of sympy that do not reorder expressions and write all digits of numbers.
 
 
 _ORDER = {"order": "none"}
@@ -278,15 +278,16 @@ _COMPARISONS = {
 
 
 class Readable(CodePrinter):  # type: ignore[misc]
-    """Put before a printer of sympy: sums, products and numbers are written as they stand.
+    """Mixin of a sympy code printer that does not reorder sums and products.
 
     Attributes:
-        forms: how functions are called, by the name of the function.
-        power: how a power is written.
-        comparisons: how comparisons are written.
-        joins: how conditions are joined, by "both" and "either".
-        number: how a number is written.
-        title: of the language, for messages.
+        forms: dict from function name to call format, such as "atan2({0}, {1})". An empty format
+            means that the language does not have the function.
+        power: format of a power.
+        comparisons: dict from sympy class name to comparison sign.
+        joins: signs of the logical operations "both" (and) and "either" (or).
+        number: function that writes a number.
+        title: name of the language, for error messages.
     """
 
     forms: Mapping[str, str]
@@ -297,7 +298,7 @@ class Readable(CodePrinter):  # type: ignore[misc]
     title: str
 
     def text(self, expr: Any) -> str:
-        """An expression in the language."""
+        """Return the text of an expression in the language."""
         return self._print(expr)
 
     def _print(self, expr: Any, **kwargs: Any) -> str:
@@ -332,7 +333,7 @@ class Readable(CodePrinter):  # type: ignore[misc]
 
     def _print_Pow(self, expr: Any, **kwargs: Any) -> str:
         base, exponent = expr.args
-        if exponent is S.Half:  # and not the number 0.5, whose power of minus infinity is no NaN
+        if exponent is S.Half:  # sqrt. Not for the number 0.5: only sqrt of -infinity is NaN
             return _call_text(self.forms["sqrt"], [self._print(base)])
         level = precedence(expr)
         if exponent == S.NegativeOne:
@@ -352,7 +353,7 @@ class Readable(CodePrinter):  # type: ignore[misc]
 
 
 def _call_text(form: str, arguments: Sequence[str]) -> str:
-    """A form filled in; arguments are in brackets unless they have them as those of a call."""
+    """Insert arguments into a call format, in parentheses unless the format encloses them."""
     texts = []
     for k, text in enumerate(arguments):
         bare = len(re.findall(rf"[\[(,] ?\{{{k}\}}[,)\]]", form)) == form.count(f"{{{k}}}")
@@ -361,7 +362,7 @@ def _call_text(form: str, arguments: Sequence[str]) -> str:
 
 
 def _is_closed(text: str) -> bool:
-    """Whether the text is a name, or all of it stands in one pair of brackets."""
+    """Whether the text is a name, or enclosed in a pair of matching parentheses."""
     if re.fullmatch(r"\w+", text):
         return True
     depths = accumulate((c == "(") - (c == ")") for c in text)
@@ -377,18 +378,18 @@ def printer_of(
     comparisons: Mapping[str, str] | None = None,
     joins: Mapping[str, str] | None = None,
 ) -> Any:
-    """A printer of sympy made readable.
+    """Return a printer object that combines `Readable` with a printer class of sympy.
 
     Args:
-        base: class of the printer.
-        title: of the language.
-        number: writes a constant.
-        forms: how functions are called where the printer of sympy does not know it, or knows it
-            for other arguments; an empty text for those that the language does not have.
-        power: how a power is written, such as `{0}^{1}`.
-        comparisons: signs that differ from those of C.
-        joins: of conditions, put between brackets, for "both" and "either"; those of C when left
-            out. A condition that is denied is the form "denied".
+        base: printer class of sympy.
+        title: name of the language.
+        number: function that writes a constant.
+        forms: call formats of functions that the sympy printer writes differently, by name. An
+            empty text means that the language does not have the function. "denied" is the negation.
+        power: format of a power, such as `{0}^{1}`.
+        comparisons: comparison signs that differ from C, by sympy class name.
+        joins: signs of "both" (and) and "either" (or) between parenthesised conditions. By default
+            those of C.
     """
     values = {
         "forms": {"sqrt": "sqrt({0})", "denied": "!{0}", **forms},

@@ -1,4 +1,4 @@
-"""The classic text of SYMORO: tables, then `X = expression;` line by line, then *=*."""
+"""Output language of SYMORO listings: tables, lines `X = expression;`, and *=* at the end."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ _FORMS = {
 
 
 class Symoro(Language):
-    """The text of SYMORO's outputs, in the syntax of sympy."""
+    """SYMORO listing, in the syntax of sympy."""
 
     title = "SYMORO"
     reserved = frozenset(["E", "I", "N", "O", "Q", "S", "pi"])
 
     def printer(self) -> Any:
-        """A printer of sympy."""
+        """Return a printer that writes sympy expressions in this language."""
         return printer_of(
             PythonCodePrinter, self.title, plain_number, _FORMS, "{0}**{1}", joins=_JOINS
         )
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """The text of a function, line by line."""
+        """Yield the lines of the text of a function."""
         first, *others = kept_inside(unit.header, in_bracket_comment)
         yield f"(* {first}"
         yield from (f"   {line}".rstrip() for line in others)

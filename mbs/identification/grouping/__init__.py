@@ -1,1 +1,1 @@
-"""Relations between the columns of a regressor, by rules and by rank."""
+"""Linear dependence of regressor columns, by symbolic rules and by numeric rank."""

@@ -1,7 +1,7 @@
-"""Columns of a regressor, and what is known of their linear relations.
+"""Linear relations between the columns of a regressor D, and groupings of its parameters.
 
-D is the regressor. A relation says that some combination of its columns vanishes in every state;
-it takes one parameter out and adds it to others.
+A relation is a combination of columns that vanishes in every state. It eliminates one parameter,
+which is added to other parameters.
 
 Source: Gautier 1991.
 """
@@ -22,14 +22,14 @@ from mbs.operations.graph import graph_of
 from mbs.operations.text import PRODUCT, Infix
 from mbs.solvers.rank import first_best
 
-# Quotients of expressions without the factors that both sides share.
+# Quotients of expressions, with common factors cancelled.
 
 
 _DEPTH = 9
 
 
 def quotient(value: SX, divisor: SX) -> SX:
-    """The quotient of two scalars, such as A for A^2 / A."""
+    """Return the quotient of two scalars with common factors cancelled, such as A for A^2 / A."""
     above, below = _factors(value), _factors(divisor)
     rest: list[SX] = []
     for factor in above:
@@ -53,41 +53,42 @@ def _factors(value: SX) -> list[SX]:
 
 
 Terms = Mapping[int, SX]
-"""Coefficients of some of the columns, by their numbers from 0."""
+"""Coefficients of columns, by column index (0-based)."""
 
 Sampled = Callable[[list[SX]], NDArray[np.float64]]
-"""(samples, n) values of n scalars at samples of the parameters of a system."""
+"""Function that evaluates n scalars at samples of the system parameters, as an array (samples,
+n)."""
 
 _CANCELLED = 1e-13
-"""What two coefficients may leave of each other, and symbols of a coefficient, when they cancel:
-some hundred roundings of factors of about one."""
+"""Largest remainder of two cancelling coefficients, or of the cancelling terms of one
+coefficient: some hundred rounding errors of factors of about one."""
 _ZERO = 1e-9
-"""Part of the largest coefficient of a relation below which one is no pivot: division by it would
-turn rounding, 1e-13, into coefficients that count."""
+"""Smallest pivot, as a fraction of the largest coefficient of a relation. Division by a smaller
+pivot would amplify rounding errors of 1e-13 to significant coefficients."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grouping:
-    """Every column as a combination of those that are kept.
+    """Expression of every column as a combination of the kept columns.
 
     Attributes:
-        columns: for each column of the regressor the coefficients of the kept ones.
+        columns: for each column of the regressor, the coefficients of the kept columns.
     """
 
     columns: tuple[Terms, ...]
 
     @staticmethod
     def none(size: int) -> Grouping:
-        """All of them kept."""
+        """Return the grouping that keeps all columns."""
         return Grouping(tuple({k: SX(1)} for k in range(size)))
 
     @property
     def kept(self) -> list[int]:
-        """Numbers of the kept columns."""
+        """Indices of the kept columns."""
         return [k for k, terms in enumerate(self.columns) if k in terms]
 
     def reduced(self, terms: Terms) -> dict[int, SX]:
-        """A combination of any columns as one of the kept columns."""
+        """Express a combination of any columns by the kept columns."""
         total: dict[int, SX] = {}
         for column, coefficient in terms.items():
             for k, part in self.columns[column].items():
@@ -95,7 +96,7 @@ class Grouping:
         return total
 
     def replaced(self, dropped: int, terms: Terms) -> Grouping:
-        """The grouping once a kept column is known to equal a combination of other columns."""
+        """Eliminate a kept column that equals a combination of other columns."""
         equal = self.reduced(terms)
         columns = []
         for column in self.columns:
@@ -112,16 +113,17 @@ class Grouping:
 def related(
     grouping: Grouping, relation: Terms, ranks: Callable[[int], int], sampled: Sampled
 ) -> Grouping:
-    """The grouping once a combination of columns is known to vanish.
+    """Apply a relation: a combination of columns that vanishes.
 
-    The column of highest rank that still is kept leaves, among those whose coefficient vanishes
-    for no sample; among equals the one of the largest coefficient, so that no quotient is large.
+    The kept column of highest rank is eliminated, among the columns whose coefficient is nonzero at
+    every sample. Among equal ranks, it is the column with the largest coefficient, so that
+    quotients stay small.
 
     Args:
-        grouping: what is known so far.
-        relation: the combination.
-        ranks: number of a column; the highest leaves first.
-        sampled: values of coefficients, which say whether they vanish.
+        grouping: grouping from earlier relations.
+        relation: coefficients of the combination.
+        ranks: function from column index to rank; the highest rank is eliminated first.
+        sampled: function that evaluates coefficients, to decide whether they vanish.
     """
     rest = grouping.reduced(relation)
     if not rest:
@@ -140,7 +142,7 @@ def related(
 
 
 def without_zeros(grouping: Grouping, sampled: Sampled) -> Grouping:
-    """The grouping without coefficients whose symbols cancel, though they are still written."""
+    """Remove coefficients whose symbolic terms cancel numerically."""
     columns = []
     for terms in grouping.columns:
         written = {k: x for k, x in terms.items() if not x.is_constant()}
@@ -151,14 +153,14 @@ def without_zeros(grouping: Grouping, sampled: Sampled) -> Grouping:
 
 
 def coefficients(grouping: Grouping) -> Iterable[tuple[int, int, SX]]:
-    """Kept column, any column, and how much of the second parameter the first one takes."""
+    """Yield (kept column, column, coefficient of the column's parameter in the base parameter)."""
     for number, terms in enumerate(grouping.columns):
         for k, coefficient in terms.items():
             yield k, number, coefficient
 
 
 def _add(total: dict[int, SX], k: int, part: SX) -> None:
-    """Add to one coefficient; numbers that cancel but for rounding leave none."""
+    """Add to one coefficient, and remove it if the sum is zero up to rounding."""
     if part.is_zero():
         return
     if k not in total:
@@ -174,15 +176,15 @@ def _add(total: dict[int, SX], k: int, part: SX) -> None:
         total[k] = both
 
 
-# Grouping equations as text, in the names of the parameters.
+# Grouping equations as text, with the names of the parameters.
 
 
 def equation(name: str, terms: Mapping[str, SX]) -> str:
-    """One grouped parameter, such as "XX2R = XX2 - YY2 + 0.25*M3".
+    """Return the equation of a grouped parameter, such as "XX2R = XX2 - YY2 + 0.25*M3".
 
     Args:
-        name: of the grouped parameter.
-        terms: coefficients of the parameters in it, its own first.
+        name: name of the grouped parameter.
+        terms: coefficients by parameter name; the kept parameter comes first.
     """
     text = ""
     for parameter, coefficient in terms.items():
@@ -194,13 +196,13 @@ def equation(name: str, terms: Mapping[str, SX]) -> str:
 
 
 def _sign(coefficient: SX) -> tuple[str, str]:
-    """The sign of a coefficient and the text of its size, a factor."""
+    """Return the sign of a coefficient and the text of its magnitude as a factor."""
     negative, size = _split(coefficient)
     return "-" if negative else "+", _factor(size)
 
 
 def _split(value: SX) -> tuple[bool, SX]:
-    """Whether a factor is negative as it is written, and the rest of it."""
+    """Return whether a factor is written with a negative sign, and the factor without it."""
     if value.is_constant():
         return float(value) < 0, SX(abs(float(value)))
     if value.is_op(casadi.OP_NEG):
@@ -213,41 +215,41 @@ def _split(value: SX) -> tuple[bool, SX]:
 
 
 class _FactorText(Infix):
-    """A factor, absolute values as in mathematics."""
+    """Text of a factor, with abs for absolute values."""
 
     def _call_text(self, op: int) -> str:
         return "abs" if op == casadi.OP_FABS else super()._call_text(op)
 
 
 def _factor(value: SX) -> str:
-    """An expression of numbers and symbols, in brackets where it is a sum."""
+    """Return the text of an expression, in parentheses if it is a sum."""
     symbols = casadi.symvar(value)
     graph = graph_of(Function("value", [casadi.vertcat(SX(0, 1), *symbols)], [value], ["p"], ["y"]))
     return _FactorText(graph, {"p": [s.name() for s in symbols]}).text(graph.results[0][0], PRODUCT)
 
 
 def table(rows: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """Lines of two columns, the first one as wide as its longest entry."""
+    """Yield lines of two columns; the first is as wide as its longest entry."""
     width = max((len(left) for left, _ in rows), default=0)
     yield from (f"{left:<{width}}  {right}".rstrip() for left, right in rows)
 
 
-# Whether grouping by rules leaves as many parameters as sampled regressors have rank.
+# Comparison of the symbolic grouping with the rank of sampled regressors.
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """What random states say about a set of base parameters.
+    """Numeric check of a set of base parameters at random states.
 
     Attributes:
-        rank: of the regressor in random states.
-        agrees: whether the rules alone kept as many parameters.
-        relations: what the rules did not find, as equations between columns of the regressor.
-        applied: whether these relations took parameters out of the set.
-        error: largest difference between the full and the grouped regressor, by the longest
-            column of the full one.
-        gap: of the singular values at the rank.
-        text: the same in one or two sentences.
+        rank: rank of the regressor at random states.
+        agrees: whether the symbolic rules alone keep this number of parameters.
+        relations: relations that the rules missed, as equations between columns of the regressor.
+        applied: whether these relations were applied.
+        error: largest difference between a column of the full and the grouped regressor, relative
+            to the longest column of the full regressor.
+        gap: ratio of successive singular values at the rank.
+        text: summary in one or two sentences.
     """
 
     rank: int
@@ -259,32 +261,34 @@ class Check:
     text: str
 
 
-# Numbers for the symbols of a system: what holds for several of them holds by structure.
+# Numeric samples of the symbols of a system; a property that holds for all samples is structural.
 
 
 Array = NDArray[np.float64]
 
 _SEED = 20260411
 _SPREAD = 0.05
-"""Relative and absolute difference of samples from the defaults: far above rounding, and so near
-that loops that close with the defaults close with them."""
+"""Relative and absolute distance of samples from the default values: far above rounding errors,
+and so small that loops that close at the default values also close at the samples."""
 _TRIES = 40
 
 
 def default_parameters(system: System) -> Array:
-    """(np,) values of the parameters, an irregular number for each that has none."""
-    # between 0.4 and 1: lengths and masses as of a robot, none near zero
+    """Return default values (np,) of the parameters, or random values if they have none."""
+    # between 0.4 and 1: typical lengths and masses of a robot, none near zero
     free = 0.4 + 0.6 * np.random.default_rng(_SEED).random(len(system.parameters))
     defaults = np.array(system.p_default, dtype=float)
     return np.where(np.isnan(defaults), free, defaults)
 
 
 def parameter_samples(system: System, value: SX) -> list[Array]:
-    """Values of the parameters: the defaults, then some near them where the value depends on them.
+    """Return samples of the parameters: the default values, then up to three samples near them.
+
+    Only the default values are returned if the expression does not depend on symbols.
 
     Args:
-        system: whose parameters they are.
-        value: expression that must have a number at every sample.
+        system: system of the parameters.
+        value: expression that must be finite at every sample.
     """
     first = default_parameters(system)
     if not casadi.symvar(value):
@@ -304,7 +308,7 @@ def parameter_samples(system: System, value: SX) -> list[Array]:
 
 
 def sampler(system: System) -> Sampled:
-    """What evaluates scalars at samples of the parameters of a system."""
+    """Return a function that evaluates scalars at samples of the system parameters."""
 
     def sampled(values: list[SX]) -> Array:
         column = casadi.vertcat(*values)

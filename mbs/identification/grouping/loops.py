@@ -1,10 +1,10 @@
 """Relations between the parameters of a mechanism with closed loops.
 
-Either side of a cut joint may carry a body that looks the same from both, and links that never
-turn relative to each other share their inertia tensors. For the rates of links and joints see
-`turning`.
+A body in the common frame of a cut joint may be attributed to either link if the joint motion does
+not change its effect. Links with constant relative orientation share their inertia tensors. The
+relations from velocities of links and joints are in `turning_relations`.
 
-Source: Khalil & Bennis 1995 and Bennis & Khalil 1990 for parallelograms; cut joints as there.
+Source: Khalil & Bennis 1995 and Bennis & Khalil 1990 for parallelograms and for cut joints.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class ClosedConfigurations:
     """Configurations that close the loops.
 
     Attributes:
-        q: (nq, configurations).
-        p: (np,) the parameters for which they do.
+        q: (nq, configurations) positions.
+        p: (np,) parameters for which the loops are closed.
     """
 
     q: Array
@@ -49,20 +49,20 @@ class ClosedConfigurations:
 
 
 Relation = dict[Key, SX]
-"""Coefficients of parameters whose effects cancel."""
+"""Coefficients of parameters in a combination without effect."""
 
 _SAME = 1e-9
-"""Difference of cosines, lengths [m] or rates of unit motions between configurations below which
-they are constant, or zero: closed configurations are open by 1e-13, and what moves moves by
+"""Difference of cosines, lengths [m] or unit velocities between configurations below which they
+count as constant or zero. Closed configurations have errors of 1e-13; true variations are
 tenths."""
 
 _TENSOR = TEN_PARAMETERS[:6]
 _SYMMETRIC = (("XX", "YY"), ("MZ",), ("M",))
-"""Of a body that looks the same after any turn about z: each tuple varies together."""
+"""Parameters of a body that is symmetric about z: the parameters of a tuple change together."""
 
 
 def cut_relations(system: System) -> Iterator[Relation]:
-    """What a body in the common frame of a cut joint does is the same on either side of it."""
+    """Yield relations from bodies that may be attributed to either side of a cut joint."""
     for cut in system.cuts:
         axis, shared = _share(cut)
         sides = [(cut.link_a, cut.pose_a, 1), (cut.link_b, cut.pose_b, -1)]
@@ -78,7 +78,7 @@ def cut_relations(system: System) -> Iterator[Relation]:
 
 
 def _share(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
-    """The frame in which a body is taken, and combinations that both sides see alike."""
+    """Return the frame of such a body, and combinations with equal effect on both sides."""
     joint = cut.edge.joint
     freedoms = joint.freedoms
     if cut.welded or isinstance(joint, Fixed):
@@ -104,12 +104,14 @@ def _along(freedom: Freedom) -> Pose:
 def pair_relations(
     system: System, configurations: Sequence[ClosedConfigurations], *, base_moves: bool = False
 ) -> Iterator[Relation]:
-    """Links whose orientations stay the same relative to each other or to the base.
+    """Yield relations of links with constant orientation relative to each other or to the base.
 
     Args:
-        system: with closed loops.
-        configurations: on the branch; more than one set where lengths are symbols.
-        base_moves: whether the base turns, so that origins that keep their distance move apart.
+        system: system with closed loops.
+        configurations: closed configurations on the assembled branch; several sets if lengths are
+            symbols.
+        base_moves: whether the base moves, so that origins at a constant distance have different
+            velocities.
     """
     poses = [_link_poses(system, each) for each in configurations]
     R = np.concatenate([turns for turns, _ in poses], axis=1)
@@ -122,18 +124,18 @@ def pair_relations(
 
 
 def _rotation(R: Array) -> SX:
-    """A constant rotation as measured at closed configurations, which are open by some 1e-13."""
-    noise = 1e-12  # ten times that: smaller elements are zeros
+    """Return a constant rotation from closed configurations, whose loop errors are about 1e-13."""
+    noise = 1e-12  # ten times the loop error: smaller elements are zeros
     return SX(DM(nearest_rotation(R.tolist(), noise=noise)))
 
 
 def _side_by_side(poses: Sequence[tuple[Array, Array]], a: int, b: int) -> bool:
-    """Whether two origins keep their distance and its direction, so that they move alike."""
+    """Whether the vector between two origins is constant, so that they have the same velocity."""
     return all(_constant(origins[b] - origins[a]) for _, origins in poses)
 
 
 def _shared_by_pair(a: int, b: int, R: SX, moments: bool) -> Iterator[Relation]:
-    """What link b shares with link a, or loses to the base."""
+    """Yield the relations that shift parameters of link b to link a, or drop them at the base."""
     through = lambda_transform(Pose.rotation(R))
     names = TEN_PARAMETERS[: (9 if a < 0 else 10) if moments else 6]
     for k, name in enumerate(names):
@@ -141,7 +143,7 @@ def _shared_by_pair(a: int, b: int, R: SX, moments: bool) -> Iterator[Relation]:
 
 
 def _link_poses(system: System, configurations: ClosedConfigurations) -> tuple[Array, Array]:
-    """Orientations (1 + links, n, 3, 3) and origins (.., 3) of base and links, n configurations."""
+    """Return orientations (1 + links, n, 3, 3) and origins (1 + links, n, 3) of base and links."""
     q = SX.sym("q", system.nq)
     poses = [Pose.identity(), *base_poses(system.tree, link_poses(system.tree, q))]
     at = Function("poses", [q, system.p], [casadi.horzcat(*(pose.matrix for pose in poses))])
@@ -154,12 +156,12 @@ def _constant(values: Array) -> bool:
     return bool(np.max(np.abs(values - values[0])) < _SAME)
 
 
-# What the rates at which links and joints of a closed mechanism turn say of its parameters.
-#
-# Along an angular velocity that keeps one direction in its link a first moment has no effect.
-# Rotational energies and dissipations are dependent where the products of the rates are; links
-# that turn about one direction and joints with a constant ratio of velocities are cases of it.
-#
+# Relations from the angular velocities of links and the joint velocities of a closed mechanism.
+
+# A first moment along an angular velocity of constant direction in its link has no effect.
+# Rotational energies and dissipated powers are dependent if the products of the velocities are.
+# Links that rotate about one direction and joints with a constant velocity ratio are special cases.
+
 # Source: Khalil & Bennis 1995 for joints of equal velocity; Gautier 1991 for the dependence.
 
 
@@ -168,11 +170,11 @@ _MOMENTS = TEN_PARAMETERS[6:9]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Effect:
-    """What one parameter does, up to a factor that all of its kind share.
+    """Effect of one parameter, up to a factor common to all parameters of its kind.
 
     Attributes:
-        parameter: it.
-        column: (values,) in all configurations.
+        parameter: the parameter.
+        column: (values,) effect at all configurations.
     """
 
     parameter: Key
@@ -182,13 +184,14 @@ class Effect:
 def turning_relations(
     system: System, configurations: Sequence[ClosedConfigurations], *, base_moves: bool = False
 ) -> Iterator[Relation]:
-    """What the rates of links and joints say.
+    """Yield the relations that follow from the velocities of links and joints.
 
     Args:
-        system: with closed loops.
-        configurations: on the branch, more than one set where lengths are symbols; at least
-            `configurations_needed`.
-        base_moves: whether the base turns, so that the rates of links are not those of joints.
+        system: system with closed loops.
+        configurations: closed configurations on the assembled branch, at least
+            `configurations_needed`; several sets if lengths are symbols.
+        base_moves: whether the base moves, so that the velocities of links do not follow from the
+            joints.
     """
     G = np.concatenate([_slopes(system, each) for each in configurations])
     links = system.tree.links
@@ -207,21 +210,21 @@ def turning_relations(
 
 
 def configurations_needed(system: System) -> int:
-    """So many that products of rates are not dependent by chance."""
+    """Return a number of configurations that avoids accidental dependence of velocity products."""
     effects = 6 * len(system.tree.links) + system.nv
     m = max(len(system.active), 1)
     return max(12, -(-3 * effects // (m * (m + 1))))
 
 
 def _slopes(system: System, configurations: ClosedConfigurations) -> Array:
-    """(configurations, nv, m) velocities of the tree from the independent ones."""
+    """Return the matrices (configurations, nv, m) from independent to tree velocities."""
     at = reduction_matrix(system)
     p = [configurations.p] if configurations.p.size else []
     return np.array([np.array(at(position, *p)) for position in configurations.q.T])
 
 
 def _angular(system: System, configurations: Sequence[ClosedConfigurations], G: Array) -> Array:
-    """(links, configurations, 3, m) angular velocities in the frames of the links."""
+    """Return the angular velocities (links, configurations, 3, m) in the frames of the links."""
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     motions = link_velocities(system.tree, link_poses(system.tree, q), v)
     slopes = [casadi.densify(casadi.jacobian(motion.w, v)) for motion in motions]
@@ -233,7 +236,7 @@ def _angular(system: System, configurations: Sequence[ClosedConfigurations], G: 
 
 
 def _one_direction(rows: Array) -> Array | None:
-    """(3,) the one direction of an angular velocity (configurations, 3, m), or None."""
+    """Return the constant direction (3,) of an angular velocity (configurations, 3, m), or None."""
     columns = rows.transpose(1, 0, 2).reshape(3, -1)
     U, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     if sizes[0] < _SAME or sizes[1] > _SAME * sizes[0]:
@@ -245,19 +248,19 @@ def _one_direction(rows: Array) -> Array | None:
 
 
 def _rotational(j: int, rows: Array) -> Iterator[Effect]:
-    """Energies of the inertia tensor of link j, of its angular velocity (configurations, 3, m)."""
+    """Yield the energy effects of the inertia tensor of link j, from its angular velocity."""
     for name, (k, i) in zip(TEN_PARAMETERS, zip(*np.triu_indices(3), strict=True), strict=False):
         yield Effect((j, name), (1 if k == i else 2) * _product(rows[:, k], rows[:, i]))
 
 
 def _product(first: Array, second: Array) -> Array:
-    """Coefficients of a product of two rates, (configurations, m) each, in all configurations."""
+    """Return the products of two velocities (configurations, m) as quadratic forms, flattened."""
     k, i = np.triu_indices(first.shape[1])
     return np.ravel(first[:, k] * second[:, i] + first[:, i] * second[:, k])
 
 
 def _dependent(effects: Sequence[Effect]) -> Iterator[Relation]:
-    """Relations of parameters with dependent effects."""
+    """Yield relations between parameters with dependent effects."""
     if not effects:
         return
     found = dependence(np.column_stack([e.column for e in effects]), range(len(effects)))
@@ -272,7 +275,7 @@ def _dependent(effects: Sequence[Effect]) -> Iterator[Relation]:
 
 
 def _dry_friction(links: Sequence[Link], joints: dict[int, Array]) -> Iterator[Relation]:
-    """Coulomb friction of joints at rest, and of joints whose velocities keep a constant ratio."""
+    """Yield relations of Coulomb friction of joints at rest or with a constant velocity ratio."""
     for k, rows in joints.items():
         if np.max(np.abs(rows)) < _SAME:
             yield {(k, "Fs"): SX(1)}

@@ -1,4 +1,4 @@
-"""Grouping by the rank of the regressor in random states, and the check of the rules by it.
+"""Grouping by the rank of the regressor at random states, and numeric check of the rules.
 
 Source: Gautier 1991.
 """
@@ -22,35 +22,36 @@ from mbs.loops.examine import examine
 from mbs.loops.reduction import reduction_matrix
 from mbs.numbers import NONZERO
 
-# Which columns of sampled regressors are independent, and how the others follow from them.
-#
+# Independent columns of sampled regressors, and the other columns as their combinations.
+
 # Source: Gautier 1991.
 
 
 Array = NDArray[np.float64]
 
 _NO_EFFECT = 1e-9
-"""A column shorter than this part of the longest has no effect."""
+"""Length of a column, relative to the longest, below which it counts as zero: rounding is 1e-15."""
 _FLOOR = 1e-16
-"""Part of the largest singular value that the others are taken to be at least: ratios of what is
-rounding alone would look like gaps."""
+"""Lower bound of the singular values relative to the largest. It prevents gaps between singular
+values that are rounding errors."""
 _LARGEST_ZERO = 1e-6
-"""A singular value above this part of the largest is not rounding."""
+"""Relative singular value above which it cannot be a rounding error."""
 _ROUNDING = 1e-8
-"""A factor so near to a whole number is one."""
+"""Distance from an integer below which a factor is rounded to the integer."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Dependence:
-    """The independent columns of a matrix, in the order in which they were looked at.
+    """Independent and dependent columns of a matrix.
 
     Attributes:
-        independent: numbers of columns.
-        dependent: numbers of the others; those without any effect are among them.
-        factors: (independent, dependent), the dependent columns from the independent ones.
-        gap: smallest singular value that counts by the largest one that does not, both of columns
-            scaled to length one; infinite when all count.
-        residual: largest error of a dependent column, by the length of the longest column.
+        independent: indices of independent columns, in the order of preference.
+        dependent: indices of the other columns, including columns without effect.
+        factors: (independent, dependent) factors of the independent columns in the dependent
+            columns.
+        gap: ratio of the smallest singular value that counts as nonzero to the largest that counts
+            as zero, for columns scaled to unit length; infinite if all are nonzero.
+        residual: largest error of a dependent column, relative to the longest column.
     """
 
     independent: tuple[int, ...]
@@ -61,15 +62,15 @@ class Dependence:
 
 
 def dependence(W: Array, order: Sequence[int]) -> Dependence:
-    """Independent columns of a matrix: the first ones in the order that are not combinations.
+    """Select independent columns of a matrix, with preference in the given order.
 
-    Columns without effect are dropped before the others are scaled, since scaling would turn
-    their rounding into a column. The rank is where the singular values fall most; QR without
-    pivoting then takes the columns in the given order.
+    Columns without effect are removed before scaling, which would amplify their rounding errors.
+    The rank is at the largest gap of the singular values. QR without pivoting then selects the
+    columns in the given order.
 
     Args:
-        W: (rows, n), at least as many rows as columns.
-        order: every number of a column once, the wanted ones first.
+        W: (rows, n) matrix with at least as many rows as columns.
+        order: permutation of the column indices, in decreasing preference.
     """
     lengths = np.linalg.norm(W, axis=0)
     longest = float(np.max(lengths, initial=0.0))
@@ -94,7 +95,7 @@ def dependence(W: Array, order: Sequence[int]) -> Dependence:
 
 
 def _rank(values: Array) -> tuple[int, float]:
-    """Where the falling singular values have their widest gap, and how wide it is."""
+    """Return the rank at the largest ratio of successive singular values, and this ratio."""
     parts = np.maximum(values / values[0], _FLOOR)
     ratios = parts[:-1] / parts[1:]
     small = parts[1:] < _LARGEST_ZERO
@@ -105,29 +106,31 @@ def _rank(values: Array) -> tuple[int, float]:
 
 
 def plain(x: float) -> float:
-    """A whole number without its rounding."""
+    """Round a value to an integer if it is close to it."""
     return float(round(x)) if abs(x - round(x)) < _ROUNDING else float(x)
 
 
-# Random states of a mechanism, those of a closed one on the branch of its assembled configuration.
+# Random states of a mechanism. States of a closed one are on its assembled branch.
 
 
 _STEP, _STEPS = 0.1, 8
-"""Of the fastest joint [rad or m], and how many steps lie between two states."""
+"""Step of the fastest joint [rad or m], and number of steps between two states."""
 _CONFIGURATIONS = 40
-"""Closed configurations; more states repeat them with other velocities."""
+"""Number of closed configurations; further states reuse them with other velocities."""
 _LEAST_LEAD = 0.02
-"""Below this a configuration is so near to a singular one that the walk could change its branch."""
+"""Squared sine (`leads` of `mbs.loops.examine`) below which a configuration is so close to a
+singular one that the random walk could change the branch."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class States:
-    """Positions, independent velocities and accelerations, one state a column.
+    """Positions, independent velocities and accelerations, one state per column.
 
     Attributes:
-        q: (nq, states).
-        v, a: (m, states).
-        base: v_0 and a_0, (6, states) each, and R_0, (3, 3 states), of a base that moves.
+        q: (nq, states) positions.
+        v, a: (m, states) independent velocities and accelerations.
+        base: velocity v_0 and acceleration a_0 (6, states each) and orientation R_0 (3, 3 states)
+            of a moving base.
     """
 
     q: Array
@@ -141,7 +144,7 @@ class States:
         return int(self.q.shape[1])
 
     def on_moving_base(self, seed: int) -> States:
-        """The same while the base moves anyhow."""
+        """Return the states with a random motion of the base."""
         rng = np.random.default_rng(seed)
         v_0, a_0 = rng.uniform(-3, 3, (6, self.count)), rng.uniform(-5, 5, (6, self.count))
         turns = np.linalg.qr(rng.standard_normal((self.count, 3, 3)))[0]
@@ -150,13 +153,13 @@ class States:
 
 
 def random_states(system: System, p: Array, count: int, seed: int) -> States:
-    """States that show every parameter that has an effect.
+    """Return random states in which every identifiable parameter has an effect.
 
     Args:
         system: open or closed.
-        p: (np,) its parameters.
+        p: (np,) parameters of the system.
         count: number of states.
-        seed: of the random numbers.
+        seed: seed of the random numbers.
 
     Raises:
         ModelError: a closed mechanism cannot leave its assembled configuration.
@@ -177,16 +180,17 @@ def _any(system: System, count: int, rng: np.random.Generator) -> Array:
 
 
 def closed_positions(system: System, p: Array, count: int, seed: int) -> Array:
-    """(nq, count) closed configurations, met on a random walk from the assembled one.
+    """Return closed configurations (nq, count) on a random walk from the assembled one.
 
-    Steps are small and each is closed again, so that the walk stays on its branch; where the
-    independent joints hardly lead the others it turns back. The system keeps them.
+    Each small step is projected onto the closed loops, so that the walk stays on its branch. It
+    reverses if the independent joints barely determine the other joints. The result is cached in
+    the system.
 
     Args:
-        system: closed.
-        p: (np,) its parameters.
+        system: closed system.
+        p: (np,) parameters of the system.
         count: number of configurations.
-        seed: of the random numbers.
+        seed: seed of the random numbers.
 
     Raises:
         ModelError: the loops cannot be closed at these parameters.
@@ -206,7 +210,7 @@ def closed_positions(system: System, p: Array, count: int, seed: int) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _ConfigurationWalk:
-    """What a walk on closed configurations needs."""
+    """State of a random walk on closed configurations."""
 
     system: System
     closing: Closing
@@ -217,7 +221,7 @@ class _ConfigurationWalk:
 
     @staticmethod
     def of(system: System, p: Array) -> _ConfigurationWalk:
-        """From the assembled configuration, closed again for these parameters."""
+        """Start at the assembled configuration, with the loops closed for these parameters."""
         closing = Closing(system, p)
         found = closing.nearest(np.array(system.configuration))
         if not found.is_closed:
@@ -233,7 +237,7 @@ class _ConfigurationWalk:
         return _ConfigurationWalk(system, closing, G, values, found.q, min(_LEAST_LEAD, leads / 4))
 
     def moved(self, q: Array, rng: np.random.Generator) -> Array:
-        """The configuration after some steps in one direction, or back in the other."""
+        """Return the configuration after some steps; the direction reverses at singularities."""
         direction = rng.uniform(-1, 1, len(self.system.active))
         for _ in range(_STEPS):
             following = self._step(q, direction)
@@ -248,7 +252,7 @@ class _ConfigurationWalk:
         arguments = (q, p) if p.size else (q,)
         G = np.array(self.G(*arguments))
         rate = np.array(self.system.qdot(q, G @ direction)).ravel()
-        # a direction that moves no position, to rounding, leads nowhere
+        # a direction without joint motion (up to rounding) makes no step
         ahead = q + rate * (_STEP / max(float(np.max(np.abs(rate))), 1e-9))
         found = self.closing.nearest(ahead)
         if not found.is_closed or np.max(np.abs(found.q - ahead)) > _STEP:
@@ -263,22 +267,23 @@ def _normalise(system: System, q: Array) -> Array:
     return q
 
 
-# Numbers of the dynamic regressor in random states.
+# Numeric values of the dynamic regressor at random states.
 
 
 def sampled_regressor(system: System, columns: Sequence[Column], states: States, p: Array) -> Array:
-    """(rows, columns) the regressor in all states, one below the other.
+    """Return the regressor (rows, columns) at all states, stacked.
 
-    The regressor with all columns of these kinds is kept for the next choice of columns.
+    The regressor Function with all columns of these kinds is cached for other selections of
+    columns.
 
     Args:
         system: open or closed.
         columns: parameters of the system.
-        states: those to take.
+        states: states at which the regressor is evaluated.
         p: (np,) parameters of the system.
 
     Raises:
-        ModelError: a column is no parameter of the system.
+        ModelError: a column is not a parameter of the system.
     """
     every = every_column(system, columns)
     numbers = numbers_among(system, every, columns)
@@ -291,23 +296,23 @@ def sampled_regressor(system: System, columns: Sequence[Column], states: States,
 
 
 _ZERO = 1e-8
-"""Factor of a dependent column below which it is rounding: those that count are ratios of lengths
-and squares of them, and whole numbers."""
+"""Factor of a dependent column below which it is a rounding error: true factors are ratios of
+lengths, squares of ratios, and integers."""
 _EXACT = 1e-7
-"""Largest error of a grouped regressor that is rounding, by the longest column."""
+"""Largest error of a grouped regressor that counts as rounding, relative to the longest column."""
 _NARROW = 1e4
-"""A smaller gap of the singular values leaves the rank in doubt."""
+"""Ratio of singular values at the rank below which the rank is reported as uncertain."""
 _PREFERRED = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY", "YY", "MZ", "M")
-"""Inertial parameters of a link in the order in which they are kept."""
+"""Inertial parameters of a link in the order of preference to keep them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RegressorSample:
-    """The regressor of a system in many random states.
+    """Regressor of a system at many random states.
 
     Attributes:
-        columns: its parameters.
-        W: (rows, columns).
+        columns: parameters of the columns.
+        W: (rows, columns) stacked regressor.
     """
 
     columns: tuple[Column, ...]
@@ -317,7 +322,7 @@ class RegressorSample:
     def of(
         system: System, columns: Sequence[Column], p: Array, seed: int, *, base_moves: bool = False
     ) -> RegressorSample:
-        """At least three rows for every column."""
+        """Evaluate the regressor at random states, with at least three rows per column."""
         count = 8 + -(-3 * len(columns) // max(len(system.active), 1))
         states = random_states(system, p, count, seed)
         states = states.on_moving_base(seed) if base_moves else states
@@ -325,9 +330,10 @@ class RegressorSample:
 
 
 def preferred_order(columns: Sequence[Column], first: Sequence[int] = ()) -> list[int]:
-    """Numbers of the columns, those that should be kept first: near the base, YY MZ M last.
+    """Return the column indices in order of preference: links near the base first.
 
-    With this order QR keeps the parameters that the rules of trees keep.
+    Within a link, YY, MZ and M come last. With this order, QR keeps the same parameters as the tree
+    rules.
     """
     known = {kind: k for k, kind in enumerate(_PREFERRED)}
     rest = [k for k in range(len(columns)) if k not in first]
@@ -336,7 +342,7 @@ def preferred_order(columns: Sequence[Column], first: Sequence[int] = ()) -> lis
 
 
 def grouped_by_rank(sample: RegressorSample, order: Sequence[int]) -> tuple[Grouping, Check]:
-    """The independent columns in this order, and the others in terms of them."""
+    """Return the grouping by independent columns in this order, and its check."""
     found = dependence(sample.W, order)
     grouping = applied(Grouping.none(len(sample.columns)), found)
     text = f"the regressor in random states has the rank {len(found.independent)}" + _gap(found)
@@ -349,12 +355,12 @@ def grouped_by_rank(sample: RegressorSample, order: Sequence[int]) -> tuple[Grou
 def applied(
     grouping: Grouping, found: Dependence, numbers: Sequence[int] | None = None
 ) -> Grouping:
-    """The grouping with dependent columns taken out.
+    """Eliminate dependent columns from a grouping.
 
     Args:
-        grouping: so far.
-        found: dependence of some of its columns.
-        numbers: of these columns, all of them when left out.
+        grouping: grouping to extend.
+        found: dependence between some columns.
+        numbers: indices of these columns; all columns by default.
     """
     numbers = range(len(grouping.columns)) if numbers is None else numbers
     for k, column in enumerate(found.dependent):
@@ -368,13 +374,13 @@ def applied(
 def checked(
     sample: RegressorSample, grouping: Grouping, beta: Array, order: Sequence[int]
 ) -> Check:
-    """What random states say of a grouping.
+    """Check a grouping at random states.
 
     Args:
-        sample: of the regressor.
-        grouping: by rules.
-        beta: (kept, columns) its coefficients in numbers.
-        order: of preference.
+        sample: regressor at random states.
+        grouping: grouping by the rules.
+        beta: (kept, columns) numeric coefficients of the grouping.
+        order: column indices in order of preference.
     """
     kept, W = grouping.kept, sample.W
     longest = float(np.max(np.linalg.norm(W, axis=0), initial=NONZERO))
@@ -391,7 +397,7 @@ def checked(
 
 
 def remainder(sample: RegressorSample, grouping: Grouping, order: Sequence[int]) -> Dependence:
-    """The dependence of the kept columns."""
+    """Return the dependence between the kept columns."""
     kept = grouping.kept
     return dependence(sample.W[:, kept], [kept.index(k) for k in order if k in kept])
 
@@ -399,7 +405,7 @@ def remainder(sample: RegressorSample, grouping: Grouping, order: Sequence[int])
 def relation_texts(
     columns: Sequence[Column], kept: Sequence[int], found: Dependence
 ) -> tuple[str, ...]:
-    """Dependent columns as equations, D(XX1) = ... of the effects of parameters."""
+    """Return equations of the dependent columns, such as D(XX1) = ..."""
     lines = []
     for k, column in enumerate(found.dependent):
         pairs = zip(found.independent, found.factors[:, k], strict=True)

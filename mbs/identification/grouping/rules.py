@@ -1,11 +1,12 @@
-"""Which inertial parameters of a tree have no effect of their own, joint by joint.
+"""Symbolic rules for the inertial parameters of a tree that have no separate effect.
 
-A parameter of link j either does no work at all, or its effect is a combination of the effects of
-other parameters: of link j itself and, moved by the lambda matrix, of its antecedent i.
+A parameter of link j either has no effect, or its effect is a combination of the effects of other
+parameters: parameters of link j itself and, transformed by the lambda matrix, of its antecedent i.
 
-Source: Gautier & Khalil 1990; Khalil & Bennis 1995; Khalil & Dombre 2002, section 9.4. Prismatic
-joints between turning ones and rotors of prismatic joints differ from the sources, whose rules
-leave out a parameter that has an effect or keep one that has none of its own.
+Source: Gautier & Khalil 1990; Khalil & Bennis 1995; Khalil & Dombre 2002, section 9.4. The rules
+for prismatic joints between revolute joints and for rotors of prismatic joints differ from the
+sources, whose rules eliminate a parameter that has an effect, or keep a parameter that has no
+separate effect.
 """
 
 from __future__ import annotations
@@ -25,30 +26,30 @@ from mbs.identification.grouping.grouping import parameter_samples
 from mbs.spatial import Inertia, MatrixRotation, Pose, cross, elements
 from mbs.spatial.inertia import TEN_PARAMETERS
 
-# Which axes of a tree are parallel, perpendicular or on one line, and where gravity points.
-#
-# The answers come from numbers: poses at the zero position for some values of the symbols. What
-# holds within 1e-9 for all of them holds by structure.
+# Geometric relations of the axes of a tree (parallel, perpendicular, coaxial) and of gravity.
+
+# They are decided numerically, with poses at the zero position for samples of the symbols. A
+# relation that holds within 1e-9 for all samples is structural.
 
 
 Array = NDArray[np.float64]
 
 _SAME = 1e-9
-"""Cosine, sine or length [m] below which one is zero for a sample: poses have roundings of 1e-15,
-and axes that a file leaves parallel to six digits only are taken as it has them."""
+"""Cosine, sine or length [m] below which a value counts as zero. Rounding errors of poses are
+1e-15; axes of a file that are parallel to six digits only do not count as parallel."""
 _TURNING = (Motion.REVOLUTE, Motion.SPHERICAL, Motion.FREE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Structure:
-    """Axes of a tree at its zero position.
+    """Axes of a tree at its zero position, for samples of the symbols.
 
     Attributes:
         tree: the links.
-        orientations: (samples, links, 3, 3) of each frame seen from the base.
-        origins: (samples, links, 3) origin of each frame in the base [m].
-        gravity: (samples, 3) in the base [m/s^2].
-        base_moves: whether the base has a motion of its own, so that nothing is known of it.
+        orientations: (samples, links, 3, 3) orientation of each frame relative to the base.
+        origins: (samples, links, 3) origin of each frame in the base frame [m].
+        gravity: (samples, 3) gravity in the base frame [m/s^2].
+        base_moves: whether the base has an arbitrary prescribed motion.
     """
 
     tree: Tree
@@ -59,27 +60,27 @@ class Structure:
 
     @property
     def axes(self) -> Array:
-        """(samples, links, 3) z axis of each frame in the base."""
+        """Unit vectors (samples, links, 3) of the z axis of each frame, in the base frame."""
         return self.orientations[..., 2]
 
     def turning(self, links: list[int]) -> list[int]:
-        """Those of the links whose joints turn."""
+        """Return the links with a revolute, spherical or free joint."""
         return [k for k in links if self.tree.links[k].motion in _TURNING]
 
     def sliding(self, links: list[int]) -> list[int]:
-        """Those of the links whose joints slide."""
+        """Return the links with a prismatic joint."""
         return [k for k in links if self.tree.links[k].motion is Motion.PRISMATIC]
 
     def before(self, j: int) -> list[int]:
-        """The links between the base and link j, itself left out."""
+        """Return the links between the base and link j, without link j."""
         return self.tree.path(j)[:-1]
 
     def rests(self, links: list[int]) -> bool:
-        """Whether a chain of these links never turns."""
+        """Whether a chain of these links has a constant orientation."""
         return not self.base_moves and not self.turning(links)
 
     def one_direction(self, links: list[int]) -> bool:
-        """Whether a chain of these links turns about one direction at most."""
+        """Whether all rotations of a chain of these links are about parallel axes."""
         turning = self.turning(links)
         if self.base_moves:
             return False
@@ -88,30 +89,30 @@ class Structure:
         return all(self.parallel(turning[0], k) for k in turning)
 
     def parallel(self, j: int, k: int) -> bool:
-        """Whether two axes have the same direction at the zero position."""
+        """Whether two axes are parallel at the zero position."""
         return _vanishes(np.cross(self.axes[:, j], self.axes[:, k]))
 
     def never_parallel(self, j: int, k: int) -> bool:
-        """Whether two axes have different directions at the zero position, for every sample."""
+        """Whether two axes are not parallel at the zero position, for every sample."""
         normal = np.cross(self.axes[:, j], self.axes[:, k])
         return bool(np.min(np.linalg.norm(normal, axis=1)) > _SAME)
 
     def perpendicular(self, j: int, k: int) -> bool:
-        """Whether two axes are at right angles at the zero position."""
+        """Whether two axes are perpendicular at the zero position."""
         return _vanishes(np.sum(self.axes[:, j] * self.axes[:, k], axis=1))
 
     def coaxial(self, j: int, k: int) -> bool:
-        """Whether two axes are on one line at the zero position."""
+        """Whether two axes are on the same line at the zero position."""
         between = np.cross(self.origins[:, k] - self.origins[:, j], self.axes[:, j])
         return self.parallel(j, k) and _vanishes(between)
 
     def axes_in(self, k: int, j: int) -> Array:
-        """(samples, 3) the axis of link k in the axes of frame j at the zero position."""
+        """Return the axis (samples, 3) of link k in the axes of frame j at the zero position."""
         seen: Array = np.einsum("sab,sa->sb", self.orientations[:, j], self.axes[:, k])
         return seen
 
     def point_rests(self, j: int, points: Array) -> bool:
-        """Whether all joints before link j leave points (samples, 3) of its axis in place."""
+        """Whether points (samples, 3) on axis j are fixed under all joints that precede link j."""
         before = self.before(j)
         return not self.base_moves and all(self._holds(k, points) for k in before)
 
@@ -124,7 +125,7 @@ class Structure:
         return False
 
     def on_axis(self, points: Array, k: int) -> bool:
-        """Whether points (samples, 3) of the base lie on the axis of link k."""
+        """Whether points (samples, 3) in the base frame lie on the axis of link k."""
         return _vanishes(np.cross(points - self.origins[:, k], self.axes[:, k]))
 
     @property
@@ -133,15 +134,15 @@ class Structure:
         return not self.base_moves and _vanishes(self.gravity)
 
     def gravity_along(self, j: int) -> bool:
-        """Whether gravity is zero or parallel to an axis at the zero position."""
+        """Whether gravity is zero or parallel to axis j at the zero position."""
         return not self.base_moves and _vanishes(np.cross(self.gravity, self.axes[:, j]))
 
     def gravity_across(self, j: int) -> bool:
-        """Whether gravity is zero or at right angles to an axis at the zero position."""
+        """Whether gravity is zero or perpendicular to axis j at the zero position."""
         return not self.base_moves and _vanishes(np.sum(self.gravity * self.axes[:, j], axis=1))
 
     def seen_from_link(self, k: int, j: int) -> Pose:
-        """The frame of link k of the path of j in the frame of link j, at the zero position."""
+        """Return the pose of frame k relative to j at zero position, with k on the path of j."""
         pose = Pose.identity()
         path = self.tree.path(j)
         for link in path[path.index(k) + 1 :]:
@@ -150,7 +151,7 @@ class Structure:
 
 
 def structure_of(system: System, *, base_moves: bool = False) -> Structure:
-    """The structure of the tree of a system."""
+    """Return the structure of the tree of a system."""
     tree = system.tree
     poses: list[Pose] = []
     for link in tree.links:
@@ -177,15 +178,17 @@ def _vanishes(values: Array) -> bool:
     return bool(np.max(np.abs(values), initial=0.0) < _SAME)
 
 
-# Where all axes before a joint meet its own axis: a point of the link that never moves.
+# Common point of axis j and all preceding axes: a point of the link that never moves.
 
 
 def resting_height(structure: Structure, j: int) -> SX | None:
-    """Where on axis j a point rests, from the origin of frame j [m]; None when no point does.
+    """Return the distance of a fixed point on axis j from the origin of frame j [m].
+
+    None if no point of the axis is fixed.
 
     Args:
-        structure: of the tree.
-        j: number of a revolute link, from 0.
+        structure: structure of the tree.
+        j: index of a revolute link, from 0.
     """
     if structure.point_rests(j, structure.origins[:, j]):
         return SX(0)
@@ -211,19 +214,19 @@ def _height_where_all_meet(structure: Structure, j: int, k: int) -> SX | None:
     return casadi.dot(cross(pose.p, u), across) / casadi.dot(across, across)
 
 
-# How the ten inertial parameters of a body change when another frame is taken.
+# Change of the reference frame of the ten inertial parameters of a body.
 
 
 def lambda_transform(pose: Pose) -> SX:
-    """(10, 10) parameters about frame i, in its axes, of a body known about frame j.
+    """Return the matrix (10, 10) that transforms inertial parameters from frame j to frame i.
 
-    Column k holds the parameters in frame i of the body whose k-th parameter in frame j is one
-    and whose others are zero.
+    Column k contains the parameters in frame i of a body whose k-th parameter in frame j is one and
+    whose other parameters are zero.
 
     Source: Gautier & Khalil 1990; Khalil & Dombre 2002, section 9.4.
 
     Args:
-        pose: of frame j seen from frame i; lengths and angles may be symbols.
+        pose: pose of frame j relative to frame i; lengths and angles may be symbols.
     """
     turn = MatrixRotation(pose.R)
     units = (Inertia.from_parameters(SX(DM.eye(10)[:, k])) for k in range(10))
@@ -231,25 +234,27 @@ def lambda_transform(pose: Pose) -> SX:
 
 
 Key = tuple[int, str]
-"""A parameter: number of the link from 0, and kind."""
+"""Key of a parameter: link index from 0, and kind."""
 
 Effects = Mapping[Key, SX]
-"""Coefficients of parameters."""
+"""Coefficients by parameter."""
 
 _TENSOR = TEN_PARAMETERS[:6]
 _MOMENTS = TEN_PARAMETERS[6:9]
 _Z = SX(DM([0, 0, 1]))
 _LEAST = 1e-9
-"""An element of a unit vector below this is zero."""
+"""Magnitude below which an element of a unit vector counts as zero: far above rounding errors
+of 1e-15."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Removal:
-    """A parameter that leaves, and the parameters that take its effect over.
+    """Elimination of a parameter, and the combination of parameters with the same effect.
 
     Attributes:
-        parameter: that leaves.
-        effects: the combination of parameters that has the same effect; empty when it has none.
+        parameter: parameter that is eliminated.
+        effects: combination of parameters with the same effect; empty if the parameter has no
+            effect.
     """
 
     parameter: Key
@@ -257,7 +262,7 @@ class Removal:
 
 
 def tree_rules(structure: Structure) -> Iterator[Removal]:
-    """The removals of a tree, from its last link to its first, in the order to make them."""
+    """Yield the eliminations of a tree in order of application, from its last link to its first."""
     for j in reversed(range(len(structure.tree.links))):
         yield from _moved_to_antecedent(structure, j)
         yield from _without_effect(structure, j)
@@ -265,7 +270,7 @@ def tree_rules(structure: Structure) -> Iterator[Removal]:
 
 
 def _moved_to_antecedent(structure: Structure, j: int) -> Iterator[Removal]:
-    """What joint j cannot tell from a part of link i, or of the base."""
+    """Yield parameters of link j that are regrouped with its antecedent i, or lost at the base."""
     link = structure.tree.links[j]
     combinations: list[tuple[str, dict[str, float], dict[str, float]]] = []
     match link.motion:
@@ -304,7 +309,11 @@ def _without_effect(structure: Structure, j: int) -> Iterator[Removal]:
 
 
 def _revolute(structure: Structure, j: int) -> Iterator[Removal]:
-    """A link that turns about one direction shows ZZ alone; on a resting axis no moments."""
+    """Apply the rules of revolute joints.
+
+    A link that rotates about one direction has ZZ only. A link on a fixed axis along gravity has no
+    MX and MY.
+    """
     if structure.one_direction([*structure.before(j), j]):
         yield from _nothing(j, ("XX", "XY", "XZ", "YZ"))
     if _on_line(structure, j):
@@ -314,7 +323,7 @@ def _revolute(structure: Structure, j: int) -> Iterator[Removal]:
 
 
 def _on_line(structure: Structure, j: int) -> bool:
-    """Whether axis j is a line at rest, along gravity or without it."""
+    """Whether axis j is a fixed line, with zero gravity or gravity along it."""
     before = structure.before(j)
     return (
         structure.gravity_along(j)
@@ -325,7 +334,7 @@ def _on_line(structure: Structure, j: int) -> bool:
 
 
 def _about_resting_point(structure: Structure, j: int) -> Iterator[Removal]:
-    """Without gravity the moments about a point at rest on axis j have no effect."""
+    """Eliminate MX and MY about a fixed point on axis j, which have no effect without gravity."""
     height = resting_height(structure, j)
     if height is None:
         return
@@ -336,7 +345,7 @@ def _about_resting_point(structure: Structure, j: int) -> Iterator[Removal]:
 
 
 def _prismatic(structure: Structure, j: int) -> Iterator[Removal]:
-    """Behind a prismatic joint moments count only where something before it turns."""
+    """Apply the rules of prismatic joints: first moments need a preceding joint that rotates."""
     before = structure.before(j)
     turning = structure.turning(before)
     if structure.rests(before):
@@ -352,10 +361,10 @@ def _prismatic(structure: Structure, j: int) -> Iterator[Removal]:
 
 
 def _moments_across(structure: Structure, first: int, j: int) -> Removal:
-    """Moments along the only direction of turning have no effect.
+    """Eliminate the first moment along the only direction of rotation, which has no effect.
 
-    With (ax, ay, az) that direction in frame j: ax MX + ay MY + az MZ is the moment that leaves,
-    by its last parameter whose factor is zero for no value of the symbols.
+    If (ax, ay, az) is this direction in frame j, it is ax MX + ay MY + az MZ. The eliminated
+    parameter is the last one whose factor is nonzero for all samples.
     """
     axis = structure.seen_from_link(first, j).R[:, 2]
     sizes = np.abs(structure.axes_in(first, j))
@@ -367,13 +376,13 @@ def _moments_across(structure: Structure, first: int, j: int) -> Removal:
 
 
 def _spherical(structure: Structure, j: int) -> Iterator[Removal]:
-    """Without gravity the moments about a centre at rest have no effect."""
+    """Eliminate the first moments about a fixed centre, which have no effect without gravity."""
     if structure.weightless and structure.point_rests(j, structure.origins[:, j]):
         yield from _nothing(j, _MOMENTS)
 
 
 def _rotor(structure: Structure, j: int) -> Iterator[Removal]:
-    """The rotor of a joint, where it has the effect of some parameters of the link."""
+    """Eliminate the rotor inertia of a joint if parameters of the link have the same effect."""
     effects, rotor = _rotor_effects(structure, j), structure.tree.links[j].rotor
     if effects is not None:
         yield Removal((j, "Ia"), effects)
@@ -384,7 +393,7 @@ def _rotor(structure: Structure, j: int) -> Iterator[Removal]:
 
 
 def _rotor_effects(structure: Structure, j: int) -> Effects | None:
-    """What has the effect of Ia; None when nothing has."""
+    """Return the parameters with the same effect as Ia; None if there are none."""
     link = structure.tree.links[j]
     match link.motion:
         case Motion.REVOLUTE if _turns_alone(structure, j):
@@ -405,7 +414,7 @@ def _turns_alone(structure: Structure, j: int) -> bool:
 
 
 def _slides_alone(structure: Structure, j: int) -> bool:
-    """Whether the velocity of link j along its axis is that of its joint, and weighs nothing."""
+    """Whether the velocity of link j along its axis is that of its joint, and gravity is across."""
     before = structure.before(j)
     return (
         structure.gravity_across(j)
@@ -416,7 +425,7 @@ def _slides_alone(structure: Structure, j: int) -> bool:
 
 
 def _mass_before(link: Link) -> dict[Key, SX]:
-    """A mass at the origin of frame j that is fixed on link i, taken away."""
+    """Return minus the parameters of a unit mass at the origin of frame j, fixed to link i."""
     if link.antecedent < 0:
         return {}
     through = lambda_transform(link.pose())
@@ -428,7 +437,7 @@ def _column(through: SX, name: str) -> SX:
 
 
 def on_link(link: int, column: SX) -> dict[Key, SX]:
-    """The parameters (10, 1) of a body fixed on a link, those that are zero left out."""
+    """Map the nonzero parameters (10, 1) of a body fixed to a link to parameter keys."""
     pairs = zip(TEN_PARAMETERS, elements(column), strict=True)
     return {(link, name): x for name, x in pairs if not x.is_zero()}
 

@@ -1,4 +1,4 @@
-"""The inverse geometric models of the menu: closed forms, and the general method."""
+"""Inverse geometric models of the catalogue: closed forms and the general method."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mbs.models.catalogue.entry import NOTHING, TARGET, Chosen, Entry, Values, s
 from mbs.models.geometry import terminal_frame
 
 SIX = 6
-"""Freedoms of a pose."""
+"""Number of degrees of freedom of a pose."""
 
 _INSTEAD = (
     "Configurations are found by closed form where there is one, else by search from random starts;"
@@ -25,16 +25,16 @@ Frame = str | int
 
 
 def moving_joints(system: System, frame: Frame) -> tuple[str, ...]:
-    """The joints between the base and a frame; none where one of them is a ball or free."""
+    """Return the names of the joints between base and frame; () if one is spherical or free."""
     links = [system.tree.links[k] for k in system.tree.path(system.frame(frame)[0])]
     simple = all(link.motion in (Motion.REVOLUTE, Motion.PRISMATIC) for link in links)
     return tuple(link.name for link in links) if simple else ()
 
 
 def surplus_joints(system: System, frame: Frame) -> tuple[str, ...]:
-    """The joints that are locked, when nothing is said, so that a pose determines the others.
+    """Return the joints that are locked by default, so that a pose determines the others.
 
-    They stand before the middle of the chain: an arm of seven joints keeps its elbow.
+    They precede the middle of the chain, so that an arm of seven joints keeps its elbow free.
     """
     names = moving_joints(system, frame)
     surplus = max(0, len(names) - SIX)
@@ -61,7 +61,7 @@ LOCKED = several("locked", "joints that stay as assembled", _joints, _surplus)
 def held_at(
     system: System, names: Sequence[str], q: Sequence[float] | None = None
 ) -> dict[str, float]:
-    """Positions of joints in a configuration, (nq), the assembled one when left out, by name."""
+    """Return joint positions by name from q (nq,), default the assembled configuration."""
     places = zip(system.coordinates, system.configuration if q is None else q, strict=True)
     return {c.name: float(x) for c, x in places if c.name in names}
 
@@ -82,7 +82,7 @@ def _sheet(method: str) -> Callable[..., str]:
 
 
 def _general(system: System, frame: Frame, locked: Sequence[str]) -> str:
-    """What the general method does for this chain, in words."""
+    """Return a text that describes the general method for a chain."""
     names = [name for name in moving_joints(system, frame) if name not in locked]
     title = f"Inverse geometric model of {system.name}, general method: frame {frame!r}"
     if not names:
@@ -101,7 +101,7 @@ def _general(system: System, frame: Frame, locked: Sequence[str]) -> str:
 
 
 def _characteristic(found: Function) -> str:
-    """The equation that the characteristic matrices M0, M1, M2 stand for."""
+    """Return the text of the equation of the characteristic matrices M0, M1, M2."""
     joint, slides = found.joint, found.prismatic  # type: ignore[attr-defined]
     terms = [f"M{k}(T)" for k in range(found.n_out())]
     powers = ["", joint, f"{joint}^2"] if slides else ["", f"cos({joint})", f"sin({joint})"]

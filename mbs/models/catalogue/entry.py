@@ -1,4 +1,4 @@
-"""A model as menus show it, and the choices that it leaves to its user."""
+"""Catalogue entries: models with their titles, options and builder functions."""
 
 from __future__ import annotations
 
@@ -31,23 +31,27 @@ NOTHING: Chosen = MappingProxyType({})
 
 
 class Offer(Protocol):
-    """What an option has in a system, where other options have these values."""
+    """Function that returns the values or the default of an option for a system.
+
+    `chosen` contains the values of other options by name.
+    """
 
     def __call__(self, system: System, chosen: Chosen = NOTHING, /) -> Any:
-        """The values, or the default."""
+        """Return the available values, or the default value."""
 
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """A choice that a model leaves to its user.
+    """Option of a model.
 
     Attributes:
-        name: of the argument of the builder.
-        title: what a form calls it.
-        kind: one frame, one of some values, yes or no, or several values of a list.
-        values: what there is to choose from.
-        default: what is chosen when nothing is said.
-        structures: the mechanisms to which it makes a difference.
+        name: name of the argument of the builder function.
+        title: label in forms.
+        kind: "frame" for one frame, "choice" for one of some values, "flag" for a Boolean, or
+            "several" for several values of a list.
+        values: function that returns the available values.
+        default: function that returns the default value.
+        structures: mechanisms for which the option has an effect: all, open or closed.
     """
 
     name: str
@@ -58,28 +62,28 @@ class Option:
     structures: Structures = "all"
 
     def matters(self, system: System) -> bool:
-        """Whether it makes a difference to this mechanism."""
+        """Whether the option has an effect for this mechanism."""
         return _has(self.structures, system)
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A model as menus show it.
+    """Model in the catalogue, as shown in menus.
 
     Attributes:
         key: short name, such as "idm".
-        menu: where it stands.
+        menu: menu of the model.
         title: full name.
-        symbol: what its formula is, in the signs of the notation.
-        options: what its builders take besides the system.
-        function: builds its casadi.Function; None where it is text or configurations only.
-        text: writes its equations in words of their own; None where they are those of `function`.
-        solver: the method of `inverse_geometry.solve` that it stands for, if any.
-        structures: the mechanisms that have it: all, those without loops, or those with loops.
-        writes: whether it has a Function of a mechanism, where `function` is given.
-        obstacle: says why a mechanism of the right structure does not have it, "" where it does.
-        numeric: builds the casadi.Function of a C library where `function` is a step of it; None
-            where that one serves there too.
+        symbol: formula of the model in the notation of the project.
+        options: options of the builder functions.
+        function: builder of the casadi.Function, or None for text or configurations only.
+        text: writer of the equations, or None if they are printed from `function`.
+        solver: method of `inverse_geometry.solve` for this model, or None.
+        structures: mechanisms with this model: all, open (without loops) or closed (with loops).
+        writes: whether `function` is available for a mechanism.
+        obstacle: reason why a mechanism of the right structure does not have the model, or "".
+        numeric: builder of the casadi.Function for a C library if `function` is only one step of
+            the algorithm, else None.
     """
 
     key: str
@@ -96,11 +100,11 @@ class Entry:
     numeric: Callable[..., Function] | None = None
 
     def applies(self, system: System) -> bool:
-        """Whether the mechanism has the model."""
+        """Whether the model is available for the mechanism."""
         return not self.refusal(system)
 
     def refusal(self, system: System) -> str:
-        """Why the mechanism does not have the model, in a sentence; "" where it does."""
+        """Return the reason why the model is not available for the mechanism, "" if it is."""
         if not _has(self.structures, system):
             kind = "closed loops" if self.structures == "closed" else "no closed loop"
             own = "some" if system.is_closed else "none"
@@ -108,18 +112,18 @@ class Entry:
         return self.obstacle(system)
 
     def has_function(self, system: System) -> bool:
-        """Whether it is a Function of this mechanism, and not text or configurations only."""
+        """Whether a casadi.Function is available, not only text or configurations."""
         return self.function is not None and self.writes(system)
 
     def choices(self, system: System, **given: Any) -> dict[str, Any]:
-        """Values of all options: those that were given, the others by default.
+        """Return the values of all options by name: given values, else default values.
 
         Args:
-            system: the mechanism.
-            **given: by the names of options; None of "several" stands for the default.
+            system: mechanism.
+            **given: values by option name; None selects the default of an option of kind "several".
 
         Raises:
-            ModelError: there is no such option, or the system offers no such value.
+            ModelError: an option is unknown, or a value is not available for the system.
         """
         known = {option.name: option for option in self.options}
         for name in given:
@@ -133,14 +137,15 @@ class Entry:
         return {name: chosen[name] for name in known}
 
     def build(self, system: System, **given: Any) -> Function:
-        """The model's Function for some of its options, the others by default.
+        """Build the casadi.Function of the model.
 
         Args:
-            system: the mechanism.
-            **given: by the names of options.
+            system: mechanism.
+            **given: values of options by name; default values for all others.
 
         Raises:
-            ModelError: the model has no Function, or an option does not fit.
+            ModelError: the model has no Function, an option is unknown, or a value is not
+                available.
         """
         if self.function is None or not self.has_function(system):
             raise ModelError(
@@ -150,7 +155,7 @@ class Entry:
         return self.function(system, **self.choices(system, **given))
 
     def build_numeric(self, system: System, **given: Any) -> Function:
-        """`build` for a C library: of an algorithm the whole of it."""
+        """Build the casadi.Function for a C library, which contains the complete algorithm."""
         if self.numeric is None:
             return self.build(system, **given)
         return self.numeric(system, **self.choices(system, **given))
@@ -178,21 +183,21 @@ def _require_offered(entry: Entry, option: Option, system: System, chosen: Chose
             )
 
 
-# The square part of a frame's Jacobian that one asks for when no rows and columns are named.
+# Default square submatrix of a Jacobian, if no rows and columns are named.
 
 
 Array = NDArray[np.float64]
 Jacobian = tuple[str | int, str | int, str]
-"""Frame, the frame in whose axes V and w are, and coordinates."""
+"""Frame, frame in whose axes V and w are expressed, and coordinates ("independent" or "tree")."""
 
 ROWS = ("Vx", "Vy", "Vz", "wx", "wy", "wz")
 """Names of the rows of [V; w]."""
 
 _CONFIGURATIONS, _SEED = 3, 20260110
 _STEP = 0.1
-"""By how much independent joints leave the assembled configuration [rad or m]."""
+"""Largest random displacement of independent joints from the assembled configuration [rad or m]."""
 _DEPENDENT = 1e-7
-"""Sine of the angle to the others below which a row or column depends on them."""
+"""Smallest singular value of unit rows or columns below which they are linearly dependent."""
 
 
 def regular_part(
@@ -201,23 +206,25 @@ def regular_part(
     rows: Sequence[str] | None = None,
     columns: Sequence[str] | None = None,
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Rows and as many columns that have an inverse where the configuration is not singular.
+    """Select rows and columns of a Jacobian that form an invertible square matrix.
 
-    The first rows of [V; w] that are independent at random configurations, then the first columns
-    that are so in these rows; what is given stays. A frame that moves in a plane gets Vx, Vy and
-    wz; one that a crank alone moves, the first row that it moves.
+    The first rows of [V; w] that are independent at random configurations are selected, then the
+    first columns that are independent in these rows. Given rows or columns are kept. For a frame
+    with planar motion the rows are Vx, Vy and wz. For a frame that is moved by a single crank the
+    row is the first nonzero row.
 
     Args:
-        system: open or closed.
-        of: whose Jacobian.
-        rows: names of rows that are chosen already.
-        columns: names of velocities that are chosen already.
+        system: open or closed system.
+        of: Jacobian: frame, frame of the axes, and coordinates.
+        rows: names of given rows.
+        columns: names of the velocities of given columns.
 
     Returns:
-        names of rows and of columns; not as many of either where the given ones do not allow it.
+        Names of rows and names of columns. Their numbers differ if the given rows or columns do not
+        allow a square matrix.
 
     Raises:
-        ModelError: there is no such frame or coordinate.
+        ModelError: the frame or coordinates are unknown.
     """
     reduced = is_reduced(system, of[2])
     speeds = system.active if reduced else range(system.nv)
@@ -233,14 +240,14 @@ def regular_part(
 
 
 def _values(system: System, of: Jacobian) -> Array:
-    """(configurations, 6, m) the Jacobian at some configurations, lengths by the longest one."""
+    """Return the Jacobian (configurations, 6, m), V scaled to a largest element of 1."""
 
     def find() -> Array:
         frame, axes, coordinates = of
         function = jacobian(system, frame, axes, coordinates=coordinates)
         every = list[Array]()
         for state in _states(system):
-            with suppress(LoopError):  # singular there; the other configurations tell enough
+            with suppress(LoopError):  # singular there; the other configurations are sufficient
                 every.append(np.array(function(*state)))
         J = np.array(every).reshape(len(every), 6, function.size2_out(0))
         J[:, :3] /= float(np.abs(J[:, :3]).max(initial=0.0)) or 1.0
@@ -251,7 +258,7 @@ def _values(system: System, of: Jacobian) -> Array:
 
 
 def _states(system: System) -> Iterator[tuple[Array, ...]]:
-    """Positions, and parameters where there are some, as the inputs of a Function."""
+    """Yield inputs of a Function: positions, and parameters if the system has any."""
     if not system.is_closed:
         for q, p in random_samples(system.tree, len(system.parameters)):
             yield (q, p) if system.parameters else (q,)
@@ -262,7 +269,7 @@ def _states(system: System) -> Iterator[tuple[Array, ...]]:
 
 
 def _closed_configurations(system: System) -> Iterator[Array]:
-    """The assembled configuration, and others near it as far as the loops close there."""
+    """Yield the assembled configuration, and random configurations nearby with closed loops."""
     yield np.array(system.configuration)
     rng = np.random.default_rng(_SEED)
     names = [system.speeds[k].name for k in system.free]
@@ -270,12 +277,12 @@ def _closed_configurations(system: System) -> Iterator[Array]:
     own = [name for name in names if name in places]
     for _ in range(_CONFIGURATIONS):
         moved = {name: places[name] + rng.uniform(-_STEP, _STEP) for name in own}
-        with suppress(LoopError):  # it does not reach so far
+        with suppress(LoopError):  # the loops cannot be closed there
             yield solve(system, moved)
 
 
 def _independent(matrices: Array, most: int) -> list[int]:
-    """Numbers of the first rows of (samples, rows, columns) that are independent somewhere."""
+    """Return indices of the first rows (samples, rows, columns) independent in any sample."""
     kept = list[int]()
     for row in range(matrices.shape[1]):
         trial = [*kept, row]
@@ -292,7 +299,7 @@ def _is_regular(rows: Array) -> bool:
     return len(sines) == len(rows) and bool(sines[-1] > _DEPENDENT)
 
 
-# The options that several models share.
+# Options of several models.
 
 
 def _constant(value: object) -> Offer:
@@ -333,22 +340,22 @@ def _part(system: System, chosen: Chosen) -> tuple[tuple[str, ...], tuple[str, .
 
 
 def one_frame(name: str, title: str, default: Offer) -> Option:
-    """One frame of the system: the number of a link, 0 for the base, or a name."""
+    """Return an option for one frame: index of a link, 0 for the base, or a name."""
     return Option(name, title, "frame", _frames, default)
 
 
 def choice(name: str, title: str, *values: str) -> Option:
-    """One of some texts, the first when nothing is said."""
+    """Return an option for one of several texts; the first is the default."""
     return Option(name, title, "choice", _constant(values), _constant(values[0]))
 
 
 def flag(name: str, title: str) -> Option:
-    """Yes or no, no when nothing is said."""
+    """Return a Boolean option with default False."""
     return Option(name, title, "flag", _constant((False, True)), _constant(False))
 
 
 def several(name: str, title: str, values: Offer, default: Offer) -> Option:
-    """Several values of a list."""
+    """Return an option for several values of a list."""
     return Option(name, title, "several", values, default)
 
 

@@ -11,7 +11,7 @@ from mbs.models.geometry import direct_geometry, transform
 
 
 def _without_closed_form(system: System) -> str:
-    """Why the loops give no explicit equations, "" where they do or there are none."""
+    """Return the reason why the loops have no closed form, "" if they do or for open systems."""
     if not system.is_closed:
         return ""
     try:

@@ -1,4 +1,4 @@
-"""Inverse geometric models: the configurations that take a frame of a robot to a pose."""
+"""Inverse geometric models: configurations of a robot for given poses of a frame."""
 
 from mbs.closed_forms.arm_search import Nearest
 from mbs.models.inverse_geometry.closed_form import InverseGeometry, function

@@ -1,4 +1,4 @@
-"""From the roots of a chain to the solutions of a robot: branches, loops, reasons."""
+"""Conversion of the roots of a serial chain to the solutions of the robot."""
 
 from __future__ import annotations
 
@@ -28,30 +28,29 @@ from mbs.models.inverse_geometry.target import (
 )
 from mbs.models.inverse_geometry.whole_robot import ClosedConfiguration, close, why_searched
 
-# The distinct solutions of a pose, how often each counts, and the self-motions among them.
+# Distinct solutions of a pose, with their multiplicities and self-motions.
 
 
 _REFINEMENTS = 8
 _SETTLED = 1e-7
-"""Move [rad or arm lengths] below which the middle of meeting roots stays: rounding moves a double
-root by the root of 1e-16, 1e-8."""
+"""Move [rad or arm lengths] below which the centre of a multiple root has converged. Rounding moves
+a double root by 1e-8, the square root of 1e-16."""
 _ONE_ROOT = 1e-6
-"""Distance [rad or arm lengths] from the middle of meeting roots up to which they count as one; a
-solution that is farther from it stands for itself, however little the forward model tells it
-from its neighbour."""
+"""Distance [rad or arm lengths] from a known root below which a solution is a copy of the root. At
+a larger distance it is another root, however small the difference of their poses."""
 _EXACT = 0.06
-"""Part of the tolerance of solutions, 2e-14 of the length, that rounding leaves: a singular root at
-which no others meet, and that misses by more, is not certain to be isolated."""
+"""Rounding error as a fraction of the tolerance of solutions (6e-14 of the length). A singular root
+of multiplicity 1 with a larger residual is not certain to be isolated."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChainIndices:
-    """Where a chain stands in its system.
+    """Position of a chain in its system.
 
     Attributes:
-        indices: numbers of its joints in q.
-        whole: the configuration (nq,) of the system for one of the chain, (n,); NaN where there is
-            none.
+        indices: indices of the joints of the chain in q.
+        whole: function from a configuration of the chain (n,) to the configuration of the system
+            (nq,); NaN if the loops cannot be closed.
     """
 
     indices: tuple[int, ...]
@@ -59,19 +58,22 @@ class ChainIndices:
 
 
 Examined = dict[bytes, tuple[ChainRoot, bool]]
-"""What was found of singular solutions, by their configurations."""
+"""Cache: bytes of a singular configuration -> (examined root, whether the result is certain)."""
 
 
 def roots(
     target: Target, gathered: Gathered, chain: ChainIndices, examined: Examined | None = None
 ) -> list[ChainRoot]:
-    """The distinct solutions, in the order in which they were gathered.
+    """Merge copies of solutions and determine multiplicities and self-motions.
 
     Args:
-        target: the target pose.
-        gathered: solutions, some of them more than once.
-        chain: its joints in the system.
-        examined: what is known of them, and what becomes known.
+        target: target pose of the arm.
+        gathered: solutions, possibly with copies. Their order is kept.
+        chain: position of the arm's joints in the system.
+        examined: cache of examined singular solutions, extended in place.
+
+    Returns:
+        Distinct solutions. A self-motion is represented by one of its configurations.
     """
     known = {} if examined is None else examined
     found = _merge(target, gathered)
@@ -110,10 +112,10 @@ def roots(
 
 
 def _without_points(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
-    """Without the solutions that are configurations of a self-motion among them.
+    """Drop the isolated solutions that lie on a self-motion in the list.
 
-    Whether a solution is found to be one of a self-motion, or of its own, rounding decides where
-    the self-motion is one but for the tolerance; on which one it lies does not depend on that.
+    If a self-motion holds the pose only within the tolerance, rounding decides whether one of its
+    configurations is first classified as isolated. The test here does not depend on that.
     """
     alone = [m for m, root in enumerate(found) if root.family is None]
     points = set[int]()
@@ -124,12 +126,12 @@ def _without_points(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
 
 
 def new_among(target: Target, found: list[ChainRoot], more: Gathered) -> Gathered:
-    """What was gathered besides without copies of known solutions and points of self-motions.
+    """Return the solutions that are no copies of known roots and on no known self-motion.
 
     Args:
-        target: the target pose.
-        found: the known solutions.
-        more: solutions.
+        target: target pose of the arm.
+        found: known roots.
+        more: further solutions.
     """
     known = np.zeros(len(more.q), dtype=bool)
     for root in found:
@@ -147,7 +149,7 @@ def _merge(target: Target, gathered: Gathered) -> list[ChainRoot]:
     residual = target.residual(gathered.q) if len(gathered.q) else np.zeros(0)
     found = []
     for group in distinct(target, gathered.q, gathered.labels):
-        # a branch of a closed form first, then the better one
+        # prefer a branch of a closed form, then the smaller residual
         best = min(group, key=lambda k: (not gathered.labels[k], float(residual[k])))
         label = next((gathered.labels[k] for k in group if gathered.labels[k]), "")
         branches = frozenset(gathered.labels[k] for k in group) - {""}
@@ -159,13 +161,13 @@ def _merge(target: Target, gathered: Gathered) -> list[ChainRoot]:
 
 
 def _singular(target: Target, found: list[ChainRoot]) -> NDArray[np.bool_]:
-    """Whether the Jacobian of each loses rank."""
+    """Return (m,) whether the Jacobian is rank-deficient at each of the m roots."""
     q = np.array([root.q for root in found]).reshape(len(found), target.arm.size)
     return np.asarray(target.singular_values(q)[:, -1] < SINGULAR)
 
 
 def _examine(target: Target, root: ChainRoot, chain: ChainIndices) -> tuple[ChainRoot, bool]:
-    """With its multiplicity or its self-motion, and whether that is certain."""
+    """Return a singular root with its multiplicity or self-motion, and whether it is certain."""
     dimension, direction = freedoms(reduction(target, root.q))
     found = curve(target, root.q, direction, dimension) if dimension else None
     if found is None:
@@ -175,9 +177,9 @@ def _examine(target: Target, root: ChainRoot, chain: ChainIndices) -> tuple[Chai
 
 
 def _nearly_moving(target: Target, root: ChainRoot, chain: ChainIndices) -> ChainRoot | None:
-    """With the self-motion along which the pose is held within the tolerance of solutions.
+    """Return the root with a self-motion that holds the pose within the tolerance, or None.
 
-    It is one of rounding: no configuration on it can be told to be better than the others.
+    Residuals on such a self-motion are of the size of rounding errors.
     """
     dimension, direction = freedoms(reduction(target, root.q))
     found = curve(target, root.q, direction, dimension, 1.0) if dimension else None
@@ -188,7 +190,7 @@ def _nearly_moving(target: Target, root: ChainRoot, chain: ChainIndices) -> Chai
 
 
 def _isolate(target: Target, root: ChainRoot) -> tuple[ChainRoot, bool]:
-    """With its multiplicity, moved to where its roots meet, and whether it stays there."""
+    """Return the root at the centre of its cluster with its multiplicity, and whether certain."""
     q, count = root.q, 1
     for _ in range(_REFINEMENTS):
         count, better, exact = multiplicity(reduction(target, q))
@@ -203,7 +205,7 @@ def _isolate(target: Target, root: ChainRoot) -> tuple[ChainRoot, bool]:
 
 
 def _on(target: Target, found: list[ChainRoot], k: int, others: list[int]) -> set[int]:
-    """Which of the others are configurations of the self-motion of root k, if it has one."""
+    """Return the indices in `others` of the roots that lie on the self-motion of root k."""
     of = found[k].family
     if of is None or not others:
         return set()
@@ -213,9 +215,9 @@ def _on(target: Target, found: list[ChainRoot], k: int, others: list[int]) -> se
 
 
 def _merged_again(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
-    """Without the copies of a multiple root that were moved to its middle.
+    """Merge the copies of a multiple root that were moved to its centre.
 
-    Of a closed form as many roots meet as branches do, at most; a branch has no other root.
+    The multiplicity is at most the number of branches of a closed form that meet in the root.
     """
     q = np.array([root.q for root in found]).reshape(len(found), target.arm.size)
     closed_form = any(root.branches for root in found)
@@ -230,7 +232,7 @@ def _merged_again(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
     return result
 
 
-# From the solutions of a chain to those of the robot: names of branches, loops, reasons.
+# From chain solutions to robot solutions: branch names, loop closure, error reasons.
 
 
 NO_LOOP = "the loops stay open: the joints on the way to the frame reach the pose, the others not"
@@ -238,13 +240,13 @@ NO_LOOP = "the loops stay open: the joints on the way to the frame reach the pos
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Question:
-    """A pose of a frame at the end of a chain.
+    """Inverse geometric problem: target pose of the end frame of a chain.
 
     Attributes:
-        chain: that is solved for.
-        target: its target pose.
-        p: (np,) parameters.
-        wishes: what the user asks for beside the pose.
+        chain: chain of joints that is solved for.
+        target: arm of the chain and its target pose.
+        p: (np,) parameter values.
+        wishes: options of the user in addition to the pose (limits, seed).
     """
 
     chain: FrameChain
@@ -254,16 +256,16 @@ class Question:
 
     @property
     def chain_indices(self) -> ChainIndices:
-        """Where the chain stands in the robot."""
+        """Position of the chain in the robot."""
         return ChainIndices(self.chain.indices, self.whole)
 
     def whole(self, q: Array) -> Array:
-        """(nq,) configuration of the robot for that of its chain, (n,); NaN if loops stay open."""
+        """Return a robot configuration (nq,) for chain positions q (n,), NaN if loops stay open."""
         configurations = self.closed(q)
         return configurations[0].q if configurations else np.full(self.chain.system.nq, np.nan)
 
     def closed(self, q: Array) -> list[ClosedConfiguration]:
-        """Configurations of the robot for that of its chain, (n,): several where loops allow."""
+        """Return all robot configurations for chain positions q (n,), one per loop branch."""
         near = self.wishes.near
         if self.chain.system.is_closed:
             return close(self.chain.system, self.chain, q[None, :], self.p, near)
@@ -273,12 +275,12 @@ class Question:
 
 
 def answer(question: Question, found: list[ChainRoot], method: str) -> Solutions:
-    """The solutions of the robot, or why there is none.
+    """Return the solutions of the robot, or the reason if there is none.
 
     Args:
-        question: what was asked for.
-        found: the solutions of the chain, named.
-        method: that gave them.
+        question: inverse geometric problem.
+        found: solutions of the chain with branch names.
+        method: name of the method that computed them.
     """
     if not found:
         closest = nearest(question.target.arm, question.target.T)
@@ -291,7 +293,7 @@ def answer(question: Question, found: list[ChainRoot], method: str) -> Solutions
 
 
 def _drafts(question: Question, found: list[ChainRoot]) -> list[RobotSolution]:
-    """The solutions of the robot: several for one of the chain where its loops allow."""
+    """Return the solutions of the robot, one per chain solution and loop branch."""
     target = question.target
     q = np.array([root.q for root in found])
     residual, sigma = target.residual(q), target.singular_values(q)[:, -1]
@@ -313,13 +315,13 @@ def _drafts(question: Question, found: list[ChainRoot]) -> list[RobotSolution]:
 def named(
     question: Question, found: list[ChainRoot], branches: tuple[str, ...] = ()
 ) -> list[ChainRoot]:
-    """With the names of branches, else numbers; what proves to be one self-motion stands once.
+    """Return the roots with branch names or numbers, without repeated self-motions.
 
     Args:
-        question: what was asked for.
-        found: the solutions of the chain, some with the signs of the closed form.
-        branches: the names of all branches of the closed form, where there is one; others are
-            those of shoulder, elbow and wrist.
+        question: inverse geometric problem.
+        found: solutions of the chain; labels contain the signs of the closed form, if any.
+        branches: names of all branches of the closed form, empty without one. Other roots are
+            named by shoulder, elbow and wrist.
     """
     found = _shown(question, found)
     chain, arm = question.chain, question.target.arm
@@ -327,7 +329,7 @@ def named(
     has: Anatomy = chain.system.cached(key, lambda: anatomy(arm))
     meeting = np.array([root.multiplicity != 1 for root in found], dtype=bool)
     names = labels(arm, has, np.array([root.q for root in found]).reshape(-1, arm.size), meeting)
-    # a branch that has but signs keeps them; signs name nothing where branches have other names
+    # keep the closed-form label if it is a branch name, or if no other name exists
     names = [
         root.label if root.label in branches or not (name or branches) else name
         for name, root in zip(names, found, strict=True)
@@ -342,7 +344,7 @@ def named(
 
 
 def _shown(question: Question, found: list[ChainRoot]) -> list[ChainRoot]:
-    """With the configurations that stand for self-motions; what proves to be one stands once."""
+    """Move each self-motion to its representative configuration and drop repeated ones."""
     shown = list[ChainRoot]()
     for root in found:
         if root.family is None:
@@ -355,21 +357,21 @@ def _shown(question: Question, found: list[ChainRoot]) -> list[ChainRoot]:
 
 
 def _is_same(target: Target, other: ChainRoot, family: Family, q: Array) -> bool:
-    """Whether a root is a self-motion of the same joints through the same configuration q, (n,)."""
+    """Whether `other` is a self-motion of the same joints through the same configuration q (n,)."""
     if other.family is None or other.family.moving != family.moving:
         return False
     return len(distinct(target, np.array([other.q, q]))) == 1
 
 
 _SEEDED = 1e-6
-"""Difference of joints that do not move [rad or arm lengths]: singular solutions are accurate to
-that."""
+"""Largest difference [rad or arm lengths] of joints that do not move in a self-motion: the accuracy
+of singular solutions."""
 
 
 def _representative(question: Question, family: Family) -> Array:
-    """The configuration of a self-motion that is within limits, its free joint near the seed's.
+    """Return the configuration (n,) of a self-motion within limits, nearest to the seed.
 
-    A seed that is one of its configurations stands for it.
+    Nearness is measured at the free joint. A seed on the self-motion and within limits is returned.
     """
     indices, near = list(question.chain.indices), question.wishes.near
     outside = set(question.wishes.bounds.outside(near)) & set(question.chain.names)
@@ -386,10 +388,9 @@ def _representative(question: Question, family: Family) -> Array:
 
 
 def _is_of(question: Question, family: Family, q: Array) -> bool:
-    """Whether a configuration (n,) takes the pose and belongs to a self-motion.
+    """Whether a configuration q (n,) reaches the pose and belongs to a self-motion.
 
-    Of a self-motion with several freedoms one curve is known. Its configurations have the same
-    positions of the joints that do not move.
+    For several freedoms only one curve is known, so the joints that do not move are compared.
     """
     target = question.target
     if not target.residual(q) < target.tolerance:
@@ -402,7 +403,7 @@ def _is_of(question: Question, family: Family, q: Array) -> bool:
 
 
 def _whole(question: Question, found: Nearest) -> Nearest:
-    """The nearest pose with the configuration of the whole robot; NaN where its loops stay open."""
+    """Complete the nearest pose with the robot configuration (nq,), NaN if loops stay open."""
     whole = question.whole(found.q)
     if not np.all(np.isfinite(whole)):
         return replace(found, q=whole)

@@ -12,32 +12,32 @@ from mbs.closed_forms.sequence import StepSequence
 from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.closed_form import at_poses, plain_branches
 
-# Names of the branches of an arm with a spherical wrist: shoulder, elbow, wrist.
+# Branch names of an arm with a spherical wrist: shoulder, elbow, wrist.
 #
 # Source: Lee & Ziegler 1984, definitions of the arm, elbow and wrist indicators.
 
 
 _PARALLEL = 1e-9
-"""Sine or cosine between axes, or part of the arm's length, that counts as zero: products of six
-transforms leave 1e-15 of rounding, descriptions with twelve digits 1e-12."""
+"""Sine or cosine between axes, or fraction of the arm length, that counts as zero. Products of six
+transforms have rounding errors of 1e-15, model data with twelve digits 1e-12."""
 _UNDECIDED = 1e-9
-"""Indicator of a branch, lengths in those of the arm, at which two branches meet: its sign is
-rounding there and names neither."""
+"""Largest indicator of a branch (lengths divided by the arm length) at which two branches meet. The
+sign of the indicator is due to rounding there, so no name is used."""
 _MEETING = 1e-5
-"""The same where roots meet: rounding of a pose by 2e-14 moves a double root by 2e-7, and solutions
-up to 1e-6 apart are one."""
+"""Largest indicator at a multiple root at which branches meet. Rounding of a pose by 2e-14 moves a
+double root by 2e-7, and solutions up to 1e-6 apart are one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Anatomy:
-    """Which branches of an arm have a name.
+    """Parts of an arm that distinguish named branches.
 
     Attributes:
-        shoulder: axes 1 and 2 are at right angles, so that the wrist centre is before or behind
-            the shoulder.
-        elbow: axes 2 and 3 are parallel, so that the elbow is above or below the line from the
-            shoulder to the wrist centre.
-        wrist: axes 4, 5 and 6 meet.
+        shoulder: whether axes 1 and 2 are perpendicular, so that the wrist centre is to the right
+            or left of the shoulder.
+        elbow: whether axes 2 and 3 are parallel, so that the elbow is above or below the line from
+            the shoulder to the wrist centre.
+        wrist: whether axes 4, 5 and 6 intersect in one point.
     """
 
     shoulder: bool
@@ -46,7 +46,7 @@ class Anatomy:
 
 
 def anatomy(arm: Arm) -> Anatomy:
-    """What an arm has of shoulder, elbow and wrist."""
+    """Return whether an arm has a shoulder, an elbow and a spherical wrist."""
     if arm.size != 6 or any(arm.prismatic[3:]) or not _wrist_meets(arm):
         return Anatomy(False, False, False)
     axes, origins = arm.lines(np.zeros(6))
@@ -58,16 +58,16 @@ def anatomy(arm: Arm) -> Anatomy:
 
 
 def labels(arm: Arm, has: Anatomy, q: Array, meeting: NDArray[np.bool_] | None = None) -> list[str]:
-    """The names of configurations' branches, such as "shoulder right, elbow up, no flip".
+    """Return branch names of configurations, such as "shoulder right, elbow up, no flip".
 
-    A name is left out where the configuration stands between two branches; an arm without a
-    spherical wrist has none.
+    A part of the name is omitted at the boundary of two branches. For an arm without a spherical
+    wrist all names are empty.
 
     Args:
-        arm: its joints.
-        has: what it has of shoulder, elbow and wrist.
+        arm: numeric geometry of the chain.
+        has: named parts of the arm (shoulder, elbow, wrist).
         q: (m, n) configurations [rad or m].
-        meeting: (m,) whether roots meet in each, none of them by default.
+        meeting: (m,) whether each configuration is a multiple root; default is False.
     """
     if not has.wrist:
         return [""] * len(q)
@@ -102,8 +102,8 @@ def _elbow(bend: float, right: float, zero: float) -> str:
 
 
 def _wrist_meets(arm: Arm) -> bool:
-    """Whether axes 4, 5, 6 meet in one point; they do so in every configuration if in two."""
-    # any two [rad or m], at neither of which an axis is at zero or a half turn
+    """Whether axes 4, 5, 6 intersect in one point: always if they do at two configurations."""
+    # two generic configurations [rad or m], without joints at zero or half a revolution
     return all(_meet(arm, q) for q in (np.full(6, 0.3), np.full(6, 1.1)))
 
 
@@ -117,7 +117,7 @@ def _meet(arm: Arm, q: Array) -> bool:
 
 
 def _meeting(a: Array, p: Array, b: Array, r: Array) -> Array:
-    """The point of the line (p, a) nearest the line (r, b), (..., 3)."""
+    """Return the point (..., 3) of the line (p, a) nearest to the line (r, b)."""
     n = np.cross(a, b)
     s = _dot(np.cross(r - p, b), n) / _dot(n, n)
     return np.asarray(p + s[..., None] * a, dtype=float)
@@ -127,25 +127,25 @@ def _dot(a: Array, b: Array) -> Array:
     return np.asarray(np.sum(a * b, axis=-1), dtype=float)
 
 
-# Names of the branches of a closed form: those of shoulder, elbow and wrist where these are one to
-# one, else its signs.
+# Branch names of a closed form: shoulder, elbow and wrist if they are one to one, else its signs.
 
 
 _SAMPLES, _SEED = 1000, 20261123
-"""Configurations at which branches are named: of eight branches each is met, and one whose name
-changes from place to place is met under both names."""
+"""Number of random configurations at which branches are named: enough to meet each of eight
+branches, and to meet a branch with a varying name under both names."""
 
 
 def branch_labels(chain: FrameChain, sequence: StepSequence, p: Array) -> tuple[str, ...]:
-    """The names of all branches of a closed form; kept on the system.
+    """Return the names of all branches of a closed form, cached on the system.
 
-    They are those of shoulder, elbow and wrist where every branch has one of its own wherever the
-    arm is, else the signs, such as "q3:+ q2:- q5:+"; with joints at positions that vary the signs.
+    Names of shoulder, elbow and wrist are used if each branch has a unique name at all
+    configurations. Otherwise, and for chains with varied joints, names are signs such as
+    "q3:+ q2:- q5:+".
 
     Args:
-        chain: what is solved for.
-        sequence: its steps, for the same p.
-        p: (np,) the parameters.
+        chain: chain that is solved for.
+        sequence: closed form of the chain, for the same p.
+        p: (np,) parameter values.
     """
     signs = tuple(sequence.label(b) or "1" for b in range(sequence.branches))
 
@@ -168,12 +168,12 @@ def branch_labels(chain: FrameChain, sequence: StepSequence, p: Array) -> tuple[
 def _names_at_samples(
     chain: FrameChain, sequence: StepSequence, p: Array, arm: Arm, has: Anatomy
 ) -> list[str]:
-    """The name that each branch has at all samples; "" where it has none, or several."""
+    """Return the name of each branch at all samples, "" if it has no unique name."""
     rng = np.random.default_rng(_SEED)
     spread = np.where(arm.prismatic, arm.length, np.pi)
     T = arm.pose(rng.uniform(-1.0, 1.0, (_SAMPLES, arm.size)) * spread)
     every = at_poses(plain_branches(chain, sequence, p), T)
-    # solutions, but for what rounding leaves of them
+    # solutions up to rounding errors
     solved = every.residual < _UNDECIDED * max(1.0, arm.length)
     names = []
     for b in range(sequence.branches):

@@ -1,4 +1,4 @@
-"""The joints between the base and a frame: what the inverse geometric model solves for."""
+"""Chain of joints from the base to a frame, for which the inverse geometric model is solved."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ from mbs.text import did_you_mean, quoted
 _SAMPLES, _SEED = 4, 20260105
 _LARGEST = 6
 _KEPT = 1024
-"""Chains and arms kept, one for every position of a locked joint."""
+"""Maximum number of cached chains and arms: one per position of locked joints."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameChain:
-    """The chain from the base of a system to a frame.
+    """Chain from the base of a system to a frame.
 
     Attributes:
-        system: whose chain it is.
-        frame: at its end.
-        chain: free joints, each with its index in q, and what is between them, of parameters p;
-            locked joints are in the gaps.
-        locked: positions of the other joints on the path by name [rad or m].
-        varied: further locked joints, whose positions are symbols.
-        symbols: (k, 1) these symbols [rad or m].
+        system: system of the chain.
+        frame: name or link index of the frame at the end.
+        chain: free joints with their indices in q, and the transforms between them as expressions
+            of the parameters. The transforms include locked joints.
+        locked: positions of locked joints on the path, by name [rad or m].
+        varied: names of locked joints whose positions are symbols.
+        symbols: (k, 1) symbolic positions of the varied joints [rad or m].
     """
 
     system: System
@@ -54,32 +54,32 @@ class FrameChain:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the free joints, from the base on."""
+        """Names of the free joints, from the base on."""
         return tuple(joint.name for joint in self.chain.joints)
 
     @property
     def indices(self) -> tuple[int, ...]:
-        """Their indices in q."""
+        """Indices of the free joints in q."""
         return tuple(joint.index for joint in self.chain.joints if joint.index is not None)
 
     @property
     def prismatic(self) -> tuple[bool, ...]:
-        """Whether each is prismatic."""
+        """Whether each free joint is prismatic."""
         return tuple(not joint.is_rotational for joint in self.chain.joints)
 
     @property
     def key(self) -> tuple[object, ...]:
-        """What tells chains of one system apart."""
+        """Cache key of the chain within its system."""
         return self.frame, tuple(self.locked.items()), self.varied
 
     @property
     def varied_indices(self) -> tuple[int, ...]:
-        """The indices in q of the joints whose positions are symbols."""
+        """Indices in q of the varied joints."""
         starts = {link.name: link.q.start for link in self.system.tree.links}
         return tuple(starts[name] for name in self.varied)
 
     def arm(self, p: NDArray[np.float64]) -> Arm:
-        """The chain in numbers for parameters p, (np,); kept on the system."""
+        """Return the numeric geometry of the chain for parameters p (np,), cached on the system."""
         key = (*self.key, p.tobytes())
         arm: Arm = self.system.recent(
             "arm", key, lambda: arm_of(self.chain, self.system.p, p), _KEPT
@@ -87,7 +87,7 @@ class FrameChain:
         return arm
 
     def gaps(self, p: NDArray[np.float64], r: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(N, n + 1, 4, 4) what is between the joints, for N positions r (N, k) of the varied."""
+        """Return the transforms (N, n + 1, 4, 4) between joints at varied positions r (N, k)."""
         free = frame_chain(self.system, self.frame, self.locked, most=len(self.system.tree.links))
         arm = free.arm(p)
         gaps = [np.broadcast_to(arm.gaps[0], (len(r), 4, 4))]
@@ -100,12 +100,12 @@ class FrameChain:
         return np.stack(gaps, axis=1)
 
     def locked_at(self, r: NDArray[np.float64]) -> FrameChain:
-        """The chain with the varied joints locked at positions r, (k,) [rad or m]."""
+        """Return the chain with the varied joints locked at positions r (k,) [rad or m]."""
         values = dict(zip(self.varied, r.tolist(), strict=True))
         return frame_chain(self.system, self.frame, {**self.locked, **values})
 
     def at(self, p: NDArray[np.float64] | None = None) -> Chain:
-        """The chain with numbers p, (np,), in the place of the parameters, where they are given."""
+        """Return the symbolic chain, with parameter values p (np,) substituted if given."""
         if p is None:
             return self.chain
         symbols, numbers = self.system.p, SX(DM(p))
@@ -117,14 +117,14 @@ class FrameChain:
         return Chain(self.chain.joints, tuple(Gap(pose) for pose in poses))
 
     def problem(self, p: NDArray[np.float64] | None = None) -> Problem:
-        """The loop that the target pose closes.
+        """Return the loop equations of the chain that is closed by a symbolic target pose T.
 
         Args:
-            p: (np,) numbers in the place of the parameters; symbols stay symbols when left out.
+            p: (np,) parameter values; symbolic parameters if None.
 
         Returns:
-            Problem whose `given` is the parameters, where they are symbols, the positions of the
-            varied joints, then the first three rows of the pose T, column by column.
+            Problem. Its `given` contains the parameters if they are symbolic, the positions of the
+            varied joints, and rows 1 to 3 of T, column by column.
         """
         n, symbols = len(self.names), self.system.p if p is None else SX(0, 1)
         symbols = casadi.vertcat(symbols, self.symbols)
@@ -148,11 +148,11 @@ class FrameChain:
         samples = []
         for _ in range(_SAMPLES):
             own = rng.uniform(*PARAMETERS, self.system.p.numel()) if p is None else p
-            # slides of about a metre and never near zero, where axes might meet
+            # prismatic positions of about 1 m and never near zero, where axes could intersect
             q = np.where(self.prismatic, rng.uniform(0.2, 1.2, len(self.names)), 0.0)
             turns = rng.uniform(-np.pi, np.pi, len(self.names))
             q = np.where(self.prismatic, q, turns)
-            # the same numbers serve a varied turn and a varied slide
+            # the range is suitable for varied revolute and prismatic joints
             r = rng.uniform(0.2, 1.2, len(self.varied))
             symbols = casadi.vertcat(self.system.p, self.symbols)
             plain = p is not None and not self.varied
@@ -169,18 +169,18 @@ def frame_chain(
     varied: tuple[str, ...] = (),
     most: int = _LARGEST,
 ) -> FrameChain:
-    """The joints from the base to a frame; kept on the system.
+    """Return the chain of joints from the base to a frame, cached on the system.
 
     Args:
-        system: open or closed; of a closed one the joints of its tree.
-        frame: a body, a named frame, the number of a link, or None for the terminal frame.
-        locked: positions of joints that stay where they are, by name [rad or m].
-        varied: joints that are locked too, at positions that stay symbols.
-        most: how many joints may be free.
+        system: open or closed system; of a closed system the joints of the tree are used.
+        frame: name of a body or frame, index of a link, or None for the terminal frame.
+        locked: positions of fixed joints, by name [rad or m].
+        varied: names of joints that are locked at symbolic positions.
+        most: maximum number of free joints.
 
     Raises:
-        ModelError: there is no such frame or joint, a joint of the chain is a ball or free, or
-            none or more than `most` are free to move.
+        ModelError: the frame or a joint is unknown, a joint of the chain is spherical or free, or
+            no joint or more than `most` joints are free.
     """
     require_system(system)
     name = _terminal_frame(system) if frame is None else frame
@@ -214,13 +214,13 @@ def _frame_chain(
     symbols = SX(casadi.vertcat(*(SX.sym(other) for other in varied)))
     q[[starts[other] for other in varied]] = symbols
     chain = tree_chain(system.tree, system.frame("base"), system.frame(name), known, q)
-    poses = (Gap(gap.pose) for gap in chain.gaps)  # a locked joint is no pivot
+    poses = (Gap(gap.pose) for gap in chain.gaps)  # drop the pivots of locked joints
     chain = replace(chain, gaps=tuple(poses))
     return FrameChain(system, name, chain, locked_positions, varied, symbols)
 
 
 def _locked(system: System, links: list[Link], given: object) -> dict[str, float]:
-    """Positions of the locked joints, in their order from the base on."""
+    """Return the positions of the locked joints by name, in order from the base on."""
     if given is None:
         return {}
     if not isinstance(given, Mapping):
@@ -279,37 +279,37 @@ def _require_few(
 
 
 _PROPOSED = 64
-"""Positions of a redundant joint that a message proposes: every five degrees or so."""
+"""Number of positions of a redundant joint that an error message proposes: one per 5.6 degrees."""
 
 
 def _proposal(free: list[Link], surplus: int) -> list[Link]:
-    """Joints before the middle of the chain.
+    """Return `surplus` joints before the middle of the chain.
 
-    An arm of seven joints keeps its elbow, without which it has one length alone.
+    An arm of seven joints keeps its elbow as a free joint; otherwise its reach would be constant.
     """
     first = (len(free) - surplus - 1) // 2
     return free[first : first + surplus]
 
 
-# Poses as a user gives them: one, or many at once.
+# Validation of poses from the user.
 
 
 __all__ = ["target_pose", "target_poses"]
 
 
 def target_poses(system: System, T: Any) -> NDArray[np.float64]:
-    """The target poses, their orientations exactly orthonormal.
+    """Convert target poses to an array with exactly orthonormal orientations.
 
     Args:
-        system: named in messages.
-        T: (N, 4, 4) homogeneous transforms [m], as one array or a sequence of poses; rounded as
-            `target_pose` does.
+        system: system that is named in error messages.
+        T: (N, 4, 4) homogeneous transforms [m], as one array or a sequence of poses. Each is
+            projected to the nearest rigid transform as in `target_pose`.
 
     Returns:
-        (N, 4, 4) numbers.
+        Poses (N, 4, 4).
 
     Raises:
-        ModelError: one of them is no rigid transform; the message tells which, counted from 0.
+        ModelError: a matrix is no rigid transform; the message gives its index, counted from 0.
     """
     matrices = _stack(system, T)
     if matrices is None or matrices.ndim != 3 or matrices.shape[1:] != (4, 4):
@@ -326,7 +326,7 @@ def target_poses(system: System, T: Any) -> NDArray[np.float64]:
 
 
 def _stack(system: System, T: Any) -> NDArray[np.float64] | None:
-    """The numbers in an array of whatever shape; None where there is more than numbers."""
+    """Convert to an array of any shape; None if an element is not a number."""
     if not isinstance(T, list | tuple):
         return pose_numbers(T)
     parts = list[NDArray[np.float64]]()

@@ -1,4 +1,4 @@
-"""Which closed form solves a chain: Pieper's, Paul's, or the cheaper of both."""
+"""Closed-form inverse geometric models: selection of Pieper's or Paul's method, and Functions."""
 
 from __future__ import annotations
 
@@ -31,31 +31,31 @@ if TYPE_CHECKING:
 
 
 CLOSED_FORMS = ("pieper", "paul")
-"""The methods that give steps, the quicker one first."""
+"""Names of the closed-form methods, the faster derivation first."""
 
 Numbers: TypeAlias = NDArray[np.float64] | None
-"""(np,) values of the parameters; None where they stay symbols."""
+"""Parameter values (np,), or None to keep parameters symbolic."""
 
 _FEW = 8
 
 
 def sequence_of(chain: FrameChain, method: str = "auto", p: Numbers = None) -> StepSequence:
-    """The steps that give the joints of a chain from the pose of its frame.
+    """Return the closed form of a chain: steps from the pose of its frame to the joint positions.
 
-    It is kept on the system: the next call with the same arguments is free.
+    The result is cached on the system.
 
     Args:
-        chain: what is solved for.
-        method: "pieper", "paul", or "auto": Pieper's where it fits without a quartic, else the
-            one with the fewest branches, and of equals the one with the fewest operations.
-        p: (np,) numbers in the place of the parameters; symbols stay symbols when left out.
+        chain: chain that is solved for.
+        method: "pieper", "paul" or "auto". "auto" selects Pieper's method if it applies without a
+            quartic, else the sequence with the fewest branches, then the fewest operations.
+        p: (np,) parameter values; symbolic parameters if None.
 
     Returns:
         StepSequence of the loop `chain.problem(p)`.
 
     Raises:
-        NoClosedForm: the message says what stood in the way of each method.
-        ModelError: there is no such method.
+        NoClosedForm: no method applies; the message gives the reason for each method.
+        ModelError: the method is unknown.
     """
     require_method(chain.system, method, ("auto", *CLOSED_FORMS))
     found, reasons = list[StepSequence](), list[str]()
@@ -77,10 +77,10 @@ def sequence_of(chain: FrameChain, method: str = "auto", p: Numbers = None) -> S
 
 
 def require_method(system: System, method: str, known: tuple[str, ...]) -> None:
-    """Refuse a method that is not known.
+    """Raise if a method is unknown.
 
     Raises:
-        ModelError: the message names those that are.
+        ModelError: the method is unknown; the message suggests a known method.
     """
     if method not in known:
         raise ModelError(
@@ -90,13 +90,16 @@ def require_method(system: System, method: str, known: tuple[str, ...]) -> None:
 
 
 def given_of(chain: FrameChain, T: SX, p: Numbers = None) -> SX:
-    """What a sequence for p, of symbolic parameters where left out, takes for a pose T, (4, 4)."""
+    """Return the input vector of a closed form for pose T (4, 4).
+
+    It contains the parameters if p is None, varied joint positions, and rows 1 to 3 of T by column.
+    """
     parameters = chain.system.p if p is None else SX(0, 1)
     return SX(casadi.vertcat(parameters, chain.symbols, casadi.vec(T[:3, :])))
 
 
 def _keep(chain: FrameChain, method: str, p: Numbers) -> StepSequence | str:
-    """The steps by one method, or why there are none; kept on the system."""
+    """Return the cached closed form by one method, or the reason if there is none."""
 
     def solve() -> StepSequence | str:
         try:
@@ -123,16 +126,16 @@ def _solver(method: str) -> Callable[[Problem], StepSequence]:
 
 
 def _is_short(sequence: StepSequence) -> bool:
-    """Whether no other sequence is worth looking for.
+    """Whether a sequence has at most 8 branches and no quartic, so that no other method is tried.
 
-    A wrist leaves no method fewer branches than Pieper's; Paul's, which takes longer to find its
-    steps, is asked where that one fails or solves quartics.
+    With a spherical wrist no method has fewer branches than Pieper's. Paul's method takes longer
+    to derive, and is tried if Pieper's fails or contains a quartic.
     """
     return sequence.branches <= _FEW and all(one.kind != "quartic" for one in sequence.steps)
 
 
 def _price(chain: FrameChain, sequence: StepSequence, p: Numbers) -> tuple[int, int]:
-    """Number of branches, then of operations for all of them; kept on the system."""
+    """Return (number of branches, cached number of operations of all branches)."""
 
     def counted() -> int:
         given = chain.problem(p).given
@@ -143,14 +146,14 @@ def _price(chain: FrameChain, sequence: StepSequence, p: Numbers) -> tuple[int, 
     return sequence.branches, operations
 
 
-# The characteristic matrix of the general method as a Function of the pose.
+# Characteristic matrix of the general method as a Function of the pose.
 
 
 class CharacteristicFunction(ModelFunction):
-    """``igm_characteristic(T) -> M0, M1, M2``, and the joint whose positions it gives.
+    """Function ``igm_characteristic(T) -> M0, M1, M2`` for one joint with position q.
 
-    M0 + M1 cos q + M2 sin q of a joint that turns, M0 + M1 q + M2 q^2 of one that slides, is
-    singular at every solution for T.
+    The matrix M0 + M1 cos q + M2 sin q of a revolute joint, or M0 + M1 q + M2 q^2 of a prismatic
+    joint, is singular at every solution for the pose T.
     """
 
     def __init__(self, function: Function, system: System, found: Characteristic) -> None:
@@ -159,26 +162,26 @@ class CharacteristicFunction(ModelFunction):
 
     @property
     def joint(self) -> str:
-        """The name of the joint."""
+        """Name of the joint with position q."""
         return self._found.joint
 
     @property
     def prismatic(self) -> bool:
-        """Whether it slides."""
+        """Whether the joint is prismatic."""
         return self._found.prismatic
 
 
 def characteristic_function(chain: FrameChain) -> Function:
-    """The matrices of a chain of six joints.
+    """Return the characteristic matrices of a chain of six joints.
 
     Source: Raghavan & Roth 1993; Manocha & Canny 1994.
 
     Returns:
-        CharacteristicFunction of T (4, 4) [m]; M0, M1, M2 (n, n), M2 missing where the matrix is
-        linear in a joint that slides.
+        CharacteristicFunction of T (4, 4) [m] with outputs M0, M1, M2 (n, n). M2 is missing if the
+        matrix is linear in the position of a prismatic joint.
 
     Raises:
-        NoClosedForm: the chain has not six joints, or the matrix is singular at every
+        NoClosedForm: the number of joints is not six, or the matrix is singular at every
             configuration.
     """
     from mbs.closed_forms.raghavan_roth.expressions import characteristic
@@ -200,48 +203,49 @@ def characteristic_function(chain: FrameChain) -> Function:
     return made
 
 
-# How far configurations are from the target pose: the forward model of a chain on symbols.
+# Pose error of configurations: symbolic forward kinematics of a chain.
 
 
 def forward(chain: FrameChain, x: SX, p: NDArray[np.float64] | None = None) -> Pose:
-    """The pose of the frame for positions x, (n, 1), of the free joints.
+    """Return the symbolic pose of the end frame of a chain in the base.
 
     Args:
-        chain: from the base to the frame.
-        x: positions [rad or m].
-        p: (np,) numbers in the place of the parameters; symbols stay symbols when left out.
+        chain: chain from the base to the frame.
+        x: (n, 1) positions of the free joints [rad or m].
+        p: (np,) parameter values; symbolic parameters if None.
     """
     return transforms(chain.at(p), x)[-1]
 
 
 def residual(pose: Pose, T: SX) -> SX:
-    """The largest difference of an element between a pose and T (4, 4), in m and 1."""
+    """Return the largest absolute difference of elements of a pose and T (4, 4), in m and 1."""
     return relative_residual(pose, T, SX(1))
 
 
 def relative_residual(pose: Pose, T: SX, length: SX) -> SX:
-    """The same with positions in multiples of a length [m]."""
+    """Return the largest difference of elements of a pose and T, positions divided by a length."""
     turned = casadi.vec(pose.R - T[:3, :3])
     return SX(casadi.mmax(casadi.fabs(casadi.vertcat(turned, (pose.p - T[:3, 3]) / length))))
 
 
 def size(chain: FrameChain, p: NDArray[np.float64] | None = None) -> SX:
-    """A length of the chain's size [m], 1 where all its ways are turns alone."""
+    """Return a reference length of the chain: sum of its link lengths [m], or 1 if all are zero."""
     lengths = [casadi.norm_2(gap.p) for gap in chain.at(p).between if not gap.p.is_zero()]
     return SX(sum(lengths, SX(0))) if lengths else SX(1)
 
 
-# The inverse geometric model as a Function of the pose and the number of a branch.
+# Inverse geometric model as a Function of the pose and the index of a branch.
 
 
 METHODS = ("auto", *CLOSED_FORMS, "general")
 
 _ROUNDING = 1e-9
-"""Of radicands, free of units, and of the residual in sizes of the chain."""
+"""Tolerance of rounding errors: of dimensionless radicands, and of the residual relative to the
+size of the chain."""
 
 
 class InverseGeometry(ModelFunction):
-    """A closed form ``igm(T, branch) -> q, valid``, and how its branches and steps are called."""
+    """Closed form ``igm(T, branch) -> q, valid`` with the names of its branches and its steps."""
 
     def __init__(
         self, function: Function, chain: FrameChain, sequence: StepSequence, annotate: Any
@@ -251,17 +255,17 @@ class InverseGeometry(ModelFunction):
 
     @property
     def branches(self) -> int:
-        """How many branches there are: `branch` is 0 .. branches - 1."""
+        """Number of branches: the input `branch` is 0 .. branches - 1."""
         return self._sequence.branches
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The name of every branch, as in the answers of `solve`.
+        """Names of the branches, as in the results of `solve`.
 
-        They are those of shoulder, elbow and wrist of an arm that has them, else `signs`; with
-        symbols among its lengths, on which names may depend, always `signs`.
+        The names describe shoulder, elbow and wrist if the arm has them. Otherwise, and for
+        symbolic parameters, on which names may depend, they are `signs`.
         """
-        from mbs.models.inverse_geometry.branches import branch_labels  # which samples branches
+        from mbs.models.inverse_geometry.branches import branch_labels  # avoids a circular import
 
         if self.system.parameters:
             return self.signs
@@ -269,16 +273,16 @@ class InverseGeometry(ModelFunction):
 
     @property
     def signs(self) -> tuple[str, ...]:
-        """The signs of every branch, such as "q3:+ q2:- q5:+"."""
+        """Signs of each branch, such as "q3:+ q2:- q5:+"."""
         return tuple(self._sequence.label(b) for b in range(self.branches))
 
     @property
     def steps(self) -> tuple[SequenceStep, ...]:
-        """The equations in the order in which they are solved."""
+        """Steps of the closed form in the order of solution."""
         return tuple(self._sequence.steps)
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        """Evaluate it as any model; a branch and a pose given in numbers must be such."""
+        """Evaluate the Function; numeric values of T and branch are checked first."""
         _require_pose(self.system, args, kwargs)
         branch = kwargs.get("branch", args[1] if len(args) > 1 else None)
         if isinstance(branch, (int, float, np.ndarray, np.generic)):
@@ -295,35 +299,35 @@ class InverseGeometry(ModelFunction):
 
 
 class AllBranches(InverseGeometry):
-    """A closed form ``igm_all(T) -> q, valid`` of all branches, a column each.
+    """Closed form ``igm_all(T) -> q, valid`` of all branches, one column per branch.
 
-    Next to singular configurations rounding of T decides whether branches are valid: see `certain`.
+    Near singular configurations rounding of T decides which branches are valid: see `certain`.
     """
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        """Evaluate it as any model; a pose given in numbers must be one."""
+        """Evaluate the Function; a numeric T must be a rigid transform."""
         _require_pose(self.system, args, kwargs)
         return ModelFunction.__call__(self, *args, **kwargs)
 
     def certain(
         self, T: Any, parameters: Mapping[str, float] | None = None
     ) -> bool | NDArray[np.bool_]:
-        """Return whether rounding of a pose cannot change which branches are valid.
+        """Return whether the set of valid branches is independent of rounding of the pose.
 
-        It may next to a singular configuration: branches meet there, or a joint is left
-        undetermined. `solve` and `solve_many` list all configurations there.
+        The result is False near a singular configuration, where branches meet or a joint is
+        undetermined. `solve` and `solve_many` compute all configurations there.
 
         Args:
             T: (4, 4) pose, or (N, 4, 4) poses [m].
-            parameters: values of symbols, the others at their defaults.
+            parameters: parameter values by name; default values for all others.
 
         Returns:
-            One value for one pose, else (N,).
+            bool for one pose, array (N,) for N poses.
 
         Raises:
-            ModelError: a matrix is no rigid transform, or a symbol has no value.
+            ModelError: a matrix is no rigid transform, or a parameter has no value.
         """
-        from mbs.models.inverse_geometry.many import draft_solutions  # which calls closed forms
+        from mbs.models.inverse_geometry.many import draft_solutions  # avoids a circular import
 
         one = np.ndim(T) == 2
         poses = target_poses(self.system, [T] if one else T)
@@ -333,9 +337,9 @@ class AllBranches(InverseGeometry):
 
 
 class AllConfigurations(ModelFunction):
-    """The general method ``igm_all(T) -> q, valid, count, certain``, a column a configuration.
+    """General method ``igm_all(T) -> q, valid, count, certain``, one column per configuration.
 
-    Columns that no configuration fills are NaN, `valid` 0; they come last.
+    Unused columns come last; they are NaN, with `valid` 0.
     """
 
     may_be_nan = ("q",)
@@ -345,17 +349,17 @@ class AllConfigurations(ModelFunction):
         self._chain = chain
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        """Evaluate it as any model; a pose given in numbers must be one."""
+        """Evaluate the Function; a numeric T must be a rigid transform."""
         _require_pose(self.system, args, kwargs)
         return super().__call__(*args, **kwargs)
 
     def example(self, name: str) -> NDArray[np.float64] | None:
-        """A pose that the arm has."""
-        q = 0.3 + 0.2 * np.sin(np.arange(len(self._chain.names)))  # where no joint is special
+        """Return a reachable pose as example of input T, None for other inputs."""
+        q = 0.3 + 0.2 * np.sin(np.arange(len(self._chain.names)))  # regular for usual arms
         return np.array(self._chain.arm(np.zeros(0)).pose(q)) if name == "T" else None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds what it was made of, and is compiled where it is read."""
+        """Pickle the chain only; the Function is compiled again on loading."""
         chain = self._chain
         return _all_again, (chain.system, chain.frame, dict(chain.locked))
 
@@ -378,44 +382,42 @@ def function(
     *,
     branches: str = "one",
 ) -> Function:
-    """``igm(T, branch) -> q, valid``: the joint positions of one branch, without iteration.
+    """Return the closed-form inverse kinematics ``igm(T, branch) -> q, valid`` as a Function.
 
-    One graph serves all branches; with ``branches="all"`` it is ``igm_all(T) -> q, valid``, a
-    column for each, which share their common steps. It can be differentiated with respect to T and
-    to the parameters wherever the configuration is not singular.
+    ``branches="all"`` returns ``igm_all(T) -> q, valid`` with one column per branch, whose common
+    steps are shared. Both are differentiable with respect to T and the parameters, except at
+    singular configurations.
 
-    Where an arm of six joints has no closed form, and with method="general", ``branches="all"``
-    gives ``igm_all(T) -> q, valid, count, certain`` of C code: all configurations, up to 16, by the
-    general method. It can be differentiated once, with respect to T.
+    With method="general", or for an arm of six joints without a closed form, ``branches="all"``
+    returns ``igm_all(T) -> q, valid, count, certain`` in C code: all configurations, up to 16, by
+    the general method. It can be differentiated once, with respect to T.
 
     Source: Pieper 1968; Paul 1981; Khalil & Creusot 1997, section 3.3; Raghavan & Roth 1993.
 
     Args:
-        system: open; a closed one is solved by `mbs.models.inverse_geometry.solve`.
-        method: "pieper", "paul", "auto" for the cheaper of them, or "general" for the matrices
-            ``igm_characteristic(T) -> M0, M1, M2`` of the method of Raghavan and Roth, and with
-            branches="all" for its configurations.
-        frame: a body, a named frame, the number of a link, or None for the terminal frame.
-        locked: positions of joints that stay where they are, by name [rad or m].
-        branches: "one", whose number is an input, or "all" in one call.
+        system: open system. For a closed system use `mbs.models.inverse_geometry.solve`.
+        method: "pieper", "paul", "auto" for the cheaper of both, or "general" for the method of
+            Raghavan and Roth: its matrices ``igm_characteristic(T) -> M0, M1, M2``, or with
+            branches="all" its configurations.
+        frame: name of a body or frame, index of a link, or None for the terminal frame.
+        locked: positions of fixed joints, by name [rad or m].
+        branches: "one" for a Function with the index of the branch as an input, or "all".
 
     Returns:
-        InverseGeometry, a Function of T (4, 4) [m], the pose of the frame seen from the base, and
-        of the number of the branch; q (nq, 1) [rad or m], finite for every T, joints outside the
-        chain as in the assembled configuration; valid, 1 where q gives T back within 1e-9 of the
-        size of the robot, else 0. AllBranches has no number; q (nq, branches), valid (branches, 1);
-        its method `certain(T)` is False where rounding of T may change which branches are valid.
-        AllConfigurations: q (nq, 16), each residual at most 1e-12 of max(1 m, the length), columns
-        from `count` on NaN; valid (16, 1), 1 for the columns before; certain, 0 where a
-        configuration may be missing, next to a singular one, or T is no rigid transform.
+        InverseGeometry: Function of T (4, 4) [m], the pose of the frame relative to the base, and
+        the index of the branch. q (nq, 1) [rad or m] is finite for every T; joints outside the
+        chain are as assembled. valid is 1 if the pose of q equals T within 1e-9 of the size of
+        the robot, else 0. AllBranches: Function of T with q (nq, branches), valid (branches, 1);
+        its method `certain(T)` is False if rounding of T may change which branches are valid.
+        AllConfigurations: q (nq, 16) with residuals of at most 1e-12 of max(1 m, length), NaN
+        from column `count` on. valid (16, 1) is 1 for the columns before. certain is 0 if T is no
+        rigid transform, or near a singular configuration, if a configuration may be missing.
 
     Raises:
-        NoClosedForm: no closed form is known; the message says what stood in the way.
-        ModelError: there is no such method, frame or joint, more than six joints are free, or
-            the system is closed; or the general method holds for its numbers alone, and some are
-            symbols.
-        CompilerError: all configurations of the general method are asked for, and there is no C
-            compiler.
+        NoClosedForm: no closed form is known; the message gives the reason.
+        ModelError: the method, frame or joint is unknown, more than six joints are free, the
+            system is closed, or the general method requires numeric parameters.
+        CompilerError: all configurations of the general method are requested without a C compiler.
     """
     require_system(system)
     require_method(system, method, METHODS)
@@ -473,18 +475,18 @@ def _all_built(chain: FrameChain, sequence: StepSequence) -> tuple[Named, Named]
     return [("T", T)], outputs
 
 
-_SIX = 6  # joints that the general method is for
+_SIX = 6  # number of joints that the general method requires
 
 
 def steps_or_all(chain: FrameChain, method: str) -> StepSequence | AllConfigurations:
-    """The steps of a closed form; where there is none, all configurations by the general method.
+    """Return the closed form of a chain, or the general method as a Function if there is none.
 
     Args:
-        chain: what is solved for.
-        method: as of `sequence_of`, or "general".
+        chain: chain that is solved for.
+        method: argument of `sequence_of`, or "general".
 
     Raises:
-        NoClosedForm, ModelError, CompilerError: as of `sequence_of` and `all_configurations`.
+        NoClosedForm, ModelError, CompilerError: errors of `sequence_of` and `all_configurations`.
     """
     if method == "general":
         return all_configurations(chain)
@@ -497,11 +499,11 @@ def steps_or_all(chain: FrameChain, method: str) -> StepSequence | AllConfigurat
 
 
 def all_configurations(chain: FrameChain) -> AllConfigurations:
-    """``igm_all(T) -> q, valid, count, certain`` of a chain of six joints; kept on the system.
+    """Return the general method ``igm_all(T) -> q, valid, count, certain``, cached on the system.
 
     Raises:
-        NoClosedForm: the general method does not hold for the arm.
-        ModelError: it has not six joints, or some length is a symbol.
+        NoClosedForm: the general method does not apply to the arm.
+        ModelError: the system has symbolic parameters.
         CompilerError: there is no C compiler.
     """
     from mbs.models.inverse_geometry.gathering import ILL_CONDITIONED, general_ready
@@ -533,7 +535,7 @@ def all_configurations(chain: FrameChain) -> AllConfigurations:
 
 
 def signs_of(sequence: StepSequence, branch: SX) -> SX:
-    """(signs, 1) +1 or -1: the bits of the number of a branch, from the highest on."""
+    """Return the signs (signs, 1), +1 or -1: bits of the branch index, highest bit first."""
     count = len(sequence.signs)
     halves = [casadi.floor((branch + 0.5) / 2**k) for k in range(count + 1)]
     bits = [halves[k] - 2 * halves[k + 1] for k in reversed(range(count))]
@@ -541,7 +543,7 @@ def signs_of(sequence: StepSequence, branch: SX) -> SX:
 
 
 def whole_configuration(chain: FrameChain, x: SX) -> SX:
-    """(nq, 1) positions of all joints: x of the chain's, the others locked or as assembled."""
+    """Return all joint positions (nq, 1): x for the chain, other joints locked or as assembled."""
     q = SX(DM(chain.system.position(chain.locked)))
     q[list(chain.indices)] = x
     return q
@@ -556,7 +558,7 @@ def _valid(chain: FrameChain, sequence: StepSequence, leaf: Leaf, T: SX, branch:
 
 
 def _names(chain: FrameChain, sequence: StepSequence, leaf: Leaf, branch: SX) -> Named:
-    """The scalars that text names: signs, sines and cosines of the joints, coefficients."""
+    """Return named scalars for printed equations: signs, sines, cosines and coefficients."""
     signs = casadi.vertsplit(signs_of(sequence, branch)) if sequence.signs else []
     named = [(f"sign_{name}", sign) for name, sign in zip(sequence.signs, signs, strict=True)]
     for k, name in enumerate(chain.names):
@@ -570,16 +572,16 @@ def _names(chain: FrameChain, sequence: StepSequence, leaf: Leaf, branch: SX) ->
 
 
 def _is_negative(value: SX) -> bool:
-    """Whether it is the opposite of an expression, which then stands in the equations alone."""
+    """Whether an expression is a negation, whose operand is used in the equations."""
     return bool(value.op() == casadi.OP_NEG)
 
 
 def joint_label(name: str) -> str:
-    """What stands for a coordinate in other names: 2 for q2, the name itself for others."""
+    """Return the suffix of names derived from a coordinate: "2" for q2, else the name itself."""
     return name[1:] if re.fullmatch(r"q\d+", name) else name
 
 
-# All branches of the inverse geometric model at once, in one graph without sines of angles.
+# All branches of the inverse geometric model in one graph, without sines of computed angles.
 
 
 _SEED = 20260111
@@ -589,18 +591,19 @@ _OUTPUTS = ("q", "residual", "real", "regular", "mark")
 def all_branches(
     chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64] | None = None
 ) -> Function:
-    """``igm_all(T) -> q, residual, real, regular, mark``: a column for every branch.
+    """Return ``igm_all(T) -> q, residual, real, regular, mark`` of all branches of a closed form.
 
     Args:
-        chain: what is solved for; positions of its varied joints are the last input r.
-        sequence: its steps, for the same p.
-        p: (np,) numbers in the place of the parameters; else they are a second input p.
+        chain: chain that is solved for; positions of its varied joints are the last input r.
+        sequence: closed form of the chain, for the same p.
+        p: (np,) parameter values; None adds a second input p.
 
     Returns:
-        Function of T (4, 4); q (n, branches) of the chain's joints [rad or m], finite; residual
-        (branches, 1), the largest difference of an element between the forward model and T, in m
-        and 1; real and regular (branches, 1), the smallest of each kind in `Leaf`; mark
-        (branches, 1), a number that is the same for equal configurations, and hardly for others.
+        Function of T (4, 4) [m]. q (n, branches) are joint positions of the chain [rad or m],
+        always finite. residual (branches, 1) is the largest absolute difference of an element of
+        the forward kinematics and T, in m and 1. real and regular (branches, 1) are the smallest
+        radicand and the smallest quantity that must not vanish (see `Leaf`). mark (branches, 1) is
+        equal for equal configurations, and usually different for different configurations.
     """
     T = SX.sym("T", 4, 4)
     given = given_of(chain, T, p)
@@ -617,11 +620,11 @@ def all_branches(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseBatch:
-    """What `all_branches` gives for N poses.
+    """Outputs of `all_branches` for N poses.
 
     Attributes:
-        q: (N, branches, n) positions of the chain's joints [rad or m].
-        residual, real, regular, mark: (N, branches).
+        q: (N, branches, n) joint positions of the chain [rad or m].
+        residual, real, regular, mark: (N, branches) outputs as in `all_branches`.
     """
 
     q: NDArray[np.float64]
@@ -632,7 +635,7 @@ class PoseBatch:
 
 
 def plain_branches(chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64]) -> Function:
-    """`all_branches` for numbers p, (np,); kept on the system."""
+    """Return `all_branches` for parameter values p (np,), cached on the system."""
     key = ("igm_all", sequence, *chain.key, p.tobytes())
     plain: Function = chain.system.cached(key, lambda: all_branches(chain, sequence, p))
     return plain
@@ -641,12 +644,12 @@ def plain_branches(chain: FrameChain, sequence: StepSequence, p: NDArray[np.floa
 def at_poses(
     plain: Function, T: NDArray[np.float64], r: NDArray[np.float64] | None = None
 ) -> PoseBatch:
-    """What `all_branches` gives for poses, by the interpreter, which needs no compiler first.
+    """Evaluate `all_branches` at N poses by the CasADi interpreter, without compilation.
 
     Args:
-        plain: `all_branches`.
-        T: (N, 4, 4) the poses [m].
-        r: (N, k) positions of varied joints [rad or m], where there are any.
+        plain: Function from `all_branches`.
+        T: (N, 4, 4) poses [m].
+        r: (N, k) positions of varied joints [rad or m], if there are any.
     """
     n, branches = plain.size_out(0)
     count = len(T)
@@ -672,7 +675,7 @@ def _column(chain: FrameChain, leaf: Leaf, T: SX, p: NDArray[np.float64] | None)
 
 
 def _mark(chain: FrameChain, x: SX) -> SX:
-    """A generic combination of slides and of sines and cosines of turns."""
+    """Return a generic linear combination of displacements, sines and cosines of the joints."""
     weights = np.random.default_rng(_SEED).uniform(0.5, 1.0, (len(chain.names), 2))
     mark = SX(0)
     for k, (a, b) in enumerate(weights):
@@ -681,12 +684,12 @@ def _mark(chain: FrameChain, x: SX) -> SX:
 
 
 def _larger(a: SX, b: SX) -> SX:
-    """The larger number, in operations that processors have in vectors."""
+    """Return the maximum of two numbers, by operations with vector instructions."""
     return SX(0.5 * (a + b + casadi.fabs(a - b)))
 
 
 def _smallest(values: SX) -> SX:
-    """The smallest of numbers, and 1."""
+    """Return the minimum of 1 and all values."""
     return functools.reduce(_smaller, casadi.vertsplit(values), SX(1))
 
 
@@ -695,9 +698,9 @@ def _smaller(a: SX, b: SX) -> SX:
 
 
 def without_sines(graph: Graph) -> Graph:
-    """The same Function with y/hypot(x, y) and x/hypot(x, y) in the place of sin, cos of atan2.
+    """Replace sin and cos of atan2(y, x) in a graph by y/hypot(x, y) and x/hypot(x, y).
 
-    Where x and y both vanish it has zeros.
+    The replacements are zero at x = y = 0.
     """
     nodes: list[Node] = []
     new: list[int] = []

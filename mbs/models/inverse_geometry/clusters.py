@@ -1,4 +1,4 @@
-"""Solutions that double precision does not tell apart are listed once, or marked."""
+"""Merging and marking of solutions that double precision cannot distinguish."""
 
 from __future__ import annotations
 
@@ -21,27 +21,28 @@ from mbs.models.inverse_geometry.target import (
 
 _FAR = 0.7
 """Largest difference of a joint [rad or arm lengths] of two solutions whose path is examined: a
-valley bends little within 40 degrees."""
-_HALVINGS = 3  # of a path: its highest point is known to some percent from seven points
+valley is nearly straight within 40 degrees."""
+_HALVINGS = 3  # bisections of a path: seven points give its highest residual to some percent
 _SLOPE = 1.05
-"""Part of the residual of a point in a valley up to which a path from it to a solution rises."""
+"""Largest residual on a path between two joined solutions, relative to the worse of both."""
 _FEW = 4  # minima of a singular value along a self-motion that are examined
 _SECTIONS, _GOLDEN = 24, 0.618
-"""Steps of golden section, which leave a hundred thousandth of a step along a self-motion."""
+"""Iterations and ratio of the golden-section search: it reduces a step along a self-motion by a
+factor of 1e5."""
 _KNOWN = 1e-2
-"""Distance [rad or arm lengths] to which a simple root is known at least, by `ONE` over the
-smallest singular value."""
+"""Largest error [rad or arm lengths] of a decided simple root, estimated as `ONE` over the smallest
+singular value."""
 _TWICE = 1e-5
-"""Second smallest singular value below which two singular configurations are near: a decade above
-the one at which rounding of the pose moves solutions along both."""
+"""Second smallest singular value below which two singular configurations are near: ten times the
+value at which rounding of the pose moves solutions along both directions."""
 
 
 def separated(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
-    """Return the solutions, each component of the nearly solved configurations once.
+    """Merge solutions that are connected by nearly solved configurations, and mark undecided ones.
 
-    Two solutions are one if a path joins them on which the residual stays below `DECIDED` or the
-    residual of the worse of the two. This highest residual changes by no more than the pose does.
-    A solution is marked as undecided
+    Two solutions are equal if a path connects them on which the residual stays below `DECIDED` or
+    below the residual of the worse of both. A perturbation of the pose changes this largest
+    residual by at most its own size. A solution is marked as undecided
 
     - if the highest residual on the path to another solution is between `ONE` and `TWO`,
     - if rounding of the pose moves it by more than a hundredth of a radian,
@@ -49,7 +50,7 @@ def separated(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
     - if two singular configurations are near it.
 
     Args:
-        target: the pose.
+        target: target pose of the arm.
         found: solutions and self-motions.
     """
     if not found:
@@ -82,10 +83,10 @@ def separated(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
 def _nearly_moves(
     target: Target, found: list[ChainRoot], x: Array, singular: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """(m,) which singular solutions an arm can nearly leave while its frame stays.
+    """Return (m,) whether a singular solution has a near self-motion.
 
-    No self-motion was found there, but the residual stays below `TWO` up to a distance of one
-    radian.
+    No self-motion was found at such a solution, but the residual stays below `TWO` up to a distance
+    of one radian.
     """
     alone = np.array([root.family is None for root in found], dtype=bool)
     nearly: NDArray[np.bool_] = np.logical_and(singular, alone)
@@ -97,9 +98,9 @@ def _nearly_moves(
 
 
 def _least_second(target: Target, q: Array) -> float:
-    """Least second smallest singular value along a self-motion, of which q, (k, n), are samples.
+    """Return the minimum of the second smallest singular value along a self-motion.
 
-    It vanishes where another motion crosses the self-motion.
+    The minimum is zero if another motion crosses the self-motion. q (k, n) are its samples.
     """
     if q.shape[1] < 2 or len(q) < 3:
         return np.inf
@@ -117,14 +118,14 @@ def _least_second(target: Target, q: Array) -> float:
 
 
 def _second(s: Array) -> Array:
-    """The second smallest singular values, infinite for one joint."""
+    """Return the second smallest singular values, infinite for an arm of one joint."""
     return s[:, -2] if s.shape[1] > 1 else np.full(len(s), np.inf)
 
 
 def _pairs(
     target: Target, found: list[ChainRoot], x: Array, singular: NDArray[np.bool_]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], Array, Array]:
-    """Pairs of solutions that a valley may join: indices, and the two ends of the path.
+    """Return pairs of solutions that a valley may connect: indices, and the ends of the path.
 
     A path to a self-motion ends at its nearest sample.
     """
@@ -150,18 +151,18 @@ def _pairs(
 def heights(
     target: Target, x: Array, other: Array, most: float, own: Array, others: Array
 ) -> Array:
-    """Return the highest residuals (m,) on paths between configurations x and others, (m, n).
+    """Return the largest residuals (m,) on paths between configurations x and `other` (m, n).
 
-    The points of a path are found by halving: a point half way is moved across the line that joins
-    its neighbours to where the residual is least. Paths that rise above a limit are not refined.
+    The points of a path are found by bisection: a point half way is moved, normal to the line
+    between its neighbours, to the least residual. Paths above the limit are not refined.
 
     Args:
-        target: the pose.
-        x: (m, n) configurations, see `Target`.
-        other: (m, n) configurations.
-        most: residual above which two configurations are not joined.
+        target: target pose of the arm.
+        x: (m, n) scaled configurations, see `Target`.
+        other: (m, n) scaled configurations at the other ends.
+        most: residual above which two configurations are not connected.
         own: (m,) residuals of x.
-        others: (m,) residuals of the others.
+        others: (m,) residuals of `other`.
     """
     highest = np.zeros(len(x))
     if not len(x):
@@ -186,10 +187,10 @@ def heights(
 def _groups(
     found: list[ChainRoot], first: NDArray[np.intp], second: NDArray[np.intp]
 ) -> NDArray[np.intp]:
-    """(count,) the number of the group of each solution, from pairs that are joined.
+    """Return the group index of each solution, from connected pairs (first, second).
 
-    Self-motions that cross each other stay apart; isolated solutions that are joined to several of
-    them belong to the first one.
+    Self-motions that cross each other stay separate. An isolated solution that is connected to
+    several self-motions belongs to the first.
     """
     families = [root.family for root in found]
     moving = np.array([family is not None for family in families], dtype=bool)
@@ -206,14 +207,14 @@ def _groups(
 
 
 def _are_same(root: ChainRoot, other: ChainRoot) -> bool:
-    """Whether two self-motions are one: each passes through the configuration of the other."""
+    """Whether two self-motions are equal: one contains the configuration of the other."""
     assert root.family is not None
     assert other.family is not None
     return bool(root.family.meets(other.q[None])[0] or other.family.meets(root.q[None])[0])
 
 
 def _components(count: int, first: NDArray[np.intp], second: NDArray[np.intp]) -> NDArray[np.intp]:
-    """(count,) the least index of the component of each point, from pairs that are joined."""
+    """Return (count,) the lowest index of the connected component of each point."""
     group = np.arange(count)
     for i, j in zip(first, second, strict=True):
         a, b = sorted((group[i], group[j]))
@@ -222,7 +223,7 @@ def _components(count: int, first: NDArray[np.intp], second: NDArray[np.intp]) -
 
 
 def _one(members: list[ChainRoot], residual: Array, undecided: bool, target: Target) -> ChainRoot:
-    """The solution that stands for members of a component."""
+    """Return the solution that represents a connected component."""
     if len(members) == 1:
         return replace(members[0], undecided=undecided)
     best = min(range(len(members)), key=lambda k: (members[k].family is None, residual[k]))
@@ -235,7 +236,7 @@ def _one(members: list[ChainRoot], residual: Array, undecided: bool, target: Tar
             for member, miss in zip(members, residual, strict=True)
             if miss <= target.decided
         ]
-        # a root in which several meet counts all of them
+        # a multiple root already counts all coinciding roots
         roots = max(counts, default=1) if max(counts, default=1) > 1 else max(1, len(counts))
         most = max(1, len(branches)) if branches else MOST_ROOTS
         root = replace(root, multiplicity=min(roots, most), at_most=len(members) > 1)

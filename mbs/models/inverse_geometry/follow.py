@@ -1,4 +1,4 @@
-"""Paths followed on one branch."""
+"""Path tracking in joint space: continuation of one inverse-geometry branch along poses."""
 
 from __future__ import annotations
 
@@ -33,20 +33,21 @@ from mbs.solvers.least_squares import gauss_newton, levenberg_marquardt
 from mbs.solvers.rank import null_space
 from mbs.text import did_you_mean, quoted
 
-# Predictor and corrector: a configuration carried on while the target pose moves.
+# Predictor-corrector continuation of a configuration while the target pose moves.
 #
-# The tangent of the path predicts, Newton's method corrects. A step counts only where the
-# corrector is shorter than the predictor and contracts, and where the Jacobian changes by less
-# than itself: all eigenvalues of J^-1 J' are within 1/2 of 1, whatever the units. So no singular
-# configuration lies between, and no other branch is met. Towards a singular configuration the
-# steps shrink to nothing.
+# The tangent of the path is the predictor and Newton's method is the corrector. A step is accepted
+# if the corrector is shorter than the predictor and contracts, and if all eigenvalues of J^-1 J'
+# are within 1/2 of 1, where J and J' are the Jacobians before and after the step. The eigenvalues
+# do not depend on the units. An accepted step crosses no singular configuration and changes to no
+# other branch. The step size tends to zero towards a singular configuration.
 #
-# Source: Deuflhard 2011, sections 2.1 and 5.1, with eigenvalues in the place of a norm.
+# Source: Deuflhard 2011, sections 2.1 and 5.1, with eigenvalues instead of a norm.
 
 
 Array = NDArray[np.float64]
 Rows = Callable[[Array, Array], tuple[Array, Array]]
-"""(x, T) -> what is missing to T, (m,), and the Jacobian (m, n) that leads there."""
+"""(x, T) -> pose error (m,) from the configuration x to the target pose T, and Jacobian (m, n). To
+first order a move dx reduces the error by J dx."""
 
 SINGULAR = 1e-7
 """Smallest singular value below which a configuration counts as singular."""
@@ -54,39 +55,40 @@ SINGULAR = 1e-7
 _CHANGE = 0.5
 _CONTRACTION = 0.5
 _LARGEST = 0.35
-"""Longest step of any joint [rad or arm lengths], 20 degrees: a longer one may lead to another
-branch, or by a whole turn."""
+"""Longest step of any joint [rad or arm lengths], 20 degrees. A longer step may change the branch
+or add a full revolution."""
 _ITERATIONS = 12
 _SMALL = 1e-9
-"""Rows, and moves [rad or arm lengths], that count as nothing: a thousand times the 1e-12 of a
-solution, as towards a singular configuration rounding is magnified."""
+"""Error rows and moves [rad or arm lengths] that count as zero: 1000 times the 1e-12 of a solution,
+because rounding errors grow towards a singular configuration."""
 _SMALLEST_STEP = 1e-12
-"""Part of the way between two poses that is not halved any more: next to one, 1e-16 is rounding."""
+"""Smallest step, as a fraction of the segment between two poses. The rounding of 1 is 1e-16."""
 _TANGENT = 1e-3
-"""Of a step, along which the tangent of a curve of poses is measured."""
+"""Fraction of a step over which a finite difference approximates the tangent of a pose curve."""
 _MOST_STEPS = 200
-"""Between two poses; a joint that turns all the way round takes some tens."""
+"""Maximum number of steps between two poses. A full revolution of a joint takes some tens."""
 _GAIN = 10.0
-"""Part of the slope that redundant joints go down per rad or arm length of the frame's way: a cost
-whose second derivative is of about one is lowered within a tenth of the arm's length."""
+"""Step along the negative gradient per rad or arm length of frame motion. A cost whose second
+derivative is about 1 decreases within a frame motion of a tenth of the arm length."""
 _NOISE = 1e-14
-"""Rounding of a row: some tens of 1e-16 from products of transforms; the step that it makes is as
-much larger as the inverse of the Jacobian is."""
+"""Rounding error of an error row: some tens of 1e-16 from products of transforms. The norm of the
+inverse Jacobian amplifies it in the Newton step."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracker:
-    """What follows the poses.
+    """Equations, limits and redundancy of the predictor-corrector continuation.
 
     Attributes:
-        rows: what is missing, lengths and slides measured so that they compare with turns.
-        slack: directions that no row sees, such as rods that spin, and those that redundant joints
-            leave free.
-        exact: whether every pose can be reached nearby, so that rows are brought to zero between
-            the given poses as well; elsewhere they are made as small as they can be.
-        low, high: (n,) limits of the configuration, infinite where there are none.
-        redundant: how many of the slack directions move joints that can keep within limits.
-        slope: None, or the gradient (n,) of a cost that redundant joints lower at x.
+        rows: pose error and Jacobian of a scaled configuration x. Lengths are divided by a
+            reference length, so that they compare with angles.
+        slack: dimension of the null space of the Jacobian at a regular configuration: idle spins
+            of rods and redundant freedoms.
+        exact: whether every nearby pose can be reached. If so, the error is zero between the given
+            poses too; if not, it is minimised.
+        low, high: (n,) limits of x, infinite for unlimited coordinates.
+        redundant: number of redundant freedoms, included in `slack`.
+        slope: gradient (n,) of a cost that redundant joints decrease, as a function of x, or None.
     """
 
     rows: Rows
@@ -102,18 +104,18 @@ class Tracker:
         return not np.any(self.beyond(x))
 
     def beyond(self, x: Array) -> NDArray[np.bool_]:
-        """(n,) which joints are beyond their limits."""
+        """Return (n,) whether each coordinate of x is beyond its limits."""
         return np.asarray((x < self.low - WITHIN) | (x > self.high + WITHIN))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathPoint:
-    """A configuration on the way.
+    """Configuration on a path, with its Jacobian and pose error.
 
     Attributes:
-        x: (n,) configuration, scaled.
-        J: (m, n) Jacobian there.
-        left: largest row that is missing there.
+        x: (n,) scaled configuration.
+        J: (m, n) Jacobian at x.
+        left: largest absolute error row at x.
     """
 
     x: Array
@@ -129,19 +131,19 @@ def carried(
     trail: list[tuple[float, PathPoint]] | None = None,
     curved: bool = False,
 ) -> tuple[PathPoint, float, float]:
-    """The configuration carried on from the pose at 0 towards the pose at 1.
+    """Continue a configuration along a pose curve from parameter 0 to parameter 1.
 
     Args:
-        tracker: what follows.
-        start: at 0.
-        pose: the path of the pose, of a number between 0 and 1.
-        step: first one to try.
-        trail: where the configurations on the way are left, each with its number.
-        curved: whether the path of the pose is another one than a straight line.
+        tracker: equations and limits of the continuation.
+        start: point at parameter 0.
+        pose: target pose (4, 4) as a function of the parameter in [0, 1].
+        step: first step of the parameter.
+        trail: list to which (parameter, point) of every accepted step is appended.
+        curved: whether the pose curve is not a straight line.
 
     Returns:
-        Where it ended, at which number, and the last step tried; the number is 1 unless it stopped
-        at a singular configuration, a limit, or after many steps that hardly advance.
+        Last point, its parameter and the next step size. The parameter is below 1 if the
+        continuation stopped at a singular configuration, at a limit, or after `_MOST_STEPS` steps.
     """
     point, at = start, 0.0
     for _ in range(_MOST_STEPS):
@@ -151,7 +153,7 @@ def carried(
         T = pose(to)
         found = _step(tracker, point, T, tracker.rows(point.x, T)[0])
         if found is None and curved:
-            # what the curve bends is magnified next to a singular configuration
+            # near a singular configuration the curvature is amplified: predict from the tangent
             part = _TANGENT * (to - at)
             found = _step(tracker, point, T, tracker.rows(point.x, pose(at + part))[0] / _TANGENT)
         if found is None:
@@ -164,27 +166,27 @@ def carried(
 
 
 def point_at(tracker: Tracker, x: Array, T: Array) -> PathPoint:
-    """A configuration and what is missing there to the pose T."""
+    """Return the path point of a configuration x (n,), with its error to the pose T (4, 4)."""
     r, J = tracker.rows(x, T)
     return PathPoint(x, J, float(np.max(np.abs(r))))
 
 
 def smallest(tracker: Tracker, J: Array) -> float:
-    """The smallest singular value that is not slack."""
+    """Return the smallest singular value of J (m, n) outside its regular null space."""
     values = np.linalg.svd(J, compute_uv=False)
     return float(values[J.shape[1] - 1 - tracker.slack])
 
 
 def _step(tracker: Tracker, point: PathPoint, T: Array, r: Array) -> PathPoint | None:
-    """The configuration at the next pose; None where the step is too long.
+    """Return the configuration at the next pose, or None if the step is too long.
 
-    Of redundant joints those that would pass a limit stop there, and the others move instead.
+    A redundant joint that would exceed its limit stops at the limit, and the other joints move.
 
     Args:
-        tracker: what follows.
-        point: the configuration before.
-        T: the next pose.
-        r: what leads to it from the one before.
+        tracker: equations and limits of the continuation.
+        point: configuration before the step.
+        T: (4, 4) next pose.
+        r: (m,) pose error from `point` to T, or its linear estimate.
     """
     free = np.ones(point.x.size, dtype=bool)
     aim = point.x.copy()
@@ -209,14 +211,14 @@ def _step(tracker: Tracker, point: PathPoint, T: Array, r: Array) -> PathPoint |
 def _predicted(
     tracker: Tracker, point: PathPoint, r: Array, free: NDArray[np.bool_], aim: Array
 ) -> tuple[Array, Array]:
-    """The first guess of a step, and the inverse of the free joints' Jacobian.
+    """Return the predicted configuration and the pseudo-inverse of the free joints' Jacobian.
 
     Args:
-        tracker: what follows.
-        point: the configuration before.
-        r: what leads from it to the next pose.
-        free: (n,) joints that are not stopped at a limit.
-        aim: (n,) positions of those that are.
+        tracker: equations and limits of the continuation.
+        point: configuration before the step.
+        r: (m,) pose error from `point` to the next pose.
+        free: (n,) whether each joint is not stopped at a limit.
+        aim: (n,) positions, of which the stopped joints take theirs.
     """
     J, move = point.J[:, free], np.where(free, 0.0, aim - point.x)
     back, _ = _pseudo_inverse(tracker, J, int(np.sum(~free)))
@@ -224,7 +226,7 @@ def _predicted(
     if tracker.slope is not None and np.sum(~free) < tracker.redundant:
         downhill = -_GAIN * float(np.linalg.norm(r)) * tracker.slope(point.x)[free]
         still = downhill - back @ (J @ downhill)
-        # not longer than what the path asks for, so that the step stays one along the path
+        # at most as long as the move along the path, which must dominate the step
         most, length = float(np.linalg.norm(move)), float(np.linalg.norm(still))
         move[free] += still * min(1.0, most / max(length, NONZERO))
     return point.x + move, back
@@ -233,7 +235,7 @@ def _predicted(
 def _correct(
     tracker: Tracker, x: Array, T: Array, free: NDArray[np.bool_] | None = None
 ) -> PathPoint | None:
-    """Newton's method; None where it does not contract, or leaves rows that should vanish."""
+    """Newton's method from x to pose T. None without contraction or with a residual error."""
     before, free = np.inf, np.ones(x.size, dtype=bool) if free is None else free
     stopped = int(np.sum(~free))
     x = x.copy()
@@ -254,7 +256,10 @@ def _correct(
 
 
 def _pseudo_inverse(tracker: Tracker, J: Array, stopped: int = 0) -> tuple[Array, float]:
-    """The inverse of J, of which some columns are left out, and its norm."""
+    """Return the pseudo-inverse of J, truncated to its regular rank, and its norm.
+
+    J lacks the columns of `stopped` joints, which lowers the dimension of its null space.
+    """
     U, values, V = np.linalg.svd(J, full_matrices=False)
     kept = J.shape[1] - max(tracker.slack - stopped, 0)
     inverse = 1 / np.maximum(values[:kept], NONZERO)
@@ -262,7 +267,7 @@ def _pseudo_inverse(tracker: Tracker, J: Array, stopped: int = 0) -> tuple[Array
     return back, float(inverse[-1])
 
 
-# What follows a path: the joints of a chain, or those of a whole robot with its loops.
+# Equations of a path: joints of an open chain, or all joints of a robot with closed loops.
 
 
 _WHOLE = 6
@@ -271,19 +276,19 @@ _TURN = 2 * math.pi
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Follower:
-    """The joints that follow, and what they are held against.
+    """Joints that track a path, and their equations. Scaled positions are x = q / scale.
 
     Attributes:
-        target: the frame, and the loops.
+        target: tracked frame and loop closure of the system.
         indices: indices in q of the joints that move.
-        scale: (n,) what one stands for in each [m]; 1 for angles.
-        rows: what is missing to a pose, and how the joints change it.
-        slack: directions that no row sees, redundant ones included.
-        exact: whether any pose nearby can be taken.
-        bounds: limits of the coordinates; None where none holds them.
-        chain: the joints in numbers, where they are those of an open chain.
-        redundant: how many more freedoms there are than a pose determines.
-        slope: None, or the gradient (n,) of a cost that these lower.
+        scale: (n,) unit of each x: 1 for angles, reference length [m] for prismatic joints.
+        rows: pose error and its Jacobian, as functions of x and the target pose.
+        slack: dimension of the regular null space of the Jacobian, redundant freedoms included.
+        exact: whether every nearby pose can be reached.
+        bounds: limits of the coordinates, or None to ignore limits.
+        chain: open chain of the joints, or None for a robot with loops.
+        redundant: number of freedoms beyond those that the pose determines.
+        slope: gradient (n,) of a cost that redundant joints decrease, or None.
     """
 
     target: Goal
@@ -299,51 +304,54 @@ class Follower:
 
     @property
     def system(self) -> System:
-        """Whose joints they are."""
+        """Robot that the joints belong to."""
         return self.target.closing.system
 
     @property
     def tracker(self) -> Tracker:
-        """The numbers of it."""
+        """Equations and scaled limits for the continuation."""
         low, high = self.limits
         return Tracker(self.rows, self.slack, self.exact, low, high, self.redundant, self.slope)
 
     @property
     def length(self) -> float:
-        """By which lengths are measured [m]."""
+        """Reference length [m]: the length of the arm, or 1 m for a robot with loops."""
         return 1.0 if self.chain is None else self.chain.arm(self.target.closing.p).length
 
     @property
     def limits(self) -> tuple[Array, Array]:
-        """(n,) lowest and highest positions of the joints that move, scaled."""
+        """Lower and upper limits (n,) of the moving joints, scaled."""
         if self.bounds is None:
             return np.full(len(self.indices), -np.inf), np.full(len(self.indices), np.inf)
         return self.scaled(self.bounds.low), self.scaled(self.bounds.high)
 
     def scaled(self, q: Array) -> Array:
-        """(n,) the joints that move in a configuration (nq,)."""
+        """Return the scaled positions (n,) of the moving joints in a configuration q (nq,)."""
         x: Array = q[list(self.indices)] / self.scale
         return x
 
     def whole(self, q: Array, x: Array) -> Array:
-        """(nq,) the configuration q with the joints that move elsewhere."""
+        """Return the configuration q (nq,) with the moving joints at scaled positions x (n,)."""
         whole = q.copy()
         whole[list(self.indices)] = x * self.scale
         return whole
 
     def pose(self, q: Array) -> Array:
-        """(4, 4) of the frame in a configuration (nq,)."""
+        """Return the pose (4, 4) of the frame in the base at a configuration q (nq,)."""
         elements = self.target.pose(q)[0]
         T = np.eye(4)
         T[:3, :3], T[:3, 3] = elements[3:].reshape(3, 3).T, elements[:3]
         return T
 
     def residual(self, q: Array, T: Array) -> float:
-        """Largest element by which a configuration misses a pose, or opens a loop."""
+        """Return the largest absolute pose error or loop closure error at q (nq,)."""
         return float(np.max(np.abs(self.target.at(T).residual(q)[0])))
 
     def passed(self, x: Array, slack: float = 0.0) -> tuple[int, float] | None:
-        """A joint, by its index in q, that comes within `slack` of its limit, and this limit."""
+        """Return (index in q, limit) of the first joint within `slack` of its limit, or None.
+
+        x (n,) are scaled positions. The limit and `slack` are in rad or m.
+        """
         if self.bounds is None:
             return None
         for index, value in zip(self.indices, x * self.scale, strict=True):
@@ -362,12 +370,12 @@ def follower(
     limits: bool | Given | None,
     redundancy: Redundancy | None = None,
 ) -> Follower:
-    """What follows the poses of a frame.
+    """Set up the joints and equations that track poses of a frame.
 
     Args:
-        target: the frame, and the loops.
-        start: (nq,) configuration, in which joints that do not follow stay.
-        locked: by name, joints that stay where they are.
+        target: tracked frame and loop closure of the system.
+        start: (nq,) configuration; joints that do not move keep their positions in it.
+        locked: joints that do not move, by name.
         limits: as in `follow`.
         redundancy: as in `follow`.
 
@@ -393,7 +401,7 @@ def follower(
 def _closed_follower(
     target: Goal, start: Array, locked: list[str], ends: CoordinateLimits | None
 ) -> Follower:
-    """Every joint of the system, less those that stay where they are."""
+    """Set up a robot with loops: all joints move, except locked and undetermined joints."""
     system = target.closing.system
     indices = {link.name: link.q.start for link in system.tree.links if link.motion.nq == 1}
     for name in locked:
@@ -432,32 +440,31 @@ def _arm_rows(arm: Arm) -> Rows:
     return rows
 
 
-# What redundant joints do beside following: a cost that they lower, by its gradient.
+# Redundancy resolution: minimum-norm motion, plus gradient descent of a cost in the null space.
 #
-# dx = J+ dr - k (1 - J+ J) grad H: the joints move as little as they can, and in the directions
-# that the frame does not see down the slope of a cost.
+# dx = J+ dr - k (1 - J+ J) grad H
 #
-# Source: Liegeois 1977; Yoshikawa 1985 (manipulability). The motion does not repeat itself on
-# closed paths: Klein & Huang 1983.
+# Source: Liegeois 1977; Yoshikawa 1985 (manipulability). Closed paths of the frame do not result in
+# closed paths of the joints: Klein & Huang 1983.
 
 
 CRITERIA = ("minimum velocity", "limits", "manipulability")
-"""What redundant joints may be asked for by name."""
+"""Names of the built-in criteria of redundancy resolution."""
 Redundancy: TypeAlias = str | Callable[[Array], Array]
-"""One of `CRITERIA`, or the gradient (nq,) of a cost at a configuration (nq,)."""
+"""Name from `CRITERIA`, or a function q (nq,) -> gradient (nq,) of a cost."""
 
 _DIFFERENCE = 1e-5
-"""Move of a joint [rad or arm lengths] for differences of log manipulability, whose second
-derivative is of about one but next to singular configurations."""
+"""Step of a joint [rad or arm lengths] for central differences of log manipulability. Its second
+derivative is about 1 except near singular configurations."""
 
 
 def _slope_of(
     led: Follower, start: Array, redundancy: Redundancy | None
 ) -> Callable[[Array], Array] | None:
-    """The gradient of the cost that redundant joints lower, in scaled positions.
+    """Return the gradient function of the redundancy cost in scaled positions, or None.
 
     Raises:
-        ModelError: there is no such criterion.
+        ModelError: the criterion is unknown.
     """
     if callable(redundancy):
         return _given_slope(led, start, redundancy)
@@ -489,7 +496,7 @@ def _given_slope(
 
 
 def _from_limits(low: Array, high: Array) -> Callable[[Array], Array]:
-    """The gradient of half the squares of distances from the middle, in half ranges.
+    """Return the gradient of 1/2 sum ((x - middle) / half range)^2 over the limited joints.
 
     Source: Liegeois 1977.
     """
@@ -500,7 +507,7 @@ def _from_limits(low: Array, high: Array) -> Callable[[Array], Array]:
 
 
 def _to_manipulability(led: Follower) -> Callable[[Array], Array]:
-    """The gradient of minus the logarithm of the manipulability, the product of singular values.
+    """Return the gradient of -log(manipulability), the product of the singular values of J.
 
     Source: Yoshikawa 1985.
     """
@@ -519,16 +526,17 @@ def _to_manipulability(led: Follower) -> Callable[[Array], Array]:
     return slope
 
 
-# A path of poses: given one by one, or as a function of a number between 0 and 1.
+# Path of poses: an array, or a function of a parameter between 0 and 1.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Path:
-    """Poses one after the other, and how one leads to the next.
+    """Sequence of poses with an interpolation between them.
 
     Attributes:
-        poses: (N, 4, 4).
-        function: that gave them, or None.
+        poses: (N, 4, 4) poses [m].
+        function: pose (4, 4) as a function of the parameter in [0, 1], or None. Without it, poses
+            are interpolated by straight lines.
     """
 
     poses: Array
@@ -536,11 +544,14 @@ class Path:
 
     @property
     def count(self) -> int:
-        """How many poses."""
+        """Number of poses."""
         return len(self.poses)
 
     def curve(self, first: Array) -> Callable[[float], Array]:
-        """The pose, of a number from -1, where it is `first` (4, 4), over 0 to count - 1."""
+        """Return the pose as a function of a real pose index u in [-1, count - 1].
+
+        u = -1 is the pose `first` (4, 4), an integer u is a pose of the path.
+        """
         lines = dict[int, Callable[[float], Array]]()
 
         def pose(u: float) -> Array:
@@ -559,10 +570,10 @@ class Path:
 
 
 def path_of(system: System, path: Any, samples: int) -> Path:
-    """A path as a user gives it.
+    """Convert the `path` argument of `follow` to a Path.
 
     Raises:
-        ModelError: it is neither poses nor a function that gives poses, or there are none.
+        ModelError: the path is empty, or neither an array of poses nor a function of poses.
     """
     if not callable(path):
         poses = target_poses(system, path)
@@ -582,7 +593,7 @@ def path_of(system: System, path: Any, samples: int) -> Path:
 
 
 def _sampled(system: System, path: Callable[[float], Any], numbers: list[float]) -> Array:
-    """(N, 4, 4) poses that a function gives."""
+    """Evaluate a pose function at N parameters and return the poses (N, 4, 4)."""
     poses = np.empty((len(numbers), 4, 4))
     for k, s in enumerate(numbers):
         given = path(s)
@@ -594,14 +605,20 @@ def _sampled(system: System, path: Callable[[float], Any], numbers: list[float])
 
 
 def straight(before: Array, after: Array) -> Callable[[float], Array]:
-    """The pose moved along a straight line and turned about a fixed axis, of a number 0 to 1."""
+    """Interpolate two poses (4, 4) by a straight line and a rotation about a fixed axis.
+
+    The result is a function of a parameter in [0, 1].
+    """
     gap = gap_to(after, before)
 
     return lambda s: after if s == 1.0 else moved(before, s * gap)
 
 
 def moved(T: Array, gap: Array) -> Array:
-    """The pose T (4, 4) moved by a translation [m] and a rotation vector [rad], (6,)."""
+    """Return the pose T (4, 4) displaced by `gap` (6,), in base axes.
+
+    `gap` contains a translation of the origin [m] and a rotation vector [rad].
+    """
     pose = T.copy()
     pose[:3, :3] = _turn(gap[3:]) @ T[:3, :3]
     pose[:3, 3] += gap[:3]
@@ -609,7 +626,7 @@ def moved(T: Array, gap: Array) -> Array:
 
 
 def _turn(vector: Array) -> Array:
-    """(3, 3) the turn about a vector by its length [rad].
+    """Return the rotation matrix (3, 3) of a rotation vector (3,) [rad].
 
     Source: Rodrigues 1840.
     """
@@ -620,39 +637,41 @@ def _turn(vector: Array) -> Array:
     return turned
 
 
-# Many poses at once, on one branch of a closed form.
+# Vectorised tracking of one branch of a closed form.
 #
-# A branch is a continuous function of the pose as long as none of its roots becomes double and no
-# joint is left undetermined: as long as none of the numbers that tell so vanishes. They do not
-# between two poses at which the least of them is nearly the same, before and after as well; what
-# is told otherwise is followed step by step.
+# A branch is a continuous function of the pose until one of its roots becomes double or a joint
+# becomes undetermined, that is until an indicator of the closed form vanishes. It is assumed not to
+# vanish between two poses if the smallest indicator is nearly equal at both, and also in the
+# intervals before and after. All other intervals are tracked step by step.
 
 
 _BLOCK = 20_000
-"""Poses that are solved at once: some megabytes for each branch."""
+"""Number of poses per block: some megabytes of memory for each branch."""
 _SHORT = 20
-"""Poses below which steps, of a millisecond or two, are quicker than equations of a new robot."""
+"""Number of poses below which single steps (1 to 2 ms each) are faster than the derivation of the
+closed form of a new robot."""
 _RATIO = 2.0
-"""Between two poses, of what vanishes where branches meet: `_CHANGE` of it."""
+"""Largest ratio of the branch indicator at two neighbouring poses: a change by `_CHANGE`."""
 _NEARER = 0.25
-"""Times the distance of the next configuration from a prediction, within which one is meant."""
+"""Largest ratio of the distances of the nearest and the second nearest solution from a prediction
+at which the nearest is selected."""
 _ON = 1e-6
-"""Difference [rad or arm lengths] between a configuration that was followed and its branch: the
-first is found to 1e-9 or better."""
+"""Largest difference [rad or arm lengths] between a tracked configuration and its branch of the
+closed form. Tracked configurations have an error of at most 1e-9."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Runs:
-    """All branches at a block of poses.
+    """All branches of the closed form at a block of N poses.
 
     Attributes:
-        first: number of the first pose.
-        q: (N, branches, n) configurations, scaled.
-        residual: (N, branches) by how much each misses the pose.
-        good: (N, branches) whether each takes the pose and is no double root.
-        size: (N, branches) what vanishes where branches meet.
-        arm: the joints.
-        limits: lowest and highest positions, scaled.
+        first: index of the first pose of the block.
+        q: (N, branches, n) scaled configurations.
+        residual: (N, branches) pose error of each configuration.
+        good: (N, branches) whether each configuration reaches the pose and is no double root.
+        size: (N, branches) indicator that vanishes where branches meet.
+        arm: open chain of the joints.
+        limits: lower and upper limits (n,) of the scaled positions.
     """
 
     first: int
@@ -664,17 +683,17 @@ class Runs:
     limits: tuple[Array, Array]
 
     def after(self, number: int, x: Array) -> tuple[Array, Array]:
-        """Configurations (k, n) at as many poses after a number as are certain, from x there.
+        """Continue x (n,) from pose `number` over the poses at which its branch is certain.
 
         Returns:
-            These, and (k,) by how much they miss the poses.
+            Configurations (k, n) at the next k poses, and their pose errors (k,).
         """
         row = number - self.first
         apart = np.max(np.abs(self.arm.wrapped(self.q[row] - x)), axis=1)
         branch = int(np.argmin(apart))
         if apart[branch] > _ON:
             return _no_run(x.size)
-        # from the pair of poses before on: what vanishes half way between two is told by the others
+        # include the preceding interval: all neighbours of an interval must be even as well
         first = max(row - 1, 0)
         q, size = self.q[first:, branch], self.size[first:, branch]
         good = self.good[first:, branch]
@@ -695,11 +714,11 @@ class Runs:
         return led[:count], self.residual[row + 1 : row + 1 + count, branch]
 
     def nearest(self, number: int, x: Array) -> tuple[Array, float] | None:
-        """The configuration (n,) at a pose that is much nearer to x than all others.
+        """Return the solution at pose `number` that is much nearer to x (n,) than all others.
 
         Returns:
-            It and by how much it misses the pose; None where there is none, or the pose is beyond
-            the block.
+            Configuration (n,) and its pose error. None if no solution is much nearer, or if the
+            pose is not in the block.
         """
         row = number - self.first
         if not 0 <= row < len(self.q) or not np.any(self.good[row]):
@@ -719,7 +738,10 @@ def _no_run(joints: int) -> tuple[Array, Array]:
 
 
 def _runs(led: Follower, poses: Path, number: int, known: Runs | None) -> Runs | None:
-    """The branches at the poses from a number on; None where there is no closed form for them."""
+    """Return the branches at a block of poses from index `number`, or None.
+
+    None without a closed form, for redundant or few poses, and at the last pose.
+    """
     if known is not None and known.first <= number < known.first + len(known.q) - 1:
         return known
     last = number == poses.count - 1
@@ -741,62 +763,64 @@ def _runs(led: Follower, poses: Path, number: int, known: Runs | None) -> Runs |
     return Runs(number, every.q / led.scale, every.residual, good, size, arm, led.limits)
 
 
-# Behind a singular configuration: the joints that go on as they came.
+# Crossing of a singular configuration: smooth continuation of the joint path.
 #
-# On a smooth curve of poses the joints before the singular configuration predict those behind it.
-# Newton's method leads from the prediction to the pose there. What it has to add, beside the way
-# from one side to the other, vanishes with this way if the joints are smooth there; if they have a
-# corner it is in proportion, and where another branch would have to be taken it does not vanish.
+# On a smooth curve of poses the joint path before the singular configuration is extrapolated past
+# it. Newton's method corrects the prediction. If the joint path is smooth, the ratio of the
+# correction to the distance between the two sides tends to zero with this distance. If the joint
+# path has a corner, the ratio is constant. If another branch is needed, the correction itself does
+# not tend to zero.
 #
-# Of poses that are given one by one, it is open how the frame moves between two of them. A smooth
-# curve through the joints is taken where it leaves the straight line by no more than a smooth curve
-# through the poses does.
+# The motion of the frame between poses of an array is not specified. A smooth curve through the
+# joints is accepted if its deviation from the straight line is at most that of a smooth curve
+# through the poses.
 
 
 _NEAREST = 1e-4
-"""Of the way between two poses, before a singular configuration: rounding, magnified there, is
-still far below the way itself."""
+"""Smallest distance from a singular configuration, as a fraction of the segment between two poses:
+amplified rounding errors are still far smaller than the distance itself."""
 _SMOOTH = 0.4
-"""Of what is added to the prediction, relative to the way, when this is halved: a quarter if the
-joints are smooth, the same or more if they have a corner or jump."""
+"""Largest ratio of the relative corrections for half and full distance at a smooth crossing. The
+ratio is 1/4 for a smooth joint path and at least 1 for a corner or jump."""
 _LITTLE = 1e-6
-"""Of the way, added to the prediction: the joints are smooth but for rounding."""
+"""Relative correction below which a joint path is smooth up to rounding errors."""
 _FAIR, _HALF = 0.1, 0.5
-"""Of the way, added to the prediction, at most: along the curve itself, and from pose to pose."""
+"""Largest relative corrections: along the curve itself, and from pose to pose."""
 _LONGEST_LEAP = 0.5
-"""Way to either side of a singular configuration, in those between two poses, tried first."""
+"""First distance to either side of a singular configuration, in segments between two poses."""
 _LEAST_LEAP = 0.03
-"""The least way tried where redundant joints pass by a singular configuration: they do not meet it
-but for rounding and the length of steps, so that close to it they turn aside."""
+"""Smallest distance, in segments, for redundant joints near a singular configuration. They miss it
+by rounding errors and the step length, so that their path turns aside close to it."""
 _BESIDE = 0.1
-"""Move [rad or arm lengths] of a configuration between two sides of a leap to one that solves."""
+"""Largest correction [rad or arm lengths] from an interpolated configuration to a solution."""
 _AT_POSE = 1e-3
-"""Of the way between two poses, before a pose, at which it may be the singular one itself."""
+"""Distance before a pose, as a fraction of the segment between two poses, at which the pose itself
+may be the singular one."""
 _WATCHED = 1e-4
-"""Smallest singular value above which no way ends at a singular configuration: it ends at a limit
-or out of reach."""
+"""Smallest singular value above which a stopped path did not end at a singular configuration but
+at a limit or out of reach."""
 _ALIKE = 0.9
-"""Cosine of the angle, 26 degrees, by which the motion that a frame does not see may turn in a
-leap: little where the joints go on, by a right angle where they turn aside."""
+"""Cosine of the largest angle (26 degrees) between the null spaces before and after a crossing. The
+angle is small in a crossing and 90 degrees if the path turns aside."""
 _UNCERTAIN = 0.25
-"""Of the distance between the straight line and a smooth curve through the poses, by which joints
-may leave the curve: they are as smooth as the poses."""
+"""Largest pose error of interpolated joints, relative to the distance between the straight line and
+a smooth curve through the poses: the joints must be as smooth as the poses."""
 _TURN_OFF = 0.05
-"""Times the step before, by which a step misses what was predicted, from which it is asked whether
-joints that go through a singular configuration would go on more smoothly."""
+"""Prediction error of a step, relative to the step before, above which a crossing of a nearby
+singular configuration is examined as a smoother continuation."""
 _NEAR_STEPS = 3.0
-"""Steps within which the smallest singular value, which is of the size of the distance to a
-singular configuration, may vanish."""
+"""Distance in steps within which a singular configuration is near. The smallest singular value
+approximates the distance to a singular configuration."""
 
 
 def _added(predicted: Array, found: Array, last: Array) -> float:
-    """What was added to a prediction, relative to the way."""
+    """Return the correction |found - predicted| relative to the distance |found - last|."""
     way = max(float(np.linalg.norm(found - last)), NONZERO)
     return float(np.linalg.norm(found - predicted)) / way
 
 
 def _settled(led: Follower, x: Array, T: Array) -> Array | None:
-    """(n,) the configuration beside x that takes a pose, also a singular one; None if it is not."""
+    """Return a solution (n,) of pose T near x, which may be singular, or None."""
 
     def residual(z: Array) -> tuple[Array, Array]:
         r, J = led.rows(z, T)
@@ -805,10 +829,10 @@ def _settled(led: Follower, x: Array, T: Array) -> Array | None:
     def missing(z: Array) -> float:
         return float(np.max(np.abs(led.rows(z, T)[0])))
 
-    # what a singular configuration leaves free stays: to move it changes rounding alone
+    # singular directions keep their positions: moving along them changes rounding errors only
     y = gauss_newton(residual, x, rank_tolerance=SINGULAR).x
     most = _OFF if led.chain is None else SOLVED
-    # else by all that is left of its rank, or downhill
+    # otherwise use the full numerical rank, then damped least squares
     if missing(y) > most:
         y = gauss_newton(residual, y).x
     if missing(y) > most:
@@ -818,7 +842,7 @@ def _settled(led: Follower, x: Array, T: Array) -> Array | None:
 
 
 def _descended(led: Follower, x: Array, T: Array) -> Array:
-    """(n,) the configuration nearest to a pose beside x, also where the Jacobian loses rank."""
+    """Minimise the pose error from x, also if the Jacobian is rank-deficient; return (n,)."""
     if led.chain is not None:
         arm = led.chain.arm(led.target.closing.p)
         better = polish(arm, T, (x * led.scale)[None]).q[0]
@@ -832,11 +856,10 @@ def _descended(led: Follower, x: Array, T: Array) -> Array:
 
 
 def _goes_across(led: Follower, before: Array, behind: Array) -> bool:
-    """Whether joints that are redundant come out on the other side of a singular configuration.
+    """Whether two configurations are on opposite sides of a singularity; True if not redundant.
 
-    There the determinant of the Jacobian and of the motion that the frame does not see has the
-    other sign, and this motion is nearly the same. Beside a configuration that they only come near
-    to they turn aside instead, on the same side.
+    On opposite sides the null space of the Jacobian is nearly equal, and det([J; null space]) has
+    opposite signs. Redundant joints that turn aside near a singularity stay on one side.
     """
     if not led.redundant:
         return True
@@ -844,17 +867,17 @@ def _goes_across(led: Follower, before: Array, behind: Array) -> bool:
     (_, J), (_, K), kept = led.rows(before, T), led.rows(behind, T), before.size - led.slack
     still = np.linalg.svd(J)[2][kept:]
     alike = np.linalg.svd(still @ np.linalg.svd(K)[2][kept:].T)[1][led.redundant - 1] > _ALIKE
-    if len(J) != kept:  # rows of loops depend on each other
+    if len(J) != kept:  # closed loops have linearly dependent rows
         return bool(alike)
     signs = [np.linalg.slogdet(np.vstack([rows, still]))[0] for rows in (J, K)]
     return bool(alike) and signs[0] != signs[1]
 
 
 def _nearest_solution(led: Follower, x: Array, T: Array) -> Array | None:
-    """(n,) the configuration nearest to x of all that take a pose."""
+    """Return the solution (n,) of pose T nearest to x, or None. Open chains only."""
     if led.chain is None:
         return None
-    if led.redundant:  # of infinitely many the one beside it
+    if led.redundant:  # infinitely many solutions: take a local one
         return _settled(led, x, T)
     p = led.target.closing.p
     q = solve_at(led.chain, NOT_VARIED, T, "auto", p).q[:, list(led.indices)]
@@ -866,7 +889,7 @@ def _nearest_solution(led: Follower, x: Array, T: Array) -> Array | None:
 
 
 def _lagrange(nodes: Sequence[float] | range, values: Array, u: float) -> Array:
-    """The polynomial through values (k, n) at k nodes, at u."""
+    """Evaluate at u the interpolating polynomial through values (k, n) at k nodes."""
     total = np.zeros(values.shape[1])
     for k, own in enumerate(nodes):
         others = [other for m, other in enumerate(nodes) if m != k]
@@ -874,30 +897,30 @@ def _lagrange(nodes: Sequence[float] | range, values: Array, u: float) -> Array:
     return total
 
 
-# Why a path could not be followed any further, in words and figures.
+# Error texts for a path that could not be followed to its end.
 
 
 _AT_LIMIT = 1e-6
-"""Distance from a limit [rad or m] at which it is the reason to stop: halved steps end much nearer,
-and what stops for another reason is hardly ever so near."""
+"""Distance from a joint limit [rad or m] below which the limit is the reason to stop. Step halving
+ends much nearer, and a stop for another reason is rarely so near."""
 _REACHED = 1e-6
-"""Largest row that is missing at a pose within reach: at a double root rounding leaves the root of
-1e-12, to which solutions are found."""
+"""Largest error row at a reachable pose: 1e-6 is the square root of 1e-12, the error of solutions,
+and rounding has this effect at a double root."""
 _STARTS, _SEED = 6, 20260109
 _NUDGE = 1e-3
-"""Move of a joint [rad or arm lengths] that tells which one leads away from a singular
-configuration: longer than the way to it, 1e-7, and short beside that to another one."""
+"""Move of a joint [rad or arm lengths] to find the joint that changes the smallest singular value
+most: longer than the distance to the singular configuration (1e-7), shorter than to the next."""
 
 
 def stop_reason(led: Follower, poses: Path, number: int, q: Array, at: float) -> str:
-    """Why the pose of a number was not reached.
+    """Return the text that explains why a pose was not reached.
 
     Args:
-        led: what follows.
-        poses: the path.
-        number: of the pose.
-        q: (nq,) the last configuration.
-        at: how far it is between the pose before, 0, and this one, 1.
+        led: joints that track the path.
+        poses: path.
+        number: index of the pose.
+        q: (nq,) last configuration.
+        at: position of the last configuration between the preceding pose (0) and this pose (1).
     """
     x, T = led.scaled(q), poses.poses[number]
     title = f"pose {number} of {poses.count}"
@@ -922,9 +945,9 @@ def stop_reason(led: Follower, poses: Path, number: int, q: Array, at: float) ->
 
 
 def _jump(led: Follower, x: Array, T: Array) -> str:
-    """The joint that is farthest from where it would have to be behind a singular configuration.
+    """Text on the joint that would jump most to the solution past the singular configuration.
 
-    Of redundant joints whether there is a configuration behind it that is near.
+    For redundant joints: text if no solution near x was found.
     """
     behind = _nearest_solution(led, x, T)
     if led.redundant and behind is None and led.chain is not None:
@@ -951,7 +974,7 @@ def _miss(led: Follower, q: Array, T: Array) -> str:
 
 
 def _nearest(led: Follower, x: Array, T: Array) -> tuple[Array, float]:
-    """The configuration nearest to the pose that some starts lead to, and what is missing there."""
+    """Return the best least-squares configuration (n,) of several starts, and its pose error."""
 
     def residual(y: Array) -> tuple[Array, Array]:
         r, J = led.rows(y, T)
@@ -971,7 +994,7 @@ def _nearest(led: Follower, x: Array, T: Array) -> tuple[Array, float]:
 
 
 def _singular(led: Follower, q: Array) -> str:
-    """The joint on which the smallest singular value depends most, and this value."""
+    """Text with the smallest singular value and the joint on which it depends most."""
     x, T = led.scaled(q), led.pose(q)
 
     def value(y: Array) -> float:
@@ -984,29 +1007,30 @@ def _singular(led: Follower, q: Array) -> str:
     return f"{name} = {q[index]:.3f}, smallest singular value {round(value(x), 12):.1g}"
 
 
-# The walk along a path: runs of a closed form, single poses, steps, and leaps.
+# Tracking of a path: blocks of a closed form, single poses, steps, and singularity crossings.
 
 
 _TRAIL = 40
-"""Configurations on the way that are kept: from step to step the way left is halved."""
+"""Number of configurations kept of the way: each step halves the remaining distance."""
 _OFF = 1e-9
-"""Largest row at a pose that was reached: solutions are found to 1e-12, and next to singular
-configurations rounding is larger."""
+"""Largest error row at a reached pose. Solutions have an error of 1e-12, and rounding errors are
+larger near singular configurations."""
 _PARTS = 0.25, 0.5, 0.75, 1.0
-"""Parts of the way to the next pose at which the pose must be the present one, to stay there."""
+"""Fractions of the segment to the next pose at which the pose must equal the current one for the
+joints to stay at rest."""
 _AFTER_STOP, _AFTER_LEAP = 1e-3, 1e-2
-"""First steps, in parts of the next segment: after a narrow passage ten doublings lead back to all
-of it; behind a singular configuration steps are short."""
+"""First steps, as fractions of the next segment. After small steps, ten doublings restore the full
+segment; past a singular configuration steps are short."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leap:
-    """A way past a singular configuration.
+    """Crossing of a singular configuration.
 
     Attributes:
-        x: (k, n) configurations at the next k poses.
-        u: number at which it ends; between two poses it is broken.
-        end: (n,) the configuration there.
+        x: (k, n) scaled configurations at the next k poses.
+        u: pose index at which the crossing ends; fractional between two poses.
+        end: (n,) scaled configuration at u.
     """
 
     x: Array
@@ -1016,22 +1040,22 @@ class Leap:
 
 @dataclass(slots=True, eq=False)
 class Walk:
-    """How far the joints have followed a path; `walk` makes it at the start.
+    """State of the tracking of a path. `walk` creates it at the start.
 
     Attributes:
-        led: what follows.
-        tracker: the numbers of it.
-        poses: the path.
-        curve: the same as a function of the number of a pose, from -1 at the start.
-        start: (nq,) the configuration there.
-        found: (N, n) configurations at the poses before `number`.
-        residual: (N,) by how much they miss them.
-        number: of the next pose.
-        u: number at which it stands, a broken one between two poses.
-        point: the configuration there.
-        trail: the last configurations on the way, each with its number.
-        step: the next one to try, in parts of the way to the next pose.
-        runs: the branches of the closed form at the poses around.
+        led: joints that track the path.
+        tracker: equations and limits of `led`.
+        poses: path.
+        curve: pose as a function of the real pose index u, -1 at the start.
+        start: (nq,) configuration at u = -1.
+        found: (N, n) scaled configurations; the rows below `number` are set.
+        residual: (N,) pose errors; the elements below `number` are set.
+        number: index of the next pose.
+        u: current pose index; fractional between two poses.
+        point: configuration at u.
+        trail: last configurations on the path, each with its pose index.
+        step: next step size, as a fraction of the segment to the next pose.
+        runs: branches of the closed form at the current block of poses, or None.
     """
 
     led: Follower
@@ -1049,7 +1073,7 @@ class Walk:
     runs: Runs | None = None
 
     def go(self) -> str:
-        """Walk to the end of the path, or to where it cannot be followed; the reason of that."""
+        """Track the path to its end or until it stops. Return the reason of a stop, or ""."""
         while self.number < self.poses.count:
             at_pose = self.u == self.number - 1 and self.number > 0
             if self._stays() or (at_pose and (self._run() or self._smooth_step())):
@@ -1060,7 +1084,7 @@ class Walk:
         return ""
 
     def _stays(self) -> bool:
-        """Stay at a singular configuration if the pose does not change to the next; else False."""
+        """Keep a singular configuration if the next pose is equal; return whether it is."""
         if smallest(self.tracker, self.point.J) > SINGULAR:
             return False
         way, x = self.number - self.u, self.point.x
@@ -1073,14 +1097,14 @@ class Walk:
         return True
 
     def _arrive(self, x: Array, residual: Array | list[float]) -> None:
-        """Note configurations (k, n) at the next poses, and stand at the last one of them."""
+        """Store configurations x (k, n) and pose errors of the next k poses, and move there."""
         first, self.number = self.number, self.number + len(x)
         self.found[first : self.number], self.residual[first : self.number] = x, residual
         self.u, self.trail = self.number - 1.0, self._last_poses()
         self.point = self.trail[-1][1]
 
     def _last_poses(self) -> list[tuple[float, PathPoint]]:
-        """The last poses that were reached, as a trail."""
+        """Return the last three reached poses as a trail."""
         numbers = range(max(0, self.number - 3), self.number)
         found, T = self.found, self.poses.poses
         return [(float(k), point_at(self.tracker, found[k], T[k])) for k in numbers]
@@ -1088,7 +1112,7 @@ class Walk:
     # many poses at once, and single ones next to a singular configuration
 
     def _run(self) -> bool:
-        """Take a run of poses on one branch of the closed form; whether there is one."""
+        """Advance over poses on one branch of the closed form; return whether there are any."""
         self.runs = _runs(self.led, self.poses, self.number - 1, self.runs)
         if self.runs is None:
             return False
@@ -1098,7 +1122,7 @@ class Walk:
         return bool(len(run))
 
     def _smooth_step(self) -> bool:
-        """Go to the next pose, where joints go on smoothly there by a closed form; else False."""
+        """Advance one pose if a closed-form solution continues smoothly; return whether so."""
         number, found, runs = self.number, self.found, self.runs
         if runs is None or self.poses.function is not None or number < 3:
             return False
@@ -1120,7 +1144,7 @@ class Walk:
     # step by step
 
     def _on(self) -> str:
-        """Go to the next pose, or past a singular configuration before it; why not, else ""."""
+        """Step to the next pose or past a singularity. Return the reason of a stop, or ""."""
         led, number, way = self.led, self.number, list[tuple[float, PathPoint]]()
         allowed = not led.redundant or self.tracker.may(self.point.x)
         segment = _segment(self.curve, self.u, number)
@@ -1147,7 +1171,7 @@ class Walk:
         return ""
 
     def _turns_off(self, point: PathPoint) -> bool:
-        """Whether a step beside a singular configuration goes elsewhere than those before lead."""
+        """Whether a step near a singularity deviates from the extrapolated joint path."""
         number, found = self.number, self.found
         if number < 2:
             return False
@@ -1161,7 +1185,7 @@ class Walk:
         return smallest(self.tracker, point.J) < _NEAR_STEPS * longest
 
     def _land(self, leap: Leap) -> None:
-        """Go on from the end of a leap."""
+        """Store the configurations of a crossing and move to its end."""
         passed = slice(self.number, self.number + len(leap.x))
         self.found[passed] = leap.x
         self.residual[passed] = [
@@ -1176,10 +1200,10 @@ class Walk:
     # past a singular configuration
 
     def _leap(self, stopped: bool) -> Leap | None:
-        """The joints behind a singular configuration; None where they do not go on smoothly.
+        """Return a smooth crossing of the singular configuration, or None.
 
         Args:
-            stopped: whether the way ends before the next pose.
+            stopped: whether the continuation stopped before the next pose.
         """
         near = self.trail[-1][1]
         if stopped and smallest(self.tracker, near.J) > _WATCHED:
@@ -1196,15 +1220,15 @@ class Walk:
         return None
 
     def _leap_along(self, trail: list[tuple[float, PathPoint]], least: float) -> Leap | None:
-        """Along the curve itself, from one side of the singular configuration to the other.
+        """Cross the singular configuration along the pose curve; None if the path is not smooth.
 
         Args:
-            trail: the way up to the singular configuration.
-            least: the shortest way to either side that is tried.
+            trail: configurations up to the singular configuration.
+            least: smallest distance to either side, in segments between poses.
         """
         tracker, poses, number = self.tracker, self.poses, self.number
         at, end = trail[-1][0], float(poses.count - 1)
-        # lines between given poses have corners there
+        # straight lines between poses have corners at the poses
         start = max(trail[0][0], number - 1.0 if poses.function is None else min(0.0, at - 1.0))
         way, before = min((at - start) / 3, _LONGEST_LEAP), np.inf
         while way > least:
@@ -1231,7 +1255,7 @@ class Walk:
         return None
 
     def _configuration_at(self, trail: list[tuple[float, PathPoint]], u: float) -> Array | None:
-        """(n,) the configuration at a number on the way that was followed."""
+        """Return the configuration (n,) at pose index u on the tracked path, or None."""
         known = [one for one in trail if one[0] <= u]
         if not known:
             return None
@@ -1243,7 +1267,7 @@ class Walk:
         return last.x if reached == 1.0 else None
 
     def _leap_between(self, stopped: bool) -> Leap | None:
-        """From the poses before a singular configuration to those behind it."""
+        """Cross the singular configuration from pose to pose; None if the path is not smooth."""
         before, number = self._before(), self.number
         if before is None:
             return None
@@ -1256,7 +1280,7 @@ class Walk:
         return next((leap for leap in leaps if leap is not None), None)
 
     def _leap_to(self, nodes: list[float], x: Array, to: int) -> Leap | None:
-        """From configurations (k, n) at nodes to the pose of a number."""
+        """Cross from configurations x (k, n) at pose indices `nodes` to the pose `to`, or None."""
         led, poses, number, may = self.led, self.poses, self.number, self.tracker.may
         predicted = _lagrange(nodes, x, float(min(to, poses.count - 1)))
         if to >= poses.count:  # the path ends at the singular configuration
@@ -1279,7 +1303,7 @@ class Walk:
         return None if passed is None else Leap(passed, float(to), behind)
 
     def _before(self) -> tuple[list[float], Array] | None:
-        """Two or three configurations before the next pose, and their numbers; None if only one."""
+        """Return pose indices and configurations of two or three previous points, or None."""
         number, found = self.number, self.found
         if number >= 2:
             first = max(0, number - 3)
@@ -1292,13 +1316,16 @@ class Walk:
         return [0.0, u], np.array([found[0], point.x])
 
     def _smooth_solution(self, predicted: Array, number: int, last: Array) -> Array | None:
-        """(n,) the configuration at a pose, near the prediction beside the way to it."""
+        """Return the solution (n,) at a pose nearest to the prediction, or None if too far."""
         found = _nearest_solution(self.led, predicted, self.poses.poses[number])
         most = _FAIR if self.led.redundant else _HALF
         return None if found is None or _added(predicted, found, last) > most else found
 
     def _passed(self, nodes: Sequence[float], x: Array, numbers: range) -> Array | None:
-        """(k, n) configurations at poses between those, (m, n), at nodes; None where one is not."""
+        """Interpolate configurations x (m, n) at nodes and solve the poses `numbers`.
+
+        Return (k, n), or None if a pose has no solution nearby.
+        """
         passed = list[Array]()
         for k in numbers:
             own = [y for u, y in zip(nodes, x, strict=True) if u == k]
@@ -1310,12 +1337,12 @@ class Walk:
         return np.array(passed).reshape(len(passed), x.shape[1])
 
     def _is_fair(self, nodes: Sequence[float], x: Array, to: int) -> bool:
-        """Whether a smooth curve through joints leaves the path as little as one through the poses.
+        """Whether interpolated joints deviate from the path as little as interpolated poses do.
 
         Args:
-            nodes: numbers around the way from the last pose to that of a number.
-            x: (k, n) configurations there.
-            to: this number.
+            nodes: pose indices around the interval from the last pose to `to`.
+            x: (k, n) configurations at the nodes.
+            to: index of the pose at the end of the interval.
         """
         led, poses, before = self.led, self.poses.poses, self.number - 1
         T, middle = poses[before], (before + to) / 2
@@ -1331,7 +1358,7 @@ class Walk:
 
 
 def walk(led: Follower, poses: Path, q: Array) -> Walk:
-    """What stands at a configuration (nq,) before the first pose."""
+    """Return the initial tracking state at a configuration q (nq,), before the first pose."""
     tracker, x, curve = led.tracker, led.scaled(q), poses.curve(led.pose(q))
     point = point_at(tracker, x, curve(-1.0))
     found, residual = np.empty((poses.count, x.size)), np.empty(poses.count)
@@ -1339,44 +1366,45 @@ def walk(led: Follower, poses: Path, q: Array) -> Walk:
 
 
 def _segment(curve: Callable[[float], Array], u: float, to: float) -> Callable[[float], Array]:
-    """The poses from one number to another, of a number between 0 and 1."""
+    """Return the pose curve from pose index u to `to`, as a function of [0, 1]."""
     return lambda s: curve(to if s == 1.0 else u + s * (to - u))
 
 
-# A path of poses followed on one branch: the joints move continuously, or stop with a reason.
+# Public function: the joints move continuously along the path, or stop with a reason.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Conditioning:
-    """What the smallest singular values on a path are computed from.
+    """Data from which the smallest singular values along a path are computed.
 
     Attributes:
-        arm: the joints; None where the values are known.
-        values: (k, n) their configurations, scaled; or (k,) the values.
+        arm: open chain of the joints, or None if the singular values are already known.
+        values: (k, n) scaled configurations of `arm`, or (k,) the singular values.
     """
 
     arm: Arm | None
     values: Array
 
     def smallest(self) -> Array:
-        """(k,) the values."""
+        """Return the smallest singular values (k,)."""
         if self.arm is None:
             return self.values
         q = self.values * self.arm.units
-        J = examine_arm(self.arm, np.eye(4), q)[2]  # which does not depend on the target
+        J = examine_arm(self.arm, np.eye(4), q)[2]  # the Jacobian does not depend on the target
         return np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1], dtype=float)
 
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """How far a path was followed.
+    """Joint path along a sequence of poses.
 
     Attributes:
-        q: (k, nq) configurations at the poses reached [rad or m]; angles go on beyond half a turn.
-        reached: number of the last pose reached, counted from 0; -1 for none.
-        reason: why it stopped there; empty where the path was followed to its end.
-        residual: (k,) largest element by which the pose is missed, and row by which a loop is open.
-        stopped_at: (nq,) the last configuration on the way, between two poses where it stopped.
+        q: (k, nq) configurations at the reached poses [rad or m]. Angles are continuous and may
+            exceed half a revolution.
+        reached: index of the last reached pose, counted from 0; -1 if no pose was reached.
+        reason: text that explains why the path stopped; empty if its end was reached.
+        residual: (k,) largest absolute pose error or loop closure error.
+        stopped_at: (nq,) last configuration; between two poses if the path stopped there.
     """
 
     q: Array
@@ -1388,7 +1416,7 @@ class Followed:
 
     @functools.cached_property
     def singular_values(self) -> Array:
-        """(k,) the smallest of the Jacobian, lengths measured by the arm's."""
+        """Smallest singular values (k,) of the Jacobian, lengths divided by the arm length."""
         return self._conditioning.smallest()
 
 
@@ -1404,35 +1432,36 @@ def follow(
     redundancy: Redundancy | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Followed:
-    """The configurations along a path of poses, on the branch of the first one.
+    """Compute joint positions along a path of poses, on the branch of the start configuration.
 
-    Between two poses the frame is led along a straight line and turned about a fixed axis, in
-    steps so small that no other branch can be taken; the poses of a function need not be straight.
-    Singular configurations are passed where the joints go on smoothly behind them; where they do
-    not, it stops before, and says where and why. Fewer than six joints need poses that they can
-    take; between these the frame is led as near to the line as they can.
+    Between two poses of an array the frame moves along a straight line and rotates about a fixed
+    axis; a function specifies any curve. Steps are small enough to stay on one branch. A singular
+    configuration is crossed if the joint path is smooth there; otherwise the path stops before it,
+    with a reason. With fewer than six joints every pose must be reachable, and between the poses
+    the frame is as close to the line as possible.
 
     Args:
-        system: open, or with closed loops, which stay closed in the way they are at the start.
-        path: (N, 4, 4) poses of the frame in the base [m], or a function that makes such a pose of
-            a number between 0 and 1.
-        start: (nq,) positions near the first pose, by name or all of them, or a solution with such
-            a `q`. The frame is led from where it is there to the first pose.
-        frame: a body, a named frame, or the number of a link; the terminal frame when left out.
-        samples: how many poses of a function are given back.
-        locked: positions of joints that stay where they are, by name [rad or m].
-        limits: (lowest, highest) by name replaces limits of the description, None for a joint
-            without; False leaves all out of account.
-        redundancy: what joints beyond the six that a pose determines do: "minimum velocity", which
-            is taken when left out; "limits", to stay far from these; "manipulability", far from
-            singular configurations; or a function that gives the gradient (nq,) of a cost at q.
-        parameters: values of symbols, the others at their defaults.
+        system: robot, open or with closed loops. Loops keep the assembly mode of the start.
+        path: (N, 4, 4) poses of the frame in the base [m], or a function that returns such a pose
+            for a parameter in [0, 1].
+        start: (nq,) positions near the first pose, a dict by name, or a solution with attribute
+            `q`. The frame first moves from its pose at the start to the first pose.
+        frame: name of a body or frame, or index of a link; default is the terminal frame.
+        samples: number of poses at which a path function is evaluated.
+        locked: positions of joints that do not move, by name [rad or m].
+        limits: (lower, upper) by joint name, to replace limits of the model; None for an unlimited
+            joint. False ignores all limits.
+        redundancy: criterion for redundant joints: "minimum velocity" (default), "limits" (away
+            from joint limits), "manipulability" (away from singular configurations), or a function
+            that returns the gradient (nq,) of a cost at q.
+        parameters: values of parameters by name; default values for all others.
 
     Returns:
-        The configurations up to the last pose reached, and why it is not the last of the path.
+        Configurations up to the last reached pose, and the reason if the path stopped before its
+        end.
 
     Raises:
-        ModelError: a pose, a name, a criterion or the start is not understood.
+        ModelError: a pose, a name, a criterion or the start is invalid.
     """
     require_system(system)
     name = terminal_frame(system) if frame is None else frame
@@ -1449,7 +1478,7 @@ def follow(
 
 
 def _conditioning(led: Follower, poses: Path, x: Array) -> Conditioning:
-    """What tells the singular values at configurations x, (k, n), when they are asked for."""
+    """Return the data for the smallest singular values at scaled configurations x (k, n)."""
     if led.chain is not None:
         return Conditioning(led.chain.arm(led.target.closing.p), x)
     J = [led.rows(one, T)[1] for one, T in zip(x, poses.poses, strict=False)]
@@ -1457,7 +1486,7 @@ def _conditioning(led: Follower, poses: Path, x: Array) -> Conditioning:
 
 
 def _start(system: System, start: Any, locked: Mapping[str, float] | None) -> Array:
-    """(nq,) the start, with locked joints where they are locked."""
+    """Return the start configuration (nq,), with locked joints at their locked positions."""
     given = getattr(start, "q", start)
     q = np.array(system.position(given)) if isinstance(given, Mapping) else _numbers(system, given)
     held = np.array(system.position(locked))

@@ -1,4 +1,4 @@
-"""Poses of which a part counts: a rotation about an axis of the tool is free, or all of them."""
+"""Inverse geometric model of partly specified poses: free rotation about a tool axis, or all."""
 
 from __future__ import annotations
 
@@ -39,34 +39,35 @@ from mbs.models.inverse_geometry.solve import solve
 from mbs.models.inverse_geometry.whole_robot import close, why_searched
 from mbs.text import did_you_mean, quoted
 
-# Behind the frame stand joints that do not exist: one about the free axis, or three that meet in
-# the origin. The whole pose of what they carry is the part of the pose that counts for the arm.
-# So five joints and a free axis are an arm of six, three joints and a free orientation one with a
-# spherical wrist, and what is known of whole poses serves.
+# Virtual joints are appended to the frame: one revolute joint about the free axis, or three with
+# axes through the origin. A pose of the last virtual link specifies only the required part of the
+# pose of the frame. Five joints and a free axis become a six-joint arm, three joints and a free
+# orientation become an arm with a spherical wrist. Both are solved for complete poses.
 
 
 FREE = ("x", "y", "z", "orientation")
-"""What may be free: the rotation about an axis of the frame, or every rotation."""
+"""Names of the free motions: rotation about an axis of the frame, or all rotations."""
 
 _AXES = {"x": "x", "y": "y", "z": "z", "orientation": "zxy"}
 _ANY = np.array([[2.0, -1.0, 2.0], [2.0, 2.0, -1.0], [-1.0, 2.0, 2.0]]) / 3.0
-"""An orientation that no axis of usual robots is parallel to: which one is looked for is free."""
+"""Target orientation of the last virtual link, not parallel to the axes of usual robots. Its choice
+does not affect the result."""
 _SAME = 1e-6
-"""Difference [rad or m] of the arm's joints in solutions that are one: those of a spherical wrist
-that does not exist come in pairs."""
+"""Difference [rad or m] of the arm's joints below which solutions are equal: a virtual spherical
+wrist has two solutions for each solution of the arm."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeOrientation:
-    """A frame whose orientation is free in part; made by `free_orientation`.
+    """Frame with a partly free orientation; created by `free_orientation`.
 
     Attributes:
-        system: the robot.
-        free: what is free.
-        robot: the joints on the way to the frame, and behind it one or three for what is free.
-        chain: the first of them.
-        arm: these in numbers.
-        p: (np,) parameters.
+        system: robot.
+        free: free rotation: "x", "y", "z" or "orientation".
+        robot: system of the joints to the frame, followed by one or three virtual joints.
+        chain: chain of the real joints from the base to the frame.
+        arm: numeric geometry of `chain`.
+        p: (np,) parameter values.
     """
 
     system: System
@@ -78,7 +79,7 @@ class FreeOrientation:
 
     @property
     def indices(self) -> tuple[int, ...]:
-        """Indices in q of the joints on the way to the frame."""
+        """Indices in q of the joints from the base to the frame."""
         return self.chain.indices
 
     def solve(
@@ -91,28 +92,30 @@ class FreeOrientation:
         locked: Mapping[str, float] | None = None,
         redundant: Redundant | None = None,
     ) -> Solutions:
-        """Every configuration that takes the frame to the part of a pose that counts.
+        """Compute all configurations at which the frame has the specified part of a pose.
+
+        The arguments from `method` on are as in `mbs.models.inverse_geometry.solve`.
 
         Args:
-            T: (4, 4) the pose of the frame seen from the base [m]; (3,) its position where the
+            T: (4, 4) pose of the frame relative to the base [m], or (3,) its position if the
                 orientation is free.
-            method: as in `mbs.models.inverse_geometry.solve`, as all that follow.
-            limits: which leave out solutions.
-            seed: a configuration by name or (nq,) [rad or m].
-            locked: positions of joints that stay where they are.
-            redundant: positions of joints that take many.
+            method: name of the method.
+            limits: joint limits.
+            seed: configuration as a dict by name or (nq,) [rad or m].
+            locked: positions of fixed joints by name [rad or m].
+            redundant: samples of redundant joints by name.
 
         Returns:
-            Solutions; their residual is that of the part and of the loops, sigma_min of the rows
-            of the part for the joints on the way. One of a self-motion has multiplicity 0 and no
-            `family`. Of a robot with loops those of the joints on the way, in every way in which
-            the loops close.
+            Solutions. The residual is the error of the specified part and of the loop closure.
+            sigma_min is the smallest singular value of the specified rows for the joints to the
+            frame. A solution on a self-motion has multiplicity 0 and no `family`. For a robot with
+            loops, all branches of the loop closure are listed.
         """
         target = target_pose(self.system, self._pose(T))
         near = np.array(self.system.position(seed))
         still = {*(locked or {}), *(redundant or {})}
         start = None if seed is None else self._start(near)
-        # of a robot with loops the limits of other joints count too
+        # for a robot with loops, limits are applied later, to all joints
         own = None if self.system.is_closed else self._limits(limits)
         found = solve(
             self.robot, target, "tool", method, own, start, locked=locked, redundant=redundant
@@ -145,18 +148,19 @@ class FreeOrientation:
         *,
         redundant: Redundant | None = None,
     ) -> ManySolutions:
-        """All solutions of many poses; see `mbs.models.inverse_geometry.solve_many`.
+        """Compute all configurations for many partly specified poses.
+
+        The arguments from `method` on are as in `mbs.models.inverse_geometry.solve_many`.
 
         Args:
-            T: (N, 4, 4) poses of the frame [m]; (N, 3) positions where the orientation is free.
-            method: as there, as all that follow.
-            limits: which leave out solutions.
-            locked: positions of joints that stay where they are.
-            redundant: positions of joints that take many.
+            T: (N, 4, 4) poses of the frame [m], or (N, 3) positions if the orientation is free.
+            method: name of the method.
+            limits: joint limits.
+            locked: positions of fixed joints by name [rad or m].
+            redundant: samples of redundant joints by name.
 
         Returns:
-            ManySolutions; their residual is that of the whole pose of what the joints that do not
-            exist carry.
+            ManySolutions. The residual is the error of the complete pose of the last virtual link.
 
         Raises:
             ModelError: the robot has loops.
@@ -183,18 +187,18 @@ class FreeOrientation:
         limits: bool | Given | None = None,
         redundancy: Redundancy | None = None,
     ) -> Followed:
-        """The configurations along a path; see `mbs.models.inverse_geometry.follow`.
+        """Compute joint positions along a path; see `mbs.models.inverse_geometry.follow`.
 
-        What is free counts as a joint beyond those of the arm, with `redundancy` for those that a
-        pose does not determine; its motion counts like theirs.
+        The virtual joints of the free rotation are treated like joints of the arm, also in the
+        criterion `redundancy`.
 
         Args:
-            path: (N, 4, 4) poses or (N, 3) positions, or a function that gives one.
-            start: as there, as all that follow: (nq,) positions near the first pose.
-            samples: how many poses of a function.
-            locked: positions of joints that stay where they are.
-            limits: which are kept.
-            redundancy: what joints do that are not determined.
+            path: (N, 4, 4) poses or (N, 3) positions, or a function of [0, 1] that returns one.
+            start: (nq,) positions near the first pose, a dict by name, or a solution.
+            samples: number of poses at which a path function is evaluated.
+            locked: positions of joints that do not move, by name [rad or m].
+            limits: joint limits that are not exceeded.
+            redundancy: criterion for redundant joints.
 
         Raises:
             ModelError: the robot has loops.
@@ -206,7 +210,7 @@ class FreeOrientation:
         T0 = self.arm.pose(near[list(self.indices)])
 
         def posed(T: Any) -> Any:
-            # the orientation of the start is kept by the joints that do not exist
+            # the virtual joints keep the last virtual link at the start orientation
             return self._pose(T, T0[:3, :3])
 
         led: Any = (lambda s: posed(path(s))) if callable(path) else np.array([*map(posed, path)])
@@ -231,7 +235,7 @@ class FreeOrientation:
         limits: bool | Given | None,
         seed: Mapping[str, float] | Sequence[float] | None,
     ) -> Solutions:
-        """Solutions of the joints on the way, with every loop closed in every way."""
+        """Complete the chain solutions by all branches of the loop closure."""
         system, n = self.system, self.arm.size
         near = np.array(system.position(seed))
         held = {k for k, c in enumerate(system.coordinates) if c.name in still}
@@ -281,7 +285,7 @@ class FreeOrientation:
         return slope
 
     def _pose(self, T: Any, R: Array = _ANY) -> Any:
-        """A pose whose orientation is as it is looked for."""
+        """Return the pose of the last virtual link; R (3, 3) replaces a free orientation."""
         if self.free != "orientation":
             return T
         given = np.asarray(T, dtype=float)
@@ -298,19 +302,19 @@ class FreeOrientation:
         return T if self.free != "orientation" else np.array([self._pose(one) for one in T])
 
     def _start(self, q: Array) -> list[float]:
-        """A configuration of the robot with further joints, these at zero."""
+        """Return the start of `robot` from q (nq,), with the virtual joints at zero."""
         own = q[list(self.indices)].tolist()
         return [*own, *[0.0] * (self.robot.nq - self.arm.size)]
 
     def _whole(self, q: Array, near: Array) -> Array:
-        """(..., nq) configurations of the system, joints that are not on the way as in `near`."""
+        """Return system configurations (..., nq); joints outside the chain as in `near` (nq,)."""
         whole = np.empty((*q.shape[:-1], near.size))
         whole[...] = near
         whole[..., list(self.indices)] = q[..., : self.arm.size]
         return whole
 
     def _limits(self, limits: bool | Given | None) -> bool | Given | None:
-        bounds(self.system, limits)  # its names are those of the system
+        bounds(self.system, limits)  # raises if a name is unknown in the system
         if not isinstance(limits, Mapping):
             return limits
         return {name: pair for name, pair in limits.items() if name in self.arm.names}
@@ -335,21 +339,21 @@ class FreeOrientation:
         )
 
     def _branch(self, solution: Solution) -> str:
-        """The name of a branch, less that of a wrist that does not exist."""
+        """Return the branch name without the label of a virtual wrist."""
         if self.free != "orientation":
             return solution.branch
         parts = solution.branch.split(", ")
         return ", ".join(part for part in parts if part not in ("flip", "no flip"))
 
     def _count(self, solution: Solution) -> int:
-        """How many solutions meet in one; a self-motion of joints that do not exist is none."""
+        """Return the multiplicity; a self-motion of virtual joints only counts as one solution."""
         family = solution.family
         if family is None:
             return solution.multiplicity
         return 0 if set(family.moving) & set(self.arm.names) else 1
 
     def _missed(self, x: Array, target: Array) -> float:
-        """Largest difference of what counts: the position, and the axis that is not free."""
+        """Return the largest error of the position and of the direction of the specified axis."""
         difference = np.abs(self.arm.pose(x) - target)
         missed = float(np.max(difference[:3, 3]))
         if self.free == "orientation":
@@ -357,14 +361,14 @@ class FreeOrientation:
         return max(missed, float(np.max(difference[:3, "xyz".index(self.free)])))
 
     def _singular_value(self, x: Array, still: Container[str]) -> float:
-        """The smallest one of the rows that count, lengths divided by the arm's."""
+        """Return the smallest singular value of the specified rows, lengths by the arm length."""
         T, J = self.arm.pose_and_jacobian(x)
         moving = [k for k, name in enumerate(self.arm.names) if name not in still]
         J = (J * self.arm.units)[:, moving]
         rows = J[:3] / self.arm.length
         if self.free != "orientation":
             k = "xyz".index(self.free)
-            across = np.delete(T[:3, :3], k, axis=1).T  # turns about the free axis do not count
+            across = np.delete(T[:3, :3], k, axis=1).T  # drops rotation about the free axis
             rows = np.vstack([rows, across @ J[3:]])
         return float(np.linalg.svd(rows, compute_uv=False)[-1])
 
@@ -376,24 +380,23 @@ def free_orientation(
     *,
     parameters: Mapping[str, float] | None = None,
 ) -> FreeOrientation:
-    """A frame whose rotation about an axis of its own is free, or whose orientation is.
+    """Set up inverse kinematics of a frame with a free rotation about an axis, or all rotations.
 
     Args:
-        system: a serial robot, a tree, or a robot with loops.
-        free: "x", "y", "z" for the rotation about this axis of the frame, as of a tool that
-            spins; "orientation" where the position alone counts.
-        frame: a body, a named frame, the number of a link, or None for the terminal frame.
-        parameters: values of symbols, the others at their defaults.
+        system: serial robot, tree, or robot with closed loops.
+        free: "x", "y" or "z" for a free rotation about this axis of the frame, as of a spinning
+            tool. "orientation" if only the position is specified.
+        frame: name of a body or frame, index of a link, or None for the terminal frame.
+        parameters: parameter values by name; default values for all others.
 
     Returns:
-        FreeOrientation with the methods `solve` and, of open chains, `solve_many` and `follow`. Six
-        joints determine
-        what counts where the arm has five of them, or three with a free orientation; further ones
-        are locked or redundant.
+        FreeOrientation with the method `solve` and, for open chains, `solve_many` and `follow`. An
+        arm of five joints is fully determined with a free axis, and an arm of three joints with a
+        free orientation. Further joints must be locked or redundant.
 
     Raises:
-        ModelError: there is no such axis or frame, or a joint of the way is neither revolute nor
-            prismatic.
+        ModelError: the axis or frame is unknown, or a joint between base and frame is neither
+            revolute nor prismatic.
     """
     require_system(system)
     if free not in FREE:
@@ -413,7 +416,7 @@ def free_orientation(
 
 
 def _with_free_joints(system: System, arm: Arm, free: str) -> System:
-    """The joints of an arm in numbers, and behind them those that stand for what is free."""
+    """Return a system with the joints of a numeric arm, followed by the virtual joints."""
     limits = {coordinate.name: coordinate.limits for coordinate in system.coordinates}
     mechanism = Mechanism(system.name, gravity=(0, 0, 0))
     last: Any = mechanism.world
@@ -432,5 +435,5 @@ def _with_free_joints(system: System, arm: Arm, free: str) -> System:
 
 
 def _behind(body: Any, gap: Array) -> Any:
-    """The point of a body behind a constant transform."""
+    """Return the point of a body at a constant transform `gap` (4, 4)."""
     return body.at(*gap[:3, 3].tolist(), rotation=gap[:3, :3].tolist())

@@ -1,4 +1,4 @@
-"""Configurations that may solve: the leaves of a closed form, the general method, the search."""
+"""Candidate solutions of a pose from closed forms, the general method and the search."""
 
 from __future__ import annotations
 
@@ -32,38 +32,38 @@ from mbs.models.inverse_geometry.target import SINGULAR, Target
 from mbs.numbers import NONZERO
 
 METHODS = ("auto", *CLOSED_FORMS, "general", "search")
-"""The methods that `solve` knows."""
+"""Values of the argument `method` of `solve`."""
 
 _BRANCH_NEAR = 1e-2
-"""Residual, of max(1 m, the arm's length), up to which a branch is polished: near a double root
-those that are not real miss by little, and all others that do not hold miss by much."""
+"""Largest residual, relative to max(1 m, arm length), of a branch that is refined. Complex branches
+near a double root have a small residual, other invalid branches a large one."""
 _DEGENERATE = 1e-5
-"""Squared and free of units, below which a step loses digits and its other roots may be missed:
-five of sixteen in the square, half as many in the angle."""
+"""Regularity (squared, dimensionless) below which a step loses digits and may miss roots: it loses
+5 of 16 digits in the square and half as many in the angle."""
 EXACT = 2e-15
-"""Residual, of max(1 m, the arm's length), that is rounding of the forward model."""
+"""Residual, relative to max(1 m, arm length), that is a rounding error of the forward model."""
 ILL_CONDITIONED = 1e-9
-"""Regularity of the general method below which it may miss solutions: seven digits are left of a
-root, of a double one three."""
+"""Regularity of the general method below which it may miss solutions: a simple root has seven
+correct digits there, a double root three."""
 NOT_VARIED = np.zeros(0)
 """Positions of the varied joints of a chain that has none."""
 _STARTS = 300
 _KEPT = 256
-"""Arms kept ready, one for every position of a locked joint, of tens of kilobytes each."""
+"""Maximum number of cached arms, one per position of locked joints, tens of kilobytes each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gathered:
-    """Solutions as the methods give them, some of them more than once.
+    """Solutions from one or several methods, possibly with copies.
 
     Attributes:
         q: (m, n) configurations [rad or m].
-        labels: of the branches they come from, "" where they come from none.
-        method: that gave them.
-        doubtful: whether further ones may be missing, because the pose is next to a degenerate
-            one of the method.
-        near: (k, n) configurations that miss the pose by little and that Newton's method did not
-            improve to solutions: starts of a search along a valley.
+        labels: name of the closed-form branch of each solution, "" without a branch.
+        method: name of the method.
+        doubtful: whether solutions may be missing, because the pose is near a degenerate case of
+            the method.
+        near: (k, n) configurations with a small residual that Newton's method did not improve to
+            solutions. They are starts of a search along a valley.
     """
 
     q: Array
@@ -76,19 +76,19 @@ class Gathered:
 def gather(
     chain: FrameChain, target: Target, method: str, p: Array, r: Array = NOT_VARIED
 ) -> Gathered:
-    """The solutions by one method, or by the first that holds for the chain.
+    """Compute solutions by one method, or by the first method that applies to the chain.
 
     Args:
-        chain: what is solved for.
-        target: the target pose, of the chain in numbers, its varied joints at r.
-        method: "pieper", "paul", "general", "search"; "auto" for a closed form, else the general
+        chain: chain that is solved for.
+        target: target pose of the numeric chain with its varied joints at r.
+        method: "pieper", "paul", "general", "search", or "auto" for a closed form, else the general
             method for six joints, else the search.
-        p: (np,) the parameters.
-        r: (k,) positions of the chain's varied joints [rad or m].
+        p: (np,) parameter values.
+        r: (k,) positions of the varied joints of the chain [rad or m].
 
     Raises:
-        NoClosedForm: "pieper" or "paul" was asked for and does not fit.
-        ModelError: there is no such method, or it does not hold for the chain.
+        NoClosedForm: method is "pieper" or "paul" and does not apply to the chain.
+        ModelError: the method is unknown or does not apply to the chain.
     """
     require_method(chain.system, method, METHODS)
     if method in (*CLOSED_FORMS, "auto"):
@@ -110,7 +110,7 @@ def gather(
 
 
 def gather_further(chain: FrameChain, target: Target, gathered: Gathered, p: Array) -> Gathered:
-    """What was gathered, what the general method adds to it, and what lies along valleys."""
+    """Add the solutions of the general method and the solutions along valleys."""
     ready = general_ready(chain, p)
     if gathered.method not in ("general", "search") and ready is not None:
         gathered = joined(gathered, _by_general(target, ready))
@@ -118,29 +118,30 @@ def gather_further(chain: FrameChain, target: Target, gathered: Gathered, p: Arr
 
 
 def joined(gathered: Gathered, more: Gathered) -> Gathered:
-    """What was gathered, and more; certain from now on."""
+    """Return the union of two results, marked as not doubtful."""
     q, labels = np.concatenate([gathered.q, more.q]), gathered.labels + more.labels
     return Gathered(q, labels, gathered.method, False, gathered.near)
 
 
-# Solutions at the far end of a valley: next to a singular configuration in which an arm could move
-# while its frame stays, it still nearly can, and another solution may lie a half turn away along
-# that motion, where the steps of a closed form meet and a search finds neither.
+# Solutions at the far end of a valley of the residual. Near a singular configuration with a
+# self-motion, the residual stays small along nearly the same motion (a valley). Another solution
+# may exist half a revolution away along it. Steps of a closed form coincide there, and a search
+# finds neither solution.
 
 
 _NEARLY_MOVES = 1e-6
-"""Residual, of max(1 m, the arm's length), at a distance along the null space below which the arm
-nearly moves there: next to a fold, where two solutions meet, it is some 1e-3."""
+"""Largest residual, relative to max(1 m, arm length), along a valley. Near a fold, where two
+solutions meet, the residual at the same distance is about 1e-3."""
 _ALONG = 0.2
-"""Length of a step along a valley [rad or arm lengths], from which four Newton steps lead back; a
-solution draws what is nearer than a quarter turn."""
-_SETTLED = 1e-8  # a Newton step [rad or arm lengths] that leaves but rounding, its square
-_STEPS_ALONG = 32  # a whole turn
-_CROSSINGS = 8  # of false position: along a sine the digits double with each
+"""Step along a valley [rad or arm lengths] that four Newton steps correct. A solution attracts
+configurations within a quarter revolution."""
+_SETTLED = 1e-8  # Newton step [rad or arm lengths] after which the error, its square, is rounding
+_STEPS_ALONG = 32  # number of steps along a valley, a full revolution
+_CROSSINGS = 8  # iterations of false position; along a sine each doubles the number of digits
 
 
 def along_valleys(target: Target, gathered: Gathered) -> Gathered:
-    """What was gathered, and the solutions along the motions that singular ones nearly allow."""
+    """Add the solutions along the valleys that start at singular solutions."""
     if target.arm.size != 6:
         return gathered
     s = target.singular_values(gathered.q) if len(gathered.q) else np.zeros((0, 6))
@@ -158,14 +159,14 @@ def along_valleys(target: Target, gathered: Gathered) -> Gathered:
 
 
 def _far_ends(target: Target, start: Array) -> list[Array]:
-    """Solutions x, (k, 6), along the valleys through singular ones, (m, 6)."""
+    """Return solutions x (k, 6) along the valleys through singular configurations (m, 6)."""
     here = _valley_at(target, start)._replace(x=start)
     back = here._replace(along=-here.along)
     valley = _Valley(*(np.concatenate(parts) for parts in zip(here, back, strict=True)))
     scale, found = max(1.0, target.arm.length), list[Array]()
     for _ in range(_STEPS_ALONG):
         ahead = _valley_at(target, valley.x + _ALONG * valley.along).like(valley)
-        # where a valley ends, its walls are steep
+        # a valley ends if the residual rises or the correction is large
         going = ahead.residual < _NEARLY_MOVES * scale
         going &= np.linalg.norm(ahead.x - valley.x, axis=1) < 2 * _ALONG
         crossed = going & (ahead.height * valley.height < 0) & (valley.residual > target.decided)
@@ -181,10 +182,10 @@ _FEW_ENDS = 4
 
 
 def beside(target: Target, x: Array) -> Gathered:
-    """Solutions along the valleys that begin at a self-motion, of which x, (k, 6), are samples.
+    """Find solutions along the valleys that branch off a self-motion with samples x (k, 6).
 
-    Another motion of the arm crosses the self-motion, nearly, where the second smallest singular
-    value has a minimum.
+    Valleys start at minima of the second smallest singular value, where another motion of the arm
+    nearly crosses the self-motion.
     """
     found, q = list[Array](), np.zeros((0, x.shape[1]))
     if x.shape[1] == 6 and len(x) > 2:
@@ -201,13 +202,13 @@ def beside(target: Target, x: Array) -> Gathered:
     return Gathered(q, ("",) * len(q), "", False)
 
 
-_REACH = 5  # steps along a valley, one radian
+_REACH = 5  # number of steps along a valley, one radian in total
 
 
 def along_valley(target: Target, start: Array) -> Array:
-    """(m,) highest residuals within a radian along the valleys through singular x, (m, 6).
+    """Return (m,) the highest residual within 1 rad along the valley through each x (m, 6).
 
-    The lower one of both directions counts.
+    Of both directions the lower value is returned. The configurations x must be singular.
     """
     here = _valley_at(target, start)._replace(x=start)
     highest = []
@@ -221,14 +222,14 @@ def along_valley(target: Target, start: Array) -> Array:
 
 
 _FREE = 0.3
-"""Part of a joint in a direction that leaves the frame, from which on the joint leads along it."""
+"""Smallest component of a joint in a null-space direction for which the joint is moved along it."""
 
 
 def _around(target: Target, start: Array) -> list[Array]:
-    """Solutions x, (k, 6), along the turn of a joint, from where two singular configurations meet.
+    """Find solutions x (k, 6) along the rotation of a joint, from doubly singular configurations.
 
-    No direction of the smallest singular value leads on there, but the joint does that nearly turns
-    alone; where the arm comes nearest to the pose on the way, a solution may lie.
+    With two small singular values the null-space direction is undetermined, but one joint nearly
+    moves alone. Solutions may be at the minima of the residual along its rotation.
     """
     null = np.linalg.svd(target.excess(start)[1])[2][:, -2:]
     leads = (np.max(np.abs(null), axis=1) > _FREE) & ~target.arm.prismatic
@@ -253,9 +254,9 @@ def _around(target: Target, start: Array) -> list[Array]:
 
 
 def _nearest_between(target: Target, x: Array, other: Array, held: Array) -> Array:
-    """(m, 6) where all equations hold, near points x of which they nearly do and others, (m, 6).
+    """Return configurations (m, 6) of least residual near pairs of points x and `other` (m, 6).
 
-    By secants in the position of one joint: the equations are nearly linear in it.
+    Secant method in the position of one joint, in which the equations are nearly linear.
     """
     best, least = x, target.residual(x * target.unit)
     for _ in range(_CROSSINGS):
@@ -272,14 +273,14 @@ def _nearest_between(target: Target, x: Array, other: Array, held: Array) -> Arr
 
 
 class _Valley(NamedTuple):
-    """Points of valleys: all equations hold but that of the smallest singular value.
+    """Points of valleys: all equations hold except the equation of the smallest singular value.
 
     Attributes:
-        along: (m, 6) the direction of the valley.
-        across: (m, 6) of the equation that is left.
-        height: (m,) its value.
-        x: (m, 6) the points, see `Target`.
-        residual: (m,) of them.
+        along: (m, 6) direction of the valley: right singular vector.
+        across: (m, 6) direction of the remaining equation: left singular vector.
+        height: (m,) value of the remaining equation.
+        x: (m, 6) scaled points, see `Target`.
+        residual: (m,) residuals of the points.
     """
 
     along: Array
@@ -289,11 +290,11 @@ class _Valley(NamedTuple):
     residual: Array
 
     def of(self, which: NDArray[np.bool_]) -> _Valley:
-        """Some of the points."""
+        """Return the points of a mask."""
         return _Valley(*(part[which] for part in self))
 
     def like(self, before: _Valley) -> _Valley:
-        """With directions that go on as those before."""
+        """Flip the signs of singular vectors to agree with the points before."""
         on = np.sign(np.sum(self.along * before.along, axis=1))
         same = np.sign(np.sum(self.across * before.across, axis=1))
         return self._replace(
@@ -304,7 +305,7 @@ class _Valley(NamedTuple):
 
 
 def _valley_at(target: Target, x: Array) -> _Valley:
-    """The valleys beside x, (m, 6)."""
+    """Correct points x (m, 6) to the nearest valley by Newton's method."""
     step = np.ones_like(x)
     for last in (False, False, False, False, True):
         e, J = target.excess(x)
@@ -320,9 +321,9 @@ def _valley_at(target: Target, x: Array) -> _Valley:
 
 
 def _crossing(target: Target, low: _Valley, high: _Valley) -> Array:
-    """(m, 6) where the equation that is left holds, between points where its signs differ.
+    """Return the roots (m, 6) of the remaining equation between points of opposite sign.
 
-    By the rule of false position, in the manner of Illinois.
+    False position with the Illinois modification.
     """
     for _ in range(_CROSSINGS):
         part = low.height / (low.height - high.height)
@@ -356,10 +357,10 @@ def _by_closed_form(
 
 
 def _leaves(chain: FrameChain, sequence: StepSequence, p: Array) -> Function:
-    """``leaves(T, r) -> q, regular``: a column for every branch, kept on the system.
+    """Return the cached Function ``leaves(T, r) -> q, regular`` with one column per branch.
 
-    q (n, branches) are configurations [rad or m], regular (1, branches) the least of the quantities
-    that must not vanish, and 1.
+    q (n, branches) are configurations [rad or m]. regular (1, branches) is the minimum of 1 and
+    the quantities that must not vanish.
     """
 
     def build() -> Function:
@@ -375,7 +376,7 @@ def _leaves(chain: FrameChain, sequence: StepSequence, p: Array) -> Function:
 
 
 def closed_form_name(chain: FrameChain, sequence: StepSequence, p: Array) -> str:
-    """Which of the closed forms a sequence is."""
+    """Return the name of the closed form of a sequence: "pieper" or "paul"."""
     try:
         return "pieper" if sequence is sequence_of(chain, "pieper", p) else "paul"
     except NoClosedForm:
@@ -389,19 +390,19 @@ def _by_general(target: Target, ready: General) -> Gathered:
 
 
 def by_search(target: Target) -> Gathered:
-    """The solutions of the search."""
+    """Compute solutions by a search from many starts."""
     q = search(target.arm, target.T, _STARTS)
     return _polish(target, Gathered(q, ("",) * len(q), "search", False))
 
 
 def _polish(target: Target, gathered: Gathered) -> Gathered:
-    """The solutions beside what was gathered."""
+    """Refine candidates by Newton's method and keep the solutions."""
     if not len(gathered.q):
         return gathered
     own = target.residual(gathered.q)
     better = polish(target.arm, target.T, gathered.q)
-    # what rounding leaves stays: next to two singularities each step of a closed form is exact,
-    # and Newton's steps go astray along a valley
+    # keep candidates with rounding errors only: near two singularities the closed form is exact,
+    # and Newton's method diverges along a valley
     exact = own <= EXACT * max(1.0, target.arm.length)
     q = np.where(exact[:, None], gathered.q, better.q)
     reached = exact | (better.residual < target.tolerance)
@@ -412,7 +413,7 @@ def _polish(target: Target, gathered: Gathered) -> Gathered:
 
 
 def general_ready(chain: FrameChain, p: Array) -> General | None:
-    """The general method of a chain for parameters p, (np,); None where it does not hold."""
+    """Return the general method of a chain for parameters p (np,), or None if inapplicable."""
 
     def build() -> General | None:
         try:

@@ -1,4 +1,4 @@
-"""What a closed form or the general method gives for one pose, and whether that is certain."""
+"""Solver for single poses of a chain by a closed form or the general method."""
 
 from __future__ import annotations
 
@@ -28,21 +28,22 @@ from mbs.native.array_calls import array_builtin
 from mbs.native.compiled import MachineCode, machine_code
 
 CERTAIN, DOUBTFUL, NOT_RIGID, FAILED = range(4)
-"""What came of a pose, as in `pose.h`."""
+"""Status codes of the compiled solver, defined in `pose.h`."""
 
 _CANDIDATES = 144
-"""ROTH_CONFIGURATIONS: those of the general method for one pose, at most."""
+"""Maximum number of configurations of the general method for one pose: ROTH_CONFIGURATIONS in C."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseDraft:
-    """The configurations of a chain for one pose.
+    """Solutions of a chain for one pose.
 
     Attributes:
-        q: (m, n) positions of the chain's joints [rad or m], angles in (-pi, pi].
-        residual: (m,) largest difference of an element from the target pose.
-        branch: (m,) numbers of their branches.
-        certain: whether none is missing and none there twice; not so next to a singular one.
+        q: (m, n) joint positions of the chain [rad or m], angles in (-pi, pi].
+        residual: (m,) largest absolute difference of an element from the target pose.
+        branch: (m,) indices of the branches.
+        certain: whether the list is complete and without copies; False near a singular
+            configuration.
     """
 
     q: Array
@@ -52,20 +53,20 @@ class PoseDraft:
 
 
 class PoseKernel:
-    """How one pose after the other is solved for a chain and numbers of its parameters.
+    """Solver for single poses of a chain with numeric parameters.
 
     Attributes:
-        chain: what is solved for.
-        p: (np,) the parameters.
-        arm: the chain in numbers.
+        chain: chain that is solved for.
+        p: (np,) parameter values.
+        arm: numeric geometry of the chain.
         method: "pieper", "paul" or "general".
-        labels: of the branches; of the general method numbers.
+        labels: names of the branches; "1", "2", ... for the general method.
     """
 
     def __init__(
         self, chain: FrameChain, p: Array, method: str, solves: StepSequence | General
     ) -> None:
-        """Use `kernel_of`, which chooses how the chain is solved."""
+        """Store the closed form or general method; call `kernel_of` to select one."""
         self.chain, self.p, self.method = chain, p, method
         self._solves, self.arm = solves, chain.arm(p)
         if isinstance(solves, General):
@@ -80,18 +81,18 @@ class PoseKernel:
         self._plain = self._indices == list(range(chain.system.nq))
 
     def code(self) -> _PoseCode | None:
-        """The compiled call; None where there is no C compiler, or it cannot be compiled."""
+        """Return the compiled solver, or None if it cannot be compiled."""
         with self._lock:
             if self._code is None:
                 self._code = _pose_code(self.chain, self.p, self._solves)
             return self._code
 
     def draft(self, T: Array) -> PoseDraft:
-        """The solutions for a rigid transform T, (4, 4); rounded again it would be another."""
+        """Solve a rigid transform T (4, 4), which is not projected again."""
         return self._by_code(T) or self._by_arrays(T)
 
     def draft_of(self, T: Any) -> PoseDraft | None:
-        """The solutions for a pose (4, 4) of any type; None where it is no rigid transform."""
+        """Solve a pose T (4, 4) of any array type; None if it is no rigid transform."""
         draft = self._by_code(T)
         if draft is not None:
             return draft
@@ -102,15 +103,15 @@ class PoseKernel:
         return None if pose is None else self._by_arrays(pose)
 
     def _by_code(self, T: Any) -> PoseDraft | None:
-        """From one compiled call; None where there is none, or it does not take the pose."""
+        """Solve by the compiled solver; None without one or if it rejects T."""
         self._asked += 1
         code = self._code
         if code is None and (isinstance(self._solves, General) or self._asked > MANY):
-            code = self.code()  # of the general method nothing is compiled but the core
+            code = self.code()  # the general method needs only the compiled core
         return None if code is None else self._read(code.call(T, code.solver))
 
     def _read(self, found: Any) -> PoseDraft | None:
-        """What the compiled call gave; None where it does not take the pose."""
+        """Convert the result of the compiled solver; None if it rejected the pose."""
         if found is None:
             return None
         q, residual, branch, told = found
@@ -122,7 +123,7 @@ class PoseKernel:
         return PoseDraft(own, residual[:m], branch[:m].astype(int), state == CERTAIN)
 
     def _by_arrays(self, T: Array) -> PoseDraft:
-        """Without machine code of the closed form."""
+        """Solve a rigid transform T (4, 4) without machine code of the closed form."""
         library = core.core_of(self.arm)
         if isinstance(self._solves, StepSequence):
             return self._settled(library, T, self._solves)
@@ -136,7 +137,7 @@ class PoseKernel:
         return PoseDraft(turned, draft.residual[0, valid], valid, not draft.searched[0])
 
     def _settled(self, library: ctypes.CDLL, T: Array, sequence: StepSequence) -> PoseDraft:
-        """By the interpreter and the compiled core."""
+        """Evaluate the closed form by the CasADi interpreter, then refine by the compiled core."""
         with self._lock:
             if self._buffers is None:
                 self._buffers = _Buffers(plain_branches(self.chain, sequence, self.p))
@@ -148,37 +149,40 @@ class PoseKernel:
 
 
 class _Buffers:
-    """A closed form of `all_branches`, evaluated by the interpreter into arrays."""
+    """Closed form of all branches, evaluated by the CasADi interpreter into arrays."""
 
     def __init__(self, plain: Function) -> None:
         buffer: Any
         buffer, self._evaluate = plain.buffer()
-        self._buffer = buffer  # which must live as long as it is evaluated
+        self._buffer = buffer  # must outlive the evaluations
         n, branches = plain.size_out(0)
-        self._T = np.empty((4, 4))  # row by row of the transpose: column by column
+        self._T = np.empty((4, 4))  # transpose of T in C order: T in column-major order
         self._values = (np.empty((branches, n)), *(np.empty(branches) for _ in range(4)))
         buffer.set_arg(0, self._T.data)
         for k, value in enumerate(self._values):
             buffer.set_res(k, value.data)
 
     def values(self, T: Array) -> tuple[Array, ...]:
-        """What `settled_by` takes for a pose T, (4, 4)."""
+        """Evaluate the closed form at T (4, 4); return the arguments of `core.settled_by`."""
         self._T[:] = T.T
         self._evaluate()
         return tuple(value.copy() for value in self._values[:4])
 
 
 def kernel_of(chain: FrameChain, p: Array, method: str = "auto") -> PoseKernel | None:
-    """How single poses are solved, kept on the system; None where only the slow methods hold.
+    """Return the solver for single poses of a chain, cached on the system.
 
     Args:
-        chain: what is solved for.
-        p: (np,) the parameters.
+        chain: chain that is solved for.
+        p: (np,) parameter values.
         method: "pieper", "paul", "general", "search", or "auto" for a closed form, else the
             general method.
 
+    Returns:
+        Solver, or None if only the search or other slow methods apply.
+
     Raises:
-        NoClosedForm: "pieper" or "paul" was asked for and does not fit.
+        NoClosedForm: method is "pieper" or "paul" and does not apply to the chain.
     """
 
     def made() -> PoseKernel | None:
@@ -200,18 +204,18 @@ def kernel_of(chain: FrameChain, p: Array, method: str = "auto") -> PoseKernel |
     return kernel
 
 
-# The compiled call: one builtin for all robots, which is handed what it needs to know of one.
+# Compiled solver: one builtin C function for all robots, with the data of a robot as an argument.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _PoseCode:
-    """The compiled call of a kernel.
+    """Compiled solver of a kernel.
 
     Attributes:
-        call: takes T and `solver`; gives q (nq, room), residual (room,), branch (room,) and
-            (count, state), or None for a T that it does not take.
-        solver: a `pose_solver` as doubles that are never looked at.
-        holds: what it points to.
+        call: function (T, solver) -> q (nq, room), residual (room,), branch (room,) and
+            (count, state), or None for an invalid T.
+        solver: C struct `pose_solver`, passed as an array of doubles.
+        holds: objects that the struct points to, kept alive.
     """
 
     call: Callable[..., Any]
@@ -244,7 +248,7 @@ def _pose_code(chain: FrameChain, p: Array, solves: StepSequence | General) -> _
         own = core.SolverStruct(handed.address, None, *addresses, *sizes, *bounds_of(solves), *end)
     solver = np.frombuffer(memoryview(own).cast("B"), dtype=np.float64)
     inputs = [SX.sym("T", 4, 4), SX.sym("solver", solver.size)]
-    room = max(room, 2)  # one column alone would come as a vector
+    room = max(room, 2)  # a single column would be returned as a vector
     outputs = [SX.zeros(nq, room), SX.zeros(room), SX.zeros(room), SX.zeros(2)]
     signature = Function("mbs_pose", inputs, outputs)
     call = array_builtin(signature, core.path_of(library), finite=False, more=work)

@@ -1,4 +1,4 @@
-"""Many poses at once."""
+"""Inverse geometric model of many poses, by vectorised closed forms or the general method."""
 
 from __future__ import annotations
 
@@ -45,27 +45,27 @@ from mbs.models.inverse_geometry.target import (
 )
 from mbs.native import compiled
 
-# The closed form of a chain at many poses: in machine code, several poses in vector lanes.
+# Closed form of a chain at many poses: machine code that solves several poses in vector lanes.
 
 
 _COLUMNS = 32
-"""Poses in one call: more make the code longer, fewer the calls felt."""
+"""Poses per call of the machine code: more poses make the code longer, fewer add call overhead."""
 MANY = 1000
-"""Poses from which machine code is worth the second that a compiler takes; those of earlier calls
-count."""
+"""Number of poses, over all calls, from which machine code saves more time than its compilation
+takes (about one second)."""
 
 
 def batch(
     chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64], T: Array, r: Array
 ) -> PoseBatch:
-    """All branches at poses T, (N, 4, 4).
+    """Evaluate all branches of a closed form at N poses.
 
     Args:
-        chain: what is solved for.
-        sequence: its steps, for the same p.
-        p: (np,) the parameters.
-        T: the poses [m].
-        r: (N, k) positions of the chain's varied joints [rad or m].
+        chain: chain that is solved for.
+        sequence: closed form of the chain, for the same p.
+        p: (np,) parameter values.
+        T: (N, 4, 4) poses [m].
+        r: (N, k) positions of the varied joints of the chain [rad or m].
     """
     plain = plain_branches(chain, sequence, p)
     key = ("machine code of igm_all", sequence, *chain.key, p.tobytes())
@@ -81,7 +81,7 @@ def _machine_code(plain: Function) -> Function:
 
 
 def _by_machine(call: Any, plain: Function, T: Array, r: Array) -> PoseBatch:
-    """By machine code for so many columns at a time, straight into the arrays."""
+    """Evaluate by machine code in blocks of `_COLUMNS` poses, directly into the arrays."""
     n, branches = plain.size_out(0)
     count = len(T)
     padded = -(-count // _COLUMNS) * _COLUMNS
@@ -99,45 +99,48 @@ def _by_machine(call: Any, plain: Function, T: Array, r: Array) -> PoseBatch:
     return PoseBatch(q[:count], *(row[:count] for row in rows))
 
 
-# What a compiled closed form gives for many poses, and which of them it leaves in doubt.
+# Solutions of a closed form at many poses, and a mask of the poses that are not certified.
 
 
 Booleans = NDArray[np.bool_]
 
 _DOUBTFUL = 1e-6
-"""Residual, of max(1 m, the arm's length), below which a solution may stand beside a
+"""Residual, relative to max(1 m, arm length), below which a solution may be near a
 configuration."""
 _EXACT = 1e-14
-"""Residual, of max(1 m, the arm's length), that polishing hardly betters."""
+"""Residual, relative to max(1 m, arm length), that Newton's method hardly improves."""
 _SUSPECT = 1e-9
-"""Radicands and regularity, squared and free of units, from which on the roots of equations with
-two lie farther apart than 1e-5, however small a singular value is."""
+"""Radicands and regularity (squared, dimensionless) above which the two roots of an equation are
+farther apart than 1e-5, for any singular value."""
 _DEGENERATE = 1e-12
-"""Squared and free of units, below which a pose is searched: its steps keep ten digits, and one
-that loses more is told by the residuals. For one pose alone, `gathering` is more careful."""
+"""Regularity (squared, dimensionless) below which a pose is solved by other methods. Above it the
+steps keep ten digits, and residuals reveal a larger loss. `gathering` uses a stricter limit for
+single poses."""
 _FOLD = 1e-9
-"""Below zero, radicand, free of units, of a root that is real but for rounding: the residual, which
-grows with it, decides."""
+"""Largest negative radicand (dimensionless) of a root that is real up to rounding. The residual
+grows with it and decides."""
 _SAME = 1e-9
-"""Difference [rad or m] of two configurations that are one: polished ones repeat to 1e-12 or so."""
+"""Difference [rad or m] below which two configurations are equal: refined copies agree to about
+1e-12."""
 _MEETING = 1e-5
-"""Difference [rad or m] below which two are near a double root, which rounding splits by 1e-8 and a
-residual of 1e-12 by 1e-6, so that how many there are is left to the search."""
+"""Difference [rad or m] below which two configurations are near a double root. Rounding splits a
+double root by 1e-8 and a residual of 1e-12 by 1e-6, so other methods determine the number."""
 _ALIKE = 12 * _MEETING
-"""Largest difference of the marks of two configurations that differ by `_MEETING`."""
+"""Largest difference of the marks (see `all_branches`) of two configurations that differ by
+`_MEETING`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BranchSolutions:
-    """Solutions of N poses, a column for every branch.
+    """Solutions of N poses, with one column per branch.
 
     Attributes:
-        q: (N, branches, n) positions of the chain's joints [rad or m].
-        valid: (N, branches) whether there is a solution.
-        residual: (N, branches) largest difference of an element from the target pose.
-        labels: of the branches.
-        searched: (N,) whether the solutions are to be looked for by other means: branches meet
-            there, or leave a joint undetermined.
+        q: (N, branches, n) joint positions of the chain [rad or m].
+        valid: (N, branches) whether the branch has a solution.
+        residual: (N, branches) largest absolute difference of an element from the target pose.
+        labels: names of the branches.
+        searched: (N,) whether the pose must be solved by other methods, because branches meet or a
+            joint is undetermined.
     """
 
     q: Array
@@ -148,7 +151,7 @@ class BranchSolutions:
 
 
 def nothing(joints: int, count: int) -> BranchSolutions:
-    """So many poses without a closed form."""
+    """Return an empty result of `count` poses, all marked for other methods."""
     shape = count, 0
     empty = np.empty((*shape, joints)), np.zeros(shape, dtype=bool), np.empty(shape)
     return BranchSolutions(*empty, (), np.ones(count, dtype=bool))
@@ -156,11 +159,11 @@ def nothing(joints: int, count: int) -> BranchSolutions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArmRows:
-    """A chain in numbers at N poses: one arm, or one for the positions of the varied joints.
+    """Numeric geometry of a chain at N poses: one arm, or one per position of varied joints.
 
     Attributes:
-        first: the arm; of several any, which tells joints and units alone.
-        gaps: (N, n + 1, 4, 4) of every arm; None where there is one.
+        first: the arm, or the first of several arms, which have the same joints and units.
+        gaps: (N, n + 1, 4, 4) constant transforms between joints of each arm, or None for one arm.
     """
 
     first: Arm
@@ -168,20 +171,20 @@ class ArmRows:
 
     @property
     def scale(self) -> Array:
-        """(N, 1) or (1, 1) max(1 m, length), by which residuals are measured."""
+        """Reference length max(1 m, arm length) of residuals, (N, 1) or (1, 1)."""
         if self.gaps is None:
             return np.full((1, 1), max(1.0, self.first.length))
         length = np.sum(np.linalg.norm(self.gaps[:, :, :3, 3], axis=2), axis=1)
         return np.asarray(np.maximum(1.0, length)[:, None])
 
     def at(self, k: int) -> Arm:
-        """The arm of pose number k."""
+        """Return the arm of pose k."""
         if self.gaps is None:
             return self.first
         return Arm(self.first.names, self.first.prismatic, self.gaps[k])
 
     def polish(self, T: Array, rows: NDArray[np.intp], q: Array) -> Polished:
-        """Better configurations (m, n) of poses whose numbers are `rows`, (m,)."""
+        """Refine configurations q (m, n) of the poses with indices `rows` (m,)."""
         if self.gaps is None:
             return polish(self.first, T[rows], q)
         better = Polished(np.empty_like(q), np.empty(len(q)))
@@ -192,7 +195,7 @@ class ArmRows:
         return better
 
     def nearly_singular(self, rows: NDArray[np.intp], q: Array, bound: float) -> Booleans:
-        """(m,) which of configurations q, (m, n), of poses `rows` are next to a singular one."""
+        """Return (m,) whether each q (m, n), of pose `rows` (m,), is nearly singular."""
         if self.gaps is None:
             return nearly_singular(self.first, q, bound)
         near = np.empty(len(q), dtype=bool)
@@ -203,7 +206,7 @@ class ArmRows:
 
 
 def arm_rows(chain: FrameChain, p: Array, r: Array) -> ArmRows:
-    """The chain in numbers for parameters p, (np,), and positions r, (N, k), of varied joints."""
+    """Return the numeric chain for parameters p (np,) and varied joint positions r (N, k)."""
     if not chain.varied:
         return ArmRows(chain.arm(p), None)
     some = r if len(r) else np.zeros((1, r.shape[1]))
@@ -215,14 +218,14 @@ def arm_rows(chain: FrameChain, p: Array, r: Array) -> ArmRows:
 def draft_solutions(
     chain: FrameChain, sequence: StepSequence, p: Array, T: Array, r: Array
 ) -> BranchSolutions:
-    """The solutions by a closed form.
+    """Solve N poses by a closed form.
 
     Args:
-        chain: what is solved for.
-        sequence: its steps, for the same p.
-        p: (np,) the parameters.
+        chain: chain that is solved for.
+        sequence: closed form of the chain, for the same p.
+        p: (np,) parameter values.
         T: (N, 4, 4) poses [m].
-        r: (N, k) positions of the chain's varied joints [rad or m].
+        r: (N, k) positions of the varied joints of the chain [rad or m].
     """
     every, arms = batch(chain, sequence, p, T, r), arm_rows(chain, p, r)
     arm, scale = arms.first, arms.scale
@@ -240,12 +243,12 @@ def draft_solutions(
 
 
 def bounds_of(sequence: StepSequence) -> tuple[float, float]:
-    """What tells whether solutions may be missing next to a singular configuration.
+    """Return the bounds of the test for missing solutions near singular configurations.
 
     Returns:
-        the value of `real` and `regular` from which on the Jacobian is not asked, and the singular
-        value below which others may be missing. Two-root equations lose none as long as two roots
-        do not count as one; quartics lose them as the general method does.
+        Value of `real` and `regular` above which the Jacobian is not checked, and singular value
+        below which solutions may be missing. Equations with two roots lose no solution until the
+        roots count as one. Quartics lose solutions as the general method does.
     """
     if any(step.kind == "quartic" for step in sequence.steps):
         return np.inf, NEARLY_SINGULAR
@@ -255,7 +258,7 @@ def bounds_of(sequence: StepSequence) -> tuple[float, float]:
 def _next_to_singular(
     arms: ArmRows, every: PoseBatch, valid: Booleans, limits: tuple[float, float]
 ) -> Booleans:
-    """At which poses a solution is next to a singular configuration."""
+    """Return (N,) whether each pose has a solution near a singular configuration."""
     least = np.minimum(np.abs(every.real), every.regular)
     suspect, nearly = limits
     asked = valid & (least < suspect)
@@ -266,7 +269,7 @@ def _next_to_singular(
 
 
 def _polish(arms: ArmRows, T: Array, every: PoseBatch, which: Booleans) -> Booleans:
-    """Improve some configurations, (m,), and tell which of them moved far."""
+    """Refine the configurations of mask `which` in place; return (m,) whether each moved far."""
     before = every.q[which]
     better = arms.polish(T, np.nonzero(which)[0], before)
     every.q[which], every.residual[which] = better.q, better.residual
@@ -276,7 +279,7 @@ def _polish(arms: ArmRows, T: Array, every: PoseBatch, which: Booleans) -> Boole
 
 
 def _merge(arm: Arm, every: PoseBatch, valid: Booleans) -> Booleans:
-    """Keep the first of equal solutions, and tell at which poses others are nearly equal."""
+    """Invalidate copies of equal solutions; return (N,) whether a pose has nearly equal ones."""
     marks = np.sort(np.where(valid, every.mark, np.inf), axis=1)
     with np.errstate(invalid="ignore"):
         rows = np.flatnonzero(np.any(np.diff(marks, axis=1) < _ALIKE, axis=1))
@@ -295,14 +298,14 @@ def _merge(arm: Arm, every: PoseBatch, valid: Booleans) -> Booleans:
 def with_configurations(
     draft: BranchSolutions, k: int, arm: Arm, q: Array, T: Array
 ) -> BranchSolutions:
-    """With other solutions of one pose, each in the column of the nearest branch.
+    """Replace the solutions of one pose, each in the column of the nearest branch.
 
     Args:
-        draft: whose rows are written over.
-        k: number of the pose.
-        arm: the chain in numbers.
-        q: (m, n) its solutions [rad or m].
-        T: (4, 4) the pose.
+        draft: solutions of all poses; row k is overwritten.
+        k: index of the pose.
+        arm: numeric geometry of the chain.
+        q: (m, n) new solutions of the pose [rad or m].
+        T: (4, 4) pose [m].
     """
     draft = _widen(draft, len(q))
     columns = _nearest_columns(arm, draft.q[k], q)
@@ -313,7 +316,7 @@ def with_configurations(
 
 
 def _widen(draft: BranchSolutions, columns: int) -> BranchSolutions:
-    """With so many columns at least."""
+    """Append unused columns up to a minimum number of columns."""
     more = columns - draft.valid.shape[1]
     if more <= 0:
         return draft
@@ -324,7 +327,7 @@ def _widen(draft: BranchSolutions, columns: int) -> BranchSolutions:
 
 
 def _nearest_columns(arm: Arm, branches: Array, q: Array) -> list[int]:
-    """A column for every configuration: the nearest pairs first."""
+    """Assign a column to each configuration, nearest pairs first."""
     apart = np.sum(np.abs(arm.wrapped(q[:, None] - branches[None])), axis=-1)
     columns = [-1] * len(q)
     for _ in columns:
@@ -334,20 +337,20 @@ def _nearest_columns(arm: Arm, branches: Array, q: Array) -> list[int]:
     return columns
 
 
-# What the general method gives for many poses, and which of them it leaves in doubt.
+# Solutions of the general method at many poses, and a mask of the poses that are not certified.
 
 
 def ready(chain: FrameChain, p: Array) -> General | None:
-    """The general method of a chain for parameters p, (np,); None where it hardly holds."""
+    """Return the general method of a chain for p (np,), or None if it is ill-conditioned."""
     found = general_ready(chain, p)
     return found if found and found.prepared.regularity >= ILL_CONDITIONED else None
 
 
 def general_draft(general: General, T: Array) -> BranchSolutions:
-    """The solutions by the general method, in no order.
+    """Solve N poses by the general method; the order of columns has no meaning.
 
     Args:
-        general: the method, made ready for an arm.
+        general: general method, prepared for an arm.
         T: (N, 4, 4) poses [m].
     """
     arm = general.arm
@@ -366,7 +369,10 @@ def general_draft(general: General, T: Array) -> BranchSolutions:
 
 
 def general_draft_varied(chain: FrameChain, p: Array, T: Array, r: Array) -> BranchSolutions:
-    """Likewise where the varied joints are at r, (N, k): each of their positions makes an arm."""
+    """Solve N poses by the general method, with the varied joints at positions r (N, k).
+
+    A separate arm is prepared for each distinct row of r.
+    """
     draft = nothing(len(chain.names), len(T))
     positions, which = np.unique(r, axis=0, return_inverse=True)
     for number, position in enumerate(positions):
@@ -382,32 +388,31 @@ def general_draft_varied(chain: FrameChain, p: Array, T: Array, r: Array) -> Bra
     return draft
 
 
-# Inverse geometric models of many poses at once.
+# Public result and function for many poses.
 
 
 Repair = Callable[[Arm, Array], Array]
-"""All configurations (m, n) of an arm that take its frame to a pose (4, 4)."""
+"""Function (arm, T (4, 4)) -> all configurations (m, n) of the arm with end pose T."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ManySolutions:
-    """The solutions of N poses: a row for every pose, in it a column for every branch.
+    """Solutions of N poses: one row per pose, one column per branch.
 
-    With S positions of redundant joints the columns are those of the first position, then those of
-    the second, and so on: `q.reshape(N, S, -1, nq)` tells them apart.
+    With S positions of redundant joints, the columns of the first position are followed by the
+    columns of the second position, and so on. Use `q.reshape(N, S, -1, nq)` to separate them.
 
     Attributes:
-        q: (N, S branches, nq) configurations [rad or m]; where there is no solution any finite
-            numbers.
-        valid: (N, S branches) whether there is a solution.
-        residual: (N, S branches) largest difference of an element between the pose of q and the
-            wanted one, in m and 1; infinite where a column is not used.
-        labels: of the columns; empty texts where no closed form tells branches apart.
-        searched: (N,) whether the pose was solved by itself, with some position of redundant
-            joints: its configurations stand in the columns of the nearest branches.
-        undecided: (N,) whether double precision does not decide the list of the pose, as
-            `Solutions.undecided`; True if it does not with some position of redundant joints.
-        samples: S, how many positions of redundant joints every pose was solved for; 1 without.
+        q: (N, S branches, nq) configurations [rad or m]; arbitrary finite values if not valid.
+        valid: (N, S branches) whether the column contains a solution.
+        residual: (N, S branches) largest absolute difference of an element between the pose of q
+            and the target, in m and 1; infinite in unused columns.
+        labels: names of the columns; empty texts without a closed form.
+        searched: (N,) whether the pose was solved individually at some position of redundant
+            joints. Its configurations are in the columns of the nearest branches.
+        undecided: (N,) whether double precision cannot decide the list of solutions at some
+            position of redundant joints; see `Solutions.undecided`.
+        samples: number S of positions of redundant joints, 1 without redundant joints.
     """
 
     q: Array
@@ -419,17 +424,17 @@ class ManySolutions:
     samples: int = 1
 
     def __len__(self) -> int:
-        """The number of poses."""
+        """Return the number of poses."""
         return len(self.q)
 
     @property
     def count(self) -> NDArray[np.int64]:
-        """(N,) how many solutions each pose has."""
+        """Number of solutions of each pose, (N,)."""
         count: NDArray[np.int64] = np.sum(self.valid, axis=1, dtype=np.int64)
         return count
 
     def of(self, k: int) -> Array:
-        """(m, nq) the solutions of pose number k, counted from 0 [rad or m]."""
+        """Return the solutions (m, nq) of pose k, counted from 0 [rad or m]."""
         configurations: Array = self.q[k, self.valid[k]]
         return configurations
 
@@ -446,37 +451,40 @@ def solve_many(
     parameters: Mapping[str, float] | None = None,
     repair: Repair | None = None,
 ) -> ManySolutions:
-    """All solutions of many poses, by a compiled closed form, else by the general method.
+    """Compute all configurations for many poses of a frame (inverse kinematics).
 
-    Poses at which solutions meet or joints are left undetermined, and all poses of robots for which
-    neither method holds, are solved one by one. An angle is within half a turn of zero; limits
-    may move it by full turns.
+    A compiled closed form is used, else the general method. Poses at which solutions coincide or
+    joints are undetermined are solved one by one, and so are all poses if neither method applies.
+    Angles are in [-pi, pi]; limits may shift them by full revolutions.
 
     Args:
-        system: a serial robot or a tree; of a robot with loops every pose is solved by itself.
-        T: (N, 4, 4) poses of the frame seen from the base [m].
-        frame: a body, a named frame, the number of a link, or None for the terminal frame.
-        method: "pieper", "paul", "auto" for the cheaper of them that fits, "general", "search".
-        limits: None leaves out no solution; True leaves out those beyond the limits of the
-            description; (lowest, highest) by name replaces these [rad or m].
-        locked: positions of joints that stay where they are, by name; one for all poses, or (N,)
-            one for each [rad or m].
-        redundant: by the name of a joint beyond the six that a pose determines how many positions
-            it takes, from limit to limit or over a turn, or the positions: (S,) for every pose, or
-            (N, S) for each [rad or m]. Several joints take all combinations, the last one fastest.
-        parameters: values of symbols, the others at their defaults.
-        repair: what solves single poses of a serial robot, `solve` when left out. Its lists are
-            not marked as undecided.
+        system: serial robot or tree. For a robot with loops each pose is solved individually.
+        T: (N, 4, 4) poses of the frame relative to the base [m].
+        frame: name of a body or frame, index of a link, or None for the terminal frame.
+        method: "pieper", "paul", "auto" for the cheaper applicable one of both, "general" or
+            "search".
+        limits: None keeps all solutions. True drops solutions beyond the joint limits of the model.
+            A dict of (lower, upper) by joint name replaces limits and drops solutions beyond them
+            [rad or m].
+        locked: positions of fixed joints by name: one for all poses, or (N,) one per pose [rad or
+            m].
+        redundant: samples of joints beyond the six that a pose determines, by name: number of
+            positions between the limits (or over one revolution), or positions (S,) for all poses
+            or (N, S) per pose [rad or m]. Several joints form all combinations, the last joint
+            varies fastest.
+        parameters: parameter values by name; default values for all others.
+        repair: function that solves single poses of a serial robot; default is `solve`. Its
+            results are not marked as undecided.
 
     Returns:
-        ManySolutions: the solutions that `solve` finds for each pose.
+        ManySolutions with the same solutions as `solve` for each pose.
 
     Raises:
-        NoClosedForm: "pieper" or "paul" was asked for and does not fit.
-        ModelError: a matrix is no rigid transform, a name is unknown, positions are not what they
-            should be, or more than six joints are free.
+        NoClosedForm: method is "pieper" or "paul" and does not apply to the robot.
+        ModelError: a matrix is no rigid transform, a name is unknown, positions have a wrong shape
+            or value, or more than six joints are free.
     """
-    from mbs.models.inverse_geometry.solve import solve_rigid  # it takes drafts from here
+    from mbs.models.inverse_geometry.solve import solve_rigid  # avoids a circular import
 
     require_system(system)
     require_method(system, method, METHODS)
@@ -522,7 +530,7 @@ def solve_many(
 
 
 def _gather_samples(many: ManySolutions, samples: LockedSamples) -> ManySolutions:
-    """The rows of all positions of a pose in one row."""
+    """Join the rows of all samples of redundant joints of a pose to one row."""
     count, number, _ = samples.r.shape
     if number == 1:
         return many
@@ -541,7 +549,7 @@ def _gather_samples(many: ManySolutions, samples: LockedSamples) -> ManySolution
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Robot:
-    """How a robot is solved; without both methods every pose is searched for by itself."""
+    """Chain, parameter values and method of a robot; `sequence` is None without a closed form."""
 
     chain: FrameChain
     p: Array
@@ -549,7 +557,7 @@ class _Robot:
     sequence: StepSequence | None
 
     def draft(self, T: Array, r: Array) -> BranchSolutions:
-        """The solutions by a closed form, else by the general method."""
+        """Solve poses T (N, 4, 4) by the closed form, else by the general method."""
         if self.sequence is not None:
             return draft_solutions(self.chain, self.sequence, self.p, T, r)
         if self.method in ("auto", "general"):
@@ -561,14 +569,14 @@ class _Robot:
         return nothing(len(self.chain.names), len(T))
 
     def solved(self, pose: Array, r: Array) -> tuple[Array, bool]:
-        """(m, n) all configurations at one pose, the varied joints at r, (k,); undecided or not."""
-        from mbs.models.inverse_geometry.solve import solve_at  # it takes drafts from here
+        """Solve one pose with varied joints at r (k,): chain positions (m, n), undecided flag."""
+        from mbs.models.inverse_geometry.solve import solve_at  # avoids a circular import
 
         found = solve_at(self.chain, r, pose, self.method, self.p)
         return found.q[:, list(self.chain.indices)], found.undecided
 
     def whole(self, q: Array, r: Array) -> Array:
-        """(N, branches, nq) positions of all joints, those outside the chain as assembled."""
+        """Return the positions (N, branches, nq) of all joints; others as assembled or locked."""
         system = self.chain.system
         if self.chain.indices == tuple(range(system.nq)):
             return q
@@ -584,7 +592,7 @@ def _robot(chain: FrameChain, method: str, p: Array) -> _Robot:
 
 
 def _sequence(chain: FrameChain, method: str, p: Array) -> StepSequence | None:
-    """The closed form that was asked for, None for methods that are none."""
+    """Return the requested closed form, or None if there is none or the method is another."""
     if method not in (*CLOSED_FORMS, "auto"):
         return None
     try:
@@ -596,7 +604,7 @@ def _sequence(chain: FrameChain, method: str, p: Array) -> StepSequence | None:
 
 
 def _stack(system: System, answers: list[Solutions]) -> ManySolutions:
-    """The solutions of every pose side by side."""
+    """Combine the solutions of all poses in arrays."""
     columns = max((len(answer) for answer in answers), default=0)
     shape = len(answers), columns
     q, valid = np.zeros((*shape, system.nq)), np.zeros(shape, dtype=bool)
@@ -611,7 +619,7 @@ def _stack(system: System, answers: list[Solutions]) -> ManySolutions:
 
 
 def _unwind(allowed: CoordinateLimits, q: Array) -> tuple[Array, Booleans]:
-    """Configurations (N, branches, nq) changed by whole turns, and whether all is within limits."""
+    """Shift angles of q (N, branches, nq) into the limits; also return whether all are within."""
     low, high = allowed.low - WITHIN, allowed.high + WITHIN
     missing = np.where(q < low, low - q, np.where(q > high, high - q, 0.0)) / (2 * np.pi)
     turns = np.copysign(np.ceil(np.abs(missing)), missing)

@@ -1,4 +1,4 @@
-"""Positions that redundant joints are to take: more joints than a pose determines."""
+"""Sampled positions of redundant joints, for arms with more joints than a pose determines."""
 
 from __future__ import annotations
 
@@ -16,23 +16,24 @@ from mbs.models.inverse_geometry.solutions import Given, bounds
 from mbs.text import did_you_mean, quoted
 
 Redundant: TypeAlias = Mapping[str, Any]
-"""By the name of a joint how many positions it takes, or these: (S,), or (N, S) of N poses."""
+"""Samples by joint name: number of positions, or positions (S,), or (N, S) for N poses."""
 Locked: TypeAlias = Mapping[str, Any]
-"""By the name of a joint its position [rad or m], or one for each of N poses, (N,)."""
+"""Positions by joint name [rad or m]: one for all poses, or (N,) one for each of N poses."""
 
 _TURN = 2 * math.pi
 _MOST = 10_000_000
-"""Samples of one call: their configurations take some gigabytes."""
+"""Maximum number of samples of one call: their configurations take some gigabytes of memory."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LockedSamples:
-    """Where joints are locked, at each of N poses S times.
+    """Positions of locked joints for N poses with S samples each.
 
     Attributes:
-        locked: joints with one position for all, by name [rad or m].
-        varied: joints with several.
-        r: (N, S, k) their positions [rad or m].
+        locked: positions of joints that are constant over all poses and samples, by name [rad or
+            m].
+        varied: names of the k joints whose positions vary.
+        r: (N, S, k) positions of the varied joints [rad or m].
     """
 
     locked: Mapping[str, float]
@@ -47,18 +48,18 @@ def samples_of(
     limits: bool | Given | None,
     count: int,
 ) -> LockedSamples:
-    """Where joints are locked at each of so many poses.
+    """Combine locked positions and samples of redundant joints for N poses.
 
     Args:
-        system: whose joints.
-        locked: a position, or one for each pose.
-        redundant: positions that each pose is solved for; of several joints in all combinations.
-        limits: as in `solve`, between which a number of positions lies evenly.
-        count: N, of poses.
+        system: system of the joints.
+        locked: position of each locked joint, or one position per pose.
+        redundant: samples of each redundant joint; several joints form all combinations.
+        limits: argument of `solve`; a number of samples is spread evenly between the limits.
+        count: number N of poses.
 
     Raises:
-        ModelError: neither is a dict, a joint is unknown or in both, or its positions are not
-            what they should be.
+        ModelError: an argument is no dict, a joint is unknown or in both, or positions have a wrong
+            shape or value.
     """
     for what, given in (("locked", locked), ("redundant", redundant)):
         if given is not None and not isinstance(given, Mapping):
@@ -82,7 +83,7 @@ def samples_of(
     for k, one in enumerate(moving.values()):
         r[:, :, k] = one[:, None]
     for k, column in enumerate(columns):
-        # the first joint changes slowest
+        # the first joint varies slowest
         repeat = math.prod(other.shape[1] for other in columns[k + 1 :])
         spread = np.repeat(column, repeat, axis=1)
         r[:, :, len(moving) + k] = np.tile(spread, number // max(spread.shape[1], 1))
@@ -112,7 +113,7 @@ def _one_per_pose(system: System, name: str, value: Any, count: int) -> Array:
 def _positions(
     system: System, name: str, value: Any, limits: bool | Given | None, count: int
 ) -> Array:
-    """(N, S) positions of a joint [rad or m]."""
+    """Return the positions (N, S) of a redundant joint [rad or m]."""
     if isinstance(value, int | np.integer) and not isinstance(value, bool):
         _require_few(system, name, int(value), count)
         return np.tile(_spread(system, name, int(value), limits), (count, 1))
@@ -138,7 +139,7 @@ def _numbers(value: Any) -> Array | None:
 
 
 def _spread(system: System, name: str, number: int, limits: bool | Given | None) -> Array:
-    """So many positions, from limit to limit, or over a turn."""
+    """Return `number` positions evenly spread between the limits, or over one revolution."""
     if number < 1:
         raise ModelError(
             f"{system.name}: {number} redundant positions of {quoted(name)}; give one at least"
@@ -153,7 +154,7 @@ def _spread(system: System, name: str, number: int, limits: bool | Given | None)
     low, high = float(within.low[index]), float(within.high[index])
     revolute = bool(within.turns[index])
     if revolute and high - low >= _TURN:
-        # a turn ends where it begins; also of limits that are infinite
+        # the end of a revolution equals its start; infinite limits start at -pi
         first = -math.pi if math.isinf(low) else low
         turn: Array = np.arange(number, dtype=np.float64) * (_TURN / number)
         return first + turn

@@ -1,4 +1,4 @@
-"""A solution of a chain, before it is completed to a configuration of the robot."""
+"""Solution of a serial chain, before it is completed to a configuration of the robot."""
 
 from __future__ import annotations
 
@@ -8,21 +8,22 @@ from mbs.closed_forms.arm import Array
 from mbs.models.inverse_geometry.self_motions import Family
 
 MOST_ROOTS = 16
-"""Roots of a pose of six joints; fewer joints have fewer."""
+"""Largest number of isolated solutions of a six-joint chain for one pose (16); shorter chains have
+fewer."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChainRoot:
-    """A solution of the chain.
+    """Solution of the inverse geometric model of a chain.
 
     Attributes:
         q: (n,) configuration [rad or m].
-        label: of the branch it comes from, "" where it comes from none.
-        multiplicity: how many roots meet in it, 0 on a self-motion.
-        family: the self-motion that it stands for.
-        branches: of a closed form that meet in it.
+        label: name of its closed-form branch, "" without a branch.
+        multiplicity: number of coinciding roots, 0 on a self-motion.
+        family: self-motion through q, or None for an isolated solution.
+        branches: names of all closed-form branches that meet in q.
         at_most: whether the multiplicity is an upper bound.
-        undecided: whether double precision does not decide that it is one solution of its own.
+        undecided: whether double precision cannot decide if the merged roots are one solution.
     """
 
     q: Array

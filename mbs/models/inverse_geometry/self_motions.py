@@ -1,4 +1,4 @@
-"""Self-motions as a user reads them: the joint that moves freely, those that move with it."""
+"""Self-motions of an arm: joint motions that keep the pose of its end frame."""
 
 from __future__ import annotations
 
@@ -15,38 +15,38 @@ from mbs.errors import ModelError
 from mbs.models.inverse_geometry.target import Target, TargetReduction
 from mbs.numbers import NONZERO
 
-# Self-motions of an arm whose frame is held: where they start, and the configurations along them.
+# Detection of a self-motion at a singular solution, and the curve of its configurations.
 
 
 _STEP, _SMALLEST_STEP = 0.1, 1e-5
-"""Lengths of a step along a self-motion [rad or arm lengths]: 63 to a turn, and the shortest: a
-curve that even this does not follow ends there, and one that is nearer is crossed."""
+"""Largest and smallest step along a self-motion [rad or arm lengths]. 63 largest steps make one
+revolution. A curve ends if the smallest step fails, and nearer curves are crossed."""
 _STRAIGHT = 0.9
-"""Cosine of 26 degrees, by which a step may turn: curves hardly ever cross at less."""
+"""Cosine of the largest angle between steps, 26 degrees: curves rarely cross at a smaller angle."""
 _MOST_STEPS, _FEW_STEPS = 2000, 60
 _SHORTEST = 1.0
 _AWAY = 0.05
-"""Distance [rad or arm lengths] at which a self-motion must still be there: at a double root the
-residual is then some 1e-3, far above the tolerance, and the null space still points along."""
+"""Distance [rad or arm lengths] at which a self-motion must still hold the pose. At a double root
+the residual there is about 1e-3, far above the tolerance, and the null space is still tangent."""
 _TRIES = 24
 _SEED = 20260108
 _ZERO = 1e-6
-"""Singular values below it are zero: on a self-motion they are known to the root of 1e-12."""
+"""Singular values below this count as zero: on a self-motion their error is 1e-6, the square root
+of the tolerance 1e-12."""
 _INTEGER = 1e-3
-"""Distance from integers within which slopes are rounded to them: a singular configuration is known
-to half its digits or fewer, and so is the null space; where rounding is wrong the residual
-tells."""
+"""Distance from integers within which slopes are rounded. A singular configuration and its null
+space are known to half the digits or fewer. The residual rejects a wrong rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConfigurationCurve:
-    """Configurations through which an arm moves while its frame stays.
+    """Sampled self-motion: configurations of an arm with the same pose of its end frame.
 
     Attributes:
-        x: (k, n) configurations in order, turns unwrapped, see `Target` for the unit.
-        closed: whether the last one is the first one again, up to whole turns.
-        slope: (n,) the constant direction of a straight one, its largest element 1; empty where
-            it bends.
+        x: (k, n) scaled configurations in order (see `Target`), angles unwrapped.
+        closed: whether the last configuration equals the first, up to full revolutions.
+        slope: (n,) constant direction of a straight self-motion, scaled to a largest element of 1;
+            empty for a curved self-motion.
     """
 
     x: Array
@@ -55,14 +55,14 @@ class ConfigurationCurve:
 
 
 def freedoms(reduced: TargetReduction) -> tuple[int, Array]:
-    """How many freedoms a self-motion through a solution has, and a direction of it.
+    """Return the number of freedoms of the self-motion through a solution, and its direction.
 
     Args:
-        reduced: the equations near the solution.
+        reduced: equations near the solution, reduced to the null space of the Jacobian.
 
     Returns:
-        0 for an isolated solution; the corank where every direction of the null space can be
-        followed, 1 where only some can; and a direction (n,) in x.
+        Number of freedoms and a direction (n,) in x. The number is 0 for an isolated solution, the
+        corank if motion is possible along every null-space direction, and 1 if only along some.
     """
     target, c = reduced.target, reduced.corank
     rng = np.random.default_rng(_SEED)
@@ -72,7 +72,7 @@ def freedoms(reduced: TargetReduction) -> tuple[int, Array]:
         return c, (probes[0] - reduced.x) / np.linalg.norm(probes[0] - reduced.x)
     if c > 1:
         around = _nearest_on_sphere(reduced, np.array(directions))
-        # on the sphere, not fallen back to its centre, at a distance of 0 in place of 1
+        # keep results on the sphere (relative distance 1); a failed correction ends at its centre
         on = np.abs(np.linalg.norm(around - reduced.x, axis=1) / _AWAY - 1) < 1e-3
         for x in around[on & (target.residual(around * target.unit) < target.tolerance)]:
             return 1, (x - reduced.x) / np.linalg.norm(x - reduced.x)
@@ -84,14 +84,20 @@ def _solves(target: Target, x: Array) -> bool:
 
 
 def _probe(reduced: TargetReduction, direction: Array) -> Array:
-    """The solution at a distance along the null space, if there is one."""
+    """Return a configuration (n,) at distance `_AWAY` along a null-space direction.
+
+    It solves the equations only if a self-motion exists there.
+    """
     h = _AWAY * direction
     start = reduced.x + reduced.null @ h
     return reduced.target.corrected(start, reduced.null.T, h + reduced.null.T @ reduced.x)
 
 
 def _nearest_on_sphere(reduced: TargetReduction, directions: Array) -> Array:
-    """Solutions (m, n) at a distance from the centre, from directions (m, corank) on."""
+    """Return configurations (m, n) of least residual at distance `_AWAY` from the solution.
+
+    The iterations start in null-space directions (m, corank).
+    """
     target = reduced.target
     x = reduced.x + _AWAY * (directions @ reduced.null.T)
     library = core.core_of(target.arm)
@@ -101,18 +107,18 @@ def _nearest_on_sphere(reduced: TargetReduction, directions: Array) -> Array:
 def curve(
     target: Target, q: Array, direction: Array, dimension: int = 1, strictness: float = 0.1
 ) -> ConfigurationCurve | None:
-    """The self-motion through a configuration; None where it soon ends.
+    """Return the self-motion through a configuration, or None if it is too short.
 
     Args:
-        target: the pose that is held.
-        q: (n,) configuration on it [rad or m].
-        direction: (n,) along it, in x.
-        dimension: how many freedoms it has; with more than one, a short way along it is enough.
-        strictness: part of the tolerance of solutions within which configurations hold the pose;
-            next to a singular configuration those of no self-motion hold it nearly.
+        target: pose that is held.
+        q: (n,) configuration on the self-motion [rad or m].
+        direction: (n,) direction of the self-motion in x.
+        dimension: number of freedoms. For more than one only a short part is sampled.
+        strictness: largest residual on the curve, as a fraction of the tolerance of solutions. Near
+            a singular configuration the pose is nearly held without any self-motion.
     """
     steps = _MOST_STEPS if dimension == 1 else _FEW_STEPS
-    # what holds the pose but within the tolerance has valleys that cross, and no sides
+    # at the full tolerance the sides of a curve are not distinguished, as its valleys cross
     way = _Way(target, strictness * target.tolerance, steps, strictness < 1.0)
     along = direction / np.linalg.norm(direction)
     start = q / target.unit
@@ -122,7 +128,7 @@ def curve(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Way:
-    """How a self-motion is followed: largest residual, number of steps, whether it keeps sides."""
+    """Tracing of a self-motion: pose, largest residual, maximum steps, side check on or off."""
 
     target: Target
     limit: float
@@ -130,7 +136,7 @@ class _Way:
     sided: bool
 
     def straight(self, x: Array, direction: Array) -> ConfigurationCurve | None:
-        """The self-motion whose joints move in constant proportions."""
+        """Return the self-motion through x if its joints move in constant proportions."""
         target = self.target
         slope = direction / direction[np.argmax(np.abs(direction))]
         whole = np.round(slope)
@@ -143,7 +149,7 @@ class _Way:
         return ConfigurationCurve(samples, turns, slope)
 
     def follow(self, x: Array, direction: Array) -> ConfigurationCurve | None:
-        """The self-motion by small steps, to where it closes or ends."""
+        """Trace the self-motion through x by small steps until it closes or ends."""
         ahead, closed = self._walk(x, direction)
         if closed:
             return ConfigurationCurve(np.array(ahead), True, np.zeros(0))
@@ -153,7 +159,7 @@ class _Way:
         return ConfigurationCurve(samples, False, np.zeros(0)) if length > _SHORTEST else None
 
     def _walk(self, start: Array, tangent: Array) -> tuple[list[Array], bool]:
-        """Configurations from the start on, and whether they come back to it."""
+        """Return configurations from the start on, and whether the curve returns to it."""
         target = self.target
         found, closed = core.walked_by(
             core.core_of(target.arm),
@@ -163,33 +169,34 @@ class _Way:
 
 
 Whole = Callable[[Array], Array]
-"""The configuration (nq,) of a robot for one of its chain, (n,); NaN where there is none."""
+"""Function from chain positions (n,) to the robot configuration (nq,); NaN if loops stay open."""
 
 _MOVES = 1e-6
-"""Way of a joint [rad or arm lengths] along a curve, or slope against the free one, from which it
-moves: points of a curve are solved to 1e-12, of singular ones to the root of it."""
+"""Range of a joint [rad or arm lengths] along a curve, or slope relative to the free joint, above
+which the joint moves. Points are solved to 1e-12, singular points to its square root."""
 _SAME = 1e-6
-"""Distance [rad or arm lengths] from a curve of configurations that belong to it, likewise."""
+"""Distance [rad or arm lengths] from a curve below which a configuration belongs to it: singular
+points are known to 1e-6."""
 _AS_NEAR = 1e-3
-"""Difference of distances [rad or arm lengths] of samples that are as near: the ends of a curve are
-known to 1e-5, the root of the tolerance over the curvature, and samples are 0.1 apart."""
+"""Difference [rad or arm lengths] below which distances of samples are equal. The ends of a curve
+are known to 1e-5, the square root of the tolerance over the curvature; samples are 0.1 apart."""
 _REFINEMENTS = 5
 _COMPARABLE = 0.5
-"""Part of the widest motion from which a joint nearer the base is the free one."""
+"""Fraction of the largest joint range above which a joint nearer to the base is the free joint."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Family:
-    """A self-motion: the frame stays while joints move.
+    """Self-motion: joints move while the frame keeps its pose.
 
     Attributes:
-        free: name of the joint that tells its configurations apart.
-        moving: names of all joints that move, the free one among them.
-        relations: between them, such as "q4 + q6 = 0.7"; empty where they are not linear.
-        range: lowest and highest position of the free joint [rad or m]; None where it may turn
-            all the way round, or slide without end.
-        dimension: how many joints may be chosen; with more than one, only the configurations along
-            one curve through the solution are described.
+        free: name of the joint that parameterises the self-motion.
+        moving: names of all moving joints, including the free joint.
+        relations: linear equations between moving joints, such as "q4 + q6 = 0.7"; empty for a
+            nonlinear self-motion.
+        range: lowest and highest position of the free joint [rad or m], or None if it is unlimited.
+        dimension: number of freedoms. For more than one, only one curve through the solution is
+            described.
     """
 
     free: str
@@ -201,22 +208,23 @@ class Family:
 
     @property
     def samples(self) -> Array:
-        """(k, nq) configurations along it [rad or m], turns unwrapped."""
+        """Configurations (k, nq) along the self-motion [rad or m], angles unwrapped."""
         motion = self._motion
         return np.array([motion.whole(q) for q in motion.curve.x * motion.target.unit])
 
     @property
     def chain_samples(self) -> Array:
-        """(k, n) configurations of the chain along it [rad or m], turns unwrapped."""
+        """Chain positions (k, n) along the self-motion [rad or m], angles unwrapped."""
         return self._motion.curve.x * self._motion.target.unit
 
     def at(self, value: float) -> Array:
-        """The configuration q (nq,) whose free joint is at a value [rad or m].
+        """Return the configuration q (nq,) with the free joint at a value [rad or m].
 
-        Where the joint passes the value more than once, the first one from the solution on.
+        If the joint takes the value more than once, the first configuration from the solution on
+        is returned.
 
         Raises:
-            ModelError: the free joint does not get there.
+            ModelError: the free joint cannot reach the value.
         """
         q = self._motion.at(value)
         whole = np.full(1, np.nan) if q is None else self._motion.whole(q)
@@ -229,15 +237,15 @@ class Family:
         return whole
 
     def nearest(self, value: float) -> Array:
-        """The configuration of the chain (n,) whose free joint is as near to a value as it gets."""
+        """Return the chain positions (n,) with the free joint as near to `value` as possible."""
         q = self._motion.at(value)
         return next(iter(self.configurations_from(value))) if q is None else q
 
     def configurations_from(self, value: float) -> Array:
-        """The samples of the chain (k, n), those whose free joint is near a value first.
+        """Return the samples (k, n) of the chain, sorted by |free joint - value|.
 
-        Of those that are as near on either side, such as both ends of half a turn, the ones
-        beyond the value come first, not those that rounding brings nearer.
+        Of equally near samples, such as both ends of half a revolution, samples above the value
+        come first, so that rounding does not decide.
         """
         motion = self._motion
         away = motion.target.wrapped(self._motion.curve.x - value / motion.target.unit)
@@ -248,11 +256,11 @@ class Family:
         return np.asarray((motion.curve.x * motion.target.unit)[order])
 
     def contains(self, q: Array) -> bool:
-        """Whether a configuration (nq,) [rad or m] is one of it, up to whole turns."""
+        """Whether a configuration q (nq,) [rad or m] is on the self-motion, up to revolutions."""
         return bool(self.meets(np.asarray(q, dtype=float)[None, list(self._motion.indices)])[0])
 
     def meets(self, q: Array) -> NDArray[np.bool_]:
-        """(m,) whether configurations (m, n) of the chain belong to it."""
+        """Return (m,) whether each of the chain positions q (m, n) is on the self-motion."""
         return self._motion.meets(q)
 
     def __str__(self) -> str:
@@ -267,7 +275,7 @@ class Family:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _SelfMotion:
-    """What a family is computed from: the curve in the chain, and the chain in the system."""
+    """Data of a family: curve of chain positions, and position of the chain in the system."""
 
     target: Target
     curve: ConfigurationCurve
@@ -284,12 +292,12 @@ class _SelfMotion:
             near = wanted
         else:
             near = x[k] + (np.mod(wanted - x[k] + np.pi, 2 * np.pi) - np.pi)
-        # samples are no farther apart; beyond the end of a curve another one may go on
+        # samples are nearer than that; past the end of the curve another curve may follow
         if not self.curve.slope.size and abs(near - x[k]) > 2 * _STEP:
             return None
         found = target.corrected(x, held, np.array([near]))
         solved = target.residual(found * target.unit) < target.tolerance
-        # solved to 1e-12 [rad or arm lengths]; where the free joint does not get, it is far off
+        # solutions have an error of 1e-12 [rad or arm lengths]; an unreachable value misses by far
         if not solved or abs(found[k] - near) > 1e-9:
             return None
         q: Array = found * target.unit
@@ -297,7 +305,7 @@ class _SelfMotion:
         return q
 
     def _start(self, wanted: float) -> Array:
-        """The configuration of the curve whose free joint is nearest the wanted position."""
+        """Return the point x (n,) of the curve whose free joint is nearest to `wanted`."""
         samples, k = self.curve.x, self.free
         away = np.abs(self.target.wrapped(samples - wanted)[:, k])
         x = samples[int(np.argmin(away))]
@@ -307,7 +315,7 @@ class _SelfMotion:
         return np.asarray(x, dtype=float)
 
     def meets(self, q: Array) -> NDArray[np.bool_]:
-        """By the configurations of the curve in the planes through q that stand across it."""
+        """Compare each q with the curve point in the plane through q normal to the curve."""
         target, samples = self.target, self.curve.x
         x = q / target.unit
         away = target.wrapped(samples - x[:, None])
@@ -323,7 +331,7 @@ class _SelfMotion:
             held = along[:, None, :]
             found = target.corrected(start, held, np.sum(along * x, axis=1, keepdims=True), 12)
         met = np.linalg.norm(found - x, axis=1) < _SAME
-        if not self.curve.slope.size:  # from farther off they may lead to another curve through x
+        if not self.curve.slope.size:  # from farther away, another curve through x may be found
             met &= np.linalg.norm(start - x, axis=1) < _STEP
         return np.asarray(met)
 
@@ -335,14 +343,14 @@ def family(
     indices: tuple[int, ...],
     whole: Whole,
 ) -> Family:
-    """The description of a self-motion.
+    """Return the description of a self-motion.
 
     Args:
-        target: the pose that is held.
-        curve: configurations along it.
-        dimension: how many freedoms it has.
-        indices: of the chain's joints in q.
-        whole: the configuration (nq,) of the robot for one of the chain, (n,).
+        target: pose that is held.
+        curve: configurations along the self-motion.
+        dimension: number of freedoms.
+        indices: indices of the joints of the chain in q.
+        whole: function from chain positions (n,) to the configuration of the robot (nq,).
     """
     moves = np.ptp(curve.x, axis=0) > _MOVES
     free = _free_joint(curve, moves)
@@ -354,10 +362,10 @@ def family(
 
 
 def _free_joint(curve: ConfigurationCurve, moves: Array) -> int:
-    """The first joint that tells all configurations apart, or moves as far as most of the others.
+    """Return the index of the first joint that moves monotonically along most of the range.
 
-    Where every joint turns back, configurations that share its position are told apart by the side
-    from which the curve reaches them.
+    Joints are candidates if they move monotonically, or all moving joints if none does. The first
+    candidate with at least half the largest range is selected.
     """
     steps = np.diff(curve.x, axis=0)
     onwards = moves & (np.all(steps > 0, axis=0) | np.all(steps < 0, axis=0))
@@ -366,7 +374,7 @@ def _free_joint(curve: ConfigurationCurve, moves: Array) -> int:
 
 
 def _relations(target: Target, curve: ConfigurationCurve, free: int) -> tuple[str, ...]:
-    """One equation for every joint that follows in proportion."""
+    """Return one linear equation per joint that moves in proportion to the free joint."""
     if not curve.slope.size:
         return ()
     texts = []
@@ -384,11 +392,11 @@ def _relations(target: Target, curve: ConfigurationCurve, free: int) -> tuple[st
 def _relation(
     target: Target, pair: tuple[int, int], factor: float, constant: float, name: str
 ) -> str:
-    """The equation factor * free + follower = constant; angles within half a turn."""
+    """Return the text of factor * free + follower = constant, angles in [-pi, pi]."""
     turning = not any(target.arm.prismatic[k] for k in pair)
     if turning and abs(factor - round(factor)) < _MOVES:
         constant = math.remainder(constant, 2 * math.pi)
-    # what is left of sums of angles and lengths that cancel
+    # rounding error of angles and lengths that cancel
     constant = 0.0 if abs(constant) < 1e-12 else constant
     free = target.arm.names[pair[0]]
     if abs(abs(factor) - 1) < _MOVES:
@@ -402,7 +410,7 @@ def _relation(
 
 
 def _range(target: Target, curve: ConfigurationCurve, free: int) -> tuple[float, float] | None:
-    """Lowest and highest position of the free joint, None where nothing bounds it."""
+    """Return the lowest and highest position of the free joint, or None if unlimited."""
     x, unit = curve.x[:, free], target.unit[free]
     whole_turn = curve.closed and abs(x[-1] - x[0]) > np.pi
     if curve.slope.size or whole_turn:
@@ -413,10 +421,10 @@ def _range(target: Target, curve: ConfigurationCurve, free: int) -> tuple[float,
 
 
 def _end(target: Target, curve: ConfigurationCurve, free: int, sign: float) -> float:
-    """The highest position of a joint along a curve, the lowest for the other sign.
+    """Return the highest (sign 1) or lowest (sign -1) position of a joint along a curve.
 
-    The highest sample is moved to the vertex of the parabola through it and its neighbours, again
-    and again with closer neighbours; an end of the curve itself stays.
+    Successive parabolic interpolation from the extreme sample, with a decreasing step. The end of
+    an open curve is not refined.
     """
     samples = curve.x
     k, last = int(np.argmax(sign * samples[:, free])), len(samples) - 1
@@ -440,26 +448,27 @@ def _end(target: Target, curve: ConfigurationCurve, free: int, sign: float) -> f
     return float(x[free])
 
 
-# Which configurations are joined by a self-motion of several freedoms.
+# Test of whether configurations are connected by a self-motion of several freedoms.
 
 
 _SURFACE_STEP, _STEPS = 0.15, 150
-"""Length of a step on a surface of configurations [rad or arm lengths], 9 degrees, which four
-Newton steps bring back to it; all steps together are more than three turns."""
+"""Step on a self-motion surface [rad or arm lengths], 9 degrees, which four Newton steps correct.
+All steps together cover more than three revolutions."""
 _ARRIVED = 1e-6
-"""Distance [rad or arm lengths] from the goal, itself known to the root of 1e-12 where singular."""
+"""Distance [rad or arm lengths] from the goal at which it is reached: a singular goal has an error
+of 1e-6, the square root of 1e-12."""
 
 
 def connected(target: Target, q: Array, goal: Array) -> NDArray[np.bool_]:
-    """Whether configurations reach another one in small steps that keep the frame where it is.
+    """Return (m,) whether each configuration is connected to another by a self-motion.
 
-    Every step goes as straight towards the goal as the null space of the Jacobian allows; one
-    that gets stuck on the way counts as not connected.
+    Every step is the direction to the goal, projected on the null space of the Jacobian. A
+    configuration whose steps stall counts as not connected.
 
     Args:
-        target: the pose that is held.
+        target: pose that is held.
         q: (m, n) solutions [rad or m].
-        goal: (n,) another one.
+        goal: (n,) solution to reach [rad or m].
     """
     x, end = q / target.unit, goal / target.unit
     for _ in range(_STEPS):
@@ -475,7 +484,7 @@ def connected(target: Target, q: Array, goal: Array) -> NDArray[np.bool_]:
 
 
 def _project(J: Array, difference: Array) -> Array:
-    """Ways (m, n) within the null spaces of J, (m, 6, n)."""
+    """Project differences (m, n) on the null spaces of J (m, 6, n)."""
     _, s, Vt = np.linalg.svd(J, full_matrices=False)
     rows = np.where((s > _ZERO)[..., None], Vt, 0.0)
     across = np.einsum("mki,mi->mk", rows, difference)

@@ -1,4 +1,4 @@
-"""The closed form of a robot as a sheet to read: joint after joint, its equation and its roots."""
+"""Text listing of the closed form of a robot: equations and signs, joint by joint."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from mbs.operations import simplify
 from mbs.operations.graph import Graph, Node, graph_of
 from mbs.operations.text import ATOM, NEGATIVE, PRODUCT, SUM, Infix
 
-# Scalar expressions as lines that people read, what is used twice under a name of its own.
+# Scalar expressions as lines of text, with names for common subexpressions.
 
 
 _SHORT = 14
-"""Characters of an expression that is repeated rather than named."""
+"""Largest number of characters of a common subexpression that is repeated instead of named."""
 
 _SUMS = {casadi.OP_ADD, casadi.OP_SUB}
 _PRODUCTS = {casadi.OP_MUL, casadi.OP_TWICE, casadi.OP_NEG}
@@ -30,13 +30,13 @@ _PRODUCTS = {casadi.OP_MUL, casadi.OP_TWICE, casadi.OP_NEG}
 def expression_lines(
     graph: Graph, inputs: Mapping[str, Sequence[str]], results: Sequence[str], prefix: str
 ) -> list[str]:
-    """The elements of the only output of a graph, each as `name = expression`.
+    """Write the elements of the first output of a graph as lines `name = expression`.
 
     Args:
-        graph: what is computed.
-        inputs: names of the elements of every input, by its name.
+        graph: expression graph with one output.
+        inputs: names of the elements of each input, by name of the input.
         results: names of the elements of the output.
-        prefix: with a number behind it, the name of what stands in several expressions.
+        prefix: prefix of the names of common subexpressions; a counter is appended.
     """
     writer = _LineWriter(graph, inputs, prefix)
     texts = [writer.text(number) for number in graph.results[0]]
@@ -45,10 +45,10 @@ def expression_lines(
 
 
 class _LineWriter(Infix):
-    """What writes the nodes of a graph.
+    """Writer of the nodes of a graph as infix text.
 
     Attributes:
-        lines: `name = expression` of what is used more than once.
+        lines: lines `name = expression` of the common subexpressions so far.
     """
 
     def __init__(self, graph: Graph, inputs: Mapping[str, Sequence[str]], prefix: str) -> None:
@@ -78,7 +78,7 @@ class _LineWriter(Infix):
         return super()._expression(node)
 
     def _product(self, node: Node) -> tuple[str, int]:
-        """The product of all numbers, then the other factors in their order."""
+        """Write the product of all constants, then the other factors in order."""
         constant, numbers = self._factors(node)
         factors = [self.text(number, PRODUCT) for number in numbers]
         if abs(constant) != 1 or not factors:
@@ -90,7 +90,7 @@ class _LineWriter(Infix):
         return text, PRODUCT if len(factors) > 1 else max(alone, PRODUCT)
 
     def _factors(self, node: Node) -> tuple[float, list[int]]:
-        """A number and the nodes that a product multiplies, products in it taken apart."""
+        """Flatten nested products: return the constant factor and the other factor nodes."""
         constant = {casadi.OP_TWICE: 2.0, casadi.OP_NEG: -1.0}.get(node.op, 1.0)
         numbers: list[int] = []
         for number in node.args:
@@ -105,7 +105,7 @@ class _LineWriter(Infix):
         return constant, numbers
 
     def _sum(self, node: Node) -> tuple[str, int]:
-        """Terms in their order, then the sum of all numbers."""
+        """Write the terms in order, then the sum of all constants."""
         constant, text = 0.0, ""
         for sign, number in self._terms(node, 1):
             if self._graph.nodes[number].op == casadi.OP_CONST:
@@ -120,7 +120,7 @@ class _LineWriter(Infix):
         return text, SUM
 
     def _terms(self, node: Node, sign: int) -> Iterator[tuple[int, int]]:
-        """Sign and number of what a sum adds up, sums in it taken apart."""
+        """Flatten nested sums: yield the sign and node number of each term."""
         last = sign if node.op == casadi.OP_ADD else -sign
         for own, number in zip((sign, last)[-len(node.args) :], node.args, strict=True):
             inner = self._graph.nodes[number]
@@ -130,20 +130,20 @@ class _LineWriter(Infix):
                 yield own, number
 
     def _is_opposite_sum(self, node: Node) -> bool:
-        """Whether it is the opposite of a sum that stands nowhere else."""
+        """Whether a node is the negative of a sum that is used only here."""
         inner = node.args[0] if node.op == casadi.OP_NEG else -1
         return inner >= 0 and self._graph.nodes[inner].op in _SUMS and self._uses[inner] == 1
 
 
 def _join(text: str, sign: int, term: str) -> str:
-    """What a term adds to the text of a sum."""
+    """Return the text with which a term is appended to the text of a sum."""
     if not text:
         return f"-{term}" if sign < 0 else term
     return f" - {term}" if sign < 0 else f" + {term}"
 
 
 def _uses(graph: Graph) -> list[int]:
-    """For each node that a result needs how many times it is written."""
+    """Return the number of uses of each node by live nodes and results."""
     alive, uses = graph.live(), [0] * len(graph.nodes)
     for number in range(len(graph.nodes)):
         if alive[number]:
@@ -156,7 +156,7 @@ def _uses(graph: Graph) -> list[int]:
 
 
 def _sine(letter: str, angle: str) -> str:
-    """S23 for the sine of q2 + q3, sin(elbow) for that of another angle."""
+    """Return S23 for the sine of q2 + q3, and sin(elbow) for other angles."""
     if re.fullmatch(r"q\d( \+ q\d)*", angle):
         return letter + "".join(re.findall(r"\d", angle))
     return {"S": "sin", "C": "cos"}[letter] + f"({angle})"
@@ -168,7 +168,7 @@ _PASSES = ("drop", "fold", "angles", "pythagoras")
 _MEANING = {
     "type 2": "+ the root at a positive angle from the direction (X, Y), - the other",
 }
-"""Of the sign of a step with one, by its kind."""
+"""Meaning of the sign of a step with a single sign, by kind of the step."""
 
 
 def text(
@@ -177,22 +177,22 @@ def text(
     frame: str | int | None = None,
     locked: Mapping[str, float] | None = None,
 ) -> str:
-    """The closed form of the inverse geometric model, to be read.
+    """Return the closed form of the inverse geometric model (inverse kinematics) as text.
 
-    For every step: the joints that it gives, the type of its equation, the equation, what its
-    signs choose between, and the coefficients, in terms of the joints found before, of the
-    elements T11 .. T34 of the pose and of the parameters. S1, C1, S12 are the sine and cosine of
-    q1 and the sine of q1 + q2.
+    The text lists for each step the joints, the type of the equation, the equation, the meaning of
+    its signs, and its coefficients. Coefficients depend on previous joints, on the elements T11 ..
+    T34 of the pose and on the parameters. S1, C1 and S12 are the sine and cosine of q1 and the sine
+    of q1 + q2.
 
     Args:
-        system: whose model it is.
-        method: "pieper", "paul", or "auto" for the cheaper of them.
-        frame: a body, a named frame, the number of a link, or None for the terminal frame.
-        locked: positions of joints that stay where they are, by name [rad or m].
+        system: open system, or a closed system whose tree contains the chain.
+        method: "pieper", "paul", or "auto" for the cheaper of both.
+        frame: name of a body or frame, index of a link, or None for the terminal frame.
+        locked: positions of fixed joints, by name [rad or m].
 
     Raises:
-        NoClosedForm: no closed form is known; the message says what stood in the way.
-        ModelError: there is no such method, frame or joint, or more than six joints are free.
+        NoClosedForm: no closed form is known; the message gives the reason.
+        ModelError: the method, frame or joint is unknown, or more than six joints are free.
     """
     chain = frame_chain(system, frame, locked)
     sequence, problem = sequence_of(chain, method), chain.problem()

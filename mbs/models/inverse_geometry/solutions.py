@@ -1,4 +1,4 @@
-"""The answer of an inverse geometric model: every configuration that takes the frame to a pose."""
+"""Result classes of the inverse geometric model, joint limits and error reasons."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ from mbs.models.inverse_geometry.target import Target
 from mbs.numbers import has_boolean
 from mbs.text import did_you_mean, quoted
 
-# Joint limits, and the whole turns by which a configuration may be wound within them.
+# Joint limits, and shifts of angles by full revolutions within the limits.
 
 
 Given = Mapping[str, tuple[float, float] | None]
-"""Limits by the name of the coordinate, None for a coordinate without."""
+"""Limits (lower, upper) by name of the coordinate [rad or m], None for an unlimited coordinate."""
 
 _TURN = 2 * math.pi
 WITHIN = 1e-9
-"""Distance beyond a limit [rad or m] that is rounding: solutions that lie on a limit are within."""
+"""Distance beyond a limit [rad or m] that counts as rounding: solutions on a limit are valid."""
 _TURNS = 4
-"""To either side of the position nearest the wanted one, at most."""
+"""Maximum number of revolutions to either side of the nearest position of a coordinate."""
 _MOST_WINDINGS = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoordinateLimits:
-    """Limits of every coordinate of a system.
+    """Limits of all coordinates of a system.
 
     Attributes:
-        names: of the coordinates.
-        low, high: (nq,) limits [rad or m], infinite where there is none.
-        turns: (nq,) which of them may be changed by whole turns.
+        names: names of the coordinates.
+        low, high: (nq,) limits [rad or m], infinite for unlimited coordinates.
+        turns: (nq,) whether each coordinate may be shifted by full revolutions.
     """
 
     names: tuple[str, ...]
@@ -52,14 +52,14 @@ class CoordinateLimits:
     turns: NDArray[np.bool_]
 
     def outside(self, q: Array) -> list[str]:
-        """The names of the coordinates that no whole number of turns brings within limits."""
+        """Return the names of the coordinates of q (nq,) that are outside in every revolution."""
         return [self.names[k] for k in range(q.size) if not self._options(k, q[k], 0.0)]
 
     def wound(self, q: Array, near: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """`wrap_to_limits` of configurations (m, nq), and (m,) which of them are within limits."""
+        """Return `wrap_to_limits` of q (m, nq), and (m,) whether each is within the limits."""
         low, high = self.low - WITHIN, self.high + WITHIN
         away = (near - q) / _TURN
-        # of two that are as near, the lower one as in `_options`
+        # of two equally near positions the lower, as in `_options`
         free = np.isinf(low) & np.isinf(high)
         turns = np.where(free, np.rint(away), np.ceil(away - 0.5))
         first, last = np.ceil((low - q) / _TURN), np.floor((high - q) / _TURN)
@@ -68,14 +68,14 @@ class CoordinateLimits:
         return np.where(self.turns, q + _TURN * turns, q), np.all(within, axis=1, keepdims=False)
 
     def windings(self, q: Array, near: Array) -> Array:
-        """Configurations that differ from q by whole turns and are within the limits.
+        """Return the configurations within limits that differ from q by full revolutions.
 
         Args:
             q: (nq,) configuration [rad or m].
-            near: (nq,) configuration by whose distance they are sorted.
+            near: (nq,) configuration; the result is sorted by the distance from it.
 
         Returns:
-            (w, nq), at most 64 of them; none where a coordinate cannot be brought within.
+            Configurations (w, nq), w at most 64; w = 0 if a coordinate is always outside.
         """
         options = [self._options(k, q[k], near[k]) for k in range(q.size)]
         while math.prod(len(option) for option in options) > _MOST_WINDINGS**2:
@@ -87,12 +87,15 @@ class CoordinateLimits:
         return nearest
 
     def wrap_to_limits(self, q: Array, near: Array) -> Array:
-        """(nq,) q changed by whole turns: each coordinate within limits if it can, near `near`."""
+        """Shift the angles of q (nq,) by full revolutions into the limits, nearest to `near`.
+
+        Coordinates that are always outside are only shifted towards `near`.
+        """
         wrapped: Array = self.wound(q[None], near)[0][0]
         return wrapped
 
     def _options(self, k: int, value: float, near: float) -> list[float]:
-        """Positions of one coordinate within its limits, the nearest first."""
+        """Return the positions of coordinate k within its limits, the nearest first."""
         low, high = self.low[k] - WITHIN, self.high[k] + WITHIN
         if not self.turns[k]:
             return [value] if low <= value <= high else []
@@ -112,17 +115,17 @@ class CoordinateLimits:
 def bounds(
     system: System, given: bool | Given | None = None, turning: Iterable[int] | None = None
 ) -> CoordinateLimits:
-    """The limits of a system's coordinates, some of them replaced.
+    """Return the limits of the coordinates of a system, with replacements.
 
     Args:
-        system: whose coordinates.
-        given: (lowest, highest) [rad or m] by name, None for a coordinate that has none; True,
-            False and None replace nothing.
-        turning: numbers of the revolute coordinates that may be changed by whole turns, all of
-            them when left out.
+        system: system with its coordinate limits.
+        given: (lower, upper) [rad or m] by name, or None for an unlimited coordinate. True, False
+            and None replace nothing.
+        turning: indices of the revolute coordinates that may be shifted by full revolutions;
+            default is all.
 
     Raises:
-        ModelError: there is no such coordinate, or limits are no dict or no pair of numbers.
+        ModelError: a coordinate is unknown, or limits are no dict or no pair of numbers.
     """
     names = tuple(coordinate.name for coordinate in system.coordinates)
     own = {c.name: c.limits for c in system.coordinates}
@@ -141,7 +144,7 @@ def bounds(
 
 
 def leaves_out(given: bool | Given | None) -> bool:
-    """Whether limits that a user gives leave out what is beyond them."""
+    """Whether the argument `limits` drops solutions beyond the limits."""
     return given is not None and given is not False
 
 
@@ -178,21 +181,21 @@ _MOST_ROWS = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """One configuration that takes the frame to the target pose.
+    """Configuration at which the frame has the target pose.
 
     Attributes:
         q: (nq,) positions [rad or m].
-        branch: what tells it from the others: shoulder, elbow and wrist of an arm that has them,
-            else the signs of the closed form, else a number.
-        residual: largest element of pose(q) - T [m or 1].
+        branch: name of the branch: shoulder, elbow and wrist if the arm has them, else the signs
+            of the closed form, else a number.
+        residual: largest absolute element of pose(q) - T [m or 1].
         sigma_min: smallest singular value of the Jacobian of the joints that were solved for,
-            lengths divided by the arm's length; zero at a singular configuration.
-        multiplicity: how many roots meet in it; 1 but at a singular configuration, 0 where it is
-            one of a self-motion; an upper bound where two singular configurations meet.
+            lengths divided by the arm length; zero at a singular configuration.
+        multiplicity: number of coinciding roots: 1 at a regular configuration, 0 on a self-motion;
+            an upper bound if two singular configurations meet.
         within_limits: whether every joint is within its limits.
-        family: the self-motion that it stands for, or None.
-        undecided: whether double precision does not decide whether it is one solution, several or
-            none; rounding of the pose may change the list there.
+        family: self-motion through q, or None.
+        undecided: whether double precision cannot decide if there are one, several or no solutions
+            near q. Rounding of the pose may change the list of solutions.
     """
 
     q: Array
@@ -207,15 +210,15 @@ class Solution:
 
     @property
     def windings(self) -> Array:
-        """(w, nq) what is within limits and differs from q by whole turns, q itself the first.
+        """Configurations (w, nq) within limits that differ from q by full revolutions.
 
-        None where a joint is outside.
+        q itself is the first. Empty if a joint is outside its limits.
         """
         return self._windings()
 
 
 class RegularSolutions(Sequence[Solution]):
-    """The solutions of a regular pose as arrays; each is a `Solution` when it is asked for."""
+    """Solutions of a regular pose, stored as arrays; each `Solution` is created on access."""
 
     __slots__ = (
         "_arm",
@@ -241,17 +244,17 @@ class RegularSolutions(Sequence[Solution]):
         near: Array,
         within: NDArray[np.bool_],
     ) -> None:
-        """Take them.
+        """Store the solutions.
 
         Args:
-            q: (m, nq) configurations, wound towards `near` within limits [rad or m].
-            branches: (m,) their names.
-            residual: (m,) largest element of pose(q) - T [m or 1].
-            arm: the chain in numbers.
-            own: (m, n) configurations of the chain [rad or m].
+            q: (m, nq) configurations, shifted towards `near` within limits [rad or m].
+            branches: (m,) names of the branches.
+            residual: (m,) largest absolute element of pose(q) - T [m or 1].
+            arm: numeric geometry of the chain.
+            own: (m, n) chain positions [rad or m].
             bounds: limits of the coordinates.
-            near: (nq,) configuration that others are wound towards.
-            within: (m,) whether each is within limits.
+            near: (nq,) configuration towards which angles are shifted by full revolutions.
+            within: (m,) whether each configuration is within limits.
         """
         self.q, self._branches, self._residual = q, branches, residual
         self._arm, self._own, self._bounds, self._near = arm, own, bounds, near
@@ -275,7 +278,7 @@ class RegularSolutions(Sequence[Solution]):
         return self._made[number]
 
     def _solution(self, k: int) -> Solution:
-        if self._sigma is None:  # which does not depend on the pose
+        if self._sigma is None:  # singular values do not depend on the pose
             self._sigma = Target(self._arm, np.eye(4)).singular_values(self._own)[:, -1]
         return Solution(
             self.q[k],
@@ -290,17 +293,16 @@ class RegularSolutions(Sequence[Solution]):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solutions(Sequence[Solution]):
-    """Every configuration that takes the frame to the target pose, a sequence of `Solution`.
+    """All configurations at which the frame has the target pose: a sequence of `Solution`.
 
     Attributes:
         system: name of the robot.
-        names: of its coordinates, in the order of q.
-        solutions: the configurations; nearest to the seed first where there was one.
-        method: that found them: pieper, paul, general or search; next to singular configurations
-            the others complete it.
-        reason: why there is none, "" where there is one.
-        nearest: the reachable pose nearest to the wanted one, and its configuration, where there
-            is no solution at all.
+        names: names of the coordinates, in the order of q.
+        solutions: configurations, sorted by distance from the seed if there was one.
+        method: method that computed them: pieper, paul, general or search. Near singular
+            configurations other methods are used in addition.
+        reason: text that explains why there is no solution, "" if there is one.
+        nearest: reachable pose nearest to an unreachable target, with its configuration, or None.
     """
 
     system: str
@@ -323,7 +325,7 @@ class Solutions(Sequence[Solution]):
 
     @property
     def q(self) -> Array:
-        """(m, nq) the configurations [rad or m]."""
+        """Configurations (m, nq) of all solutions [rad or m]."""
         if isinstance(self.solutions, RegularSolutions):
             return self.solutions.q.copy()
         return np.array([s.q for s in self.solutions]).reshape(len(self), len(self.names))
@@ -334,10 +336,12 @@ class Solutions(Sequence[Solution]):
         return any(s.undecided for s in self.solutions)
 
     def closest(self, q: Sequence[float] | Array) -> Solution:
-        """The solution nearest a configuration (nq,) [rad or m], wound as limits allow.
+        """Return the solution nearest to a configuration q (nq,) [rad or m].
+
+        Angles are shifted by full revolutions towards q, within the limits.
 
         Raises:
-            ModelError: there is no solution, or the configuration is not that many finite numbers.
+            ModelError: there is no solution, or q does not consist of nq finite numbers.
         """
         if not self.solutions:
             raise ModelError(f"{self.system}: there is no solution; {self.reason}")
@@ -394,23 +398,23 @@ def _numbers(system: str, q: object) -> Array:
     return near
 
 
-# Why no configuration takes the frame to a pose.
+# Reasons why a pose has no solution.
 
 
 _REASON_STARTS, _STEPS, _SEED = 40, 60, 20260109
 _REACHED = 1e-9
-"""Largest row, free of units, of equations that have a solution: damped steps end far below, and a
-pose out of reach by less, a nanometre of a metre, is told by its distance."""
+"""Largest dimensionless error of equations that have a solution. Damped steps end far below. A pose
+that is out of reach by less (1 nm per metre) is reported by its distance."""
 _SMALLEST = 1e-9
-"""Distance [m] and angle [rad] that are told; below it is rounding."""
+"""Smallest distance [m] and angle [rad] that are reported; smaller values are rounding."""
 
 
 def unreachable(target: Target, nearest: Nearest) -> str:
-    """Why a pose has no solution at all.
+    """Return the text that explains why a pose cannot be reached.
 
     Args:
-        target: the target pose.
-        nearest: the reachable pose nearest to it.
+        target: target pose of the arm.
+        nearest: reachable pose nearest to the target.
     """
     arm = target.arm
     away = f"the nearest reachable pose is {apart(nearest.distance, nearest.angle)}"
@@ -429,11 +433,11 @@ def unreachable(target: Target, nearest: Nearest) -> str:
 
 
 def apart(distance: float, angle: float) -> str:
-    """How far two poses are apart, in words; what is but rounding is left out.
+    """Return the text of the difference of two poses, without values below `_SMALLEST`.
 
     Args:
-        distance: between their origins [m].
-        angle: between their orientations [rad].
+        distance: distance of the origins [m].
+        angle: rotation angle between the orientations [rad].
     """
     parts = [f"{distance:.4g} m away"] if distance > _SMALLEST else []
     if angle > _SMALLEST:
@@ -442,7 +446,11 @@ def apart(distance: float, angle: float) -> str:
 
 
 def excluded(outside: Sequence[Sequence[str]]) -> str:
-    """Why no solution is left, from the names of the joints outside their limits in each."""
+    """Return the text that limits exclude all solutions.
+
+    Args:
+        outside: for each solution the names of the joints outside their limits.
+    """
     count = len(outside)
     joints = Counter(name for names in outside for name in names)
     most = [f"{name} in {k} of {count}" for name, k in joints.most_common()]
@@ -451,24 +459,21 @@ def excluded(outside: Sequence[Sequence[str]]) -> str:
 
 
 def reaches_position(target: Target) -> bool:
-    """Whether the frame's origin can get to the wanted place, however it is turned."""
+    """Whether the origin of the frame can reach the target position in any orientation."""
     return _reaches(target, slice(0, 3))
 
 
 def reaches_orientation(target: Target) -> bool:
-    """Whether the frame can be turned as wanted, wherever it is."""
+    """Whether the frame can reach the target orientation at any position."""
     return _reaches(target, slice(3, 6))
 
 
 def _reaches(target: Target, rows: slice) -> bool:
-    """Whether some rows of the equations alone have a solution.
-
-    Levenberg-Marquardt from several configurations at once.
-    """
+    """Whether a subset of the pose equations has a solution: Levenberg-Marquardt, many starts."""
     n = target.arm.size
     rng = np.random.default_rng(_SEED)
     x = rng.uniform(-math.pi, math.pi, (_REASON_STARTS, n))
-    # of rows of about one: little, as starts are many
+    # initial damping, relative to rows of size 1: small, because there are many starts
     damping = np.full(_REASON_STARTS, 1e-2)
     e, J = (part[:, rows] for part in target.excess(x))
     for _ in range(_STEPS):
@@ -478,17 +483,17 @@ def _reaches(target: Target, rows: slice) -> bool:
         better = np.sum(e_trial**2, axis=1) < np.sum(e**2, axis=1)
         x = np.where(better[:, None], x - step, x)
         e, J = np.where(better[:, None], e_trial, e), np.where(better[:, None, None], J_trial, J)
-        # less would be rounding beside entries of J'J of about one
+        # below 1e-14 the damping vanishes in the rounding of J'J, whose entries are about 1
         damping = np.where(better, np.maximum(damping / 5, 1e-14), damping * 4)
     return bool(np.min(np.max(np.abs(e), axis=1)) < _REACHED)
 
 
-# Which of the solutions a user wants, in which order, and wound by how many turns.
+# Selection, order and full revolutions of the solutions, according to the options of the user.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotSolution:
-    """A solution of the whole robot before whole turns and limits are looked at; see `Solution`."""
+    """Solution of the robot before limits are applied; attributes as in `Solution`."""
 
     q: Array
     branch: str
@@ -501,15 +506,15 @@ class RobotSolution:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wishes:
-    """What a user asks for beside the pose.
+    """Options of an inverse geometric problem.
 
     Attributes:
-        system: the robot.
-        near: (nq,) the configuration that solutions are wound towards; it places the joints that
-            the frame does not depend on.
+        system: robot.
+        near: (nq,) configuration towards which angles are shifted by full revolutions. Joints that
+            do not move the frame take their positions from it.
         bounds: limits of the coordinates.
-        strict: whether solutions outside the limits are left out.
-        seeded: whether the nearest solution comes first.
+        strict: whether solutions outside the limits are dropped.
+        seeded: whether solutions are sorted by their distance from `near`.
     """
 
     system: System
@@ -525,13 +530,13 @@ class Wishes:
         reason: str = "",
         nearest: Nearest | None = None,
     ) -> Solutions:
-        """The answer.
+        """Apply the limits and the order, and return the solutions for the user.
 
         Args:
-            drafts: every solution.
-            method: that found them.
-            reason: why there is none, where there is none.
-            nearest: the reachable pose nearest to the wanted one, where there is none.
+            drafts: all solutions of the robot.
+            method: name of the method that computed them.
+            reason: explanation, if there is no solution.
+            nearest: reachable pose nearest to the target, if there is no solution.
         """
         every = [self._solution(draft) for draft in drafts]
         kept = [s for s in every if s.within_limits or not self.strict]

@@ -1,4 +1,4 @@
-"""Every configuration that takes a frame of a robot to a pose."""
+"""Inverse geometric model for one pose: all configurations at which a frame has this pose."""
 
 from __future__ import annotations
 
@@ -61,36 +61,36 @@ def solve(
     redundant: Redundant | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Solutions:
-    """Every configuration that takes a frame to a pose.
+    """Compute all configurations at which a frame has a given pose (inverse kinematics).
 
-    Each is checked with the forward model to 1e-12 of max(1 m, the robot's length). Next to
-    singular configurations several methods are joined so that none is missed.
+    Each solution is verified with forward kinematics to 1e-12 of max(1 m, length of the robot).
+    Near singular configurations the solutions of several methods are merged, to miss none.
 
     Args:
-        system: a serial robot, a tree, or a robot with loops.
-        T: (4, 4) the pose of the frame seen from the base [m].
-        frame: a body, a named frame, the number of a link, or None for the terminal frame.
-        method: "auto" for a closed form where there is one, else the general method, else the
-            search; or one of "pieper", "paul", "general", "search".
-        limits: None leaves out no solution and says of each whether it is within the robot's own
-            limits; True leaves out those that are not; (lowest, highest) by name replaces limits
-            and leaves out likewise.
-        seed: a configuration by name or (nq,) [rad or m]; solutions are sorted by their distance
-            from it and wound towards it, and it places the joints that the frame does not depend
-            on.
-        locked: positions of joints that stay where they are, by name [rad or m].
-        redundant: by the name of a joint beyond the six that a pose determines how many positions
-            it takes, from limit to limit or over a turn, or (S,) these [rad or m]; the solutions
-            of all of them are given, of several joints those of all combinations.
-        parameters: values of symbols, the others at their defaults.
+        system: serial robot, tree, or robot with closed loops.
+        T: (4, 4) pose of the frame relative to the base [m].
+        frame: name of a body or frame, index of a link, or None for the terminal frame.
+        method: "auto" selects a closed form if one exists, else the general method, else the
+            search. "pieper", "paul", "general" and "search" select one method.
+        limits: None keeps all solutions and reports for each whether it is within the joint limits
+            of the model. True drops solutions beyond these limits. A dict of (lower, upper) by
+            joint name replaces limits and drops solutions beyond them.
+        seed: configuration as a dict by name or (nq,) [rad or m]. Solutions are sorted by their
+            distance from it, and angles are shifted by full revolutions towards it. Joints that do
+            not move the frame take their positions from it.
+        locked: positions of fixed joints, by name [rad or m].
+        redundant: samples of joints beyond the six that a pose determines, by name: number of
+            positions between the limits (or over one revolution), or array (S,) of positions [rad
+            or m]. Solutions of all combinations are returned.
+        parameters: parameter values by name; default values for all others.
 
     Returns:
-        Solutions, which say why they are empty where they are.
+        Solutions. If there is none, its `reason` explains why.
 
     Raises:
         ModelError: T is no rigid transform, a name or a method is unknown, or more than six
             joints are free.
-        NoClosedForm: "pieper" or "paul" was asked for and does not fit.
+        NoClosedForm: method is "pieper" or "paul" and does not apply to the robot.
     """
     require_system(system)
     if redundant is None:
@@ -112,18 +112,18 @@ def solve(
     )
 
 
-_KEPT = 256  # shells, one for every position of locked joints and value of parameters
+_KEPT = 256  # cached shells per system: one for each set of locked positions and parameter values
 Seed = Mapping[str, float] | Sequence[float] | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Shell:
-    """What `solve` knows of a frame before it is told a pose.
+    """Data of a frame that `solve` reuses for all poses.
 
     Attributes:
-        kernel: that solves for poses.
-        names: of the coordinates.
-        plain: what is asked for where no seed is given.
+        kernel: solver for single poses.
+        names: names of the coordinates of the system.
+        plain: options without a seed.
     """
 
     kernel: PoseKernel
@@ -131,7 +131,7 @@ class _Shell:
     plain: Wishes
 
     def solutions(self, T: Any, seed: Seed) -> Solutions | None:
-        """The solutions of a regular pose; None where they are found, or not found, otherwise."""
+        """Return the solutions of a regular pose, or None if `solve` must use other methods."""
         kernel, wishes = self.kernel, self.plain
         draft = kernel.draft_of(T)
         if draft is None or not draft.certain or not len(draft.q):
@@ -170,8 +170,8 @@ def _shell_of(
     locked: Mapping[str, float] | None,
     parameters: Mapping[str, float] | None,
 ) -> _Shell | None:
-    """What is kept for poses of a frame; None where only the slow methods hold."""
-    # what is no dict keeps its type in the key, and is refused where it is read
+    """Return the cached data of a frame, or None if only the slow methods apply."""
+    # an argument that is no dict keeps its type in the key; its reader raises the error
     given = (
         (type(x), tuple(x.items()) if isinstance(x, Mapping) else x)
         for x in (limits, locked, parameters)
@@ -179,7 +179,7 @@ def _shell_of(
     key = (frame, method, *given)
     try:
         hash(key)
-    except TypeError:  # what cannot be looked up is read anew
+    except TypeError:  # unhashable arguments are not cached
         return None
 
     def made() -> _Shell | None:
@@ -208,18 +208,18 @@ def solve_rigid(
     redundant: Redundant | None = None,
     parameters: Mapping[str, float] | None,
 ) -> Solutions:
-    """`solve` for a transform that is rigid to the last digit: rounded twice it would be another.
+    """`solve` for a pose from `target_pose`, which is not projected to a rigid transform again.
 
     Args:
-        system: as of `solve`.
-        target: (4, 4) as `target_pose` gives it.
-        frame: as of `solve`.
-        method: likewise.
-        limits: likewise.
-        seed: likewise.
-        locked: likewise.
-        redundant: likewise.
-        parameters: likewise.
+        system: argument of `solve`.
+        target: (4, 4) result of `target_pose`. A second projection would change its rounding.
+        frame: argument of `solve`.
+        method: argument of `solve`.
+        limits: argument of `solve`.
+        seed: argument of `solve`.
+        locked: argument of `solve`.
+        redundant: argument of `solve`.
+        parameters: argument of `solve`.
     """
     p = np.array(system.parameter_values(parameters))
     samples = samples_of(system, locked, redundant, limits, 1)
@@ -241,22 +241,22 @@ def solve_at(
     limits: bool | Given | None = None,
     seed: Mapping[str, float] | Sequence[float] | None = None,
 ) -> Solutions:
-    """The solutions with the varied joints of a chain at one position.
+    """Solve a pose of a chain for given positions of its varied (redundant) joints.
 
     Args:
-        chain: whose closed form serves all of these positions.
-        r: (k,) positions of its varied joints [rad or m].
-        T: (4, 4) the pose of its frame [m].
-        method: as in `solve`.
-        p: (np,) parameters.
-        limits: as in `solve`.
-        seed: as in `solve`.
+        chain: chain whose closed form is valid for all positions of the varied joints.
+        r: (k,) positions of the varied joints [rad or m].
+        T: (4, 4) pose of the end frame relative to the base [m].
+        method: argument of `solve`.
+        p: (np,) parameter values.
+        limits: argument of `solve`.
+        seed: argument of `solve`.
     """
     return answer(*_asked(chain, r, T, method, p, limits, seed))
 
 
 _Asked = tuple[Question, list[ChainRoot], str]
-"""A question, the solutions of its chain, and the method that gave them."""
+"""Problem, solutions of its chain, and name of the method that computed them."""
 
 
 def _asked(
@@ -286,7 +286,7 @@ def _asked(
 
 
 def _signs(chain: FrameChain, method: str, p: Array) -> tuple[str, ...]:
-    """The names of the branches of a closed form, where there is one."""
+    """Return the branch names of the closed form, empty without one."""
     if method not in ("auto", *CLOSED_FORMS):
         return ()
     try:
@@ -298,13 +298,13 @@ def _signs(chain: FrameChain, method: str, p: Array) -> tuple[str, ...]:
 def solved(
     question: Question, method: str, varied: FrameChain, r: Array
 ) -> tuple[list[ChainRoot], str]:
-    """The solutions of a chain, and the method that gave them.
+    """Return the distinct solutions of a chain and the name of the method that computed them.
 
     Args:
-        question: the chain and the pose.
-        method: as in `solve`.
-        varied: the chain with some joints at positions that are symbols.
-        r: (k,) these positions in the question [rad or m].
+        question: chain and target pose.
+        method: argument of `solve`.
+        varied: the same chain with symbolic positions of the varied joints.
+        r: (k,) positions of the varied joints in `question` [rad or m].
     """
     chain, target, p = question.chain, question.target, question.p
     gathered = gather(varied, target, method, p, r)
@@ -321,7 +321,7 @@ def solved(
         found = roots(target, gathered, question.chain_indices, examined)
     if gathered.method == "search":
         return separated(target, found), gathered.method
-    # where an arm moves, a search gives points of what is known already
+    # a search also finds points of known self-motions, which are dropped here
     more = new_among(target, found, by_search(target))
     if len(more.q):
         found = roots(target, joined(gathered, more), question.chain_indices, examined)
@@ -329,7 +329,10 @@ def solved(
 
 
 def _joined(asked: list[_Asked], samples: LockedSamples, near: Array | None) -> Solutions:
-    """The solutions of all positions of redundant joints; else why there is none at the best."""
+    """Join the solutions of all samples of redundant joints, sorted by distance from `near`.
+
+    Without any solution: the reason at the sample that comes nearest to the pose.
+    """
     reached = [k for k, (_, found, _) in enumerate(asked) if found]
     if not reached:
         reached = [int(np.argmin([_away(question) for question, _, _ in asked]))]
@@ -346,7 +349,7 @@ def _joined(asked: list[_Asked], samples: LockedSamples, near: Array | None) -> 
 
 
 def _away(question: Question) -> float:
-    """How far the nearest reachable pose is [arm lengths and rad]."""
+    """Return the distance of the nearest reachable pose: [arm lengths] plus [rad]."""
     arm = question.target.arm
     found = nearest(arm, question.target.T)
     return found.distance / arm.length + found.angle
@@ -358,7 +361,7 @@ def chain_or_none(
     locked: Mapping[str, float] | None,
     varied: tuple[str, ...] = (),
 ) -> FrameChain | None:
-    """The chain to the frame; None where a robot with loops has none that can stand alone."""
+    """Return the chain to the frame, or None if loops prevent a separate solution of a chain."""
     try:
         return frame_chain(system, frame, locked, varied)
     except ModelError:
@@ -370,7 +373,7 @@ def chain_or_none(
 
 
 def _is_doubtful(target: Target, gathered: Gathered) -> bool:
-    """Whether a solution may be missing: none was found, or next to a singular configuration."""
+    """Whether solutions may be missing: none was found, or one is nearly singular."""
     if gathered.doubtful or not len(gathered.q):
         return True
     return bool(np.any(nearly_singular(target.arm, gathered.q)))
@@ -392,7 +395,7 @@ def _wishes(
 
 
 def _near(system: System, chain: FrameChain | None, seed: Seed) -> Array:
-    """(nq,) the configuration that solutions are wound towards."""
+    """Return the configuration (nq,) from which distances are measured: seed or default."""
     near = np.array(system.position(seed))
     if chain is None:
         return near

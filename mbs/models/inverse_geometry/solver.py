@@ -1,4 +1,4 @@
-"""All configurations for one pose after the other, each from one compiled call."""
+"""Inverse geometric model for a sequence of single poses, with one compiled call per pose."""
 
 from __future__ import annotations
 
@@ -22,13 +22,14 @@ from mbs.models.inverse_geometry.solve import chain_or_none, solve_rigid
 
 
 class PoseAnswer:
-    """The configurations for one pose.
+    """All configurations for one pose.
 
     Attributes:
         q: (m, nq) configurations, angles in (-pi, pi] [rad or m].
-        residual: (m,) largest element of pose(q) - T [m or 1].
-        singular: whether the pose is next to a singular one, so that slower methods joined in;
-            copies are then merged, and `solutions` tells multiplicities and self-motions.
+        residual: (m,) largest absolute element of pose(q) - T [m or 1].
+        singular: whether `solve` was used because the compiled call did not certify the result, as
+            near a singular configuration. Copies are then merged, and `solutions` contains
+            multiplicities and self-motions.
     """
 
     __slots__ = ("_T", "_branch", "_labels", "_solutions", "_solver", "q", "residual", "singular")
@@ -47,42 +48,42 @@ class PoseAnswer:
         T: Any,
         solutions: Solutions | None,
     ) -> None:
-        """Made by a `PoseSolver`."""
+        """Store the results of a `PoseSolver`."""
         self.q, self.residual, self.singular = q, residual, solutions is not None
         self._labels, self._branch, self._solver, self._T = labels, branch, solver, T
         self._solutions = solutions
 
     def __len__(self) -> int:
-        """The number of configurations."""
+        """Return the number of configurations."""
         return len(self.q)
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The name of the branch of each."""
+        """Name of the branch of each configuration."""
         if self._branch is None:
             return tuple(self._labels)  # type: ignore[arg-type]
         return tuple([self._labels[b] for b in self._branch.tolist()])
 
     @property
     def solutions(self) -> Solutions:
-        """What `solve` says of the pose: singular values, families, limits; made when asked for."""
+        """Result of `solve` for the pose (singular values, self-motions), computed on access."""
         if self._solutions is None:
             self._solutions = self._solver.solutions(self._T)
         return self._solutions
 
     @property
     def undecided(self) -> bool:
-        """Whether double precision does not decide the list, as `Solutions.undecided`."""
+        """Whether double precision cannot decide the list of solutions; see `Solutions`."""
         return self.singular and self.solutions.undecided
 
     @property
     def reason(self) -> str:
-        """Why there is no configuration, "" where there is one; looked for when asked for."""
+        """Reason for an empty result, "" if configurations exist; computed on access."""
         return "" if len(self.q) else self.solutions.reason
 
     @property
     def nearest(self) -> Nearest | None:
-        """The reachable pose nearest to the wanted one where there is no configuration."""
+        """Reachable pose nearest to the target, or None if there is a configuration."""
         return None if len(self.q) else self.solutions.nearest
 
     def __repr__(self) -> str:
@@ -91,16 +92,16 @@ class PoseAnswer:
 
 
 class PoseSolver(MadeOnce):
-    """``solver(T)`` gives all configurations that take a frame to a pose, in microseconds.
+    """Solver for poses of a frame: ``solver(T)`` returns all configurations in microseconds.
 
     Attributes:
-        system: the robot.
-        frame: what is brought to the pose; None for the terminal frame.
-        locked: positions of joints that stay where they are, by name [rad or m].
-        parameters: values of symbols, by name.
-        method: as it was asked for.
-        used: the method that solves regular poses; "search" where there is none but that.
-        labels: of all branches of a closed form, in their order; else empty.
+        system: robot.
+        frame: frame whose pose is specified, None for the terminal frame.
+        locked: positions of fixed joints, by name [rad or m].
+        parameters: parameter values by name.
+        method: requested method.
+        used: method for regular poses; "search" if no other method applies.
+        labels: names of all branches of the closed form, in order; empty without a closed form.
     """
 
     settings = ("system", "frame", "locked", "parameters", "method", "used", "labels")
@@ -113,7 +114,7 @@ class PoseSolver(MadeOnce):
         parameters: Mapping[str, float] | None,
         method: str,
     ) -> None:
-        """Made by `solver`."""
+        """Derive and compile the solver; call `solver` instead."""
         self.system, self.frame, self.method = system, frame, method
         self.locked = None if locked is None else dict(locked)
         self.parameters = None if parameters is None else dict(parameters)
@@ -127,7 +128,7 @@ class PoseSolver(MadeOnce):
         self.used = self._kernel.method if self._kernel else "search"
         closed_form = self._kernel is not None and self.used != "general"
         self.labels = self._kernel.labels if self._kernel and closed_form else ()
-        # numbers of branches come as doubles, which equal integers as keys
+        # branch indices are returned as doubles, which are equal to integers as keys
         self._names = dict(enumerate(self._kernel.labels)) if self._kernel else {}
         code = self._kernel.code() if self._kernel else None
         self._call = code.call if code else _decline
@@ -136,10 +137,10 @@ class PoseSolver(MadeOnce):
         self._turning: NDArray[np.bool_] = np.array(turning, dtype=bool)
 
     def __call__(self, T: Any) -> PoseAnswer:
-        """All configurations for a pose.
+        """Return all configurations for a pose.
 
         Args:
-            T: (4, 4) the pose of the frame seen from the base [m]: an array of any type and
+            T: (4, 4) pose of the frame relative to the base [m]: array of any type and memory
                 order, or nested lists.
 
         Raises:
@@ -156,7 +157,7 @@ class PoseSolver(MadeOnce):
         return self._in_python(target_pose(self.system, T))
 
     def _in_python(self, T: Array) -> PoseAnswer:
-        """Without compiled code, and next to singular configurations."""
+        """Solve without compiled code, or by `solve` if the result is not certified."""
         draft = self._kernel.draft(T) if self._kernel else None
         if draft is None or self._kernel is None or not draft.certain:
             found = self._solve(T)
@@ -171,7 +172,7 @@ class PoseSolver(MadeOnce):
         return PoseAnswer(q, draft.residual, self._names, draft.branch, self, T, None)
 
     def solutions(self, T: Any) -> Solutions:
-        """What `solve` gives for a pose (4, 4) [m]."""
+        """Return the result of `solve` for a pose T (4, 4) [m]."""
         return self._solve(target_pose(self.system, T))
 
     def _solve(self, T: Array) -> Solutions:
@@ -185,7 +186,7 @@ class PoseSolver(MadeOnce):
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds what it was made of, and is compiled where it is read."""
+        """Pickle the arguments only; the solver is compiled again on loading."""
         return _again, (self.system, self.frame, self.locked, self.parameters, self.method)
 
     def __repr__(self) -> str:
@@ -193,7 +194,7 @@ class PoseSolver(MadeOnce):
 
 
 def _decline(*_: Any) -> None:
-    """The call where nothing is compiled."""
+    """Return None; substitute for the compiled call if there is no compiled code."""
 
 
 def _again(system: System, frame: Any, locked: Any, parameters: Any, method: str) -> PoseSolver:
@@ -208,27 +209,26 @@ def solver(
     parameters: Mapping[str, float] | None = None,
     method: str = "auto",
 ) -> PoseSolver:
-    """What gives all configurations for one pose after the other, for control loops and planners.
+    """Compile an inverse kinematics solver for control loops and planners.
 
-    Everything that does not depend on the pose is done here, once: the steps of the closed form
-    are derived and compiled. A call then takes microseconds with a closed form, and a fraction of
-    a millisecond for a general arm of six joints. Next to singular configurations, and for robots
-    with loops, a call is one of `solve`, which takes milliseconds. Without a C compiler the
-    answers are the same, in a fraction of a millisecond.
+    The closed form is derived and compiled once. A call of the result takes microseconds with a
+    closed form, and a fraction of a millisecond for a general arm of six joints. Near singular
+    configurations, and for robots with loops, a call uses `solve`, which takes milliseconds.
+    Without a C compiler the results are equal, and a call takes a fraction of a millisecond.
 
     Args:
-        system: as of `solve`.
-        frame: a body, a named frame, the number of a link, or None for the terminal frame.
-        locked: positions of joints that stay where they are, by name [rad or m].
-        parameters: values of symbols, the others at their defaults.
-        method: "auto", or one of "pieper", "paul", "general", "search".
+        system: serial robot, tree, or robot with closed loops.
+        frame: name of a body or frame, index of a link, or None for the terminal frame.
+        locked: positions of fixed joints, by name [rad or m].
+        parameters: parameter values by name; default values for all others.
+        method: "auto", "pieper", "paul", "general" or "search"; see `solve`.
 
     Returns:
-        PoseSolver, to be called with poses; it can be pickled.
+        PoseSolver: callable with a pose; it can be pickled.
 
     Raises:
         ModelError: a name or a method is unknown, or more than six joints are free.
-        NoClosedForm: "pieper" or "paul" was asked for and does not fit.
+        NoClosedForm: method is "pieper" or "paul" and does not apply to the robot.
     """
     require_system(system)
     return PoseSolver(system, frame, locked, parameters, method)

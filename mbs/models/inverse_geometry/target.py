@@ -1,7 +1,7 @@
-"""A pose that a serial arm is wanted to take, and how many roots meet in a solution.
+"""Equations of a target pose of a serial arm, and multiplicities of their roots.
 
-Positions are counted in x = q / unit, where the unit is the arm's length for slides and one radian
-for turns, so that a number in x or in the equations means the same for every joint and every row.
+Scaled positions are x = q / unit, where the unit is the arm length for prismatic joints and 1 rad
+for revolute joints. Elements of x and rows of the equations are thus comparable.
 """
 
 from __future__ import annotations
@@ -25,29 +25,29 @@ SOLVED = 1e-12
 """Largest residual of a solution, of max(1 m, the arm's length)."""
 
 ONE, TWO = 2e-14, 2e-13
-"""Residuals, of max(1 m, the arm's length), between which it is undecided whether two solutions
-are one. The residual at the highest point of a path between two solutions changes by no more than
-the pose does. Rounding of a pose by a hundred units in the last place changes it by 2e-14."""
+"""Residuals, relative to max(1 m, arm length), between which it is undecided whether two solutions
+are equal. A perturbation of the pose changes the largest residual on a path between two solutions
+by at most its own size. Rounding of a pose by 100 units in the last place changes it by 2e-14."""
 DECIDED = 6e-14
-"""Residual in the middle of `ONE` and `TWO`: below it two solutions are listed as one."""
+"""Geometric mean of `ONE` and `TWO`: residual below which two solutions are listed as one."""
 
 NEARLY_SINGULAR = 1e-4
-"""Smallest singular value, lengths divided by the arm's length, below which a solution next to the
-one found may be missing: two roots lie about as far apart as it is large. The general method was
-seen to miss one at 5e-7; two orders more cost little, as few poses are so near."""
+"""Smallest singular value, lengths divided by the arm length, below which a neighbouring solution
+may be missing: the distance of two roots is about this value. The general method misses a root at
+5e-7. A margin of two orders costs little, as few poses are so near to a singularity."""
 
 _LONGEST_STEP, _TARGET_SETTLED = 0.3, 1e-12
-"""Steps [rad or arm lengths]: the longest, 17 degrees, within which the equations are nearly
-linear; and one that is hardly more than rounding."""
+"""Steps [rad or arm lengths]: the longest Newton step, 17 degrees, within which the equations are
+nearly linear, and the size of a step that is mostly rounding, where iterations end."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:
-    """The equations of a target pose.
+    """Equations of a target pose of an arm.
 
     Attributes:
-        arm: that moves the frame.
-        T: (4, 4) the target pose; (m, 4, 4) of m configurations, each its own.
+        arm: numeric geometry of the chain that moves the frame.
+        T: (4, 4) target pose [m], or (m, 4, 4) one for each of m configurations.
     """
 
     arm: Arm
@@ -58,12 +58,12 @@ class Target:
         object.__setattr__(self, "_library", core.core_of(self.arm))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A library is found again where it is read."""
+        """Pickle the arm and pose only; the compiled library is loaded again."""
         return type(self), (self.arm, self.T)
 
     @property
     def unit(self) -> Array:
-        """(n,) the unit of every joint [m or rad]."""
+        """Unit (n,) of each joint: arm length [m] or 1 rad."""
         return self.arm.units
 
     @property
@@ -77,7 +77,7 @@ class Target:
         return DECIDED * max(1.0, self.arm.length)
 
     def residual(self, q: Array) -> Array:
-        """(...) largest element of pose(q) - T at configurations q, (..., n)."""
+        """Return (...) the largest absolute element of pose(q) - T for q (..., n) [rad or m]."""
         library = self._library
         if self.T.ndim > 2 and q.ndim != 2:
             return self.arm.residual(q, self.T)
@@ -85,7 +85,10 @@ class Target:
         return core.residual_by(library, self.arm, self.T, flat).reshape(q.shape[:-1])
 
     def excess(self, x: Array) -> tuple[Array, Array]:
-        """The equations e(x) = 0, (..., 6), and their derivative to first order, (..., 6, n)."""
+        """Return the pose error e(x) (..., 6) and its Jacobian de/dx (..., 6, n).
+
+        Position rows are divided by the arm length. The Jacobian is exact at e = 0.
+        """
         library = self._library
         if self.T.ndim == 2 or x.ndim == 2:
             q = (x * self.unit).reshape(-1, self.arm.size)
@@ -96,25 +99,25 @@ class Target:
         return -gap_to(self.T, T) / rows, J * unit / rows[:, None]
 
     def singular_values(self, q: Array) -> Array:
-        """(..., n) singular values of the Jacobian, lengths divided by the arm's length."""
+        """Return the singular values (..., n) of de/dx at q (..., n), largest first."""
         J = self.excess(q / self.unit)[1]
         return np.asarray(np.linalg.svd(J, compute_uv=False), dtype=float)
 
     def wrapped(self, x: Array) -> Array:
-        """Differences x with those of turns brought into [-pi, pi)."""
+        """Return differences x (..., n) with those of revolute joints wrapped to [-pi, pi)."""
         return self.arm.wrapped(x)
 
     def corrected(self, x: Array, held: Array, values: Array, iterations: int = 40) -> Array:
-        """Solutions near x, (..., n), at which held @ x = values, by Gauss-Newton.
+        """Solve e(x) = 0 and held @ x = values near x by Gauss-Newton.
 
         Args:
-            x: (..., n) first guesses.
-            held: (..., k, n) further linear equations.
-            values: (..., k) their right sides.
-            iterations: at most.
+            x: (..., n) initial guesses.
+            held: (..., k, n) additional linear equations.
+            values: (..., k) right-hand sides of the additional equations.
+            iterations: maximum number of iterations.
 
         Returns:
-            (..., n) the last iterates; whether they solve the equations is left to the residual.
+            Last iterates (..., n). The caller must check their residual.
         """
         library = self._library
         if held.shape[-2] == 1 and type(self) is Target:
@@ -127,7 +130,7 @@ class Target:
         for _ in range(iterations):
             e, J = self.excess(x)
             further = (held @ x[..., None])[..., 0] - values
-            # only exact dependence, 1e-16 by rounding, is left out; nearly dependent rows count
+            # truncate only exactly dependent rows (1e-16 by rounding), not nearly dependent ones
             inverse = np.linalg.pinv(np.concatenate([J, held], axis=-2), rcond=1e-12)
             step = (inverse @ np.concatenate([e, further], axis=-1)[..., None])[..., 0]
             size = np.linalg.norm(step, axis=-1, keepdims=True)
@@ -138,41 +141,43 @@ class Target:
 
 
 def nearly_singular(arm: Arm, q: Array, bound: float = NEARLY_SINGULAR) -> NDArray[np.bool_]:
-    """(m,) which of configurations q, (m, n), have a singular value below a bound."""
+    """Return (m,) whether each configuration q (m, n) has a singular value below a bound."""
     return core.singular_by(core.core_of(arm), arm, q, bound)
 
 
-# Which of the configurations that were found are one solution.
+# Grouping of computed configurations into distinct solutions.
 
 
 _SAME, _CLOSE = 1e-9, 1e-2
-"""Distances [rad or arm lengths] below which two solutions are one, and may be one."""
+"""Distances [rad or arm lengths] below which two solutions are equal, and may be equal."""
 _SPLIT = 1e-7
-"""The same of two branches of a closed form: rounding splits a double root by the root of 1e-16."""
+"""Distance [rad or arm lengths] below which solutions of two closed-form branches are equal:
+rounding splits a double root by 1e-8, the square root of 1e-16."""
 _FLOOR, _WORSE = 2e-15, 4.0
-"""Residual half way, of max(1 m, the length), that is rounding of the forward model, some units of
-2e-16; and of the worse of two solutions, whose own miss the half way may show. It grows with the
-square of the distance of two roots, so that they are told apart from 1e-7 on."""
-_ACROSS = 3  # Newton steps back into a bent valley: of 1e-2, 1e-4, 1e-8 from it rounding is left
+"""Residual half way between two solutions, relative to max(1 m, arm length), that is a rounding
+error of the forward model (some units of 2e-16), and its largest ratio to the residual of the worse
+solution. The residual half way grows with the square of the distance of two roots: roots are
+distinguished from a distance of 1e-7."""
+_ACROSS = 3  # Newton steps back to a curved valley: distances 1e-2, 1e-4, 1e-8, then rounding
 
 
 def distinct(target: Target, q: Array, apart_from: Sequence[object] = ()) -> list[list[int]]:
-    """The configurations in groups of equal ones, the groups and their members in the given order.
+    """Group equal configurations and return lists of indices, in the order of q.
 
-    Two are one solution when they are closer than 1e-9, or closer than 1e-2 and a configuration
-    half way between solves too but for rounding, as between copies of a multiple root. Whole turns
-    do not count. The order decides nothing: those that a third one joins are one.
+    Two configurations are equal if their distance is below 1e-9. They are also equal if it is below
+    1e-2 and a configuration half way solves the equations up to rounding, as between copies of a
+    multiple root. Full revolutions are ignored. Equality is transitive.
 
     Args:
-        target: the pose they take.
+        target: target pose of the configurations.
         q: (m, n) solutions [rad or m].
-        apart_from: of each its branch of a closed form, or something false; those of different
-            branches are one only where they are closer than 1e-7.
+        apart_from: name of the closed-form branch of each, or a false value. Copies never merge
+            two groups of different branches; branches themselves merge if close.
     """
     x = q / target.unit
     apart = np.max(np.abs(target.wrapped(x[:, None] - x)), axis=2, initial=0.0)
     first, second = np.nonzero(np.triu(apart < _CLOSE, 1))
-    if not len(first):  # each is close to itself alone
+    if not len(first):  # no two configurations are close
         return [[k] for k in range(len(q))]
     limit = target.decided
     own = target.residual(q)
@@ -182,7 +187,7 @@ def distinct(target: Target, q: Array, apart_from: Sequence[object] = ()) -> lis
     joined[~joined] = middles(target, x[i], x[j])[1] < limits[~joined]
     branch = list(apart_from) or [None] * len(q)
     both = np.array([bool(branch[i] and branch[j]) for i, j in zip(first, second, strict=True)])
-    # of two branches first; then copies go to what is nearest, and join no two branches
+    # merge pairs of branches first, then copies with the nearest, without joining two branches
     group, told = np.arange(len(q)), np.array([bool(name) for name in branch])
     order = np.lexsort((apart[first, second], ~both))
     for k in order[joined[order]]:
@@ -193,7 +198,7 @@ def distinct(target: Target, q: Array, apart_from: Sequence[object] = ()) -> lis
 
 
 def highest_between(target: Target, q: Array) -> float:
-    """Largest residual half way from the first to other copies (m, n) of a solution."""
+    """Return the largest residual half way between q[0] and the other copies q (m, n)."""
     x = q / target.unit
     far = x[1:][np.max(np.abs(target.wrapped(x[1:] - x[0])), axis=1) > _SAME]
     if not len(far):
@@ -202,10 +207,10 @@ def highest_between(target: Target, q: Array) -> float:
 
 
 def middles(target: Target, x: Array, other: Array) -> tuple[Array, Array]:
-    """Configurations (m, n) half way between x and others, (m, n), and their residuals (m,).
+    """Return configurations (m, n) half way between x and `other` (m, n), and residuals (m,).
 
-    The configuration half way is moved across the line between the two, for the valley that joins
-    copies of a root may bend.
+    Each is moved normal to the connecting line to the least residual, because the valley between
+    copies of a multiple root may be curved.
     """
     difference = target.wrapped(other - x)
     middle = x + 0.5 * difference
@@ -221,18 +226,18 @@ def middles(target: Target, x: Array, other: Array) -> tuple[Array, Array]:
 
 
 _FLAT = 1e-5
-"""Singular values, of the largest, along which a point is not moved: next to two singular
-configurations Newton's steps along the second one are endless."""
+"""Ratio to the largest singular value below which a direction is not used: near two singular
+configurations Newton's method does not converge along the second direction."""
 
 
 def _steep(target: Target, x: Array, held: Array, values: Array) -> Array:
-    """Points (m, n) moved to the pose along all directions but those of small singular values.
+    """Newton's method from points x, without the directions of small singular values.
 
     Args:
-        target: the pose.
-        x: (m, n) the points.
-        held: (m, 1, n) a further linear equation of each.
-        values: (m, 1) its right sides.
+        target: target pose.
+        x: (m, n) initial points.
+        held: (m, 1, n) additional linear equation of each point.
+        values: (m, 1) right-hand sides of the additional equations.
     """
     for _ in range(_ACROSS + 1):
         e, J = target.excess(x)
@@ -243,43 +248,43 @@ def _steep(target: Target, x: Array, held: Array, values: Array) -> Array:
     return x
 
 
-# How many roots meet in a solution: the equations near it, reduced to the directions left free.
+# Multiplicity of a solution: Lyapunov-Schmidt reduction of the equations to the null space.
 #
-# Where the Jacobian has c singular values of zero, the implicit function theorem solves all
-# equations but those of the left null space for all unknowns but the c along the right null
-# space: g(h) = 0 remains, without linear terms (Lyapunov-Schmidt). With one unknown the
-# multiplicity is the order of the first derivative of g that does not vanish; with more, the
-# dimension of the dual space of the ideal of g, from the ranks of Macaulay matrices.
+# If the Jacobian has c zero singular values, the implicit function theorem solves all equations
+# except those of the left null space for all unknowns except the c unknowns h of the right null
+# space. The remaining equations g(h) = 0 have no linear terms. For c = 1 the multiplicity is the
+# order of the first nonzero derivative of g. For c > 1 it is the dimension of the dual space of
+# the ideal of g, computed from the ranks of Macaulay matrices.
 #
 # Source: Golubitsky & Schaeffer 1985, chapter VII (reduction); Dayton & Zeng 2005, section 3
 # (dual space).
 
 
 SINGULAR = 2e-6
-"""Singular values below it count as zero: two roots that lie 1e-6 apart are one double root."""
+"""Singular values below this count as zero: two roots at a distance of 1e-6 are a double root."""
 
 _MEETING = DECIDED
-"""Terms of g, free of units, that are negligible."""
-# h [rad or arm lengths] at which g is fitted, each a fourth or fifth of the one before: the first
-# within which Newton's method converges and a polynomial of degree 8 is g but for rounding
+"""Size of dimensionless terms of g that are negligible."""
+# radii of h [rad or arm lengths] for the fit of g, each 1/4 or 1/5 of the radius before. The first
+# is used at which Newton's method converges and a polynomial of degree 8 fits g up to rounding.
 _RADII = (0.05, 0.012, 3e-3, 7e-4, 1.5e-4, 3e-5, 6e-6)
-_ROUNDING = 3e-15  # of g, some tens of 1e-16, with which a fitted polynomial agrees
+_ROUNDING = 3e-15  # rounding error of g, some tens of 1e-16: largest error of a fitted polynomial
 _HIGHEST = 4
-_FARTHEST = 0.4  # h [rad or arm lengths] of a step: beyond eight radii no polynomial holds
+_FARTHEST = 0.4  # largest step h [rad or arm lengths]: polynomials are invalid beyond 8 radii
 _DEGREE = 8
 _SEED = 20260107
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TargetReduction:
-    """The equations of a target near a solution, split by the singular directions.
+    """Lyapunov-Schmidt reduction of the equations near a solution to g(h) = 0.
 
     Attributes:
-        target: whose equations.
-        x: (n,) the solution.
-        left: (6, 6 - rank) directions of the equations that remain.
-        solved: (6, rank) those that are solved for the other unknowns.
-        null: (n, corank) directions of the unknowns h that remain.
+        target: target pose with its equations.
+        x: (n,) scaled solution.
+        left: (6, 6 - rank) left null space: directions of the remaining equations g.
+        solved: (6, rank) directions of the equations that are eliminated.
+        null: (n, corank) right null space: directions of the remaining unknowns h.
         next: smallest singular value that does not count as zero.
     """
 
@@ -292,11 +297,11 @@ class TargetReduction:
 
     @property
     def corank(self) -> int:
-        """The number of unknowns that remain."""
+        """Number of remaining unknowns h."""
         return int(self.null.shape[1])
 
     def at(self, h: Array) -> tuple[Array, Array, bool]:
-        """X (k, n) and g (k, 6 - rank) for h, (k, corank), and whether all were found."""
+        """Return x (k, n) and g (k, 6 - rank) at h (k, corank), and whether all converged."""
         target, library = self.target, self.target._library
         if library is not None and type(target) is Target:
             parts = self.x, self.solved.T, self.left.T, self.null.T
@@ -311,13 +316,13 @@ class TargetReduction:
             right = np.concatenate([e @ self.solved, off], axis=1)
             step = _solved(rows, right)
             x = x - step
-        # after twelve Newton steps either rounding, magnified by the inverse, or no convergence
+        # after twelve Newton steps only amplified rounding remains, or the iteration diverged
         found = bool(np.max(np.abs(step)) < 1e-11 and np.max(np.abs(right)) < 1e-11)
         return x, self.target.excess(x)[0] @ self.left, found
 
 
 def _solved(rows: Array, right: Array) -> Array:
-    """The solutions of square systems, zero where a system is singular."""
+    """Solve square linear systems and limit the steps to 0.5; zero for singular systems."""
     try:
         step = np.asarray(np.linalg.solve(rows, right[..., None])[..., 0], dtype=float)
     except np.linalg.LinAlgError:
@@ -326,7 +331,7 @@ def _solved(rows: Array, right: Array) -> Array:
 
 
 def reduction(target: Target, q: Array) -> TargetReduction:
-    """The equations near the solution q, (n,) [rad or m]."""
+    """Return the reduced equations near the solution q (n,) [rad or m]."""
     x = q / target.unit
     J = target.excess(x)[1]
     U, s, Vt = np.linalg.svd(J)
@@ -336,15 +341,15 @@ def reduction(target: Target, q: Array) -> TargetReduction:
 
 
 def multiplicity(reduced: TargetReduction) -> tuple[int, Array, bool]:
-    """How many roots meet in an isolated solution, and where.
+    """Return the multiplicity of an isolated solution and the centre of its roots.
 
     Args:
-        reduced: the equations near it.
+        reduced: reduced equations near the solution.
 
     Returns:
-        the number of roots, the configuration q (n,) [rad or m] in their middle, and whether both
-        are certain: where two singular configurations nearly meet, terms that are nearly zero
-        decide, and the number is an upper bound.
+        Number of roots, configuration q (n,) [rad or m] at their centre, and whether both are
+        certain. For a corank above 1 the number is an upper bound, as it depends on terms that
+        are nearly zero.
     """
     if reduced.corank == 0:
         return 1, reduced.x * reduced.target.unit, True
@@ -354,10 +359,10 @@ def multiplicity(reduced: TargetReduction) -> tuple[int, Array, bool]:
 
 
 def _order(reduced: TargetReduction) -> tuple[int, Array]:
-    """The order of the root of g in one unknown, and the middle of the roots that meet.
+    """Return the order of the root of g in one unknown, and the centre of the roots as q (n,).
 
-    It is the highest k for which, about the middle of k roots, all terms below the k-th are
-    negligible as far from it as the k-th is.
+    The order is the highest k for which all lower terms of the Taylor series about the centre are
+    negligible, within the radius at which the k-th term is negligible.
     """
     g = _coefficients(reduced)
     order, middle = 1, 0.0
@@ -378,7 +383,7 @@ def _order(reduced: TargetReduction) -> tuple[int, Array]:
 
 
 def _best(reduced: TargetReduction, steps: list[float]) -> Array:
-    """The configuration (n,) of least residual after one of several steps, or none."""
+    """Return the configuration q (n,) of least residual among zero step and given steps of h."""
     x, _, _ = reduced.at(np.clip(np.array(steps)[:, None], -_FARTHEST, _FARTHEST))
     q = np.vstack([reduced.x, x]) * reduced.target.unit
     best: Array = q[int(np.argmin(reduced.target.residual(q)))]
@@ -386,7 +391,7 @@ def _best(reduced: TargetReduction, steps: list[float]) -> Array:
 
 
 def _simple_roots(g: Array) -> list[float]:
-    """Where a simple root of g near h = 0 may be: by its first two, three and all terms."""
+    """Return candidates h of a simple root of g near 0, from its first 2, 3 and all terms."""
     slope = float(np.linalg.norm(g[1]))
     if slope == 0.0:
         return [0.0]
@@ -394,14 +399,14 @@ def _simple_roots(g: Array) -> list[float]:
     found = [-float(along[0]) / slope]
     for terms in (along[:3], along):
         every = np.roots(terms[::-1])
-        # fitted coefficients split a double root by a root of their rounding
+        # rounding of the coefficients splits a double root into a conjugate pair
         real = every.real[np.abs(every.imag) < 1e-6 * np.abs(every)]
         found += [float(real[np.argmin(np.abs(real))])] if len(real) else []
     return found
 
 
 def _shift(g: Array, by: float) -> Array:
-    """Taylor coefficients about another point."""
+    """Return the Taylor coefficients of g about h = `by`."""
     orders = range(len(g))
     return np.array(
         [sum(math.comb(m, k) * by ** (m - k) * g[m] for m in orders[k:]) for k in orders]
@@ -409,7 +414,7 @@ def _shift(g: Array, by: float) -> Array:
 
 
 def _coefficients(reduced: TargetReduction) -> Array:
-    """(degree + 1, 6 - rank) Taylor coefficients of g in one unknown."""
+    """Return the Taylor coefficients (degree + 1, 6 - rank) of g in one unknown."""
     nodes, powers, inverse = _fitting()
     for radius in _RADII:
         _, g, found = reduced.at(radius * nodes[:, None])
@@ -423,20 +428,20 @@ def _coefficients(reduced: TargetReduction) -> Array:
 
 @functools.cache
 def _fitting() -> tuple[Array, Array, Array]:
-    """Nodes in [-1, 1], their powers, and what makes coefficients of values at them."""
+    """Return Chebyshev nodes in [-1, 1], their Vandermonde matrix and its pseudo-inverse."""
     nodes = np.cos(np.pi * (np.arange(2 * _DEGREE + 1) + 0.5) / (2 * _DEGREE + 1))
     powers = np.vander(nodes, _DEGREE + 1, increasing=True)
     return nodes, powers, np.linalg.pinv(powers)
 
 
 def _dual_dimension(reduced: TargetReduction) -> int:
-    """The dimension of the dual space of g at h = 0, up to degree 5."""
+    """Return the dimension of the dual space of g at h = 0, up to degree 5."""
     powers, columns = _taylor(reduced)
     before = 1
     for degree in range(1, 6):
         matrix = _macaulay(powers, columns, degree, reduced.corank)
         s = np.linalg.svd(matrix, compute_uv=False)
-        # fitted coefficients, in units of the radius, lack terms beyond degree 6, which are less
+        # 1e-4: the fit omits terms above degree 6, which are smaller
         nullity = int(matrix.shape[1]) - int(np.sum(s > 1e-4 * max(float(s[0]), NONZERO)))
         if nullity == before:
             return nullity
@@ -445,7 +450,7 @@ def _dual_dimension(reduced: TargetReduction) -> int:
 
 
 def _taylor(reduced: TargetReduction) -> tuple[list[tuple[int, ...]], Array]:
-    """Exponents of monomials, and their coefficients in g with h counted in units of the radius."""
+    """Return exponents of monomials and their coefficients in g, for h divided by the radius."""
     c = reduced.corank
     powers = _monomials(c, 6)
     rng = np.random.default_rng(_SEED)
@@ -467,7 +472,7 @@ def _monomials(c: int, degree: int) -> list[tuple[int, ...]]:
 
 
 def _macaulay(powers: list[tuple[int, ...]], columns: Array, degree: int, c: int) -> Array:
-    """Rows: the products of monomials and equations, cut off above the degree."""
+    """Return the Macaulay matrix: products of monomials and equations up to a degree."""
     kept = _monomials(c, degree)
     index = {power: k for k, power in enumerate(kept)}
     rows = []

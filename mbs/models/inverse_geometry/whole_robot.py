@@ -1,4 +1,4 @@
-"""Trees and robots with loops: every joint from those on the way to the frame."""
+"""Configurations of trees and robots with loops from the joints of one chain or from a pose."""
 
 from __future__ import annotations
 
@@ -28,36 +28,36 @@ from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.solutions import RobotSolution, Solutions, Wishes
 
-# Whole configurations of trees and of robots with closed loops, from the joints on the way to a
-# frame.
+# Configurations of trees and of robots with closed loops, from the joints between base and frame.
 #
-# The chain from the base to the frame is solved as if it stood alone; with its joints known the
-# loops give all others. Where balls or a free body stand in the chain, as in a parallel robot,
-# the known pose closes one more loop instead.
+# The chain from the base to the frame is solved separately. Its joints are then known, and loop
+# closure determines all other joints. If the chain has spherical or free joints, as in a parallel
+# robot, the known pose of the frame closes one more loop instead.
 #
 # Source: Khalil & Creusot 1997, section 3.3.
 
 
 _SAME = 1e-7
-"""Difference [rad or m] of two configurations that are one: loops are closed to 1e-12, which
-joints that they determine weakly magnify, and regular branches are farther apart."""
+"""Difference [rad or m] below which two configurations are equal. Loops are closed to 1e-12, an
+error that weakly determined joints amplify. Regular branches are farther apart."""
 _SEED = 20260108
 _AGREE = 1e-7
-"""Difference [rad or m] of joints that both the chain and the loops determine, likewise."""
+"""Largest difference [rad or m] of joints that both the chain and the loops determine: closure
+errors of 1e-12, amplified by weakly determined joints."""
 _MOVED = 1e-5
-"""Move [rad or m] to the nearest closed configuration that only takes rounding away, up to that of
-a double root, 1e-6; more is another configuration."""
+"""Largest move [rad or m] to the nearest closed configuration that corrects rounding errors, which
+are up to 1e-6 at a double root. A larger move results in another configuration."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClosedConfiguration:
-    """A configuration of the whole system that closes its loops.
+    """Configuration of the whole system with closed loops.
 
     Attributes:
         q: (nq,) positions [rad or m].
-        label: how the loops close, such as "q9:parallel, q3:+"; empty where they do so in one way
-            only, or were closed by search.
-        residual: largest row of the loops there, and of the pose where it closes one.
+        label: branch of the loop closure, such as "q9:parallel, q3:+"; empty if the closure has one
+            branch only, or was found by search.
+        residual: largest closure error of the loops, and of the pose if it was prescribed.
     """
 
     q: Array
@@ -68,24 +68,24 @@ class ClosedConfiguration:
 def close(
     system: System, chain: FrameChain, configurations: Array, p: Array, seed: Array | None = None
 ) -> list[ClosedConfiguration]:
-    """The whole configurations that belong to configurations of a chain.
+    """Return all system configurations with given positions of the joints of a chain.
 
-    The loops are closed in every way, by closed forms; by search from many starts where
-    `why_searched` tells so. What neither chain nor loops determine stays as in the seed.
+    All branches of the loop closure are computed by closed forms, or by a search from many starts
+    if `why_searched` gives a reason. Joints that neither the chain nor the loops determine keep
+    their positions in the seed.
 
     Args:
-        system: open or closed.
-        chain: of its tree, to the frame that is wanted somewhere.
-        configurations: (m, n) positions of the joints of the chain.
-        p: (np,) parameters.
-        seed: (nq,) configuration, the assembled one when left out.
+        system: open or closed system.
+        chain: chain of joints from the base to a frame.
+        configurations: (m, n) positions of the joints of the chain [rad or m].
+        p: (np,) parameter values.
+        seed: (nq,) reference configuration; default is the assembled configuration.
 
     Returns:
-        Those of the first configuration of the chain, then those of the second, and so on; none
-        where the loops stay open.
+        Configurations in the order of `configurations`. Empty if the loops cannot be closed.
 
     Raises:
-        NoClosedForm: balls or free bodies beside the chain move in some of their ways only.
+        NoClosedForm: spherical or free joints outside the chain are only partly determined.
     """
     rest = np.array(system.configuration if seed is None else seed, dtype=float)
     given = _given(system, chain)
@@ -101,23 +101,24 @@ def close(
 def configurations_at(
     system: System, frame: str | int, T: Array, p: Array, seed: Array | None = None
 ) -> list[ClosedConfiguration]:
-    """The whole configurations that bring a frame to a pose, where balls or free bodies carry it.
+    """Return all system configurations with a given pose of a frame, as for a parallel robot.
 
-    By closed forms where every loop has one; by search from many starts where `why_searched` tells
-    so. What the pose does not determine stays as in the seed.
+    The frame may be supported by spherical or free joints. The configurations are computed by
+    closed forms, or by a search from many starts if `why_searched` gives a reason. Joints that the
+    pose does not determine keep their positions in the seed.
 
     Args:
-        system: open or closed.
-        frame: a body, a named frame, or the number of a link.
-        T: (4, 4) target pose, as `target_pose` gives it.
-        p: (np,) parameters.
-        seed: (nq,) configuration, the assembled one when left out.
+        system: open or closed system.
+        frame: name of a body or frame, or index of a link.
+        T: (4, 4) target pose, a result of `target_pose`.
+        p: (np,) parameter values.
+        seed: (nq,) reference configuration; default is the assembled configuration.
 
     Returns:
-        Those near the seed first.
+        Configurations, sorted by distance from the seed.
 
     Raises:
-        LoopError: by search, where joints can move while the frame stays.
+        LoopError: the search is used, and joints can move while the frame is fixed.
     """
     rest = np.array(system.configuration if seed is None else seed, dtype=float)
     given = zip(system.parameters, p, strict=True)
@@ -133,14 +134,14 @@ def configurations_at(
 
 
 def why_searched(system: System, chain: FrameChain | str | int) -> str | None:
-    """Why configurations are searched for, so that no proof of completeness stands behind them.
+    """Return the reason why a search is used, whose list of configurations may be incomplete.
 
     Args:
-        system: open or closed.
-        chain: the one that `close` gets, or the frame that `configurations_at` gets.
+        system: open or closed system.
+        chain: argument `chain` of `close`, or argument `frame` of `configurations_at`.
 
     Returns:
-        One sentence; None where all are found by closed forms.
+        Error text, or None if closed forms find all configurations.
     """
     outcome: object = None
     if not isinstance(chain, FrameChain):
@@ -151,7 +152,7 @@ def why_searched(system: System, chain: FrameChain | str | int) -> str | None:
 
 
 def _given(system: System, chain: FrameChain) -> tuple[int, ...]:
-    """The indices in q of the free joints of the chain, then of the locked ones."""
+    """Return the indices in q of the free joints of the chain, then of its locked joints."""
     starts = {link.name: link.q.start for link in system.tree.links}
     return (*chain.indices, *(starts[name] for name in chain.locked))
 
@@ -162,7 +163,7 @@ def _known(system: System, given: tuple[int, ...]) -> Known:
 
 
 def _stages(system: System, given: tuple[int, ...]) -> tuple[Stage, ...] | str:
-    """How the loops are closed with the given positions; why by no closed form."""
+    """Return the closed-form stages that close the loops, or the reason if there are none."""
 
     def find() -> tuple[Stage, ...] | str:
         try:
@@ -176,7 +177,7 @@ def _stages(system: System, given: tuple[int, ...]) -> tuple[Stage, ...] | str:
 
 
 def _plan_to(system: System, frame: str | int) -> Posed | str:
-    """How the loops are closed with the pose of a frame; why by no closed form."""
+    """Return the closed-form plan for a known frame pose, or the reason if there is none."""
 
     def find() -> Posed | str:
         try:
@@ -191,7 +192,7 @@ def _plan_to(system: System, frame: str | int) -> Posed | str:
 def _complete(
     system: System, given: tuple[int, ...], q: Array, p: Array
 ) -> Iterable[ClosedConfiguration]:
-    """The closed configurations with the given positions as in q, and the held ones."""
+    """Return the closed configurations with the positions `given` as in q (nq,)."""
     if not system.is_closed:
         return [ClosedConfiguration(q, "", 0.0)]
     known = _known(system, given)
@@ -204,14 +205,14 @@ _Branches = Iterable[tuple[Array, tuple[str, ...]]]
 
 
 def _branches(closing: Closing, stages: tuple[Stage, ...] | str, q: Array) -> _Branches:
-    """All positions and the labels of the branch, by closed forms where every loop has one."""
+    """Return positions and branch labels of all closures, by closed forms or by search."""
     if isinstance(stages, str):
         return [(found, ()) for found in closed_configurations(closing, q)]
     return every_configuration(stages, started_at(closing.system, q, closing.locked), closing.p)
 
 
 def _agreeing(system: System, known: Known, q: Array, branches: _Branches) -> _Branches:
-    """Those whose dependent joints are where the chain has them."""
+    """Keep the branches whose dependent joints agree with the chain positions in q."""
     indices = list(known.dependent)
     for found, branch in branches:
         whole = found[: system.nq].copy()
@@ -221,7 +222,7 @@ def _agreeing(system: System, known: Known, q: Array, branches: _Branches) -> _B
 
 
 def _closed(closing: Closing, branches: _Branches) -> Iterator[ClosedConfiguration]:
-    """Those in which the loops are closed."""
+    """Keep the branches with closed loops, after correction of rounding errors."""
     for found, branch in branches:
         q = found
         if closing.openness(q) > TOLERANCE:
@@ -233,7 +234,7 @@ def _closed(closing: Closing, branches: _Branches) -> Iterator[ClosedConfigurati
 
 
 def _reaching(target: Goal, branches: _Branches) -> Iterator[ClosedConfiguration]:
-    """Those in which the loops are closed and the frame is where it is wanted."""
+    """Keep the branches with closed loops and the frame at its target pose."""
     for found, branch in branches:
         q = found[: target.closing.system.nq]
         if TOLERANCE < target.openness(q) < _MOVED:
@@ -247,7 +248,7 @@ def _reaching(target: Goal, branches: _Branches) -> Iterator[ClosedConfiguration
 def _distinct(
     system: System, configurations: Iterable[ClosedConfiguration]
 ) -> list[ClosedConfiguration]:
-    """Two that meet are listed once."""
+    """Remove copies of equal configurations."""
     kept = list(configurations)
     along = [_mark(system, configuration.q) for configuration in kept]
     order = np.argsort(along, kind="stable")
@@ -262,9 +263,9 @@ def _distinct(
 
 
 def _mark(system: System, q: Array) -> float:
-    """A number that is the same for the same configuration, and most often for no other one."""
+    """Return a number that is equal for equal configurations and usually differs otherwise."""
     turns = np.array([coordinate.unit == "rad" for coordinate in system.coordinates])
-    # of a joint, any that differ, none near zero
+    # arbitrary different weights of the joints, none near zero
     weights = np.random.default_rng(_SEED).uniform(0.1, 0.5, (2, system.nq))
     return float(
         weights[0] @ np.where(turns, np.cos(q), np.abs(q)) + weights[1] @ (turns * np.sin(q))
@@ -279,22 +280,22 @@ def _largest(rows: Array) -> float:
     return float(np.max(np.abs(rows), initial=0.0))
 
 
-# Robots whose frame hangs on balls or on more joints than a chain may have: legs solve it.
+# Robots whose frame has spherical joints or too many joints in its chain: closure of the legs.
 
 
 _SINGULAR = 1e-6
-"""Singular value of pose and loops together at which roots meet and a solution counts for none: two
-roots that lie 1e-6 apart are one."""
+"""Singular value of the pose and closure equations below which a solution has multiplicity 0: two
+roots at a distance of 1e-6 count as one."""
 
 
 def parallel(wishes: Wishes, frame: str | int | None, T: Array, p: Array) -> Solutions:
-    """Every configuration that takes a frame of a robot with loops to a pose.
+    """Compute all configurations of a robot with loops for a pose of a frame.
 
     Args:
-        wishes: the robot, and what is asked for beside the pose.
-        frame: as for `solve`.
-        T: (4, 4) the target pose.
-        p: (np,) parameters.
+        wishes: robot and options of the user (limits, seed).
+        frame: argument of `solve`.
+        T: (4, 4) target pose relative to the base [m].
+        p: (np,) parameter values.
     """
     system = wishes.system
     name = terminal_frame(system) if frame is None else frame
@@ -314,7 +315,7 @@ def parallel(wishes: Wishes, frame: str | int | None, T: Array, p: Array) -> Sol
 
 
 def _draft(configuration: ClosedConfiguration, slope: Array, number: int) -> RobotSolution:
-    """A solution; its singular value is that of pose and loops together."""
+    """Return a robot solution with the smallest singular value of pose and loop equations."""
     sigma = float(np.linalg.svd(slope, compute_uv=False)[-1])
     count = 1 if sigma > _SINGULAR else 0
     return RobotSolution(

@@ -1,1 +1,1 @@
-"""State equations of the independent joints and of the tree, what drives them, their events."""
+"""State equations of the independent joints and of the tree, with their inputs and events."""

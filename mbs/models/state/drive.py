@@ -1,4 +1,4 @@
-"""What drives the state equation of the independent joints, as a caller wires it."""
+"""Additional inputs and control laws of the state equation of the independent joints."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ Kind = Literal["q", "a"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DriveInputs:
-    """Inputs of a state equation beside the efforts of motors, and laws in place of them.
+    """Additional inputs of a state equation, and control laws that replace inputs.
 
     Attributes:
-        wrenches: frames, as for `System.frame`, on each of which a wrench acts that is an input.
-        motions: velocities by name and what of them is an input: "a", the acceleration, or "q",
+        wrenches: frames (arguments of `System.frame`) on which an input wrench acts.
+        motions: pairs of a velocity name and its input: "a" for the acceleration, or "q" for
             position, velocity and acceleration, so that the joint has no states.
-        effort: `effort(t, q, v, w, p) -> tau` of all joints, (nv, 1), in place of the inputs of
-            motors and beside what devices deliver; q and v are those of the tree, w (nw, 1) are
-            further inputs, p the parameters of the system.
-        device: `device(t, q, v, w, p) -> u`, the inputs of the devices in place of theirs.
+        effort: `effort(t, q, v, w, p) -> tau`, (nv, 1) joint efforts that replace the motor inputs
+            and are added to the efforts of components. q and v are positions and velocities of the
+            tree, w (nw, 1) further inputs, p parameters of the system.
+        device: `device(t, q, v, w, p) -> u`, values that replace the inputs of components.
     """
 
     wrenches: tuple[str | int, ...] = ()
@@ -47,11 +47,11 @@ class DriveInputs:
 
 @dataclass(frozen=True, slots=True)
 class InputMotion:
-    """A joint whose motion is an input.
+    """Joint whose motion is an input.
 
     Attributes:
-        velocity: its index in v.
-        position: index in q where the position is an input too, None where it is a state.
+        velocity: index in v of its velocity.
+        position: index in q of its position if the position is an input too, None if it is a state.
     """
 
     velocity: int
@@ -59,20 +59,20 @@ class InputMotion:
 
     @property
     def kind(self) -> Kind:
-        """What of it is an input."""
+        """Kind of input: "a" for the acceleration, "q" for position, velocity and acceleration."""
         return "a" if self.position is None else "q"
 
     @property
     def size(self) -> int:
-        """How many inputs it takes."""
+        """Number of inputs: 1 or 3."""
         return 1 if self.position is None else 3
 
 
 def frames_of(system: System, drive: DriveInputs) -> tuple[Frame, ...]:
-    """Link and pose of every frame on which a wrench acts.
+    """Return the link index and pose of each frame with an input wrench.
 
     Raises:
-        ModelError: there is no such frame, it comes twice, or it is fixed to the base.
+        ModelError: a frame is unknown, is named twice, or is fixed to the base.
     """
     _require_once(system, "wrenches", drive.wrenches)
     frames = tuple(system.frame(name) for name in drive.wrenches)
@@ -87,17 +87,17 @@ def frames_of(system: System, drive: DriveInputs) -> tuple[Frame, ...]:
 
 
 def motions_of(system: System, drive: DriveInputs) -> tuple[InputMotion, ...]:
-    """The joints whose motions are inputs.
+    """Return the joints whose motions are inputs.
 
     Raises:
-        ModelError: a name is unknown, comes twice or belongs to no independent joint, a position
-            is asked for in a closed system or of a quaternion joint, or a contact acts there.
+        ModelError: a name is unknown, is repeated or belongs to no independent joint, a position is
+            requested in a closed system or of a quaternion joint, or a contact acts on the joint.
     """
     names = [name for name, _ in drive.motions]
     _require_once(system, "motions", names)
     found = tuple(_motion(system, name, kind) for name, kind in drive.motions)
     if found:
-        hybrid_dynamics(system, names)  # refuses what the loops tie
+        hybrid_dynamics(system, names)  # raises if the loops couple the prescribed motions
     require_undriven(system, contacts_of(system), [motion.velocity for motion in found])
     return found
 
@@ -132,10 +132,10 @@ def _motion(system: System, name: str, kind: str) -> InputMotion:
 
 
 def further_inputs(system: System, drive: DriveInputs) -> int:
-    """How many inputs w the laws of a drive take.
+    """Return the number of inputs w of the laws of a drive.
 
     Raises:
-        ModelError: a law has other inputs or outputs than it needs, or the two differ in w.
+        ModelError: a law has wrong inputs or outputs, or the laws have different sizes of w.
     """
     counts = [
         _further(system, name, law, size)
@@ -182,7 +182,7 @@ def _require_once(system: System, what: str, names: Sequence[object]) -> None:
             )
 
 
-# The motion of the tree from the states and inputs of the independent joints.
+# Motion of the tree from states and inputs of the independent joints.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -190,12 +190,12 @@ class TreeMotion:
     """Positions and velocities of the tree.
 
     Attributes:
-        raw: (nq, 1) positions, quaternions as they are in the state.
-        q: (nq, 1) the same on the loops, quaternions of unit length.
+        raw: (nq, 1) positions with the quaternions of the state.
+        q: (nq, 1) positions that close the loops, with unit quaternions.
         v_a: (m, 1) independent velocities.
         v: (nv, 1) velocities of the tree.
-        G: (nv, m), the slopes of v; None in an open chain, where v is v_a.
-        gamma: (nv, 1), a = G a_a + gamma.
+        G: (nv, m) reduction matrix dv/dv_a; None for an open chain, where v is v_a.
+        gamma: (nv, 1) bias acceleration in a = G a_a + gamma.
     """
 
     raw: SX
@@ -206,21 +206,21 @@ class TreeMotion:
     gamma: SX
 
     def tree_acceleration(self, a: SX) -> SX:
-        """(nv, 1) accelerations of the tree for the independent ones, (m, 1)."""
+        """Return the accelerations (nv, 1) of the tree for independent accelerations a (m, 1)."""
         return a if self.G is None else casadi.mtimes(self.G, a) + self.gamma
 
     def reduced_effort(self, tau: SX) -> SX:
-        """(m, 1) efforts of the tree, (nv, 1), brought to the independent joints."""
+        """Return the efforts (m, 1) of the independent joints equivalent to tau (nv, 1)."""
         return tau if self.G is None else casadi.mtimes(self.G.T, tau)
 
 
 def tree_motion(system: System, raw: SX, q: SX, v_a: SX) -> TreeMotion:
-    """The motion of a tree whose loops the positions close.
+    """Return the motion of a tree for positions that close the loops.
 
     Args:
-        system: open or closed.
-        raw: (nq, 1) positions, quaternions as they are in the state.
-        q: (nq, 1) positions on the loops; not used in an open chain.
+        system: open or closed system.
+        raw: (nq, 1) positions with the quaternions of the state.
+        q: (nq, 1) positions that close the loops; not used for an open chain.
         v_a: (m, 1) independent velocities.
     """
     if not system.is_closed:
@@ -234,7 +234,7 @@ def tree_motion(system: System, raw: SX, q: SX, v_a: SX) -> TreeMotion:
 
 
 def input_motions(motions: Sequence[InputMotion], u: SX) -> list[tuple[SX, SX, SX]]:
-    """Position, velocity and acceleration of each, zero where they are no input."""
+    """Return position, velocity and acceleration of each input motion; zero if not an input."""
     found, first = [], 0
     for motion in motions:
         *place, a = casadi.vertsplit(u[first : first + motion.size])
@@ -244,12 +244,14 @@ def input_motions(motions: Sequence[InputMotion], u: SX) -> list[tuple[SX, SX, S
 
 
 def wrenches_of(system: System, q: SX, frames: Sequence[Frame], u: SX) -> dict[int, Wrench]:
-    """For some links the wrench that they exert on what pushes them, about and in their frames.
+    """Return the wrenches that links exert against input wrenches, by link index.
+
+    Each wrench is the reaction to the inputs, about the origin and in axes of the link frame.
 
     Args:
-        system: open or closed.
+        system: open or closed system.
         q: (nq, 1) positions.
-        frames: on which the wrenches act.
+        frames: k frames on which the input wrenches act.
         u: (6 k, 1) force and moment on each frame, about its origin, in axes of the base.
     """
     exerted: list[dict[int, Wrench]] = []
@@ -264,12 +266,12 @@ def wrenches_of(system: System, q: SX, frames: Sequence[Frame], u: SX) -> dict[i
 
 
 def load_of(system: System, q: SX, external: dict[int, Wrench]) -> SX:
-    """(nv, 1) joint efforts that do what wrenches on links do.
+    """Return the joint efforts (nv, 1) equivalent to external wrenches on links.
 
     Args:
-        system: open or closed.
+        system: open or closed system.
         q: (nq, 1) positions.
-        external: the wrenches that links exert, about and in their frames.
+        external: wrenches that links exert (reactions), from `wrenches_of`.
     """
     if not external:
         return SX.zeros(system.nv)

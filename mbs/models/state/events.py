@@ -1,8 +1,7 @@
-"""Rigid stops and Coulomb friction in the state equation of the independent joints.
+"""Events of rigid stops and Coulomb friction in the state equation of the independent joints.
 
-Only what the elements need is a mode or an indicator: a stop has the limit that it is at, friction
-    its
-direction of sliding, and a limit that is not given is not watched.
+Modes are the limit at which a stop is in contact, and the sliding direction of friction. Limits
+that are not specified have no event indicator.
 """
 
 from __future__ import annotations
@@ -22,17 +21,16 @@ from mbs.models.symbols import dense_function, outputs_of
 from mbs.numbers import NONZERO
 from mbs.recursions.parts import PartEvent, after_events
 
-# What keeps dependent joints at rest that rigid stops or Coulomb friction constrain.
+# Corrections that keep dependent joints at rest if stops or Coulomb friction constrain them.
 #
-# A state equation of the independent joints is integrated without any projection. Those of
-# its own that are stuck stay where they are; a dependent joint would creep by the errors of the
-# steps.
+# The state equation of the independent joints is integrated without projection. Stuck independent
+# joints stay exactly at rest. A stuck dependent joint would drift by the integration errors.
 
 
 RETURN_RATE = 20.0
-"""How fast a stuck coordinate returns to where it should be [1/s]."""
+"""Rate at which the error of a stuck coordinate decays [1/s]."""
 _SHARED = 1e-6
-"""Square that is added to rows: they may depend on others, or vanish."""
+"""Regularisation that is added to squared rows, which may be zero or dependent on other rows."""
 
 
 def standstill(
@@ -42,20 +40,20 @@ def standstill(
     required: tuple[SX, SX],
     prescribed: Sequence[int],
 ) -> SX:
-    """A small change of the independent coordinates that changes dependent ones as required.
+    """Return a small change of independent coordinates with a required change of dependent ones.
 
-    Independent coordinates that are stuck do not change, nor do those whose motion is prescribed.
+    Stuck independent coordinates and coordinates with prescribed motion do not change.
 
     Args:
-        system: open or closed.
-        contacts: the k coordinates.
-        motion: of the tree.
-        required: (k, 1) 1 where a coordinate is stuck, 0 elsewhere; and (k, 1) the changes of those
-            that are stuck.
-        prescribed: indices of the velocities whose motion is prescribed.
+        system: open or closed system.
+        contacts: k contact coordinates.
+        motion: positions and velocities of the tree.
+        required: (k, 1) 1 for each stuck coordinate, else 0; and (k, 1) required changes of the
+            stuck coordinates.
+        prescribed: indices of the velocities with prescribed motion.
 
     Returns:
-        (m, 1) in the order of the independent velocities; changes of positions or of rates.
+        Change (m, 1) in the order of the independent velocities, of positions or rates as required.
     """
     active = list(system.active)
     rows = [j for j, number in enumerate(contacts.velocities) if number not in active]
@@ -78,11 +76,11 @@ def standstill(
     return casadi.densify(casadi.mtimes(R.T, shares))
 
 
-# What states and modes are after an event, where nothing projects the motion later.
+# States and modes after an event, without a later projection.
 
 
 States = tuple[Sequence[int], Sequence[int]]
-"""Indices in q and in v of the positions and velocities that a state begins with."""
+"""Indices in q and v of the positions and velocities at the start of a state x."""
 
 
 def minimal_jump(
@@ -92,21 +90,21 @@ def minimal_jump(
     before: tuple[SX, SX],
     states: States,
 ) -> tuple[SX, SX]:
-    """The state and the modes after an event.
+    """Return the state and the modes after an event.
 
-    What meets a limit is put there with the velocity that it had there, since an importer may
-    locate events coarsely: an impact neither drifts nor gains energy. A stuck coordinate has no
-        velocity.
+    A coordinate that passed a limit is moved to the limit, with its velocity at the time of the
+    impact. Importers may locate events coarsely, and without this correction an impact would drift
+    or gain energy. The velocity of a stuck coordinate is zero.
 
     Args:
-        system: open or closed.
-        contact: its equations of contact.
-        motion: of the tree.
-        before: the state x; and (5 k, 1) 1 for each indicator that is not positive.
-        states: what x begins with.
+        system: open or closed system.
+        contact: contact equations of the system.
+        motion: positions and velocities of the tree.
+        before: state x; and (5 k, 1) 1 for each indicator that is not positive.
+        states: indices in q and v of the positions and velocities in x.
 
     Returns:
-        x and (2 k, 1) modes.
+        State x and modes (2 k, 1).
     """
     contacts, (x, fired) = contact.contacts, before
     lower, upper, *_ = casadi.vertsplit(fired, len(contacts))
@@ -121,13 +119,13 @@ def minimal_jump(
 
 
 def to_limits(system: System, contact: ContactEquations, motion: TreeMotion, limit: SX) -> SX:
-    """(m, 1) changes of independent positions that bring dependent ones to their limits.
+    """Return the changes (m, 1) of independent positions that move dependent ones to limits.
 
     Args:
-        system: open or closed.
-        contact: its equations of contact.
-        motion: of the tree.
-        limit: (k, 1) -1 for the lower limit, 1 for the upper one, 0 for none.
+        system: open or closed system.
+        contact: contact equations of the system.
+        motion: positions and velocities of the tree.
+        limit: (k, 1) -1 for the lower limit, 1 for the upper limit, 0 for no limit.
     """
     contacts = contact.contacts
     required = limit**2, -contacts.distance(motion.q, limit)
@@ -135,12 +133,12 @@ def to_limits(system: System, contact: ContactEquations, motion: TreeMotion, lim
 
 
 def _at_impact(contact: ContactEquations, motion: TreeMotion, wall: SX) -> SX:
-    """(nv, 1) velocities when limits were reached, which may be a little while ago.
+    """Return the velocities (nv, 1) at the earlier time at which limits were reached.
 
     Args:
-        contact: the equations of contact.
-        motion: now.
-        wall: (k, 1) -1 where a lower limit is met, 1 where an upper one is, 0 elsewhere.
+        contact: contact equations of the system.
+        motion: current positions and velocities of the tree.
+        wall: (k, 1) -1 at a lower limit, 1 at an upper limit, 0 otherwise.
     """
     contacts = contact.contacts
     depth = casadi.fmax(wall * contacts.distance(motion.q, wall), 0)
@@ -158,7 +156,7 @@ def _at_impact(contact: ContactEquations, motion: TreeMotion, wall: SX) -> SX:
 def _after(
     system: System, contact: ContactEquations, motion: TreeMotion, before: tuple[SX, SX]
 ) -> tuple[SX, SX]:
-    """(nv, 1) velocities after an event, those of stuck coordinates zero, and the modes."""
+    """Return velocities (nv, 1) after an event, zero for stuck coordinates, and the modes."""
     contacts, (speed, fired) = contact.contacts, before
     v, modes = jump(system, contacts, contact.modes, (motion.q, speed, fired), contact.driven)
     stuck, m = contacts.modes(modes).stuck, len(contact.driven)
@@ -169,7 +167,7 @@ def _after(
 
 
 def _shift(system: System, q: SX, x: SX, shift: SX, positions: Sequence[int]) -> SX:
-    """The state with independent positions, which are at q, shifted."""
+    """Return the state x with its positions shifted by `shift` (m, 1) from q."""
     after = SX(x)
     if not shift.is_zero():
         v = SX.zeros(system.nv)
@@ -179,13 +177,14 @@ def _shift(system: System, q: SX, x: SX, shift: SX, positions: Sequence[int]) ->
 
 
 def _write(contacts: Contacts, motion: tuple[SX, SX], acting: tuple[SX, SX], states: States) -> SX:
-    """The state x with velocities v: stuck coordinates at rest, those at a limit just there.
+    """Return the state x with new velocities, stuck coordinates at rest and positions at limits.
 
     Args:
-        contacts: the k coordinates.
-        motion: x and v (nv, 1).
-        acting: (k, 1) the limits where coordinates are, as -1 and 1; (k, 1) 1 where one is stuck.
-        states: what x begins with.
+        contacts: k contact coordinates.
+        motion: state x and velocities v (nv, 1).
+        acting: (k, 1) limit of each coordinate as -1, 1 or 0 for no limit; (k, 1) 1 for each stuck
+            coordinate.
+        states: indices in q and v of the positions and velocities in x.
     """
     (positions, velocities), (x, v), (at, stuck) = states, motion, acting
     after = SX(x)
@@ -203,20 +202,20 @@ def _write(contacts: Contacts, motion: tuple[SX, SX], acting: tuple[SX, SX], sta
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MinimalEvents:
-    """Where states and modes jump, and how; p = [parameters; modes] in all functions.
+    """Event functions of a state equation; p = [parameters; modes] in all of them.
 
-    The state x is that of the independent joints, or of the tree, which has no z.
+    The state x is the state of the independent joints, or of the tree with empty z.
 
     Attributes:
-        modes: name of every mode, such as `stop.mode`.
-        names: (k) what each indicator watches.
-        first: `first(t, x, z, u, p) -> (modes, beyond)` at a start, of the modes in p nothing;
-            beyond (k, 1) is positive where x is beyond the limit that the indicator watches.
+        modes: names of the modes, such as `stop.mode`.
+        names: (k) descriptions of the events of the indicators.
+        first: `first(t, x, z, u, p) -> (modes, beyond)` at the start; it does not depend on the
+            modes in p. beyond (k, 1) is positive if x is beyond the limit of the indicator.
         indicators: `indicators(t, x, z, u, p) -> g`, (k, 1), positive between events.
         jump: `jump(t, x, z, u, p, fired) -> (x, modes)` after an event; fired (k, 1) is 1 for each
-            indicator that is not positive, 0 for the others.
-        approaches: `approaches(t, x, z, u, p) -> a`, (k, 3) as `Events` of `mbs.solvers` has them;
-            None where all are zero.
+            indicator that is not positive, else 0.
+        approaches: `approaches(t, x, z, u, p) -> a`, (k, 3) as in `Events` of `mbs.solvers`, or
+            None if all are zero.
     """
 
     modes: tuple[str, ...]
@@ -229,12 +228,12 @@ class MinimalEvents:
 
 @dataclass(frozen=True, slots=True)
 class ContactEffort:
-    """What a rigid stop or Coulomb friction exerts, as an output.
+    """Effort of a rigid stop or of Coulomb friction as an output.
 
     Attributes:
-        name: such as `stop.effort`.
-        unit: N.m or N.
-        row: its number among the 2 k efforts of k coordinates.
+        name: name of the output, such as `stop.effort`.
+        unit: unit, N.m or N.
+        row: index among the 2 k efforts of k coordinates.
     """
 
     name: str
@@ -243,28 +242,28 @@ class ContactEffort:
 
 
 def used_modes(contacts: Contacts) -> list[int]:
-    """Numbers of the modes, among the 2 k of k coordinates, that elements have."""
+    """Return the indices, among the 2 k modes of k coordinates, of modes with an element."""
     elements = (*contacts.stops, *contacts.frictions)
     return [number for number, element in enumerate(elements) if element is not None]
 
 
 def element_names(contacts: Contacts) -> list[str]:
-    """Names of the stops, then of the frictions."""
+    """Return the names of the stops, then of the frictions."""
     elements = (*contacts.stops, *contacts.frictions)
     return [element.name for element in elements if element is not None]
 
 
 def contact_efforts(system: System, contacts: Contacts) -> tuple[ContactEffort, ...]:
-    """The outputs of the efforts of stops, then of friction."""
+    """Return the effort outputs of the stops, then of the frictions."""
     elements = (*contacts.stops, *contacts.frictions)
     found = [(k, element) for k, element in enumerate(elements) if element is not None]
     return tuple(ContactEffort(f"{element.name}.effort", element.unit, k) for k, element in found)
 
 
 def few_modes(contact: ContactEquations | None, p: SX, values: Sequence[SX]) -> tuple[SX, list[SX]]:
-    """[p; modes] of the elements alone, and expressions of all 2 k modes with these in them.
+    """Substitute the used modes for all 2 k modes in expressions.
 
-    Where there are no contacts, both as they are.
+    Return [p; used modes] and the expressions. Without contacts, return both unchanged.
     """
     if contact is None:
         return p, list(values)
@@ -280,14 +279,14 @@ def minimal_events(
     point: Sequence[SX],
     jump: Callable[[SX], tuple[SX, SX]],
 ) -> MinimalEvents:
-    """The events of a state equation.
+    """Return the contact events of a state equation.
 
     Args:
-        contact: its equations of contact.
-        motion: of the tree.
-        point: t, x, z, u and p, without modes.
-        jump: x and (2 k, 1) modes after an event, of (5 k, 1) 1 for each indicator that is not
-            positive.
+        contact: contact equations of the system.
+        motion: positions and velocities of the tree.
+        point: symbols t, x, z, u and p, without modes.
+        jump: function of fired (5 k, 1), 1 for each indicator that is not positive, that returns x
+            and modes (2 k, 1) after an event.
     """
     contacts, modes = contact.contacts, used_modes(contact.contacts)
     watched = _watch(contacts)
@@ -318,13 +317,13 @@ def join_part_events(
     own: Sequence[PartEvent],
     point: Sequence[SX],
 ) -> MinimalEvents | None:
-    """The events of contacts, and behind them those of components.
+    """Append the events of components to the events of contacts.
 
     Args:
-        system: open or closed.
-        contacts: None where there are none.
+        system: open or closed system.
+        contacts: events of contacts, or None.
         own: events of all components.
-        point: t, x that ends with the states of components, z, u and p, without modes.
+        point: symbols t, x (ends with the states of components), z, u and p, without modes.
     """
     if not own:
         return contacts
@@ -358,14 +357,14 @@ def join_part_events(
 
 
 def at_limits(system: System, contact: ContactEquations | None, motion: TreeMotion) -> SX:
-    """(m, 1) rates of independent positions that bring dependent ones at limits back to them."""
+    """Return rates (m, 1) of independent positions that return dependent ones to their limits."""
     if contact is None:
         return SX.zeros(len(system.active))
     return RETURN_RATE * to_limits(system, contact, motion, contact.modes.limit)
 
 
 def _watch(contacts: Contacts) -> list[tuple[int, str]]:
-    """Number among the 5 k indicators, and name, of those that can fall to zero."""
+    """Return index (among 5 k) and name of each indicator that can become zero."""
     lower, upper, friction = (
         np.array(flags)[:, 0] > 0
         for flags in (contacts.has_lower, contacts.has_upper, contacts.has_friction)
@@ -393,7 +392,7 @@ def _name(contacts: Contacts, j: int, word: str) -> str:
 
 
 def _spread(values: SX, indices: Sequence[int], size: int) -> SX:
-    """(size, 1) values at their indices, zero elsewhere."""
+    """Return (size, 1) with values at their indices, else zero."""
     every = SX.zeros(size)
     every[list(indices)] = values
     return every

@@ -1,6 +1,6 @@
-"""The state equation of the independent joints, the others solved for.
+"""State equation of the independent joints, with dependent joints solved from loop closure.
 
-It is what an importer of an FMU expects: states that may be set freely, and no drift.
+The states can be set freely and there is no constraint drift, as importers of FMUs require.
 """
 
 from __future__ import annotations
@@ -65,31 +65,29 @@ from mbs.recursions.route import relative_pose
 from mbs.solvers.linear import newton_step
 from mbs.spatial import Wrench, quaternion_rate, quaternion_rotation
 
-# Quaternion joints in loops whose motion is independent, as a whole or in part.
+# Quaternion joints in loops with independent rotations, all or some of them.
 #
-# A rod between two spherical joints spins about its own axis whatever the loops do, and no element
-# of the quaternion of a spherical joint stands for that spin. The quaternion as a whole is then a
-# state,
-# and a second one, on the loops, is solved for with the other dependent positions: of all
-# quaternions that close the loops the one that is not rotated from the state about the independent
-# axes.
+# A rod between two spherical joints spins freely about its own axis, and no element of the
+# quaternion of a spherical joint is the angle of that spin. The whole quaternion is then a state. A
+# second quaternion, which closes the loops, is solved with the other dependent positions. It is the
+# one that is not rotated relative to the state about the independent axes.
 #
-# The state rotates with the same angular velocity in space as the solved quaternion, so that what
-# is solved moves with exactly the velocities of the joint, and decays to it.
+# The state rotates with the same angular velocity in space as the solved quaternion and decays to
+# it, so the solved quaternion moves exactly with the velocities of the joint.
 
 
 NORM_RATE = 10.0
-"""How fast a quaternion returns to unit length, and to the loops [1/s]: an error of the solver is
-gone within a second, and steps that a mechanism takes at 1 Hz or faster are not shortened by it."""
+"""Rate at which a quaternion state decays to unit length and to the loops [1/s]. An integration
+error decays within one second, and steps of a mechanism at 1 Hz or faster are not shortened."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Orientation:
-    """A quaternion joint of which independent velocities are.
+    """Quaternion joint in a loop with at least one independent velocity.
 
     Attributes:
-        link: that it moves.
-        free: indices in v of its velocities whose positions may be chosen.
+        link: link that the joint moves.
+        free: indices in v of the velocities of the joint that are independent.
     """
 
     link: Link
@@ -97,22 +95,22 @@ class Orientation:
 
     @property
     def whole(self) -> bool:
-        """Whether all its velocities are: its positions are states then, and none is solved for."""
+        """Whether all velocities are independent; then all positions are states, none solved."""
         return len(self.free) == self.link.motion.nv
 
     @property
     def positions(self) -> tuple[int, ...]:
-        """Indices in q."""
+        """Indices in q of the positions of the joint."""
         return tuple(range(self.link.q.start, self.link.q.stop))
 
     @property
     def quaternion(self) -> slice:
-        """Indices of its quaternion in q."""
+        """Index range in q of the quaternion of the joint."""
         return slice(self.link.q.stop - 4, self.link.q.stop)
 
 
 def orientations_of(system: System) -> tuple[Orientation, ...]:
-    """The quaternion joints of a closed system that are independent, in part at least."""
+    """Return the quaternion joints of a closed system with at least one independent velocity."""
     free = set(system.free)
     found = (
         Orientation(link, tuple(k for k in range(link.v.start, link.v.stop) if k in free))
@@ -123,7 +121,7 @@ def orientations_of(system: System) -> tuple[Orientation, ...]:
 
 
 def with_unit_length(joints: Sequence[Orientation], q: SX) -> SX:
-    """The positions with the quaternions of joints that are states alone at unit length."""
+    """Normalise the quaternions in q (nq, 1) of the joints whose positions are all states."""
     result = SX(q)
     for joint in joints:
         if joint.whole:
@@ -133,12 +131,14 @@ def with_unit_length(joints: Sequence[Orientation], q: SX) -> SX:
 
 
 def tie_orientations(system: System, joints: Sequence[Orientation], raw: SX, q: SX) -> SX:
-    """(k, 1) zero where q differs from the state by none of the independent velocities.
+    """Return the orientation residual (k, 1) of independent quaternion joints.
+
+    It is the projection of q - raw on the independent velocities, and zero at the solution.
 
     Args:
-        system: with closed loops.
-        joints: its independent quaternion joints.
-        raw: (nq, 1) positions as in the state.
+        system: system with closed loops.
+        joints: independent quaternion joints of the system.
+        raw: (nq, 1) positions with the quaternions of the state.
         q: (nq, 1) positions that are solved for.
     """
     u = SX.sym("u", system.nv)
@@ -147,7 +147,7 @@ def tie_orientations(system: System, joints: Sequence[Orientation], raw: SX, q: 
     for joint in joints:
         if not joint.whole:
             size = SX.ones(system.nq)
-            size[joint.quaternion] = 4  # of the columns of N, which are half unit vectors there
+            size[joint.quaternion] = 4  # compensates the columns of N, which have length 1/2 there
             part = list(joint.positions)
             along = N[part, list(joint.free)]
             rows.append(casadi.mtimes(along.T, (size * (q - raw))[part]))
@@ -155,12 +155,13 @@ def tie_orientations(system: System, joints: Sequence[Orientation], raw: SX, q: 
 
 
 def state_rates(system: System, joints: Sequence[Orientation], motion: tuple[SX, SX, SX]) -> SX:
-    """(nq, 1) rates of the positions as in the state.
+    """Return the rates (nq, 1) of the positions of the state.
 
     Args:
-        system: with closed loops.
-        joints: its independent quaternion joints.
-        motion: positions as in the state, positions on the loops, and velocities of the tree.
+        system: system with closed loops.
+        joints: independent quaternion joints of the system.
+        motion: positions of the state (nq, 1), positions that close the loops (nq, 1), and
+            velocities of the tree (nv, 1).
     """
     raw, q, v = motion
     rate = position_rate(system.tree, q, v)
@@ -182,34 +183,34 @@ def state_rates(system: System, joints: Sequence[Orientation], motion: tuple[SX,
     return rate
 
 
-# What stands where in the state equation of the independent joints.
+# Layout of states, inputs and outputs of the state equation of the independent joints.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class MinimalLayout:
-    """The elements of states x, dependent positions z, inputs u and outputs y.
+    """Layout of states x, dependent positions z, inputs u and outputs y of a state equation.
 
-    x = [positions; velocities; states of devices]; u = [efforts of motors; inputs of devices;
-    wrenches; motions; w]; y = [accelerations; positions of z that are not in x, velocities and
-    accelerations of the dependent joints; origin (3) and orientation (9, by rows) of the terminal
-    frame; outputs of devices; efforts; efforts of contacts; what is observed].
+    x = [positions; velocities; states of components]; u = [efforts of motors; inputs of
+    components; wrenches; motions; w]; y = [accelerations; positions of z that are not in x,
+    velocities and accelerations of the dependent joints; origin (3) and orientation (9, by rows) of
+    the terminal frame; outputs of components; efforts; efforts of contacts; observed quantities].
 
     Attributes:
-        positions: indices in q of the first part of x.
-        orientations: quaternion joints of loops that are among them.
-        velocities: indices in v of the second part of x.
-        dependents: indices in q of z, some of them in x too: see `minimal_orientation`.
-        shown: those of them that are in y, which are not in x.
-        inputs: indices in v of the efforts of motors.
-        devices: numbers of the devices whose inputs are in u.
-        wrenches: names of the frames on which wrenches act, six numbers each: force and moment
-            about the origin, in axes of the base.
-        frames: these frames.
+        positions: indices in q of the positions in x.
+        orientations: quaternion joints of loops with positions in x.
+        velocities: indices in v of the velocities in x.
+        dependents: indices in q of z. Positions of `orientations` that are solved are in x too.
+        shown: indices in q of the positions of z that are in y and not in x.
+        inputs: indices in v of the efforts of motors in u.
+        devices: indices of the component inputs in u.
+        wrenches: names of the frames with wrenches in u. Each wrench has six elements: force and
+            moment about the origin of the frame, in axes of the base.
+        frames: frames of `wrenches`.
         motions: joints whose accelerations, or positions, velocities and accelerations, are in u.
-        extra: size of w.
-        accelerations: indices in v of the first part of y.
+        extra: size of the further inputs w of control laws.
+        accelerations: indices in v of the accelerations at the start of y.
         passive: indices in v of the velocities and accelerations of dependent joints in y.
-        efforts: indices in v of the efforts in y, each all that drives the joint but contacts.
+        efforts: indices in v of the efforts in y: the total effort of a joint without contacts.
         contacts: efforts of rigid stops and Coulomb friction in y.
     """
 
@@ -231,11 +232,13 @@ class MinimalLayout:
 
 
 def motors_of(system: System, prescribed: Sequence[int] = ()) -> tuple[int, ...]:
-    """Numbers of the velocities that motors drive, the independent ones first.
+    """Return the indices in v of the velocities driven by motors, independent velocities first.
+
+    Velocities driven by components are excluded.
 
     Args:
-        system: open or closed.
-        prescribed: velocities whose motion is prescribed; they and those of devices are left out.
+        system: open or closed system.
+        prescribed: indices of velocities with prescribed motion, which are excluded.
     """
     others = [k for k in range(system.nv) if k not in system.active]
     taken = [*prescribed, *(device.velocity for device in system.devices)]
@@ -245,14 +248,14 @@ def motors_of(system: System, prescribed: Sequence[int] = ()) -> tuple[int, ...]
 
 
 def minimal_layout(system: System, drive: DriveInputs) -> MinimalLayout:
-    """The elements of the state equation of a system.
+    """Return the layout of the state equation of a system.
 
     Args:
-        system: open or closed.
-        drive: what drives it.
+        system: open or closed system.
+        drive: additional inputs and control laws.
 
     Raises:
-        ModelError: a drive does not fit the system.
+        ModelError: `drive` is inconsistent with the system.
     """
     motions, extra = motions_of(system, drive), further_inputs(system, drive)
     inputs_q = [motion.position for motion in motions]
@@ -282,7 +285,7 @@ def minimal_layout(system: System, drive: DriveInputs) -> MinimalLayout:
 
 
 def _free_positions(system: System, orientations: Sequence[Orientation]) -> tuple[int, ...]:
-    """Indices in q of the positions that are independent, those of quaternion joints as a whole."""
+    """Return the indices in q of the independent positions; quaternion joints count as a whole."""
     if not system.is_closed:
         return tuple(range(system.nq))
     numbers = {coordinate.name: k for k, coordinate in enumerate(system.coordinates)}
@@ -291,18 +294,18 @@ def _free_positions(system: System, orientations: Sequence[Orientation]) -> tupl
     return tuple(dict.fromkeys(position for part in found for position in part))
 
 
-# Accelerations of the independent joints under contacts, prescribed motions and wrenches.
+# Accelerations of the independent joints with contacts, prescribed motions and wrenches.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Accelerations:
-    """What a tree does under given efforts.
+    """Accelerations and efforts of a tree.
 
     Attributes:
-        a_a: (m, 1) of the independent joints.
-        a: (nv, 1) of the tree.
-        tau: (nv, 1) joint efforts, those of prescribed motions included, those of contacts not.
-        contact: what contacts do, None where there are none.
+        a_a: (m, 1) accelerations of the independent joints.
+        a: (nv, 1) accelerations of the tree.
+        tau: (nv, 1) joint efforts, including prescribed motions, without contacts.
+        contact: equations of the contacts, or None.
     """
 
     a_a: SX
@@ -312,7 +315,7 @@ class Accelerations:
 
     @property
     def every_effort(self) -> SX:
-        """(nv, 1) joint efforts, those of contacts included."""
+        """Joint efforts (nv, 1) including contacts."""
         total = SX(self.tau)
         return total if self.contact is None else total + self.contact.pushes
 
@@ -320,17 +323,17 @@ class Accelerations:
 def minimal_accelerations(
     system: System, motion: TreeMotion, tau: SX, load: SX, given: Mapping[int, SX]
 ) -> Accelerations:
-    """Accelerations of a tree whose loops stay closed.
+    """Compute the accelerations of a tree whose loops stay closed.
 
-    What is given, and what contacts constrain, is exact in a_a, since nothing projects the motion
-    later.
+    Prescribed accelerations and contact constraints are exact in a_a, because the motion is not
+    projected later.
 
     Args:
-        system: open or closed.
-        motion: of the tree.
+        system: open or closed system.
+        motion: positions and velocities of the tree.
         tau: (nv, 1) joint efforts.
-        load: (nv, 1) what acts from outside, as joint efforts.
-        given: accelerations that are prescribed, by the numbers of their velocities.
+        load: (nv, 1) joint efforts equivalent to external wrenches.
+        given: prescribed accelerations by index in v.
     """
     contact = contact_equations(system, motion.q, motion.v, tau + load, given)
     if contact is None and not given:
@@ -354,7 +357,7 @@ def minimal_accelerations(
 
 
 def _stuck_accelerations(system: System, contact: ContactEquations, motion: TreeMotion) -> SX:
-    """(nv, 1) accelerations under contacts, exact for independent joints that are stuck."""
+    """Return the accelerations (nv, 1) with contacts, exact for stuck independent joints."""
     a, contacts, stuck = SX(contact.a), contact.contacts, contact.modes.stuck
     back = -RETURN_RATE * contact.state.velocity
     a[list(system.active)] += standstill(system, contacts, motion, (stuck, back), contact.driven)
@@ -367,12 +370,12 @@ def _stuck_accelerations(system: System, contact: ContactEquations, motion: Tree
 def _reduced_hybrid(
     system: System, motion: TreeMotion, tau: SX, given: Mapping[int, SX]
 ) -> tuple[SX, SX]:
-    """Hybrid dynamics in the independent joints, (m, 1) efforts tau and prescribed accelerations.
+    """Hybrid dynamics in the independent joints with efforts tau (m, 1).
 
     Source: Featherstone 2008, section 9.2, for the inertia matrix G' A G.
 
     Returns:
-        (nv, 1) accelerations, of the independent joints alone, and the efforts of drives.
+        Accelerations (nv, 1), zero for dependent joints, and efforts of the prescribed joints.
     """
     (A,) = outputs_of(system, inertia_matrix(system), motion.q)
     (H,) = outputs_of(system, bias(system), motion.q, motion.v_a)
@@ -390,19 +393,19 @@ def _reduced_hybrid(
     return every, needed[driven]
 
 
-# A state equation whose motors and devices follow laws instead of inputs.
+# State equation whose motor efforts and component inputs are computed by control laws.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StateEquations:
-    """The functions of a state equation.
+    """Functions of a state equation.
 
     Attributes:
         rhs: `rhs(t, x, z, u, p) -> (xdot, y)`.
-        motion: `motion(t, x, z, u, p) -> (q, v)`, positions and velocities of the tree; p are the
-            parameters alone.
-        events: None where there are none.
-        sizes: of the parts of u: efforts, inputs of devices, the rest.
+        motion: `motion(t, x, z, u, p) -> (q, v)`, positions and velocities of the tree; p contains
+            the parameters without modes.
+        events: events of contacts and components, or None.
+        sizes: sizes of the parts of u: efforts, inputs of components, remaining inputs.
     """
 
     rhs: Function
@@ -414,16 +417,16 @@ class StateEquations:
 def with_laws(
     equations: StateEquations, drive: DriveInputs, extra: int, crossings: Function | None = None
 ) -> StateEquations:
-    """The same with inputs that the laws of a drive compute.
+    """Replace efforts and component inputs of a state equation by the control laws of a drive.
 
-    The functions are of scalars where the laws are. Else they hold calls of the laws, which may be
+    The functions are SX if the laws are. Otherwise they contain calls of the laws, which may be
     external functions.
 
     Args:
-        equations: where u begins with what the laws give.
-        drive: with a law.
-        extra: number of the inputs w of the laws, which end u.
-        crossings: as `drive_crossings` has them; None for none.
+        equations: state equation whose u starts with the values of the laws.
+        drive: drive with at least one law.
+        extra: number of the inputs w of the laws, the last elements of the new u.
+        crossings: Function from `drive_crossings`, or None.
     """
     tau, u, rest = equations.sizes
     wiring = _Wiring(
@@ -443,7 +446,7 @@ def with_laws(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Wiring:
-    """What computes the inputs, and the sizes of the parts of u that are left."""
+    """State equation, its control laws, and the sizes of the parts of the remaining u."""
 
     equations: StateEquations
     drive: DriveInputs
@@ -463,7 +466,7 @@ def _events(wiring: _Wiring, events: MinimalEvents | None) -> MinimalEvents | No
 
 
 def _driven(wiring: _Wiring, function: Function) -> Function:
-    """The function with what the laws give."""
+    """Return the function with efforts and component inputs from the laws."""
     drive, motion = wiring.drive, wiring.equations.motion
     laws = [law for law in (drive.effort, drive.device) if law is not None]
     kind: Any = SX if all(law.is_a("SXFunction") for law in laws) else MX
@@ -481,7 +484,7 @@ def _driven(wiring: _Wiring, function: Function) -> Function:
 
 
 def _idle(wiring: _Wiring, function: Function) -> Function:
-    """The function, which depends on no effort, with other inputs."""
+    """Return a function that does not depend on efforts, with the remaining inputs only."""
     symbols = _symbols(wiring, function, SX)
     others = _parts(symbols[3], wiring.sizes)[2]
     return _write(function, symbols, _fill(wiring, SX, others), SX)
@@ -495,7 +498,7 @@ def _symbols(wiring: _Wiring, function: Function, kind: Any) -> list[Any]:
 
 
 def _fill(wiring: _Wiring, kind: Any, others: Any) -> Any:
-    """The inputs that a function takes, zero where laws give them."""
+    """Return the inputs u of a function, with zeros for the values of laws."""
     tau, u, _ = wiring.equations.sizes
     return casadi.vertcat(kind.zeros(tau), kind.zeros(u), others)
 
@@ -516,7 +519,7 @@ __all__ = ["DriveInputs", "MinimalState", "Observe", "Seen", "consistent_start",
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """A motion and what makes it, for outputs.
+    """Values of a motion from which outputs are computed.
 
     Attributes:
         t: time [s].
@@ -527,8 +530,8 @@ class Seen:
         v_a: (m, 1) velocities of the independent joints.
         a_a: (m, 1) accelerations of the independent joints.
         tau: (nv, 1) joint efforts: motors, devices, prescribed motions and contacts.
-        external: for some links the wrench that they exert on what pushes them, about and in their
-            frames.
+        external: wrench that a link exerts on its environment, by link index, about the origin and
+            in axes of the link frame.
     """
 
     t: SX
@@ -543,21 +546,21 @@ class Seen:
 
 
 Observe = Callable[[Seen], Sequence[SX]]
-"""What else is seen of a motion."""
+"""Function that returns additional outputs of a motion."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class MinimalState(MinimalLayout):
-    """A state equation; `MinimalLayout` says what stands where in x, z, u and y.
+    """State equation of the independent joints; `MinimalLayout` defines x, z, u and y.
 
     Attributes:
-        rhs: `rhs(t, x, z, u, p) -> (xdot, y)`; p are the parameters, here and in `events` with the
-            modes behind them.
+        rhs: `rhs(t, x, z, u, p) -> (xdot, y)`. Here and in `events`, p contains the parameters
+            followed by the modes.
         closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step; None in open chains.
-        slopes: `slopes(x, z, p) -> J`, how the equations that the Newton step solves change with z,
-            (nz, nz); None in open chains, and where they are of least squares, whose determinant
-            has no sign.
-        events: of rigid stops and Coulomb friction; None where there are none.
+        slopes: `slopes(x, z, p) -> J`, Jacobian (nz, nz) of the closure equations with respect to
+            z. None in open chains, and for least-squares equations, whose determinant has no
+            meaningful sign.
+        events: events of rigid stops, Coulomb friction and components, or None.
     """
 
     rhs: Function
@@ -573,18 +576,18 @@ def minimal_state(
     *,
     crossings: bool = False,
 ) -> MinimalState:
-    """The state equation of the independent joints.
+    """Return the state equation of the independent joints.
 
     Args:
-        system: open or closed.
-        observe: what else the outputs end with.
-        drive: what drives it beside, or in place of, the efforts of motors and the inputs of
-            devices.
-        crossings: whether events end steps where laws jump.
+        system: open or closed system.
+        observe: function that returns additional outputs at the end of y.
+        drive: additional inputs, and control laws that replace the efforts of motors or the inputs
+            of components.
+        crossings: whether events end steps at discontinuities of laws.
 
     Raises:
-        ModelError: a drive does not fit the system, or the independent rows of the loops change
-            with the configuration, which contacts do not follow.
+        ModelError: `drive` is inconsistent with the system, or the independent rows of the loops
+            change with the configuration, which contacts do not support.
     """
     require_lasting_rows(system, contacts_of(system))
     drive = DriveInputs() if drive is None else drive
@@ -605,7 +608,7 @@ def minimal_state(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StatePoint:
-    """Symbols, and the parts of x and u."""
+    """Symbols of a state equation (t, x, z, u), and the parts of x and u."""
 
     t: SX
     x: SX
@@ -621,11 +624,11 @@ class StatePoint:
 
 
 def point_of(system: System, layout: MinimalLayout, motors: Sequence[int]) -> StatePoint:
-    """Symbols of a state equation.
+    """Create the symbols of a state equation.
 
     Args:
-        system: open or closed.
-        layout: what stands where.
+        system: open or closed system.
+        layout: index ranges of positions, velocities and inputs in x and u.
         motors: indices in v of the efforts in u.
     """
     in_x = [len(layout.positions), len(layout.velocities), state_count(system)]
@@ -649,7 +652,7 @@ def _equations(
     *,
     crossings: bool,
 ) -> StateEquations:
-    """The functions, where u has no w, and all efforts and inputs of devices that laws give."""
+    """Return the functions without laws: u contains the values of the laws, and no w."""
     motors = layout.inputs if drive.effort is None else tuple(range(system.nv))
     s = point_of(system, layout, motors)
     laws = input_motions(layout.motions, s.motions)
@@ -694,7 +697,7 @@ def _equations(
 def motion_of(
     system: System, layout: MinimalLayout, s: StatePoint, laws: Sequence[tuple[SX, SX, SX]]
 ) -> TreeMotion:
-    """The motion of the tree, from states, dependent positions and prescribed motions."""
+    """Return the motion of the tree from states, dependent positions and prescribed motions."""
     raw, q = positions_of(system, layout, s)
     v = SX.zeros(system.nv)
     v[list(layout.velocities)] = s.v
@@ -705,7 +708,7 @@ def motion_of(
 
 
 def positions_of(system: System, layout: MinimalLayout, s: StatePoint) -> tuple[SX, SX]:
-    """(nq, 1) positions as in the state, and on the loops."""
+    """Return the positions (nq, 1) of the state, and the positions (nq, 1) on the loops."""
     raw = SX.zeros(system.nq)
     raw[list(layout.dependents)] = s.z
     raw[list(layout.positions)] = s.q
@@ -717,7 +720,7 @@ def positions_of(system: System, layout: MinimalLayout, s: StatePoint) -> tuple[
 def _rate(
     system: System, layout: MinimalLayout, motion: TreeMotion, response: Accelerations, devices: SX
 ) -> SX:
-    """The rate of x; quaternions are drawn back to unit length."""
+    """Return the rate of x, with decay of quaternions to unit length."""
     v = SX(motion.v)
     v[list(system.active)] += at_limits(system, response.contact, motion)
     if system.is_closed:
@@ -741,7 +744,7 @@ def _steadied_rate(system: System, motion: TreeMotion) -> SX:
 def outputs_vector(
     system: System, layout: MinimalLayout, motion: TreeMotion, response: Accelerations, shown: SX
 ) -> SX:
-    """The outputs y that every state equation has."""
+    """Return the outputs y of a state equation without the observed quantities."""
     efforts = response.contact.efforts if response.contact else SX(0, 1)
     return casadi.vertcat(
         _rows(response.a, layout.accelerations),
@@ -756,19 +759,19 @@ def outputs_vector(
 
 
 def _rows(vector: SX, numbers: Sequence[int]) -> SX:
-    """Some elements of a vector; none of a vector (1, 1) are (1, 0), which would count as a row."""
+    """Return elements of a column vector; (0, 1) for no elements, unlike [] on a (1, 1) vector."""
     return vector[list(numbers)] if numbers else SX(0, 1)
 
 
 def _terminal_pose(system: System, q: SX) -> SX:
-    """(12, 1) origin, and orientation by rows, of the terminal frame in the base."""
+    """Return (12, 1) origin and orientation (by rows) of the terminal frame in the base."""
     base, tool = system.frame("base"), system.frame(terminal_frame(system))
     T = relative_pose(system.tree, q, base, tool)
     return casadi.vertcat(T.p, casadi.reshape(T.R.T, 9, 1))
 
 
 def _closure_step(system: System, layout: MinimalLayout) -> tuple[Function, Function | None]:
-    """`closure` and `slopes` of the state equation."""
+    """Return the functions `closure` and `slopes` of `MinimalState`."""
     dependents, s = list(layout.dependents), point_of(system, layout, ())
     symbols, z = SX.sym("q", system.nq), s.z
     raw, q = positions_of(system, layout, s)
@@ -787,7 +790,7 @@ def _closure_step(system: System, layout: MinimalLayout) -> tuple[Function, Func
 
 
 def consistent_start(system: System, state: MinimalLayout) -> tuple[list[float], list[float]]:
-    """State x and dependents z of the assembled configuration at rest."""
+    """Return state x and dependents z of the assembled configuration at rest."""
     configuration = np.array(system.configuration)
     rest = [0.0] * len(state.velocities)
     x = [*configuration[list(state.positions)], *rest, *system.z_start]

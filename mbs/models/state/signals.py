@@ -25,13 +25,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class LawArgument:
-    """What a user gives to drive a mechanism with.
+    """Argument of the user that drives a mechanism, such as tau.
 
     Attributes:
-        name: of the argument.
-        noun: what its values are.
-        elements: the name of every value.
-        short: indices of the values that models of a closed system take; a law may return these.
+        name: name of the argument.
+        noun: plural noun for its values in error messages, such as "efforts".
+        elements: name of each value.
+        short: indices of the values that models of a closed system take; a law may return only
+            these values.
     """
 
     name: str
@@ -46,19 +47,19 @@ def signal_function(
     given: SX | Function | Callable[[Any, Any, Any], Any],
     driven: Collection[str] | None = None,
 ) -> Function:
-    """`f(t, q, v, p)` -> the values of the signal, (n, 1).
+    """Return the Function `f(t, q, v, p)` of a signal with n values, (n, 1).
 
     Args:
-        system: open or closed.
-        signal: what it is, for messages.
-        given: the values, or a function of (t, q, v) that returns them: all of them in their order,
-            or a dict by name, where those that it does not name are zero.
-        driven: names of the elements that have a motor, outside of which a value is refused unless
-            a dict names it; every element may have one when left out.
+        system: open or closed system.
+        signal: description of the signal for checks and messages.
+        given: expression of the values, or a function of (t, q, v) that returns all values in order
+            or a dict by name. Values that are not in the dict are zero.
+        driven: names of the elements with a motor. Other elements must be zero or named in a dict.
+            None allows all elements.
 
     Raises:
-        ModelError: the function cannot be traced, there are too few or too many values, a name is
-            unknown, or a value is given to what has no motor.
+        ModelError: the function cannot be traced, the number of values is wrong, a name is unknown,
+            or an element without a motor has a value.
     """
     t, q, v = SX.sym("t"), SX.sym("q", system.nq), SX.sym("v", system.nv)
     if isinstance(given, SX):
@@ -96,7 +97,7 @@ def signal_function(
 def _trace(
     system: System, signal: LawArgument, function: Callable[..., Any], point: tuple[SX, SX, SX]
 ) -> tuple[SX, bool]:
-    """The values as an expression of t, q and v, and whether they were given by name."""
+    """Return the values as an expression of t, q and v, and whether a dict was returned."""
     _check_inputs(system, signal, function, point)
     t, q, v = point
     if isinstance(function, Function) and function.numel_in(2) != v.numel():
@@ -152,7 +153,7 @@ def _has_nan(value: SX) -> bool:
 
 
 def _in_order(system: System, signal: LawArgument, values: Mapping[str, Any]) -> list[Any]:
-    """Every element, zero where it is not named."""
+    """Return all elements of the signal in order; zero for elements without a value."""
     values = by_coordinate(system.name, values, signal.elements, [signal.name])
     for name in values:
         if name not in signal.elements:
@@ -228,27 +229,28 @@ def _check_inputs(
         return
 
 
-# Joint efforts that drive a motion, in whatever form the user gives them.
+# Joint efforts from the user: constants, dict by name, or function.
 
 
 Effort = Mapping[str, float] | Sequence[float] | Function | Callable[[Any, Any, Any], Any] | None
 
 
 def effort_function(system: System, tau: Effort) -> Function | None:
-    """`tau(t, q, v, p) -> tau`, (nv, 1).
+    """Return joint efforts as a Function `tau(t, q, v, p) -> tau`, (nv, 1).
 
     Args:
-        system: open or closed.
-        tau: constants of motors by name, or all of them, or a function of (t, q, v), or None. A
-            function that returns a dict names joints, also such as have no motor. Values of a
-            closed system may be those of all joints of the tree, or those that its models take.
+        system: open or closed system.
+        tau: constants by motor name, a list of all constants, a function of (t, q, v), or None. A
+            function may return a dict by joint name, also for joints without a motor. For a closed
+            system, the values are either of all joints of the tree or of the independent motors
+            that its models take.
 
     Returns:
-        the Function; None when there is no effort.
+        Function, or None without efforts.
 
     Raises:
-        ModelError: a name is unknown, an effort is of a joint that has no motor, or the efforts
-            are not (nv, 1) numbers.
+        ModelError: a name is unknown, a joint without a motor has an effort, or the efforts are not
+            (nv, 1) numbers.
     """
     if tau is None:
         return None
@@ -283,18 +285,18 @@ def _require_motors(system: System, tau: Mapping[str, float], driven: Sequence[s
             )
 
 
-# Efforts and inputs that are given as numbers for each motion.
+# Efforts and inputs that are constants of each simulation run.
 
 
 @dataclass(frozen=True, slots=True)
 class GivenInput:
-    """An effort or an input that is one number for a motion.
+    """Joint effort or component input that is constant during a simulation run.
 
     Attributes:
-        name: such as "j1.tau" or "motor.voltage".
-        is_effort: one of tau; else of u.
-        index: in tau or u.
-        default: where a motion gives none.
+        name: name, such as "j1.tau" or "motor.voltage".
+        is_effort: whether it is an element of tau; otherwise it is an element of u.
+        index: index in tau or u.
+        default: value if a run specifies none.
     """
 
     name: str
@@ -304,10 +306,10 @@ class GivenInput:
 
 
 def given_inputs(system: System, names: Sequence[str]) -> tuple[GivenInput, ...]:
-    """What names such as "j1.tau" and "motor.voltage" are.
+    """Resolve names of efforts and inputs, such as "j1.tau" and "motor.voltage".
 
     Raises:
-        ModelError: a name is unknown, or there twice.
+        ModelError: a name is unknown or repeated, or a joint has no motor.
     """
     names = names_given(f"{system.name}: inputs", names, "j1.tau")
     efforts = [f"{speed.name}.tau" for speed in system.speeds]
@@ -340,15 +342,15 @@ def given_inputs(system: System, names: Sequence[str]) -> tuple[GivenInput, ...]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prescribed:
-    """A coordinate that a drive moves along a law.
+    """Coordinate with a prescribed motion.
 
     Attributes:
-        name: of the velocity.
-        velocity: its index in v.
-        position: index in q where the position is prescribed, None where it is free.
-        holds_speed: whether the velocity is prescribed; an acceleration alone leaves it free.
-        laws: `laws(t, z, p)` -> position, velocity and acceleration, of the time [s], the states of
-            components (nz, 1) and the parameters (np, 1); what is free is zero.
+        name: name of the velocity.
+        velocity: index of the velocity in v.
+        position: index in q of a prescribed position, None if the position is free.
+        holds_speed: whether the velocity is prescribed; it is free if only the acceleration is.
+        laws: `laws(t, z, p)` -> position, velocity and acceleration, for the time [s], the states
+            of components (nz, 1) and the parameters (np, 1); free quantities are zero.
     """
 
     name: str
@@ -359,11 +361,11 @@ class Prescribed:
 
     @property
     def order(self) -> int:
-        """What is prescribed: 0 for a position, 1 for a velocity, 2 for an acceleration."""
+        """Lowest prescribed derivative: 0 for position, 1 for velocity, 2 for acceleration."""
         return 0 if self.position is not None else 1 if self.holds_speed else 2
 
     def law(self, t: SX, z: SX, p: SX) -> tuple[SX, SX, SX]:
-        """Position, velocity and acceleration at a time, states of components and parameters."""
+        """Return position, velocity and acceleration for time, component states and parameters."""
         position, velocity, acceleration = self.laws.call([t, z, p])
         return SX(position), SX(velocity), SX(acceleration)
 
@@ -372,7 +374,7 @@ class Prescribed:
 
 
 def full_name(name: str, quantities: Sequence[tuple[str, str]]) -> str:
-    """A quantity by its own name, or by that of its component where this has no other."""
+    """Return the full name of a quantity, also for the name of a component with one quantity."""
     names = [full for full, _ in quantities]
     owned = [full for full in names if full.rpartition(".")[0] == name]
     return owned[0] if name not in names and len(owned) == 1 else name
@@ -385,7 +387,7 @@ def by_name(
     quantities: Sequence[tuple[str, str]],
     otherwise: Sequence[float],
 ) -> Array:
-    """Values of states or inputs, those that are not named as they are otherwise.
+    """Return the values of states or inputs by name, with `otherwise` as default values.
 
     Raises:
         ModelError: a name is unknown, or a value is no finite number.

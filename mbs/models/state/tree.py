@@ -1,7 +1,7 @@
-"""The state equation of the whole tree with the inputs and outputs of the independent one.
+"""State equations of the whole tree: all positions and velocities of the tree are states.
 
-What integrates it passes configurations in which the independent joints determine nothing, and
-shows the same outputs.
+The integration can cross configurations at which the independent joints do not determine the
+dependent joints. Inputs and outputs are as in the state equation of the independent joints.
 """
 
 from __future__ import annotations
@@ -59,19 +59,20 @@ from mbs.recursions.parts import PartsAt, after_events
 from mbs.solvers.linear import partial_ldl
 from mbs.solvers.problem import Passage
 
-# One Newton step of a state of the whole tree onto all that constrains it.
+# One Newton step of a state of the whole tree onto its constraints.
 
 
 Array = NDArray[np.float64]
 
 _NEARLY_DEPENDENT = 1e-6
-"""Squared sine between a row and the rows before it below which it is left alone."""
+"""Squared sine between a row and the span of the rows before, below which the row is skipped."""
 _ASLEEP = 1e-6
-"""What rows count in that case."""
+"""Weight of the residual while a row is skipped."""
 _SHARED = 1e-4
-"""Square that is added to rows of contacts, which may depend on others: they converge as fast."""
+"""Regularisation that is added to the squares of contact rows, which may depend on other rows.
+Convergence is as fast as without it."""
 _NEVER = 1e300
-"""Pivot of a row that is left alone: what it would move, divided by this, is zero."""
+"""Pivot of a skipped row: division by it makes its correction zero."""
 
 
 def project_step(
@@ -82,23 +83,24 @@ def project_step(
     t: SX,
     touch: tuple[Contacts, Modes] | None = None,
 ) -> tuple[SX, SX, SX]:
-    """Positions and velocities one Newton step closer, and the largest row before the step.
+    """Project positions and velocities by one Newton step onto the constraints.
 
-    The step is made on the independent rows of the loops: off the loops a dependent row is
-    almost, not exactly, dependent, and would make motion of rounding. Close to a singular
-    configuration the same holds for a row that the others nearly imply there: it is left alone, and
-    rows count little for as long. The largest row is that of all, dependent ones included.
+    The constraints are loop closure, unit quaternions, prescribed motions and contacts. The step
+    uses the independent rows of the loops, because a dependent row is only nearly dependent off
+    the loops and would amplify rounding. Near a singular configuration, a row that nearly depends
+    on the others is skipped, and the residual is weighted by 1e-6 meanwhile.
 
     Args:
-        system: open or closed.
+        system: open or closed system.
         q: (nq, 1) positions.
         v: (nv, 1) velocities.
-        motions: what is prescribed.
+        motions: prescribed motions.
         t: time [s].
-        touch: contacts and what they do; none when left out.
+        touch: contacts and their modes, or None.
 
     Returns:
-        q (nq, 1), v (nv, 1), and the largest row, lengths as parts of the size of the mechanism.
+        q (nq, 1) and v (nv, 1) after the step, and the largest residual before it, over all rows,
+        with lengths relative to the size of the mechanism.
     """
     if not system.is_closed and not motions and touch is None:
         return normalised(system.tree, q), v, SX(0)
@@ -114,7 +116,7 @@ def project_step(
     J = SX(0, system.nv)
     if system.is_closed:
         loops = independent_closure(system, symbols)
-        measures = constraint_sizes(system)[kept_rows(system), :]  # (0, 1) where nothing is kept
+        measures = constraint_sizes(system)[kept_rows(system), :]  # (0, 1) if no row is kept
         J = independent_constraint_rows(system, symbols)
         drift = independent_drift(system, symbols)
     found = scales(system)
@@ -146,10 +148,10 @@ def project_step(
 def _touch(
     system: System, q: SX, v: SX, touch: tuple[Contacts, Modes] | None, columns: Array
 ) -> tuple[SX, SX, SX, SX, SX]:
-    """Rows of positions at stops, then of velocities that are stuck; each with its `_switch`.
+    """Return position rows of stops and velocity rows of stuck contacts, with their switches.
 
-    The last ones are the factors that make rows of velocities of unit length, where `columns` are
-    the scales of v.
+    Order: position rows, their `_switch`, velocity rows, their `_switch`, and the factors that
+    scale velocity rows to unit length. `columns` are the scales of v.
     """
     if touch is None:
         return SX(0, 1), SX(0, 1), SX(0, 1), SX(0, 1), SX(0, 1)
@@ -165,18 +167,18 @@ def _touch(
 
 
 def _switch(acting: SX) -> SX:
-    """What stands in for the squares of rows that vanish when they do not act."""
+    """Return the addition to the squared norms of rows: 1 for an inactive row, which is zero."""
     return casadi.if_else(acting, _SHARED, 1)
 
 
 def _shortest(J: SX, r: SX, off: SX, first: Array, columns: Array, last: SX) -> tuple[SX, SX]:
-    """A short step x with J x = r, by rows that are not nearly dependent, and whether all are.
+    """Return the minimum-norm x with J x = r without nearly dependent rows, and 1 if none is.
 
     Args:
-        J: rows of loops, then rows on one coordinate each; the last ones are switched.
-        r: what the rows are to become.
-        off: what is added to the squares of the switched rows.
-        first: scales of the rows of the loops; other rows are of unit length.
+        J: rows of loops, then rows on one coordinate each, then switched rows of contacts.
+        r: right-hand side.
+        off: additions to the squared norms of the switched rows, from `_switch`.
+        first: scales of the rows of the loops; all other rows are scaled to unit length.
         columns: scales of the columns.
         last: scales of the switched rows.
     """
@@ -196,15 +198,15 @@ def _shortest(J: SX, r: SX, off: SX, first: Array, columns: Array, last: SX) -> 
 
 
 def _unit(row: SX, columns: Array) -> float:
-    """The scale of a row on one coordinate, or on a quaternion."""
+    """Return the scale of a row on one coordinate or on one quaternion."""
     columns_of_row = casadi.sparsify(row).sparsity().get_triplet()[1]
     return 1 / float(columns[columns_of_row[0]]) if columns_of_row else 1.0
 
 
-# What steps in local tangent coordinates need of a system: all its rows, inertia and forces.
+# Functions for steps in local tangent coordinates: constraint rows, inertia and forces.
 #
-# All rows of the loops, dependent ones included, since those that assembling keeps may become
-# dependent where the others do not; the rank is what assembling found, never a threshold.
+# Dependent rows of the loops are included, because the rows that are independent in the assembled
+# configuration may become dependent elsewhere. The rank is the rank at assembly, not a threshold.
 
 
 def passage(
@@ -217,20 +219,20 @@ def passage(
     inputs: SX | None = None,
     given_inputs: SX | None = None,
 ) -> Passage | None:
-    """The functions of passages; None where nothing is lost.
+    """Return the functions for steps through singular configurations of the loops, or None.
 
-    They are None as well where rows bind velocities alone. Where a contact sticks on a velocity
-    that is the rate of no known position, every configuration counts as regular.
+    None for open chains and for nonholonomic constraints. While a contact sticks on a velocity
+    without a corresponding position, every configuration counts as regular.
 
     Args:
-        system: open or closed.
-        point: t, x = [q; v; z] and p, without modes.
-        tau: (nv, 1) joint efforts, those of drives and contacts left out.
-        rates: (nz, 1) of z.
-        motions: coordinates that drives move along laws.
-        contact: what rigid stops and Coulomb friction do.
-        inputs: u, where the functions are to take (t, x, z, u, p), z empty.
-        given_inputs: (nu, 1) values of the inputs of parts, where they are no inputs here.
+        system: open or closed system.
+        point: symbols t, x = [q; v; z] and p, without modes.
+        tau: (nv, 1) joint efforts, without prescribed motions and contacts.
+        rates: (nz, 1) rates of the states z of components.
+        motions: coordinates with prescribed motions.
+        contact: equations of rigid stops and Coulomb friction, or None.
+        inputs: inputs u. If given, the functions take (t, x, z, u, p) with empty z.
+        given_inputs: (nu, 1) values that replace the inputs of components, or None.
     """
     closure = system.closure
     if closure is None or closure.slips:
@@ -242,7 +244,7 @@ def passage(
     nq, nv = system.nq, system.nv
     q, v = SX.sym("q", nq), SX.sym("v", nv)
     J = casadi.sparsify(constraint_rows(system, q))
-    moving = sorted(set(J.sparsity().row()))  # a row that nothing moves says nothing
+    moving = sorted(set(J.sparsity().row()))  # structurally zero rows are dropped
     if not moving:
         return None
     J = J[moving, :]
@@ -279,7 +281,7 @@ def passage(
     still = SX.zeros(len(anchors))
     b = casadi.vertcat(SX.zeros(count), *(law[1] for law in laws), still)
     c = casadi.vertcat(loops[2], *(law[2] for law in laws), bends)
-    has_quaternions = nq > nv  # else N is the unit matrix, and J are the slopes of `positions`
+    has_quaternions = nq > nv  # otherwise q' = v, and the Jacobian of `positions` is sufficient
     rate = position_rate(system.tree, q, v)
     rank = len(closure.rows) + len(motions) + (_count_stuck(contact, held) if contact else 0)
     rows = [
@@ -302,7 +304,7 @@ def passage(
     measure = _regularity(system, q, unit[drives, :])
     regularity = casadi.substitute(measure, q, at[0])
     typical = _typical(system, q, measure)
-    if contact is not None and loose:  # what sticks without a position is for full steps
+    if contact is not None and loose:  # contacts that stick without a position need full steps
         sticks = casadi.mmax(contact.modes.stuck[loose])
         regularity = casadi.if_else(sticks, max(typical, 1.0), regularity)
     txp = [t, x, p] if inputs is None else [t, x, SX.sym("z", 0), inputs, p]
@@ -317,12 +319,12 @@ def passage(
 
 
 def _moved(contact: ContactEquations | None, tau: SX) -> tuple[SX | None, SX]:
-    """Accelerations as far as contacts give them, and efforts with those of contacts."""
+    """Return accelerations under contacts (None without contacts), and efforts incl. contacts."""
     return (None, tau) if contact is None else (contact.a, tau + contact.pushes)
 
 
 def _without_passages(system: System, point: tuple[SX, SX, SX, SX]) -> Passage:
-    """That of a system without passages: every configuration counts as regular."""
+    """Return placeholder functions without constraints; every configuration counts as regular."""
     t, X, u, p = point
     nq, nv = system.nq, system.nv
     at = [t, X, SX.sym("z", 0), u, p]
@@ -344,12 +346,12 @@ def _without_passages(system: System, point: tuple[SX, SX, SX, SX]) -> Passage:
 
 
 _LARGE = 100
-"""Elements of an output beyond which its zeros are not written one by one: a line of C each, of
-which compilers need more than proportional time. Steps in tangent coordinates skip them."""
+"""Largest number of elements of an output whose zeros are stored. Each zero is a line of C code,
+and the compile time grows more than linearly. Steps in tangent coordinates skip zeros."""
 
 
 def _mostly_dense(name: str, inputs: Sequence[SX], outputs: Sequence[SX]) -> Function:
-    """A Function of dense outputs, but for those that are large and for the most part zero."""
+    """Return a Function with dense outputs, except for large outputs that are mostly zero."""
     values = [casadi.densify(value) for value in outputs]
     for k, value in enumerate(values):
         if value.numel() > _LARGE and 2 * (few := casadi.sparsify(value)).nnz() < value.numel():
@@ -358,7 +360,7 @@ def _mostly_dense(name: str, inputs: Sequence[SX], outputs: Sequence[SX]) -> Fun
 
 
 def _count_stuck(contact: ContactEquations, rows: Sequence[int]) -> SX:
-    """How many of some rows are stuck, equal ones counted once."""
+    """Return the number of stuck contact rows, equal rows counted once."""
     groups, stuck = contact.contacts.groups, contact.modes.stuck
     kept = dict.fromkeys(groups[j] for j in rows)
     same = [[j for j in rows if groups[j] == k] for k in kept]
@@ -366,22 +368,25 @@ def _count_stuck(contact: ContactEquations, rows: Sequence[int]) -> SX:
 
 
 def _regularity(system: System, q: SX, drives: SX) -> SX:
-    """The smallest sine between a kept row and those before it: near zero, linear in the path."""
+    """Return the smallest sine between a kept constraint row and the span of the rows before.
+
+    The measure is zero at a singular configuration, and linear in the path nearby.
+    """
     found = scales(system)
     columns = DM(found.columns([speed.unit for speed in system.speeds]))
     J = casadi.vertcat(
         DM(found.rows[kept_rows(system)]) * independent_constraint_rows(system, q), drives
     )
-    if J.shape[0] == 0:  # the loops constrain nothing
+    if J.shape[0] == 0:  # no independent constraint
         return SX(1)
     B = casadi.mtimes(J, casadi.diag(columns))
-    squares = casadi.fmax(casadi.sum2(B * B), 1)  # a row may also vanish by itself
+    squares = casadi.fmax(casadi.sum2(B * B), 1)  # a single row may become zero as well
     D, _, order = casadi.ldl(casadi.sparsify(casadi.mtimes(B, B.T)))
     return casadi.sqrt(casadi.fmax(casadi.mmin(D / squares[order]), 0))
 
 
 def _typical(system: System, q: SX, measure: SX) -> float:
-    """The regularity at the assembled configuration; zero where symbols have no value."""
+    """Return the regularity at the assembled configuration, 0 if parameters have no value."""
     found = Function("typical", [q, system.p], [measure])
     value = float(found(np.array(system.configuration), system.p_default))
     return value if np.isfinite(value) else 0.0
@@ -389,23 +394,23 @@ def _typical(system: System, q: SX, measure: SX) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TreeState:
-    """A state equation of X = [q; v; states of devices]; functions take (t, X, z, u, p), z empty.
+    """State equation with state X = [q; v; states of components]; functions have empty z.
 
-    Where rigid stops or Coulomb friction act, p has their modes behind the parameters.
+    With rigid stops or Coulomb friction, p contains the parameters followed by the modes.
 
     Attributes:
-        rhs: `rhs(t, X, z, u, p) -> (Xdot, y)`, y the outputs of the independent state equation.
+        rhs: `rhs(t, X, z, u, p) -> (Xdot, y)`; y are the outputs of `MinimalState`.
         project: `project(t, X, z, u, p) -> (X, residual)`, one Newton step onto the loops.
-        start: `start(t, x, z, u, p) -> X` of states x and dependents z of the independent one.
-        passage: of rows, forces and regularity.
-        passes: whether it is asked for passages; see `passage`.
-        events: of rigid stops and Coulomb friction; None where there are none.
-        rate: `rate(X) -> q'`, the rates of the positions in X.
-        states: numbers in X of the states x.
-        dependents: numbers in X of the dependents z.
-        passive: numbers in X of the velocities of the dependent joints.
+        start: `start(t, x, z, u, p) -> X` from the states x and dependents z of `MinimalState`.
+        passage: constraint rows, forces and regularity for steps through singular configurations.
+        passes: whether such steps are possible; see `passage`.
+        events: events of rigid stops, Coulomb friction and components, or None.
+        rate: `rate(X) -> q'`, rates of the positions in X.
+        states: indices in X of the states x of `MinimalState`.
+        dependents: indices in X of the dependents z of `MinimalState`.
+        passive: indices in X of the velocities of the dependent joints.
         independent: indices in v of the independent velocities.
-        units: (nv,) typical velocities, of one size for all joints.
+        units: (nv,) typical velocities, comparable for all joints.
     """
 
     rhs: Function
@@ -429,13 +434,16 @@ def tree_state(
     *,
     crossings: bool = False,
 ) -> TreeState | None:
-    """The state equation of the tree; None where it has no advantage, or is not known.
+    """Return the state equation of the tree with the inputs and outputs of `minimal_state`.
+
+    None without dependent positions and without nonholonomic constraints, with motions as inputs,
+    or if `passage` is None for holonomic loops.
 
     Args:
-        system: open or closed.
-        observe: as of `minimal_state`, likewise the next one.
-        drive: motions that are inputs are left to the independent state equation.
-        crossings: as of `minimal_state`.
+        system: open or closed system.
+        observe: argument of `minimal_state`.
+        drive: argument of `minimal_state`.
+        crossings: argument of `minimal_state`.
     """
     drive = DriveInputs() if drive is None else drive
     layout = minimal_layout(system, drive)
@@ -547,38 +555,38 @@ def _mode_count(events: MinimalEvents | None) -> int:
     return 0 if events is None else len(events.modes)
 
 
-# The state equation of the whole tree, with a projection that keeps its loops closed.
+# State equation of the whole tree, with a projection that keeps its loops closed.
 #
-# Every position and velocity of the tree is a state: the motion runs through configurations where
-# no choice of independent joints would hold.
+# Every position and velocity of the tree is a state, so the motion can pass configurations at which
+# a choice of independent joints is invalid.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FullState:
-    """State x = [q; v; z] of the whole tree and of the devices that drive its shafts.
+    """State equation of the whole tree with state x = [q; v; z], z the states of components.
 
     Attributes:
         rhs: `rhs(t, x, p) -> xdot`.
-        project: `project(t, x, p) -> (x, residual)`, one Newton step onto loops, unit quaternions
-            and prescribed motions, None where there is nothing to keep.
-        observe: `observe(t, x, p) -> a, tau, u, y, contacts, E, U, openness`, what a result shows
-            beside x: u and y are inputs and outputs of the devices, `contacts` the efforts of rigid
-            stops and of Coulomb friction, the last is the largest closure row.
-        events: `indicators(t, x, p) -> g` and `jump(t, x, p, fired) -> (x, modes)` of rigid stops
-            and Coulomb friction, whose modes are then the last of p; None where there are none.
-        passage: for steps through singular configurations of the loops; None where there are none.
+        project: `project(t, x, p) -> (x, residual)`, one Newton step onto loop closure, unit
+            quaternions and prescribed motions, or None without such constraints.
+        observe: `observe(t, x, p) -> a, tau, u, y, contacts, E, U, openness`, the quantities of a
+            result in addition to x. u and y are inputs and outputs of the components, `contacts`
+            the efforts of rigid stops and Coulomb friction, E and U kinetic and potential energy,
+            `openness` the largest closure residual.
+        events: `indicators(t, x, p) -> g` and `jump(t, x, p, fired) -> (x, modes)` of rigid stops,
+            Coulomb friction and components, or None. Contact modes are the last elements of p.
+        passage: functions for steps through singular configurations of the loops, or None.
         crossings: `crossings(t, x, p)`, a column of event indicators; None if the system has
             none. The indicators of the k contacts come first, then the sides, then the counts. A
-            law jumps or bends if a side changes its sign, or a count its whole number.
+            law jumps or bends if a side changes its sign, or a count its integer part.
         approaches: `approaches(t, x, p)`, (k, 2), the speeds and paces of the contacts, as
-            `Approach` has them; None if there are no contacts.
-        sides: number of the crossings that may stay at zero or pass it without end, such as the
-            velocity in a law of dry friction.
-        counts: number of the last crossings, at whose whole numbers laws jump.
-        short: whether a smooth law may be short behind a crossing.
-        timing: what efforts, inputs and prescribed motions say of the time alone; None where they
-            say nothing.
-        prepared: what integrations keep between runs.
+            in `Approach`; None if there are no contacts.
+        sides: number of the crossings that may stay at zero or cross it infinitely often, such as
+            the velocity in a law of dry friction.
+        counts: number of the last crossings, at whose integer values laws jump.
+        short: whether a smooth law may hold for a short time only after a crossing.
+        timing: time-dependent parts of efforts, inputs and prescribed motions, or None.
+        prepared: cache of the integrator between runs.
     """
 
     rhs: Function
@@ -602,16 +610,16 @@ def full_state(
     motions: Sequence[Prescribed] = (),
     given: Sequence[GivenInput] = (),
 ) -> FullState:
-    """The state equation of the whole tree under given joint efforts and inputs of devices.
+    """Return the state equation of the whole tree for given joint efforts and component inputs.
 
     Args:
-        system: open or closed.
-        effort: `effort(t, q, v, p) -> tau`, (nv, 1), beside what devices deliver; no effort when
-            left out.
-        inputs: `inputs(t, q, v, p) -> u`, (nu, 1), one for each device; zeros when left out.
-        motions: coordinates that drives move along laws; their efforts are added to tau.
-        given: efforts and inputs that are numbers of a motion, the last elements of p, in place of
-            what the laws say of them.
+        system: open or closed system.
+        effort: `effort(t, q, v, p) -> tau`, (nv, 1) joint efforts in addition to the efforts of
+            components; None for zero.
+        inputs: `inputs(t, q, v, p) -> u`, (nu, 1) inputs of components; None for default values.
+        motions: coordinates with prescribed motions; their drive efforts are added to tau.
+        given: efforts and inputs that are constants of a simulation run. They are the last elements
+            of p and replace the values of `effort` and `inputs`.
     """
     nq, n = system.nq, system.nq + system.nv
     t, x = SX.sym("t"), casadi.vertcat(SX.sym("x", n), system.z)
@@ -679,17 +687,17 @@ def _law_conditions(
     motions: Sequence[Prescribed],
     parts: PartsAt,
 ) -> tuple[TimeLaws | None, SX, SX, bool]:
-    """Parts of laws that depend on time alone, and sides and counts at which laws jump or bend.
+    """Return purely time-dependent laws, sides, counts, and the flag `short` of `FullState`.
 
-    The last value is whether a smooth law may be short behind one of the sides.
+    Laws jump or bend at sign changes of the sides and at integer values of the counts.
 
     Args:
-        system: open or closed.
-        point: t, q and v.
+        system: open or closed system.
+        point: symbols t, q and v.
         u: (nu, 1) values of the inputs of components.
-        signals: functions of (t, q, v, p).
-        motions: coordinates that drives move along laws.
-        parts: all components.
+        signals: functions of (t, q, v, p), or None.
+        motions: coordinates with prescribed motions.
+        parts: equations of all components.
     """
     t, q, v = point
     values = [signal(t, q, v, system.p) for signal in signals if signal is not None]
@@ -723,7 +731,7 @@ def _events(
     txp: list[SX],
     u: SX,
 ) -> tuple[Function, Function] | None:
-    """The functions of `FullState.events`; events of components come behind those of contacts."""
+    """Return the functions of `FullState.events`: events of contacts, then of components."""
     own = parts.events()
     if contact is None and not own:
         return None
@@ -734,7 +742,7 @@ def _events(
     if contact:
         indicators.append(contact.indicators)
         after, modes = tree_jump(system, contact, x, fired[:count])
-        if own:  # a jump of contacts changes what it need not where none of them asks for it
+        if own:  # without a contact event, the jump of contacts must not change the state
             jumps = casadi.mmax(fired[:count])
             after = casadi.if_else(jumps, after, x)
             modes = casadi.if_else(jumps, modes, contact.values)
@@ -753,7 +761,7 @@ def _events(
 
 
 def with_inputs(system: System, values: Sequence[SX], u: SX) -> list[SX]:
-    """Expressions with values (nu, 1) in place of the inputs of parts."""
+    """Substitute values u (nu, 1) for the input symbols of components in expressions."""
     if not system.u.numel():
         return [SX(value) for value in values]
     dense = [casadi.densify(SX(value)) for value in values]
@@ -763,7 +771,7 @@ def with_inputs(system: System, values: Sequence[SX], u: SX) -> list[SX]:
 def _accelerations(
     system: System, q: SX, v: SX, tau: SX, motions: Sequence[Prescribed], t: SX
 ) -> tuple[SX, SX]:
-    """Accelerations of the tree, and its efforts, those of drives included."""
+    """Return accelerations (nv, 1) of the tree and efforts (nv, 1) including prescribed motions."""
     if not motions:
         ddm = direct_dynamics(system, coordinates="tree")
         return outputs_of(system, ddm, q, v, tau)[0], tau

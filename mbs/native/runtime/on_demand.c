@@ -1,10 +1,10 @@
-/* Derivatives of a compiled Function, of which the library has the names alone: when one of them is
- * first called, Python makes it and puts its addresses into a table. COUNT, the number of names,
- * PARTS, of what is made at once, and RECORD, a file, stand before this text, a line FORWARD or
- * FORWARD_VOID for each name behind it.
+/* Stubs of the derivatives of a compiled Function. At its first call a stub lets Python compile the
+ * derivative, which writes its addresses to a table. This text is preceded by definitions of COUNT
+ * (number of stubs), PARTS (number of derivatives) and RECORD (path of the file with the Function).
+ * It is followed by a line FORWARD or FORWARD_VOID for each stub.
  *
- * A Function that was sent to another process finds the names there too, so nothing is registered:
- * the few functions of Python's stable interface are looked up in the process. */
+ * The stubs also work in another process to which the Function is sent, without registration: the
+ * few functions of the stable interface of Python are looked up in the process. */
 #include <stdint.h>
 #include <stdio.h>
 #ifdef _WIN32
@@ -58,7 +58,7 @@ static int fetched(int part) {
   return known[part];
 }
 
-/* Asked for at the end, when nothing is made any longer. */
+/* Readiness of a part for stubs that are called last: they do not start a compilation. */
 static int there(int part) { return known[part]; }
 
 #define FORWARD(name, k, part, ready, otherwise, type, declared, passed)            \

@@ -1,15 +1,19 @@
 /* Inverse and direct dynamics of open trees, and their derivatives; see tree_core.h.
  *
- * All vectors are in the axes of the base. Wrenches, inertias and velocities of a link are about
- * its own origin, so that no digit is lost far away from the base; where pairs of joints meet, all
- * is about the origin of the first link of their tree, which an observer follows.
+ * All vectors are expressed in the axes of the base. Wrenches, inertias and velocities of a link
+ * are about its own origin, which avoids cancellation far away from the base. Products of pairs of
+ * joints are about a common point: the origin of the first link of their tree. Velocities are then
+ * relative to this point.
  *
- * What needs the link before goes from node to node; all else runs in vector lanes over nodes, and
- * the columns of a solution in lanes side by side.
+ * Recursions over the links run node by node. All other loops run in SIMD lanes over nodes. The
+ * columns of a linear system are solved in lanes, one column per lane.
+ *
+ * Terms: "the link before" is the parent link. "All behind a node" is the subtree of the node: the
+ * bodies that the motion of the node moves.
  *
  * Source: Khalil & Creusot 1997 (Newton and Euler); Walker & Orin 1982 (composite bodies);
  * Featherstone 1983 (articulated bodies); Singh, Russell & Wensing 2022 (derivatives of the
- * efforts); Carpentier & Mansard 2018 (those of the accelerations). */
+ * efforts); Carpentier & Mansard 2018 (derivatives of the accelerations). */
 #include "tree_core.h"
 
 #include <math.h>
@@ -28,7 +32,7 @@ typedef struct {
 
 #define INLINE static inline __attribute__((always_inline, unused))
 
-/* Vectors of three elements, of lanes and of single numbers. */
+/* Operations on vectors of three elements: SIMD vectors (V3) and scalars (D3). */
 #define OPERATIONS(T, S)                                                                      \
   INLINE T plus##T(T a, T b) { return (T){a.x + b.x, a.y + b.y, a.z + b.z}; }                 \
   INLINE T minus##T(T a, T b) { return (T){a.x - b.x, a.y - b.y, a.z - b.z}; }                \
@@ -60,69 +64,69 @@ OPERATIONS(D3, double)
 #define plus_cross(c, a, b) OF(plus_cross, a)(c, a, b)
 #define combine(a, x, b, y, c, z) OF(combine, a)(a, x, b, y, c, z)
 
-/* Rows of the work space. */
+/* Rows of the work space, for each node. Vectors are in the axes of the base, except E and T. */
 enum {
-  X,              /* positions of joints of one velocity */
-  QD,             /* velocities */
-  QDD,            /* accelerations */
-  E,              /* 9: axes of the link in those of the link before, by columns */
-  T = E + 9,      /* 3: its origin there */
+  X,              /* position of a joint with a single velocity */
+  QD,             /* velocity */
+  QDD,            /* acceleration */
+  E,              /* 9: axes of the link in the axes of the parent link, by columns */
+  T = E + 9,      /* 3: origin of the link in the frame of the parent link */
   R = T + 3,      /* 9: axes of the link */
-  D = R + 9,      /* 3: its origin from that of the link before */
-  P = D + 3,      /* 3: and from that of the first link of the tree */
-  SL = P + 3,     /* 3: velocity of the origin for a unit velocity of the node */
-  SA = SL + 3,    /* 3: and angular */
+  D = R + 9,      /* 3: vector from the origin of the parent link to the origin of the link */
+  P = D + 3,      /* 3: vector from the origin of the first link of the tree to the origin */
+  SL = P + 3,     /* 3: linear velocity of the origin for a unit velocity of the node */
+  SA = SL + 3,    /* 3: angular velocity for a unit velocity of the node */
   W = SA + 3,     /* 3: angular velocity of the link */
-  WL = W + 3,     /* 3: of the link before */
+  WL = W + 3,     /* 3: angular velocity of the parent link */
   WD = WL + 3,    /* 3: angular acceleration of the link */
-  WDL = WD + 3,   /* 3: of the link before */
+  WDL = WD + 3,   /* 3: angular acceleration of the parent link */
   VD = WDL + 3,   /* 3: acceleration of the origin of the link, minus gravity */
-  VDL = VD + 3,   /* 3: of the link before */
-  HB = VDL + 3,   /* 3: first moments */
-  JB = HB + 3,    /* 6: inertia */
-  F = JB + 6,     /* 3: force, of the body, then of all behind the node */
-  M = F + 3,      /* 3: and moment */
-  CM = M + 3,     /* mass of all behind the node */
-  CH = CM + 1,    /* 3: and first moments */
-  CJ = CH + 3,    /* 6: and inertia */
-  N2 = CJ + 6,    /* 3: and twice the momentum */
-  K = N2 + 3,     /* 9: and moment for an angular velocity added to what moves, by columns */
-  VO = K + 9,     /* 3: velocity of the origin for the observer */
-  VL = VO + 3,    /* 3: of the point of the link before that is there */
-  FL = VL + 3,    /* 3: momentum of all behind the node for its unit velocity */
-  FA = FL + 3,    /* 3: and angular momentum, about the common point */
-  GA = FA + 3,    /* 3: effort of the node for an angular velocity added to what moves */
-  SC = GA + 3,    /* 3: unit velocity of the node, at the common point */
-  YA = SC + 3,    /* 3: rate of its axis */
-  Y2L = YA + 3,   /* 3: second rate of its motion, at the common point */
-  Y2A = Y2L + 3,  /* 3 */
-  YSL = Y2A + 3,  /* 3: rates of its motion with the link before and with its own, together */
-  YSA = YSL + 3,  /* 3 */
-  DQL = YSA + 3,  /* 3: change of the wrench with the position of the node */
-  DQA = DQL + 3,  /* 3 */
-  DVL = DQA + 3,  /* 3: and with its velocity */
-  DVA = DVL + 3,  /* 3 */
-  GB = DVA + 3,   /* 3: spin of the rotor for a unit velocity */
-  TAU = GB + 3,   /* effort */
+  VDL = VD + 3,   /* 3: acceleration of the origin of the parent link, minus gravity */
+  HB = VDL + 3,   /* 3: first moments of the body */
+  JB = HB + 3,    /* 6: inertia of the body */
+  F = JB + 6,     /* 3: force on the body, then on the subtree of the node */
+  M = F + 3,      /* 3: moment on the body, then on the subtree */
+  CM = M + 3,     /* mass of the subtree */
+  CH = CM + 1,    /* 3: first moments of the subtree */
+  CJ = CH + 3,    /* 6: inertia of the subtree */
+  N2 = CJ + 6,    /* 3: twice the momentum of the subtree */
+  K = N2 + 3,     /* 9: moment on the subtree per added angular velocity, by columns */
+  VO = K + 9,     /* 3: velocity of the origin minus the velocity of the common point */
+  VL = VO + 3,    /* 3: the same for the point of the parent link that is at the origin */
+  FL = VL + 3,    /* 3: momentum of the subtree for a unit velocity of the node */
+  FA = FL + 3,    /* 3: its angular momentum, about the common point */
+  GA = FA + 3,    /* 3: effort of the node per added angular velocity of the subtree */
+  SC = GA + 3,    /* 3: linear velocity at the common point for a unit velocity of the node */
+  YA = SC + 3,    /* 3: rate of SA */
+  Y2L = YA + 3,   /* 3: second rate of the unit velocity (linear), at the common point */
+  Y2A = Y2L + 3,  /* 3: second rate of the unit velocity (angular) */
+  YSL = Y2A + 3,  /* 3: sum of its rates with the parent link and with the link (linear) */
+  YSA = YSL + 3,  /* 3: sum of its rates with the parent link and with the link (angular) */
+  DQL = YSA + 3,  /* 3: derivative of the force with respect to the position of the node */
+  DQA = DQL + 3,  /* 3: derivative of the moment with respect to the position of the node */
+  DVL = DQA + 3,  /* 3: derivative of the force with respect to the velocity of the node */
+  DVA = DVL + 3,  /* 3: derivative of the moment with respect to the velocity of the node */
+  GB = DVA + 3,   /* 3: angular momentum of the rotor for a unit velocity of the joint */
+  TAU = GB + 3,   /* effort, or inertia that the node moves (see `momenta`) */
   MBS_WORK_ROWS
 };
 
 typedef struct {
   const mbs_tree *m;
   int n;
-  double *w;       /* cells */
-  struct chain *nodes; /* what goes from link to link: of the base, then of each node */
-  double *record;  /* factors: 16 for each node */
-  V *lanes;        /* 14 of eight numbers for each node */
-  double *column;  /* one that nobody wants, or a right side */
-  double *square;  /* size x size, where v has another order than the tree */
+  double *w;       /* rows of the work space, accessed by CELL */
+  struct chain *nodes; /* state of the recursion over the links: base, then each node */
+  double *record;  /* factors of the inertia matrix: 16 for each node */
+  V *lanes;        /* 14 groups of eight doubles for each node */
+  double *column;  /* scratch column: right-hand side, or unused output */
+  double *square;  /* scratch matrix size x size, used if v is not in the order of the tree */
 } work;
 
 _Static_assert(MBS_WORK_ROWS < 144, "MBS_TREE_WORK counts 143 rows and a column");
 
 static work space_of(const mbs_tree *m, double *w) {
   work k = {m, m->size, mbs_aligned(w), 0, 0, 0, 0, 0};
-  const size_t whole = ((size_t)k.n + 7) / 8 * 8; /* MBS_TREE_WORK counts all this */
+  const size_t whole = ((size_t)k.n + 7) / 8 * 8; /* MBS_TREE_WORK is the sum of all these */
   k.nodes = (struct chain *)(k.w + whole * MBS_WORK_ROWS);
   k.record = k.w + whole * (MBS_WORK_ROWS + 32) + 32;
   k.lanes = (V *)(k.record + 16 * (size_t)k.n);
@@ -131,8 +135,8 @@ static work space_of(const mbs_tree *m, double *w) {
   return k;
 }
 
-/* Access: lanes and single numbers, of the work space and of the table. Eight nodes stand side by
- * side, their rows one after the other. */
+/* Access to the work space and to the table, by SIMD vectors and by scalars. Blocks of eight nodes
+ * are stored row by row. */
 INLINE size_t start_of(int node, size_t rows) {
   return ((size_t)node >> 3) * (8 * rows) + ((size_t)node & 7);
 }
@@ -162,13 +166,13 @@ INLINE void put_one3(double *x, size_t s, D3 a) {
 #define PUT_O3(row, node, value) put_one3(&CELL(row, node), 8, value)
 #define EVERY_LANE for (int j = 0; j < k.n; j += MBS_LANES)
 
-/* Rows that go from node to node leave the lanes after the last one as they are: make them zero. */
+/* Set a row to zero in the unused lanes after the last node; node by node loops do not write it. */
 static void clear_ends(work k, int row, int rows) {
   for (int j = k.n; j % 8; ++j)
     for (int r = row; r < row + rows; ++r) CELL(r, j) = 0;
 }
 
-/* Joints of several velocities: pose in the link before. */
+/* Poses of joints of several velocities (spherical, free) in the parent link. */
 static void several(work k, const double *q) {
   const int *joint = k.m->joints;
   for (int c = 0; c < k.m->many; ++c, joint += 3) {
@@ -191,20 +195,20 @@ static void several(work k, const double *q) {
   }
 }
 
-/* What goes from link to link is in vectors of four, the fourth of which is zero. */
+/* Vectors of the recursion over the links have four elements; the fourth is zero. */
 typedef double Q __attribute__((vector_size(32), may_alias));
 INLINE Q turn_round(Q a) { return (Q){a[1], a[2], a[0], a[3]}; }
 INLINE Q crossed(Q a, Q b) { return turn_round(a * turn_round(b) - turn_round(a) * b); }
 
-/* Of each node, from the second on; the first is the base. */
+/* State of a link in the recursion. The first element of an array is the base, then each node. */
 struct chain {
   Q r0, r1, r2;     /* axes of the link */
-  Q w, wd, vd;      /* its motion: see W, WD and VD */
-  Q d, vo;          /* its origin from that of the link before, and its velocity: see VO */
+  Q w, wd, vd;      /* motion of the link: see rows W, WD and VD */
+  Q d, vo;          /* see rows D and VO */
 };
 typedef struct chain chain;
 
-/* Poses of all links and, where they move, their velocities and accelerations. */
+/* Poses of all links. If `moves` is 1, also their velocities and accelerations. */
 INLINE void from_link_to_link(work k, int moves) {
   const mbs_tree *m = k.m;
   const double *g = m->gravity;
@@ -213,7 +217,7 @@ INLINE void from_link_to_link(work k, int moves) {
   nodes[0] = (chain){{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, zero, zero,
                      {-g[0], -g[1], -g[2], 0}, zero, zero};
   Q r0 = zero, r1 = zero, r2 = zero, d = zero, w = zero, wd = zero, vd = zero, vo = zero;
-  Q wl = zero, angular = zero, linear = zero; /* of the link before; of the joint so far */
+  Q wl = zero, angular = zero, linear = zero; /* parent link; motion of the joint so far */
   int held = -2;
   for (int j = 0; j < k.n; held = j++) {
     const int b = m->before[j], kind = m->kind[j];
@@ -255,7 +259,7 @@ INLINE void from_link_to_link(work k, int moves) {
         wd += axis * a + crossed(wl, s);
         w += s;
         angular += s;
-        /* the velocities of a free joint are along axes that it turns */
+        /* the linear velocities of a free joint are along axes that its rotation turns */
         if (h == 2) vd += crossed(angular, linear);
       }
     }
@@ -266,7 +270,7 @@ INLINE void from_link_to_link(work k, int moves) {
 static void poses_alone(work k) { from_link_to_link(k, 0); }
 static void poses_and_motions(work k) { from_link_to_link(k, 1); }
 
-/* Two vectors of each lane's node to six rows. */
+/* Store two vectors of the node of each lane to the rows `row` and `other`. */
 INLINE void to_rows(work k, int j, const double *const *from, int at, int row, int other) {
 #if defined(MBS_PAIR) && MBS_LANES == 8
   V square[8];
@@ -283,8 +287,8 @@ INLINE void to_rows(work k, int j, const double *const *from, int at, int row, i
 #endif
 }
 
-/* Poses of all links in lanes and, where they move, their motions, which all nodes of a joint have
- * in common; and the unit motions of all nodes. */
+/* Store the poses of all links to rows, and their motions if `moves` is 1. All nodes of a joint
+ * have the motion of its last node. Also store the unit velocities of all nodes. */
 INLINE void in_lanes(work k, int moves) {
   const mbs_tree *m = k.m;
   for (int j = k.n; j % MBS_LANES; ++j) k.nodes[1 + j] = k.nodes[0];
@@ -310,7 +314,7 @@ INLINE void in_lanes(work k, int moves) {
     }
 }
 
-/* A column of numbers in the order of v brought to a row; null is zeros. */
+/* Copy a column in the order of v to a row. A null pointer is a column of zeros. */
 INLINE void gather(work k, int row, const double *from) {
   int j = 0;
   if (k.m->in_order && from)
@@ -318,7 +322,7 @@ INLINE void gather(work k, int row, const double *from) {
   for (; j < k.n; ++j) CELL(row, j) = from ? from[k.m->v_at[j]] : 0;
 }
 
-/* Poses in the links before, from positions. */
+/* Poses of all links in their parent links. */
 static void pose_joints(work k, const double *q) {
   const mbs_tree *m = k.m;
   if (m->plain)
@@ -338,8 +342,8 @@ static void pose_joints(work k, const double *q) {
   several(k, q);
 }
 
-/* Origins of all links from those of the links before and from that of the first link of their
- * tree, and, where they move, velocities for an observer. */
+/* Origins of all links relative to the parent link and to the first link of the tree, and their
+ * velocities relative to the common point. */
 static void places(work k) {
   const mbs_tree *m = k.m;
   EVERY_LANE {
@@ -364,7 +368,7 @@ static void poses(work k, const double *q) {
   in_lanes(k, 0);
 }
 
-/* First moments and inertia of all bodies in the axes of the base. */
+/* First moments and inertia of all bodies in the axes of the base, about the link origins. */
 static void bodies(work k) {
   EVERY_LANE {
     const V3 r0 = L3(R), r1 = L3(R + 3), r2 = L3(R + 6), h = TL3(MBS_H);
@@ -382,14 +386,14 @@ static void bodies(work k) {
   }
 }
 
-/* An inertia matrix xx xy xz yy yz zz times a vector. */
+/* Product of a vector and a symmetric inertia matrix with the elements xx xy xz yy yz zz. */
 #define INERTIA_TIMES(J, a)                                                                   \
   {(J)[0] * (a).x + (J)[1] * (a).y + (J)[2] * (a).z, (J)[1] * (a).x + (J)[3] * (a).y + (J)[4] * (a).z, \
    (J)[2] * (a).x + (J)[4] * (a).y + (J)[5] * (a).z}
 #define LANES6(name, row) \
   const V name[6] = {L1(row), L1((row) + 1), L1((row) + 2), L1((row) + 3), L1((row) + 4), L1((row) + 5)}
 
-/* Spins of rotors for unit velocities, in the axes of the base. */
+/* Angular momentum of the rotors for unit joint velocities, in the axes of the base. */
 static void spins(work k) {
   if (!k.m->rotors) return;
   EVERY_LANE PUT3(GB, ((V3){mbs_all(0), mbs_all(0), mbs_all(0)}));
@@ -400,7 +404,7 @@ static void spins(work k) {
   }
 }
 
-/* The wrenches of all bodies, then of all that is behind each node. */
+/* Body wrenches, then their sums over the subtree of each node (backward pass). */
 static void wrenches(work k) {
   const mbs_tree *m = k.m;
   EVERY_LANE {
@@ -419,7 +423,7 @@ static void wrenches(work k) {
   for (int j = k.n - 1, held = -1; j >= 0; --j) {
     const int b = m->before[j];
     D3 here = O3(F, j), there = O3(M, j);
-    if (held == j) { /* from the only node behind it, or the first of several */
+    if (held == j) { /* add the wrench from the only child node, or from the first of several */
       here = plus(here, f), there = plus(there, mo);
       PUT_O3(F, j, here);
       PUT_O3(M, j, there);
@@ -438,7 +442,7 @@ static void wrenches(work k) {
   }
 }
 
-/* Efforts of all nodes; what bodies and rotors need, and what the joints need themselves. */
+/* Efforts of all nodes: projected wrenches, rotors, friction and springs of the joints. */
 static void efforts(work k) {
   const mbs_tree *m = k.m;
   EVERY_LANE {
@@ -458,7 +462,7 @@ static void efforts(work k) {
   }
   const int *joint = m->joints;
   for (int c = 0; c < m->many; ++c, joint += 3)
-    if (joint[1] == 6) { /* rotors of a free joint, whose axes turn: Ia (a + w x v) */
+    if (joint[1] == 6) { /* rotor inertia of a free joint along rotating axes: Ia (a + w x v) */
       const int first = joint[0];
       double v[6], Ia[3];
       for (int h = 0; h < 6; ++h) v[h] = CELL(QD, first + h);
@@ -470,7 +474,7 @@ static void efforts(work k) {
     }
 }
 
-/* Accelerations `a` may be null, for zeros. */
+/* Inverse dynamics in the work space. If `a` is null, the accelerations are zero. */
 static void inverse(work k, const double *q, const double *v, const double *a) {
   gather(k, QD, v);
   gather(k, QDD, a);
@@ -491,7 +495,7 @@ void mbs_tree_idm(const mbs_tree *m, const double *q, const double *v, const dou
     for (int j = 0; j < k.n; ++j) tau[m->v_at[j]] = CELL(TAU, j);
 }
 
-/* Mass, first moments and inertia of all that is behind each node. */
+/* Mass, first moments and inertia of the subtree of each node (composite bodies). */
 static void composites(work k) {
   const mbs_tree *m = k.m;
   EVERY_LANE {
@@ -534,8 +538,8 @@ static void composites(work k) {
   }
 }
 
-/* Momenta of all that is behind each node for its unit velocity, and unit velocities, about the
- * common point; TAU is the inertia that the node moves. */
+/* Momentum of the subtree of each node for its unit velocity, and the unit velocities, about the
+ * common point. TAU becomes the diagonal of the inertia matrix. */
 static void momenta(work k) {
   EVERY_LANE {
     const V3 sl = L3(SL), sa = L3(SA), h = L3(CH), p = L3(P);
@@ -556,7 +560,7 @@ static void momenta(work k) {
   }
 }
 
-/* Lanes of a column of a matrix, from a node up to another one. */
+/* Store lanes to a column of a matrix; only the lanes `from` to `to` - 1 are written. */
 INLINE void put_column(double *x, int from, int to, V value) {
 #if MBS_LANES == 8
   const unsigned mask = (0xffu << (from > 0 ? from : 0)) & (0xffu >> (to < 8 ? 8 - to : 0));
@@ -574,7 +578,7 @@ INLINE void zeros(double *x, int count) {
   for (int j = 0; j < count; ++j) x[j] = 0;
 }
 
-/* A matrix in the order of the tree brought to that of v. */
+/* Permute a matrix from the order of the tree to the order of v, in place. */
 static void reorder(work k, double *x) {
   if (k.m->in_order || !x) return;
   const size_t n = (size_t)k.n;
@@ -584,7 +588,7 @@ static void reorder(work k, double *x) {
       x[(size_t)k.m->v_at[r] + n * (size_t)k.m->v_at[c]] = k.square[r + n * c];
 }
 
-/* A block of the inertia matrix within a joint made symmetric to the last bit. */
+/* Make the blocks of joints of several velocities in the inertia matrix exactly symmetric. */
 static void mirror(work k, double *A) {
   const size_t n = (size_t)k.n;
   const int *joint = k.m->joints;
@@ -595,10 +599,10 @@ static void mirror(work k, double *A) {
   }
 }
 
-/* The lanes that hold the nodes from one up to another. */
+/* Loop over the vectors that contain the nodes `from` to `to` - 1. */
 #define LANES_OF(from, to) for (int j = (from) & -MBS_LANES; j < (to); j += MBS_LANES)
 
-/* The inertia matrix, column by column: the links before, then the joint and all behind it. */
+/* Inertia matrix, column by column: ancestors of the joint, then the joint and its subtree. */
 static void inertia(work k, double *A) {
   const mbs_tree *m = k.m;
   for (int c = 0; c < k.n; ++c, A += k.n) {
@@ -618,7 +622,7 @@ static void inertia(work k, double *A) {
   }
 }
 
-/* The momenta of composite bodies at unit velocities: columns of the inertia matrix follow. */
+/* Momenta of the composite bodies at q, from which the inertia matrix is formed. */
 static void composites_at(work k, const double *q) {
   poses(k, q);
   places(k);
@@ -637,7 +641,7 @@ void mbs_tree_inertia(const mbs_tree *m, const double *q, double *A, double *w) 
   reorder(k, A);
 }
 
-/* The sum over the nodes of a joint of a row times the velocities. */
+/* Sum over the nodes of a joint of a row times the velocity. */
 static D3 of_joint(work k, int row, const int *joint) {
   D3 total = {0, 0, 0};
   for (int h = 0; h < joint[1]; ++h)
@@ -645,18 +649,18 @@ static D3 of_joint(work k, int row, const int *joint) {
   return total;
 }
 
-/* Motions of the links before, and places in the tree. Velocities are those that an observer sees
- * who follows the first link of the tree, whose origin is the common point. */
+/* Motions of the parent links. Velocities VL are relative to the common point, which moves with the
+ * first link of the tree. */
 static void links_before(work k) {
   const mbs_tree *m = k.m;
   EVERY_LANE {
     const double *from[MBS_LANES];
     for (int l = 0; l < MBS_LANES; ++l)
       from[l] = (const double *)&k.nodes[1 + (j + l < k.n ? m->link[j + l] : -1)].r2;
-    to_rows(k, j, from, 0, WDL, WL); /* of r2, which WDL does not keep, and w */
+    to_rows(k, j, from, 0, WDL, WL); /* r2 and w; WDL is overwritten by the next line */
     to_rows(k, j, from, 8, WDL, VDL);
-    to_rows(k, j, from, 16, VL, VL); /* of d, likewise, and vo */
-    /* the point of the link before that is at the origin */
+    to_rows(k, j, from, 16, VL, VL); /* d and vo; the second one remains */
+    /* velocity of the point of the parent link that coincides with the origin of the link */
     const V inner = TL1(MBS_INNER), v = inner * L1(QD) - L1(QD);
     PUT3(VL, more(plus_cross(times(inner, L3(VL)), L3(WL), L3(D)), v, L3(SL)));
   }
@@ -668,8 +672,8 @@ static void links_before(work k) {
     }
 }
 
-/* Twice the momentum of all that is behind each node, and the matrix K that gives the moment which
- * an angular velocity s adds: 2 (tr(N) - N) s, where N is the integral of velocity times place. */
+/* Twice the momentum of the subtree of each node, and the matrix K: the moment that an angular
+ * velocity s adds is K s = 2 (tr(N) - N) s, where N is the integral of velocity times position. */
 static void moving_composites(work k) {
   const mbs_tree *m = k.m;
   EVERY_LANE {
@@ -678,7 +682,7 @@ static void moving_composites(work k) {
     const V mass = TL1(MBS_MASS), trace = J[0] + J[3] + J[5];
     const V3 n = times(mbs_all(2), plus_cross(times(mass, v), w, h)), v2 = times(mbs_all(2), v);
     const V vh = dot(v2, h);
-    /* column c: 2 w x J_c - trace w x e_c + 2 (v . h) e_c - 2 v h_c */
+    /* column c of K: 2 w x J_c - trace w x e_c + 2 (v . h) e_c - 2 v h_c */
     const V3 w2 = times(mbs_all(2), w);
     V3 x = cross(w2, ((V3){J[0], J[1], J[2]})), y = cross(w2, ((V3){J[1], J[3], J[4]})),
        z = cross(w2, ((V3){J[2], J[4], J[5]}));
@@ -691,7 +695,7 @@ static void moving_composites(work k) {
     PUT3(K + 3, y);
     PUT3(K + 6, z);
   }
-  for (int r = 0; r < m->rotors; ++r) { /* K - spin x */
+  for (int r = 0; r < m->rotors; ++r) { /* K - spin x, with the spin of the rotor */
     const int node = m->rotor[2 * r], c = m->rotor[2 * r + 1];
     const D3 s = times(CELL(QD, node), O3(GB, node));
     CELL(K + 1, c) -= s.z, CELL(K + 2, c) += s.y;
@@ -712,7 +716,7 @@ static void moving_composites(work k) {
       n = O3(N2, j), x = O3(K, j), y = O3(K + 3, j), z = O3(K + 6, j);
     }
     if (b < 0) continue;
-    if (m->link[j] == b) { /* about the origin of the link before: (n . d) - n d' */
+    if (m->link[j] == b) { /* shift to the origin of the parent link: add (n . d) - n d' */
       const D3 d = O3(D, j);
       const double nd = dot(n, d);
       x = more(x, -d.x, n), y = more(y, -d.y, n), z = more(z, -d.z, n);
@@ -729,7 +733,8 @@ static void moving_composites(work k) {
   }
 }
 
-/* What a node changes of the wrench behind it, and how its effort changes with other nodes. */
+/* Derivatives of the subtree wrench of each node with respect to its position and velocity, and
+ * the terms by which its effort depends on the motion of other nodes. */
 static void changes(work k) {
   const mbs_tree *m = k.m;
   EVERY_LANE {
@@ -737,10 +742,10 @@ static void changes(work k) {
     const V3 d = L3(D), h = L3(CH), n = L3(N2), k0 = L3(K), k1 = L3(K + 3), k2 = L3(K + 6);
     const V mass = L1(CM);
     LANES6(J, CJ);
-    /* acceleration of the point of the link before, less w x v: that of a twist */
+    /* acceleration of the point of the parent link, minus w x v: the linear part of a twist */
     const V3 swing = cross(wl, d);
     const V3 al = plus_cross(plus_cross(L3(VDL), wdl, d), wl, minus(swing, vl));
-    /* rates of the unit velocity S of the node: y = v x S, y2 = a x S + v x y, v of the link before */
+    /* rates of the unit velocity S of the node: y = v x S, y2 = a x S + v x y; v: parent link */
     const V3 yl = plus_cross(cross(wl, sl), vl, sa), ya = cross(wl, sa);
     const V3 y2l = plus_cross(plus_cross(plus_cross(cross(wdl, sl), al, sa), wl, yl), vl, ya);
     const V3 y2a = plus_cross(cross(wdl, sa), wl, ya);
@@ -750,9 +755,9 @@ static void changes(work k) {
     PUT3(Y2A, y2a);
     PUT3(YSL, plus_cross(ysl, p, ysa));
     PUT3(YSA, ysa);
-    /* effort for an angular velocity of all behind: K' sa + n x sl */
+    /* effort per angular velocity of the subtree: K' sa + n x sl */
     PUT3(GA, plus_cross(((V3){dot(k0, sa), dot(k1, sa), dot(k2, sa)}), n, sl));
-    /* change with the position: I y2 + K y + S x f */
+    /* derivative of the wrench by the position: I y2 + K y + S x f */
     const V3 Jy2 = INERTIA_TIMES(J, y2a), Jys = INERTIA_TIMES(J, ysa);
     const V3 f = L3(F);
     const V3 ql = plus_cross(plus_cross(plus_cross(times(mass, y2l), y2a, h), ya, n), sa, f);
@@ -760,7 +765,7 @@ static void changes(work k) {
                                                    y2l), sa, L3(M)), sl, f);
     PUT3(DQL, ql);
     PUT3(DQA, plus_cross(qa, p, ql));
-    /* and with the velocity: I ys + K sa */
+    /* derivative of the wrench by the velocity: I ys + K sa */
     const V3 ul = plus_cross(plus_cross(times(mass, ysl), ysa, h), sa, n);
     const V3 ua = plus_cross(plus(Jys, combine(k0, sa.x, k1, sa.y, k2, sa.z)), h, ysl);
     PUT3(DVL, ul);
@@ -774,8 +779,8 @@ static void changes(work k) {
   }
 }
 
-/* The derivatives, column by column from its top as `inertia`; a matrix that is null is left out:
- * its columns go to one and the same place. */
+/* Derivatives of the efforts by positions and velocities, and the inertia matrix, column by column
+ * from the top as in `inertia`. A matrix may be null; its columns are then discarded. */
 static void pairs(work k, double *dq, double *dv, double *A) {
   const mbs_tree *m = k.m;
   const size_t n = (size_t)k.n;
@@ -815,7 +820,7 @@ static void pairs(work k, double *dq, double *dv, double *A) {
     zeros(dq + end, k.n - end);
     zeros(dv + end, k.n - end);
     zeros(A + end, k.n - end);
-    /* what the joint needs itself */
+    /* spring and friction of the joint itself */
     const double v = CELL(QD, c), Fs = FACT(MBS_FS, c), width = FACT(MBS_WIDTH, c);
     dq[c] += FACT(MBS_STIFFNESS, c);
     dv[c] += FACT(MBS_FV, c);
@@ -827,9 +832,9 @@ static void pairs(work k, double *dq, double *dv, double *A) {
   }
 }
 
-/* What `pairs` leaves to do about rotors. One that spins with its own link turns it too; one on the
- * link before does not feel its own joint, which `changes` gave to it as to all nodes before. Those
- * of a free joint have axes that turn: Ia (a + w x v). */
+/* Corrections of `pairs` for rotors. A rotor on its own link is also rotated by its joint. A rotor
+ * on the parent link does not move with its own joint, but `changes` treats it as if it did. The
+ * rotors of a free joint have rotating axes: Ia (a + w x v). */
 static void turning_rotors(work k, double *dq, double *dv) {
   const mbs_tree *m = k.m;
   const size_t n = (size_t)k.n;
@@ -854,7 +859,7 @@ static void turning_rotors(work k, double *dq, double *dv) {
         const double Ia = FACT(MBS_IA, joint[0] + x);
         double v[6];
         for (int h = 0; h < 6; ++h) v[h] = CELL(QD, joint[0] + h);
-        double *row = dv + first + (size_t)x + n * first; /* of the elements of w x v */
+        double *row = dv + first + (size_t)x + n * first; /* row of element x of w x v */
         row[n * (size_t)z] += Ia * v[3 + y];
         row[n * (size_t)y] -= Ia * v[3 + z];
         row[n * (size_t)(3 + y)] += Ia * v[z];
@@ -862,7 +867,7 @@ static void turning_rotors(work k, double *dq, double *dv) {
       }
 }
 
-/* Derivatives of the efforts in the order of the tree; what `inverse` found is in the work space. */
+/* Derivatives of the efforts in the order of the tree; uses the work space left by `inverse`. */
 static void slopes(work k, double *dq, double *dv, double *A) {
   places(k);
   links_before(k);
@@ -887,8 +892,8 @@ void mbs_tree_idm_derivatives(const mbs_tree *m, const double *q, const double *
   reorder(k, A);
 }
 
-/* What a solution needs of each node. */
-enum { RS = 0, RU = 6, RD = 12, RP = 13 }; /* motion, U / D, 1 / D, origin */
+/* Elements of a record: factors of the inertia matrix at a node. */
+enum { RS = 0, RU = 6, RD = 12, RP = 13 }; /* unit velocity, U / D, 1 / D, vector D of the origin */
 
 /* A matrix of three columns. */
 typedef struct {
@@ -916,7 +921,7 @@ INLINE columns transposed(columns A) {
 #endif
 }
 
-/* An inertia matrix of six rows: force M al + N wd, moment N' al + J wd. */
+/* Articulated inertia (6 x 6): force = M al + N wd, moment = N' al + J wd. */
 typedef struct {
   columns M, N, J;
 } articulated;
@@ -925,7 +930,7 @@ INLINE void add(articulated *I, const articulated *other) {
   I->M = sum(I->M, other->M), I->N = sum(I->N, other->N), I->J = sum(I->J, other->J);
 }
 
-/* The inertia with that of a body. */
+/* Add the inertia of the body of node j. */
 INLINE void add_body(work k, articulated *I, int j) {
   const Q x = {1, 0, 0, 0}, y = {0, 1, 0, 0}, z = {0, 0, 1, 0};
   const double m = FACT(MBS_MASS, j), hx = CELL(HB, j), hy = CELL(HB + 1, j), hz = CELL(HB + 2, j);
@@ -936,7 +941,7 @@ INLINE void add_body(work k, articulated *I, int j) {
   I->J.z += CELL(JB + 2, j) * x + CELL(JB + 4, j) * y + CELL(JB + 5, j) * z;
 }
 
-/* The same inertia about a point that is d behind. */
+/* Shift an inertia to the point that lies at -d from the current reference point. */
 INLINE void shift(articulated *I, Q d) {
   const columns M = I->M, before = transposed(crossed_columns(d, I->N));
   I->N.x += M.z * d[1] - M.y * d[2];
@@ -947,7 +952,7 @@ INLINE void shift(articulated *I, Q d) {
 
 INLINE double sum3(Q a) { return a[0] + a[1] + a[2]; }
 
-/* The articulated inertia of each node as far as a solution needs it. */
+/* Factorise the inertia matrix by articulated bodies; stores a record for each node. */
 static void factorise(work k) {
   const mbs_tree *m = k.m;
   const Q zero = {0, 0, 0, 0};
@@ -972,7 +977,7 @@ static void factorise(work k) {
       a = product(I.J, sa) + (Q){sum3(I.N.x * sl), sum3(I.N.y * sl), sum3(I.N.z * sl), 0};
     }
     double inertia = sum3(sl * l + sa * a) + FACT(MBS_IA, j);
-    if (m->rotors) { /* U + spin; the rotor of a joint on its own link feels the joint too */
+    if (m->rotors) { /* U + spin; a rotor on the link of its own joint is also rotated by it */
       const Q g = {CELL(GB, j), CELL(GB + 1, j), CELL(GB + 2, j), 0};
       a += g;
       inertia += 2 * FACT(MBS_OWN, j) * sum3(g * sa);
@@ -996,10 +1001,11 @@ static void factorise(work k) {
   }
 }
 
-/* Solutions of A a = right by the factors, in place, of W columns or of W groups of them in lanes:
- * two groups at once, for one alone waits for its own results. Nodes from `count` on have zeros to
- * the right, and are not wanted. Wrenches and accelerations pass from node to node in f; what
- * forks in the tree need of them is in `at`, six for each node. */
+/* Solve A x = right-hand side by the factors, in place, for W columns, or for W groups of columns
+ * in lanes. Two groups are solved at once, because a single group waits for its own results. Nodes
+ * from `count` on have a zero right-hand side, and their solution is not computed. `f` is the
+ * wrench, then the acceleration, that passes from node to node. `at` stores six elements of f for
+ * each node with several children. */
 #define EACH(W) _Pragma("GCC unroll 2") for (int h = 0; h < W; ++h)
 #define SIX(W, TO, OP, FROM)                                                                  \
   EACH(W) {                                                                                   \
@@ -1074,7 +1080,7 @@ static void solve(work k, double *x) {
   solve_one(k, (double(*)[1])x, k.n, (double(*)[6][1])k.lanes);
 }
 
-/* The accelerations, in the order of the tree, in the spare row; `inverse` was without any. */
+/* Accelerations in the order of the tree, to k.column; `inverse` was called with a = 0. */
 static void accelerations(work k, const double *tau) {
   double *a = k.column;
   for (int j = 0; j < k.n; ++j) a[j] = tau[k.m->v_at[j]] - CELL(TAU, j);
@@ -1091,8 +1097,9 @@ void mbs_tree_ddm(const mbs_tree *m, const double *q, const double *v, const dou
     for (int j = 0; j < k.n; ++j) a[m->v_at[j]] = k.column[j];
 }
 
-/* Columns of a matrix side by side in lanes, every second vector, with the opposite sign; and back.
- * Squares of rows, of which the last overlaps the one before it. */
+/* to_lanes transposes columns of a matrix to lanes, with opposite sign; from_lanes transposes them
+ * back. h selects the group of columns. Rows are processed in square blocks; the last block may
+ * overlap the previous block. */
 static void to_lanes(V (*rows)[2], int h, int count, int columns, const double *from, size_t step) {
   int first = 0;
 #if defined(MBS_PAIR)
@@ -1130,12 +1137,12 @@ static void from_lanes(V (*rows)[2], int h, int count, int columns, double *to, 
 
 INLINE int least(int a, int b) { return a < b ? a : b; }
 
-/* - A^-1 times matrices, in place; one of them may be null. */
+/* Replace matrices by - A^-1 times the matrix; one of them may be null. */
 static void solve_matrices(work k, double *dq, double *dv) {
   const size_t n = (size_t)k.n;
   V(*rows)[2] = (V(*)[2])(k.lanes + 12 * n);
   double *both[2] = {dq ? dq : dv, dv ? dv : dq};
-  /* two groups of columns: of both matrices, or one behind the other of the only one */
+  /* two groups of columns: one of each matrix, or two consecutive groups of the only matrix */
   const int step = dq && dv ? MBS_LANES : 2 * MBS_LANES;
   for (int c = 0; c < k.n; c += step) {
     const int at[2] = {c, dq && dv ? c : least(c + MBS_LANES, k.n)};
@@ -1147,7 +1154,7 @@ static void solve_matrices(work k, double *dq, double *dv) {
   }
 }
 
-/* A^-1: its upper triangle needs no node behind the column's; the lower one is the same. */
+/* A^-1. Only the upper triangle is solved, which needs no later nodes; it is then mirrored. */
 static void inverse_matrix(work k, double *x) {
   const size_t n = (size_t)k.n;
   V(*rows)[2] = (V(*)[2])(k.lanes + 12 * n);
@@ -1172,7 +1179,7 @@ void mbs_tree_ddm_derivatives(const mbs_tree *m, const double *q, const double *
   inverse(k, q, v, 0);
   accelerations(k, tau);
   const double *found = k.column;
-  double *given = (double *)k.lanes; /* in the order of v */
+  double *given = (double *)k.lanes; /* accelerations in the order of v */
   for (int j = 0; j < k.n; ++j) given[m->v_at[j]] = found[j];
   if (a) memcpy(a, given, (size_t)k.n * sizeof(double));
   if (dq || dv) {
@@ -1210,7 +1217,7 @@ void mbs_tree_by_positions(const mbs_tree *m, const double *q, const double *alo
     const double *e = q + at;
     const double square = e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3];
     const double w = e[0], x = e[1], y = e[2], z = e[3];
-    /* velocities for the elements of the quaternion: 2 / |e|^2 (-e, w - e x)' */
+    /* angular velocity per rate of the quaternion e = (w, x, y, z): 2 / |e|^2 (-e, w - e x)' */
     const double by[4][3] = {{-x, -y, -z}, {w, -z, y}, {z, w, -x}, {-y, x, w}};
     for (int h = 0; h < 4; ++h) {
       double *to = by_q + n * (size_t)(at + h);
@@ -1223,7 +1230,7 @@ void mbs_tree_by_positions(const mbs_tree *m, const double *q, const double *alo
     const D3 Q[3] = {{w * w + x * x - y * y - z * z, 2 * (x * y + w * z), 2 * (x * z - w * y)},
                      {2 * (x * y - w * z), w * w - x * x + y * y - z * z, 2 * (y * z + w * x)},
                      {2 * (x * z + w * y), 2 * (y * z - w * x), w * w - x * x - y * y + z * z}};
-    for (int h = 0; h < 3; ++h) { /* velocities for the elements of the place: rows of Q */
+    for (int h = 0; h < 3; ++h) { /* linear velocity per rate of the position: rows of Q */
       double *to = by_q + n * (size_t)(joint[2] + h), row[3];
       for (int r = 0; r < 3; ++r) row[r] = (h == 0 ? Q[r].x : h == 1 ? Q[r].y : Q[r].z) / square;
       for (size_t i = 0; i < n; ++i) {

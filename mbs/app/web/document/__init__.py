@@ -1,1 +1,1 @@
-"""A robot as typed: text cells, what is wrong with them, the files they come from."""
+"""A robot as the user types it: text cells, errors in cells, and files that it is read from."""

@@ -1,4 +1,4 @@
-"""A robot in the app: what was typed or opened, what is wrong in it, and its System."""
+"""Description of a robot in the app, as typed or opened, with its errors and its System."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from mbs.mechanism import Mechanism
 from mbs.robots import catalogue
 from mbs.text import did_you_mean
 
-# What is wrong in a robot's tables, and in which cell.
+# Errors in the tables of a robot, and the cells that they are about.
 
 
 _ROW = re.compile(r"(?:^|/)(frame|body|loop) (\d+)\b")
@@ -49,7 +49,7 @@ _ALIASES = {"sigma": "joint", "cut": "frame", "motor": "actuated"}
 
 
 def unread(tables: Tables) -> Iterator[CellProblem]:
-    """Every cell whose text cannot be read."""
+    """Yield a problem for every cell whose text cannot be read."""
     for cell, text in tables.cells():
         try:
             reader_of(*cell)(text, place_of(*cell))
@@ -58,7 +58,7 @@ def unread(tables: Tables) -> Iterator[CellProblem]:
 
 
 def placed(tables: Tables, error: MbsError) -> CellProblem:
-    """The cell that an error is about, as far as its sentence tells."""
+    """Return the cell that an error is about, as far as the error message identifies it."""
     sentence = str(error)
     return (
         _by_number(tables, sentence)
@@ -79,9 +79,9 @@ def _by_number(tables: Tables, sentence: str) -> CellProblem | None:
 
 
 def _by_name(tables: Tables, sentence: str) -> CellProblem | None:
-    """The row whose joint or body has the name that the sentence quotes or begins with.
+    """Find the row whose joint or body name the error message quotes or begins with.
 
-    Where there are two, it is the one that was named by hand, or the last one.
+    If several rows match, a row that the user named is preferred, then the last row.
     """
     by_hand = [bool(g[-1].strip() or b[-1].strip()) for g, b in _pairs(tables)]
     for row in sorted(range(len(by_hand)), key=lambda k: (by_hand[k], k), reverse=True):
@@ -119,7 +119,7 @@ def _after(sentence: str, name: str) -> str:
 
 
 def _column(sheet: str, words: str) -> str:
-    """The first word that is the name of a column."""
+    """Return the first word that is the name of a column; empty if there is none."""
     columns: Any = COLUMNS[sheet]
     for word in _WORD.findall(words):
         if (known := _ALIASES.get(word, word)) in columns:
@@ -129,18 +129,18 @@ def _column(sheet: str, words: str) -> str:
 
 _UNSAFE = re.compile(r"[^A-Za-z0-9_-]+")
 _KEPT = 24
-"""Assembled systems that are kept; they are the same for every visitor."""
+"""Number of assembled systems that are cached for all visitors."""
 
 
 @dataclass(frozen=True, slots=True)
 class DocumentOrigin:
-    """Where a mechanism comes from that its tables do not say.
+    """Source of a mechanism that a table of frames cannot express.
 
     Attributes:
-        name: in the catalogue, or "" for a file.
-        content: of the file.
-        suffix: of the file's name.
-        reason: why no table of frames says it.
+        name: name in the catalogue, or "" for a file.
+        content: content of the file.
+        suffix: suffix of the file name.
+        reason: reason why a table of frames cannot express it.
     """
 
     name: str
@@ -149,7 +149,7 @@ class DocumentOrigin:
     reason: str = ""
 
     def mechanism(self) -> Mechanism:
-        """The mechanism, made anew."""
+        """Build the mechanism from its source."""
         if self.name:
             return catalogue()[self.name]()
         made = read_upload(self.content, self.suffix)
@@ -158,12 +158,12 @@ class DocumentOrigin:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A robot as texts: hashable, picklable, never changed.
+    """Description of a robot as text cells; immutable, hashable and picklable.
 
     Attributes:
-        tables: the cells; of a mechanism with an `origin` only its name, its source and the
-            values of its symbols.
-        origin: where a mechanism comes from that no table of frames can say; None for the others.
+        tables: the cells. For a mechanism with an `origin` only name, gravity, mount, source and
+            the values of symbols.
+        origin: source of a mechanism that a table of frames cannot express; else None.
     """
 
     tables: Tables
@@ -171,20 +171,20 @@ class Document:
 
     @staticmethod
     def of(table: RobotTable) -> Document:
-        """The document of a table of frames."""
+        """Return the document of a table of frames."""
         return Document(tables_of(table))
 
     @staticmethod
     def blank() -> Document:
-        """A robot of one joint, to begin with."""
+        """Return a new robot with a single joint."""
         return Document(document_rows.blank())
 
     @staticmethod
     def of_name(name: str) -> Document:
-        """A mechanism of the catalogue.
+        """Return the document of a mechanism of the catalogue.
 
         Raises:
-            DescriptionError: there is none of this name.
+            DescriptionError: the catalogue has no robot with this name.
         """
         if name not in catalogue():
             raise DescriptionError(
@@ -194,10 +194,10 @@ class Document:
 
     @staticmethod
     def of_upload(content: bytes, suffix: str) -> Document:
-        """The robot in a file: .toml, .par, .urdf, .sdf, .world or .xml (MJCF).
+        """Return the document of a robot file: .toml, .par, .urdf, .sdf, .world or .xml (MJCF).
 
         Raises:
-            DescriptionError: the file is too large, of another kind, or malformed.
+            DescriptionError: the file is too large, of another type, or malformed.
         """
         made = read_upload(content, suffix)
         if isinstance(made, RobotTable):
@@ -206,26 +206,26 @@ class Document:
 
     @property
     def name(self) -> str:
-        """Of the robot."""
+        """Name of the robot."""
         return self.tables.general[0].strip() or "robot"
 
     @property
     def is_table(self) -> bool:
-        """Whether the cells say the whole robot, so that they can be changed."""
+        """Whether the cells describe the robot completely, so that they can be edited."""
         return self.origin is None
 
     @property
     def symbols(self) -> tuple[str, ...]:
-        """Names of its symbols."""
+        """Names of the symbols of the robot."""
         if self.origin is None:
             return self.tables.symbols
         return tuple(name for name, _ in self.tables.values)
 
     def changed(self, cell: Cell, text: str) -> Document:
-        """The document with another text in a cell.
+        """Return the document with another text in a cell.
 
         Raises:
-            DescriptionError: there is no such cell, or it cannot be changed.
+            DescriptionError: the cell does not exist, or cannot be changed.
         """
         if self.origin is not None:
             if cell.sheet == "general" and cell.row in (*GRAVITY_ROWS, MOUNT_ROW):
@@ -239,54 +239,55 @@ class Document:
         return replace(self, tables=self.tables.changed(cell, text[: LONGEST_CELL + 1]))
 
     def with_frame(self) -> Document:
-        """One more frame at the end."""
+        """Return the document with an additional frame at the end."""
         return self._edit(document_rows.with_frame)
 
     def without_frame(self, row: int) -> Document:
-        """Frame row + 1 taken out; numbers of the others follow."""
+        """Return the document without frame row + 1; the numbers of later frames decrease."""
         return self._edit(lambda tables: document_rows.without_frame(tables, row))
 
     def with_loop(self) -> Document:
-        """One more loop."""
+        """Return the document with an additional loop."""
         return self._edit(document_rows.with_loop)
 
     def without_loop(self, row: int) -> Document:
-        """Loop row + 1 taken out."""
+        """Return the document without loop row + 1."""
         return self._edit(lambda tables: document_rows.without_loop(tables, row))
 
     @property
     def problems(self) -> tuple[CellProblem, ...]:
-        """What is wrong in the tables, cell by cell; what only assembly finds is not among it."""
+        """Errors in the tables by cell, without errors that only assembly can find."""
         return _problems(self)
 
     @property
     def file_name(self) -> str:
-        """The name in safe characters, for files."""
+        """Name of the robot in safe characters, for file names."""
         return _UNSAFE.sub("_", self.name)[:60].strip("_") or "robot"
 
     def as_table(self) -> Document:
-        """The table of frames with the links of the mechanism, for one that was composed.
+        """Convert the links of an assembled mechanism to a table of frames.
 
         Raises:
-            MbsError: no table of frames says it, or it cannot be assembled.
+            MbsError: a table of frames cannot express it, or it cannot be assembled.
         """
         return self if self.origin is None else Document.of_upload(toml(self.system()), ".toml")
 
     def table(self) -> RobotTable:
-        """The table of frames.
+        """Return the table of frames that the cells describe.
 
         Raises:
-            DescriptionError: the cells do not say one, or the mechanism cannot be said by one.
+            DescriptionError: the cells are not a valid table, or a table cannot express the
+                mechanism.
         """
         if self.origin is not None:
             raise DescriptionError(self.origin.reason)
         return _table(self)
 
     def mechanism(self) -> Mechanism:
-        """The mechanism, with the values of symbols as typed.
+        """Return the mechanism, with the values of symbols as typed.
 
         Raises:
-            MbsError: something is wrong in a cell.
+            MbsError: a cell has an error.
         """
         if self.origin is None:
             mechanism = to_mechanism(self.table())
@@ -299,13 +300,13 @@ class Document:
         return mechanism
 
     def _set_values(self, mechanism: Mechanism, names: Collection[str]) -> None:
-        """Set the values of symbols of these names that have one."""
+        """Set the values of the symbols with these names, if they have a value."""
         for name, text in self.tables.values:
             if name in names and text.strip():
                 mechanism.values[name] = Parameter(name, number(text, f"symbol {name}"))
 
     def _change_gravity(self, mechanism: Mechanism) -> None:
-        """Give a mechanism the gravity and the mount of the cells, if they are other ones."""
+        """Set gravity and mount of a mechanism from the cells, if they differ."""
         cells = [Cell("general", k, "value") for k in GRAVITY_ROWS]
         texts = [self.tables.text(cell) for cell in cells]
         gravity = None
@@ -316,34 +317,34 @@ class Document:
             mechanism.change_gravity(gravity, mounted or None)
 
     def system(self) -> System:
-        """The assembled mechanism; the same System for equal documents.
+        """Return the assembled mechanism; equal documents share the same System.
 
         Raises:
-            MbsError: a cell is wrong, or the mechanism cannot be assembled.
+            MbsError: a cell has an error, or the mechanism cannot be assembled.
         """
         return _system(self)
 
     def shown(self) -> Tables:
-        """The tables to look at: the cells, or what a composed mechanism was assembled into.
+        """Return the tables to display: the cells, or the links of an assembled mechanism.
 
         Raises:
-            MbsError: it cannot be assembled.
+            MbsError: the mechanism cannot be assembled.
         """
         return self.tables if self.origin is None else _shown(self)
 
     def toml(self) -> str:
-        """The text of a TOML file of the table.
+        """Return the text of a TOML file of the table.
 
         Raises:
-            DescriptionError: as in `table`.
+            DescriptionError: see `table`.
         """
         return self._write(write_toml, "robot.toml")
 
     def par(self) -> str:
-        """The text of a .par file of the table.
+        """Return the text of a .par file of the table.
 
         Raises:
-            DescriptionError: as in `table`, or the format cannot say it.
+            DescriptionError: see `table`, or the format cannot express the table.
         """
         return self._write(write_par, "robot.par")
 

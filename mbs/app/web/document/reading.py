@@ -1,4 +1,4 @@
-"""The table of frames of a mechanism that was made from one, and uploaded files."""
+"""Reading of uploaded files, and conversion of mechanisms to tables of frames."""
 
 from __future__ import annotations
 
@@ -45,24 +45,25 @@ from mbs.mechanism import Mechanism
 from mbs.spatial.inertia import TEN_PARAMETERS
 from mbs.text import did_you_mean, quoted
 
-# MJCF files that were sent: what MuJoCo would read from other files is refused beforehand.
+# Uploaded MJCF files: references to other files, which MuJoCo would read, are rejected first.
 
 
 _PARTS = ("include", "model", "attach")
-"""Elements that stand for parts of the model in another file."""
+"""Elements that insert parts of the model from another file."""
 
 
 def close_mjcf(path: Path) -> None:
-    """Write the file anew as its parser understood it, once it is sure to name no other place.
+    """Check that an MJCF file refers to no other location, and rewrite the file as parsed.
 
-    MuJoCo reads XML in a way of its own; it gets what was checked. Meshes may be named by plain
-    relative paths: bodies whose inertia is given need none of them.
+    The XML parser of MuJoCo differs from the parser of the check, so MuJoCo reads the rewritten
+    file. Meshes with plain relative paths are permitted: they are not needed for bodies
+    with given inertia.
 
     Args:
-        path: of the file, alone in its folder.
+        path: path of the file, which must be alone in its folder.
 
     Raises:
-        DescriptionError: it is not XML, or names files at other places.
+        DescriptionError: the file is not XML, or refers to files at other locations.
     """
     root = parse_xml(path)
     for element in root.iter():
@@ -81,13 +82,13 @@ def _check(path: Path, element: Element) -> None:
 
 
 def _is_inside(value: str) -> bool:
-    """Whether a path stays in the folder of the file."""
+    """Return whether a path stays in the folder of the file."""
     plain = value.replace("\\", "/")
     return not plain.startswith("/") and ":" not in plain and ".." not in plain.split("/")
 
 
 LARGEST_UPLOAD = 5_000_000
-"""Bytes that an uploaded file may have."""
+"""Maximum size of an uploaded file in bytes."""
 
 READERS: Mapping[str, Callable[[Path], RobotTable | Mechanism]] = MappingProxyType(
     {
@@ -99,23 +100,23 @@ READERS: Mapping[str, Callable[[Path], RobotTable | Mechanism]] = MappingProxyTy
         ".xml": partial(read_mjcf, other_files=False),
     }
 )
-"""Suffixes of files that are read."""
+"""Readers by file name suffix."""
 
 _DRIVE = (*DRIVE, "Fs_width", "rest", "rotor")
 _SIGMA: Mapping[type[Joint], int] = MappingProxyType({Revolute: 0, Prismatic: 1})
 
 
 def read_upload(content: bytes, suffix: str) -> RobotTable | Mechanism:
-    """What a file says that somebody sent.
+    """Read a robot from the content of an uploaded file.
 
-    It is read under a name of our own in a folder of its own, where no other file is.
+    The file is stored under a fixed name in its own temporary folder, without other files.
 
     Args:
-        content: of the file.
-        suffix: the end of its name, such as ".par", which chooses the reader.
+        content: content of the file.
+        suffix: suffix of the file name, such as ".par", which selects the reader.
 
     Raises:
-        DescriptionError: the file is too large, of another kind, or malformed.
+        DescriptionError: the file is too large, of another type, or malformed.
     """
     kind = suffix.lower()
     if kind not in READERS:
@@ -136,10 +137,11 @@ def read_upload(content: bytes, suffix: str) -> RobotTable | Mechanism:
 
 
 def table_of(mechanism: Mechanism) -> RobotTable:
-    """The table of frames that a mechanism was made from.
+    """Return the table of frames from which a mechanism was made.
 
     Raises:
-        DescriptionError: it was made otherwise; the sentence names what no table can say.
+        DescriptionError: the mechanism was made in another way; the message names the part that a
+            table cannot express.
     """
     _require_plain(mechanism)
     table = _table(mechanism)
@@ -176,7 +178,7 @@ def _require_plain(mechanism: Mechanism) -> None:
 
 
 def _table(mechanism: Mechanism) -> RobotTable:
-    """The rows in the order of the bodies, the frames of cut joints last."""
+    """Return the table of frames: rows in the order of the bodies, cut joints last."""
     bodies = [body for body in mechanism.bodies() if isinstance(body, KhalilBody)]
     numbers = {mechanism.world.name: 0, **{body.name: j for j, body in enumerate(bodies, 1)}}
     placed: dict[str, tuple[Point, Joint | None]] = {}
@@ -218,7 +220,7 @@ def _sort(
     placed: dict[str, tuple[Point, Joint | None]],
     cuts: dict[str, list[Point]],
 ) -> None:
-    """Put one weld to what it belongs to: a body, a joint before a body, or a cut joint."""
+    """Assign a connection to its body, to the joint before a body, or to a cut joint."""
     for joint, other in ((a.owner, b), (b.owner, a)):
         if isinstance(joint, Joint) and joint.name in cuts:
             cuts[joint.name].append(other)
@@ -287,18 +289,18 @@ def _cut_kind(joint: Joint) -> str:
     return kind
 
 
-# What the tables show of a mechanism that was composed: the links that it was assembled into.
+# Tables of a composed mechanism: they show the links into which it was assembled.
 
 
 _DIGITS = 9
 
 
 def shown_tables(system: System, tables: Tables) -> Tables:
-    """The frames and inertias of the links, and the loops, as texts that are only read.
+    """Return tables with frames and inertias of the links, and the loops, for display only.
 
     Args:
-        system: the assembled mechanism.
-        tables: with its name and the values of its symbols.
+        system: assembled mechanism.
+        tables: tables with its name and the values of its symbols.
     """
     return Tables(
         geometry=tuple(_geometry(system, row) for row in system.links),
@@ -327,7 +329,7 @@ def _geometry(system: System, row: LinkRow) -> Texts:
 
 
 def _fixed_frame(six: tuple[float | SX, ...]) -> str:
-    """A fixed frame on the way to a link, by its parameters that are not zero."""
+    """Return the text of a fixed frame before a link, with its non-zero parameters."""
     values = (f"{k} {_text(x)}" for k, x in zip(GEOMETRY, six, strict=True) if not _is_zero(x))
     return f"fixed frame ({', '.join(values)})"
 
@@ -347,7 +349,7 @@ def _inertia(system: System, j: int) -> Texts:
 
 
 def _number(system: System, value: SX) -> str:
-    """The number at the defaults of the symbols, or the expression where one has none."""
+    """Return the value with default symbols; the expression if a symbol has no default."""
     at = float(Function("value", [system.p], [value])(system.p_default))
     return str(value) if at != at else _text(at)
 

@@ -1,4 +1,4 @@
-"""Rows put into a robot's tables and taken out, with the numbers of frames kept right."""
+"""Insertion and removal of rows in the tables of a robot, with frame numbers updated."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from mbs.errors import DescriptionError
 from mbs.formats.table import BODY_SCALARS, InertiaRow
 
 _LAST = 200
-"""Frames that a table may have."""
+"""Maximum number of frames in a table."""
 
 _NEW_FRAME = dict.fromkeys(GEOMETRY_COLUMNS, "0") | {
     "joint": "revolute",
@@ -19,10 +19,10 @@ _NEW_FRAME = dict.fromkeys(GEOMETRY_COLUMNS, "0") | {
 
 
 def with_frame(tables: Tables) -> Tables:
-    """The tables with one more frame, on the last one that no loop is cut at.
+    """Append a frame to the tables, placed on the last frame that no loop is cut at.
 
     Raises:
-        DescriptionError: there are too many already.
+        DescriptionError: the table is full.
     """
     count = len(tables.geometry)
     if count >= _LAST:
@@ -41,10 +41,10 @@ def with_frame(tables: Tables) -> Tables:
 
 
 def without_frame(tables: Tables, row: int) -> Tables:
-    """The tables without frame row + 1; what stood on it stands on its antecedent then.
+    """Remove frame row + 1 from the tables; frames placed on it move to its antecedent.
 
     Raises:
-        DescriptionError: there is no such frame, or it is the only one.
+        DescriptionError: the frame does not exist, or it is the only frame.
     """
     _require_row(tables.geometry, row, "frame")
     if len(tables.geometry) < 2:
@@ -71,16 +71,16 @@ def without_frame(tables: Tables, row: int) -> Tables:
 
 
 def with_loop(tables: Tables) -> Tables:
-    """The tables with one more loop, cut at the last two frames."""
+    """Append a loop to the tables, cut at the last two frames."""
     count = len(tables.geometry)
     return replace(tables, loops=(*tables.loops, (str(max(count - 1, 1)), str(count), "revolute")))
 
 
 def without_loop(tables: Tables, row: int) -> Tables:
-    """The tables without a loop; its frames stay.
+    """Remove a loop from the tables; its frames remain.
 
     Raises:
-        DescriptionError: there is no such loop.
+        DescriptionError: the loop does not exist.
     """
     _require_row(tables.loops, row, "loop")
     return replace(tables, loops=_without(tables.loops, row))
@@ -96,6 +96,6 @@ def _without(rows: tuple[Texts, ...], row: int) -> tuple[Texts, ...]:
 
 
 def blank() -> Tables:
-    """A robot of one revolute joint."""
+    """Return the tables of a robot with a single revolute joint."""
     empty = Tables((), (), general=("robot", "0", "0", "-9.81", "", ""))
     return with_frame(empty)

@@ -1,4 +1,4 @@
-"""A robot as tables of texts, and the table of frames that they say."""
+"""A robot as tables of texts, and their conversion to and from a table of frames."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from mbs.formats.base_pose import POSE, base_placement, base_pose_texts, placeme
 from mbs.formats.table import BODY_SCALARS, GEOMETRY, JOINTS, LOOP_JOINTS, InertiaRow
 from mbs.text import did_you_mean, quoted
 
-# Texts of the cells of a robot's tables: which columns there are, and what each may hold.
+# Columns of the tables of a robot, and readers of the texts in their cells.
 
 
 LONGEST_CELL = 2000
-"""Characters that a cell may hold."""
+"""Maximum number of characters in a cell."""
 
 RANGES = ("velocity", "effort")
-"""Columns of a motor's ranges: lower, upper, or one number for both directions."""
+"""Columns of actuator ranges: lower, upper, or a single number for both directions."""
 
 GEOMETRY_COLUMNS = (
     "antecedent",
@@ -56,12 +56,12 @@ COLUMNS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "general": GENERAL_COLUMNS,
     }
 )
-"""The columns that can be changed, by sheet."""
+"""Editable columns, by table."""
 
 GENERAL_ROWS = ("name", "gravity x", "gravity y", "gravity z", "source", "mount")
-"""What the rows of the sheet "general" hold: the mount is steps such as x=pi; position=0,0,2.5."""
+"""Rows of the table "general". The mount is a list of steps such as x=pi; position=0,0,2.5."""
 GRAVITY_ROWS, MOUNT_ROW = range(1, 4), 5
-"""Rows of the sheet "general" with gravity and with the mount."""
+"""Row indices of gravity and of the mount in the table "general"."""
 
 ACTUATED: Mapping[str, bool | None] = MappingProxyType({"": None, "yes": True, "no": False})
 CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = MappingProxyType(
@@ -71,7 +71,7 @@ CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = MappingProxyType(
         ("loops", "joint"): LOOP_JOINTS,
     }
 )
-"""Cells that hold one of some words."""
+"""Permitted words of columns that accept only certain words."""
 
 _INTEGER = re.compile(r"\d{1,6}")
 _PAIR = re.compile(r"\s*\[?([^,;]*)[,;]([^,;]*?)\]?\s*")
@@ -79,12 +79,12 @@ _TURNS = tuple((n, d) for d in (1, 2, 3, 4, 6) for n in range(-2 * d, 2 * d + 1)
 
 
 class Cell(NamedTuple):
-    """A place in the tables.
+    """Position of a cell.
 
     Attributes:
-        sheet: "geometry", "inertia", "loops", "symbols" or "general".
-        row: from 0; in the first two sheets that of frame row + 1.
-        column: one of `COLUMNS[sheet]`.
+        sheet: table: "geometry", "inertia", "loops", "symbols" or "general".
+        row: 0-based row index; in "geometry" and "inertia" it is the row of frame row + 1.
+        column: name in `COLUMNS[sheet]`.
     """
 
     sheet: str
@@ -93,7 +93,7 @@ class Cell(NamedTuple):
 
 
 class CellProblem(NamedTuple):
-    """What is wrong, and where; the column is "" for a whole row, the sheet "" for the robot."""
+    """Error message of a cell. The column is "" for a whole row, the sheet "" for the robot."""
 
     sheet: str
     row: int
@@ -102,7 +102,7 @@ class CellProblem(NamedTuple):
 
 
 def written(value: Scalar) -> str:
-    """The text of a scalar, multiples of pi by their name."""
+    """Return the text of a scalar, with multiples of pi by name."""
     known = expression(value)
     if not isinstance(known, Number):
         return str(known)
@@ -124,10 +124,10 @@ _PI = _turns()
 
 
 def scalar(text: str, where: str) -> Scalar:
-    """The expression in a cell; an empty one is zero.
+    """Return the expression in a cell; zero if the cell is empty.
 
     Raises:
-        DescriptionError: it is not of the grammar, or too long.
+        DescriptionError: the text is not in the grammar, or too long.
     """
     if len(text) > LONGEST_CELL:
         raise DescriptionError(
@@ -137,19 +137,19 @@ def scalar(text: str, where: str) -> Scalar:
 
 
 def number(text: str, where: str) -> float:
-    """The value of a cell that holds no symbols.
+    """Return the value of a cell without symbols.
 
     Raises:
-        DescriptionError: it does.
+        DescriptionError: the text contains symbols or is invalid.
     """
     return number_of(scalar(text, where), where)
 
 
 def integer(text: str, where: str) -> int:
-    """The number of a frame in a cell.
+    """Return the frame number in a cell.
 
     Raises:
-        DescriptionError: it is none.
+        DescriptionError: the text is not a frame number.
     """
     if not _INTEGER.fullmatch(text.strip()):
         raise DescriptionError(f"{where}: {quoted(text)} is not the number of a frame; write one")
@@ -157,10 +157,10 @@ def integer(text: str, where: str) -> int:
 
 
 def pair(text: str, where: str) -> tuple[float, float] | None:
-    """The limits in a cell, None in an empty one.
+    """Return the limits in a cell; None if the cell is empty.
 
     Raises:
-        DescriptionError: they are not two numbers.
+        DescriptionError: the text is not two numbers.
     """
     if not text.strip():
         return None
@@ -173,17 +173,17 @@ def pair(text: str, where: str) -> tuple[float, float] | None:
 
 
 def span(text: str, where: str) -> tuple[float, float] | float | None:
-    """The range in a cell: lower, upper, or one number for both directions.
+    """Return the range in a cell: lower, upper, or a single number for both directions.
 
     Raises:
-        DescriptionError: it is neither.
+        DescriptionError: the text is neither of these.
     """
     plain = text.strip().strip("[]")
     return number(plain, where) if plain and _PAIR.fullmatch(plain) is None else pair(text, where)
 
 
 def written_span(value: tuple[float, float] | float | None) -> str:
-    """The text of limits or of a range."""
+    """Return the text of limits or of a range."""
     if value is None:
         return ""
     if isinstance(value, (int, float)):
@@ -193,10 +193,10 @@ def written_span(value: tuple[float, float] | float | None) -> str:
 
 
 def word(text: str, where: str, known: Sequence[str]) -> str:
-    """One of the known words.
+    """Return the word in a cell, if it is among the known words.
 
     Raises:
-        DescriptionError: it is another one.
+        DescriptionError: the word is unknown.
     """
     if text.strip() not in known:
         words = [one for one in known if one]
@@ -205,7 +205,7 @@ def word(text: str, where: str, known: Sequence[str]) -> str:
 
 
 def reader_of(sheet: str, row: int, column: str) -> Callable[[str, str], Any]:
-    """What reads the text of a cell and refuses a wrong one; its arguments are text and place."""
+    """Return the reader of a cell: a callable (text, position) that raises for wrong texts."""
     if (sheet, column) in CHOICES:
         return lambda text, where: word(text, where, CHOICES[sheet, column])
     if column in ("antecedent", "frame", "other"):
@@ -224,10 +224,10 @@ def reader_of(sheet: str, row: int, column: str) -> Callable[[str, str], Any]:
 
 
 def mount(text: str, where: str) -> dict[str, Any]:
-    """The mount that a text is, in the form of `mbs.load`; empty if there is none.
+    """Read the mount in a cell, in the form of `mbs.load`; empty if the cell is empty.
 
     Raises:
-        DescriptionError: it is no mount.
+        DescriptionError: the text is not a mount.
     """
     steps = [step for step in _short(text, where).split(";") if step.strip()]
     found: dict[str, Any] = mounting_of(mount=steps).get("mount", {})
@@ -245,7 +245,7 @@ def _short(text: str, where: str) -> str:
 
 
 def place_of(sheet: str, row: int, column: str) -> str:
-    """The cell in the words of a message."""
+    """Return the description of a cell for error messages."""
     if sheet == "general":
         return GENERAL_ROWS[row]
     if sheet == "symbols":
@@ -258,22 +258,22 @@ Texts = tuple[str, ...]
 Named = tuple[tuple[str, str], ...]
 
 _NO_BODY = (*(written(getattr(InertiaRow(1), name)) for name in BODY_SCALARS), "")
-"""The cells of a frame without a body."""
+"""Cells of a frame without a body."""
 
 
 @dataclass(frozen=True, slots=True)
 class Tables:
-    """The cells of a robot, as they were typed.
+    """Cells of a robot, as the user typed them.
 
     Attributes:
         geometry: a row for each frame, in the order of `GEOMETRY_COLUMNS`.
         inertia: a row for each frame, in the order of `INERTIA_COLUMNS`.
         loops: a row for each loop, in the order of `LOOP_COLUMNS`.
         general: name, gravity, source and mount, in the order of `GENERAL_ROWS`.
-        values: of symbols, by name; those of symbols that no cell uses are kept as well.
+        values: values of symbols, by name, including symbols that no cell uses.
         attached: for each frame a rotor, and whether its inertia is that of several bodies.
-        guess: further positions near which loops are closed, by the names of coordinates.
-        extras: what a file says beyond the mechanism.
+        guess: further initial positions for closing loops, by names of coordinates.
+        extras: data of a file beyond the mechanism.
     """
 
     geometry: tuple[Texts, ...]
@@ -287,11 +287,11 @@ class Tables:
 
     @property
     def symbols(self) -> Texts:
-        """Names of the symbols in cells that can be read, in the order of their first use."""
+        """Names of the symbols in readable cells, in the order of their first use."""
         return tuple(dict.fromkeys(name for value in self._scalars() for name in _names(value)))
 
     def rows(self, sheet: str) -> tuple[Texts, ...]:
-        """The rows of a sheet, each in the order of `COLUMNS[sheet]`."""
+        """Return the rows of a table, each in the order of `COLUMNS[sheet]`."""
         if sheet == "symbols":
             known = dict(self.values)
             return tuple((known.get(name, ""),) for name in self.symbols)
@@ -301,11 +301,11 @@ class Tables:
         return answer
 
     def text(self, cell: Cell) -> str:
-        """What a cell holds."""
+        """Return the text of a cell."""
         return self.rows(cell.sheet)[cell.row][COLUMNS[cell.sheet].index(cell.column)]
 
     def changed(self, cell: Cell, text: str) -> Tables:
-        """The tables with another text in a cell."""
+        """Return the tables with another text in a cell."""
         if cell.sheet == "symbols":
             return self._with_value(self.symbols[cell.row], text)
         if cell.sheet == "general":
@@ -316,18 +316,18 @@ class Tables:
         return replace(self, **changes)
 
     def cells(self) -> Iterator[tuple[Cell, str]]:
-        """Every cell and its text."""
+        """Yield every cell and its text."""
         for sheet, columns in COLUMNS.items():
             for k, row in enumerate(self.rows(sheet)):
                 for column, text in zip(columns, row, strict=True):
                     yield Cell(sheet, k, column), text
 
     def joint_name(self, row: int) -> str:
-        """The name of the joint of frame row + 1."""
+        """Return the name of the joint of frame row + 1."""
         return self.geometry[row][-1].strip() or f"q{row + 1}"
 
     def body_name(self, row: int) -> str:
-        """The name of the body of frame row + 1."""
+        """Return the name of the body of frame row + 1."""
         return self.inertia[row][-1].strip() or f"link{row + 1}"
 
     def _with_value(self, name: str, text: str) -> Tables:
@@ -344,7 +344,7 @@ class Tables:
         yield from self.mount().expressions()
 
     def mount(self) -> Placement:
-        """Pose of the base in the world; none while its cell is wrong."""
+        """Return the pose of the base in the world; the identity if its cell has an error."""
         try:
             given = mount(self.general[MOUNT_ROW], "mount")
         except MbsError:
@@ -353,7 +353,7 @@ class Tables:
 
 
 def _mounted_cells(table: RobotTable) -> tuple[Texts, tuple[tuple[str, Texts], ...]]:
-    """Return the cells of gravity in the world and of the mount, and the other extras."""
+    """Return the cells of gravity in the world, source and mount, and the other extras."""
     placement, notes = base_placement(table.extras)
     pose = placement_pose(placement, {})
     kept = tuple((k, v) for k, v in table.extras.items() if notes or k != POSE)
@@ -367,7 +367,7 @@ def _mounted_cells(table: RobotTable) -> tuple[Texts, tuple[tuple[str, Texts], .
         gravity = in_rotated_axes(tuple(map(expression, gravity)), back, "mount")
     size = max([abs(g) for g in map(to_float, gravity) if g is not None], default=0.0)
     texts = [
-        # rounding of the rotation, which is some 1e-16 of the acceleration
+        # rounding error of the rotation, about 1e-16 of the acceleration
         "0" if (g := to_float(value)) is not None and abs(g) < 1e-15 * size else written(value)
         for value in gravity
     ]
@@ -378,7 +378,7 @@ def _mounted_cells(table: RobotTable) -> tuple[Texts, tuple[tuple[str, Texts], .
 
 
 def tables_of(table: RobotTable) -> Tables:
-    """The cells that say a table of frames."""
+    """Return the cells of a table of frames."""
     general, extras = _mounted_cells(table)
     bodies = {body.frame: body for body in table.bodies}
     count = len(table.frames)
@@ -400,7 +400,7 @@ def tables_of(table: RobotTable) -> Tables:
 
 
 def robot_table(tables: Tables) -> RobotTable:
-    """The table of frames that the cells say.
+    """Return the table of frames that the cells describe.
 
     Raises:
         DescriptionError: a cell cannot be read, or rows contradict each other.
@@ -435,12 +435,12 @@ def robot_table(tables: Tables) -> RobotTable:
         guess=guess,
         extras=extras,
     )
-    # symbols of the position of the mount are in no row
+    # symbols that only the position of the mount contains are in no row of the table
     return replace(table, parameters={k: v for k, v in known.items() if k in table.symbols})
 
 
 def _rotated(gravity: Sequence[Scalar], mounted: Mapping[str, Any]) -> tuple[Scalar, ...]:
-    """Gravity in the axes of the mounted base."""
+    """Return gravity expressed in the axes of the mounted base."""
     rotation = mounted.get("rotation")
     vector = tuple(map(expression, gravity))
     return vector if rotation is None else in_rotated_axes(vector, rotation, "mount")
@@ -456,7 +456,7 @@ def _frame(values: dict[str, Any]) -> FrameRow:
 
 
 def _says_something(tables: Tables, k: int) -> bool:
-    """Whether the body row of frame k + 1 is other than that of a frame without a body."""
+    """Return whether the body row of frame k + 1 describes a body."""
     texts = zip(tables.inertia[k], _NO_BODY, strict=True)
     given = any(text.strip() not in ("", usual) for text, usual in texts)
     return given or tables.attached[k] != (None, False)
@@ -482,7 +482,7 @@ def _geometry(row: FrameRow, guess: float | None) -> Texts:
 
 
 def _motor_span(value: tuple[float, float] | float | None) -> str:
-    """One number where the range is the same in both directions."""
+    """Return the text of a motor range; a single number if it is equal in both directions."""
     even = isinstance(value, tuple) and value[0] == -value[1]
     return written_span(value[1] if even and isinstance(value, tuple) else value)
 
@@ -503,10 +503,10 @@ def _put(values: tuple[Any, ...], place: int, value: Any) -> tuple[Any, ...]:
 
 
 def require_cell(tables: Tables, cell: Cell) -> None:
-    """Refuse a place that is not in the tables.
+    """Raise if a cell does not exist.
 
     Raises:
-        DescriptionError: there is no such sheet, row or column.
+        DescriptionError: the table, row or column does not exist.
     """
     known = cell.sheet in COLUMNS and cell.column in COLUMNS[cell.sheet]
     if not known or not 0 <= cell.row < len(tables.rows(cell.sheet)):

@@ -1,6 +1,6 @@
-"""What the server that children are forked from loads in advance."""
+"""Modules that the process from which jobs are forked imports in advance."""
 
-import mbs.export.languages.build  # with sympy, a second of every text
+import mbs.export.languages.build  # imports sympy, which would take one second of each job
 import mbs.identification
 import mbs.loops
 import mbs.models

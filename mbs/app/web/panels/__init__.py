@@ -1,1 +1,1 @@
-"""What the menus open: forms, equations, configurations, tables, plots and downloads."""
+"""Panels that the menus open: forms, equations, configurations, tables, plots and downloads."""

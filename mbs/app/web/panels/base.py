@@ -29,10 +29,10 @@ _BASE_COLUMNS = (
 
 
 async def open_base(app: App) -> None:
-    """Open the panel and find the base parameters of the present robot.
+    """Open the panel and compute the base parameters of the present robot.
 
     Args:
-        app: of the page.
+        app: app of the page.
     """
 
     def arguments(options: dict[str, Any]) -> tuple[Any, ...]:

@@ -1,4 +1,4 @@
-"""The panel of inverse geometry: a pose, and every configuration that takes a frame there."""
+"""Panel of inverse kinematics: a pose, and all configurations in which a frame has the pose."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ from mbs.expressions import number as number_of
 from mbs.models.catalogue.configurations import moving_joints, surplus_joints
 from mbs.models.geometry import terminal_frame
 
-# The configurations that solve the inverse geometry as a table whose rows move the picture.
+# Configurations that solve the inverse kinematics, as a table whose rows move the picture.
 
 
 _PAGE = 32
@@ -52,11 +52,11 @@ RAD, DEG = "rad", "deg"
 
 
 def show_configurations(app: App, made: ConfigurationList) -> None:
-    """The configurations where the slot is, or why there are none.
+    """Show the configurations at the present position, or the reason why there are none.
 
     Args:
-        app: of the page.
-        made: what was found.
+        app: app of the page.
+        made: result of the inverse kinematics.
     """
     ui.label(_headline(made)).style("font-weight: 600").mark("headline")
     if not made.rows:
@@ -98,7 +98,7 @@ def show_configurations(app: App, made: ConfigurationList) -> None:
 
 
 def csv_of(made: ConfigurationList) -> bytes:
-    """The configurations as comma-separated values, a header first; positions in rad and m."""
+    """Return the configurations as comma-separated values with a header; positions in rad or m."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     units = zip(made.names, made.units, strict=True)
@@ -197,18 +197,18 @@ def _outside(row: Configuration) -> str:
     return f"outside: {', '.join(row.outside)}" if row.outside else "outside"
 
 
-# Fields in which a visitor types a pose: a place and three angles, or a matrix.
+# Fields in which the user types a pose: a position and three angles, or a matrix.
 
 
 ANGLES, MATRIX = "place and angles", "matrix"
 _NAMES = ("x [m]", "y [m]", "z [m]", "roll [rad]", "pitch [rad]", "yaw [rad]")
 _FORMS = "12 or 16 numbers row by row, or x y z roll pitch yaw; pi/2 and the like are read"
 _ROUNDED = 1e-12
-"""Element of a pose [m or cosine] that is shown as zero: rounding, such as sin(pi)."""
+"""Element of a pose [m or cosine] below which it is shown as zero: rounding, such as sin(pi)."""
 
 
 class PoseFields:
-    """The pose in two forms, of which one is shown; both say the same after `show`."""
+    """Fields of a pose in two forms; a single form is visible. `show` sets both forms."""
 
     def __init__(self) -> None:
         self._form = ui.toggle([ANGLES, MATRIX], value=ANGLES, on_change=self._switch)
@@ -222,7 +222,7 @@ class PoseFields:
 
     @property
     def T(self) -> Array:
-        """(4, 4) the pose as typed.
+        """Pose (4, 4) as typed.
 
         Raises:
             MbsError: a field has no value.
@@ -252,7 +252,7 @@ def _field(name: str) -> ui.input:
 
 
 def _text(value: float) -> str:
-    """A number that reads back to the same double, zeros without noise."""
+    """Return a number as text that is read back to the same double; 0 for rounding errors."""
     return "0" if abs(value) < _ROUNDED else repr(float(value))
 
 
@@ -280,11 +280,11 @@ _POSITIONS = {
 
 
 async def open_configurations(app: App, key: str = "igm-general") -> None:
-    """Open the panel, with the pose that the frame has now.
+    """Open the panel, with the present pose of the frame.
 
     Args:
-        app: of the page.
-        key: of the model whose method is chosen at first.
+        app: app of the page.
+        key: key of the model whose method is selected initially.
     """
     try:
         panel = _ConfigurationsPanel(app, key)
@@ -294,7 +294,7 @@ async def open_configurations(app: App, key: str = "igm-general") -> None:
 
 
 class _ConfigurationsPanel:
-    """Frame, method and pose above, the configurations below."""
+    """Panel with frame, method and pose at the left and the configurations at the right."""
 
     def __init__(self, app: App, key: str) -> None:
         self._app = app
@@ -336,7 +336,7 @@ class _ConfigurationsPanel:
         app.on_robot(self._robot_changed)
 
     def _robot_changed(self) -> None:
-        """Offer the frames of the new robot; its last one where it was the last one."""
+        """Offer the frames of the new robot; a selected terminal frame stays the terminal frame."""
         if self._frame.is_deleted:
             return
         system = self._app.system()
@@ -347,7 +347,7 @@ class _ConfigurationsPanel:
         self._offer_joints()
 
     def _offer_joints(self) -> None:
-        """Offer the joints of which one may be redundant; nothing where there are six at most."""
+        """Offer the joints that may be redundant; none if there are at most six joints."""
         system, frame = self._app.system(), self._frame.value
         surplus = surplus_joints(system, frame) if frame else ()
         joints = list(moving_joints(system, frame)) if surplus else []
@@ -356,7 +356,7 @@ class _ConfigurationsPanel:
         self._surplus_changed()
 
     def _surplus_changed(self) -> None:
-        """Show the field of a position where the redundant joint stays at one."""
+        """Show the position field if the redundant joint is locked at a given position."""
         joint = self._joint.value
         self._surplus.set_visibility(bool(joint))
         self._at.set_visibility(self._many.value == _GIVEN)
@@ -365,13 +365,13 @@ class _ConfigurationsPanel:
             self._at.props(f'label="{joint} [{self._coordinate(joint)[1]}]"')
 
     def _coordinate(self, joint: str) -> tuple[int, str]:
-        """The number of a joint's coordinate, and its unit."""
+        """Return the index and the unit of the coordinate of a joint."""
         coordinates = self._app.system().coordinates
         number = [coordinate.name for coordinate in coordinates].index(joint)
         return number, coordinates[number].unit
 
     def _redundant(self) -> dict[str, Any]:
-        """What is asked of the joint beyond six, for `configurations`.
+        """Return the arguments of `configurations` for the redundant joint.
 
         Raises:
             MbsError: its position has no value.
@@ -398,7 +398,7 @@ class _ConfigurationsPanel:
         self._pose.show(T)
 
     async def solve(self) -> None:
-        """List every configuration that takes the frame to the pose."""
+        """Find and show all configurations in which the frame has the pose."""
         try:
             T, redundant = self._pose.T, self._redundant()
         except MbsError as error:
@@ -427,7 +427,7 @@ class _ConfigurationsPanel:
 
 
 def _frames(system: System) -> dict[str | int, str]:
-    """The frames that can be asked for, with what the list calls them."""
+    """Return the frames that can be selected, and their labels."""
     numbers = system.numbered or range(1, len(system.tree.links) + 1)
     frames = (*numbers, *system.named_frames, terminal_frame(system))
     return {frame: frame_label(system, frame) for frame in frames}

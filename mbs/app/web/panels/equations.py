@@ -1,4 +1,4 @@
-"""The panel that writes the equations of a model as text, with the operations they take."""
+"""Panel that writes the equations of a model as text, with their operation counts."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ TITLES = {
     "latex": "LaTeX",
     "symoro": "classic text",
 }
-"""What a form calls the languages."""
+"""Labels of the languages in a form."""
 
 _SPOKEN = "language"
 _OFF = "without the optimizer"
 
 
 async def open_equations(app: App, key: str, language: str | None = None) -> None:
-    """Open the panel of a model and write its equations with the options of last time.
+    """Open the panel of a model and write its equations with the options of the last time.
 
     Args:
-        app: of the page.
-        key: of the model.
-        language: to write in at first; the one of last time when left out.
+        app: app of the page.
+        key: key of the model.
+        language: initial language. Default: the language of the last time.
     """
     one = entry(key)
     system = app.checked_system()
@@ -62,7 +62,7 @@ async def open_equations(app: App, key: str, language: str | None = None) -> Non
 
 
 class _EquationsPanel:
-    """The form at the left, the text at the right."""
+    """Panel with the form at the left and the equations at the right."""
 
     def __init__(self, app: App, one: Entry) -> None:
         self._app, self._entry = app, one
@@ -107,7 +107,7 @@ class _EquationsPanel:
             await self.write()
 
     async def write(self) -> None:
-        """Write the equations for what the form says; asked for meanwhile, once more."""
+        """Write the equations for the present form; calls during this run cause another run."""
         self._again = self._ready = True
         if self._busy:
             return

@@ -1,4 +1,4 @@
-"""The panel that hands out files of the robot: for C, for other tools, as a picture."""
+"""Panel that provides files of the robot: for C, for other programs, and as a picture."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mbs.app.web.panels.plots import FieldLook, add_look, choice_field, several_
 from mbs.assembly import System
 from mbs.errors import MbsError
 
-# The options of an FMU as a form.
+# Options of an FMU as a form.
 
 
 _SOLVERS = {
@@ -35,7 +35,7 @@ _PARAMETERS = (
 
 @dataclass(slots=True)
 class FmuAsked:
-    """What the form holds; attributes as those of `FmuSettings`, `more_...` as typed."""
+    """Values of the form, see `FmuSettings`; `more_...` are additional names as typed."""
 
     fmi: str = "2.0"
     solver: str = "dopri5"
@@ -51,7 +51,7 @@ class FmuAsked:
     more_parameters: str = ""
 
     def settings(self) -> FmuSettings:
-        """The settings that the form stands for."""
+        """Return the settings that the form specifies."""
         return FmuSettings(
             fmi=self.fmi,
             inputs=_names(self.more_inputs),
@@ -67,11 +67,11 @@ class FmuAsked:
 
 
 def fmu_form(system: System, asked: FmuAsked) -> None:
-    """Fields that write into `asked`.
+    """Create the fields of the form, which write into `asked`.
 
     Args:
-        system: that is exported.
-        asked: of the form, at first and later.
+        system: system to export.
+        asked: values of the form; they are updated while the user types.
     """
     offered = [name for name in _OUTPUTS if _is_offered(system, name)]
     asked.outputs = [name for name in asked.outputs if name in offered]
@@ -132,7 +132,7 @@ _NOTE = "export"
 
 @dataclass(slots=True)
 class _ExportAsked:
-    """What the form holds."""
+    """Values of the form."""
 
     models: list[str] = field(default_factory=lambda: list(exporting.MODELS))
     fmu: FmuAsked = field(default_factory=FmuAsked)
@@ -142,7 +142,7 @@ def open_export(app: App) -> None:
     """Open the panel for the present robot.
 
     Args:
-        app: of the page.
+        app: app of the page.
     """
     system = app.checked_system()
     if system is None:
@@ -209,7 +209,7 @@ def _files_card(app: App) -> None:
 
 
 async def _robot_file(app: App, suffix: str) -> None:
-    """The document as typed where a table says it, else what the system says."""
+    """Download the document as typed if it is a table, else a file of the assembled system."""
     document = app.document
     if document.is_table:
         try:
@@ -230,7 +230,7 @@ async def _picture(app: App) -> None:
 async def _hand_out(
     app: App, suffix: str, label: str, task: Callable[..., bytes], *args: Any
 ) -> None:
-    """Download what a task makes, under the name of the robot that it was asked for."""
+    """Run a task and download its result, with the file name of the present robot."""
     name = f"{app.document.file_name}{suffix}"
     made = await app.run(label, task, *args)
     if made is not None:
@@ -238,7 +238,7 @@ async def _hand_out(
 
 
 def _models(system: System) -> dict[str, str]:
-    """Keys of the models that are Functions of the system, with their titles."""
+    """Return the keys and titles of the models that are Functions of the system."""
     return {
         one.key: one.title for one in entries() if one.has_function(system) and one.applies(system)
     }

@@ -1,4 +1,4 @@
-"""The small form of a model: frames, choices, flags and lists, from the options of its entry."""
+"""Form of the options of a model: frames, choices, flags and lists."""
 
 from __future__ import annotations
 
@@ -19,21 +19,22 @@ Given = MutableMapping[str, Any]
 
 
 class OptionForm:
-    """The options of an entry, for the robot in the app.
+    """Form of the options of a model for the robot in the app.
 
-    Options that nobody touched follow from the others: the rows of a Jacobian from its frame.
+    Options that the user did not change depend on the other options. For example, the rows of a
+    Jacobian depend on the frame.
     """
 
     def __init__(
         self, app: App, entry: Entry, given: Given, on_change: Callable[[], Any] | None = None
     ) -> None:
-        """A form where the slot is; `fill` puts the options into it.
+        """Create an empty form at the present position; `fill` adds the options.
 
         Args:
-            app: of the page.
+            app: app of the page.
             entry: the model.
-            given: values that were chosen; it is changed as the user chooses others.
-            on_change: called after every change.
+            given: chosen values by option; it is updated when the user chooses others.
+            on_change: callable that is called after every change.
         """
         self._app, self._entry, self._given = app, entry, given
         self._on_change = on_change or (lambda: None)
@@ -43,11 +44,11 @@ class OptionForm:
 
     @property
     def given(self) -> dict[str, Any]:
-        """The values that were chosen, by the names of options."""
+        """Chosen values, by the names of options."""
         return dict(self._given)
 
     async def fill(self) -> None:
-        """Show the options of the present robot; what it does not offer is forgotten."""
+        """Show the options of the present robot; values that it does not offer are dropped."""
         try:
             system = self._app.system()
             rows = await self._app.aside(_rows, system, self._entry, self._given)
@@ -86,7 +87,7 @@ class OptionForm:
         field.props(FIELD).style(f"flex: 1 1 {width}px").mark(f"option.{row.name}")
 
     async def _take(self, row: OptionRow, value: Any) -> None:
-        """Keep a value; lists that may follow from it are asked for anew."""
+        """Store a value; lists that may depend on it are reset to their defaults."""
         self._given[row.name] = tuple(value) if row.kind == "several" else value
         names = [option.name for option in self._entry.options]
         later = self._entry.options[names.index(row.name) + 1 :]
@@ -99,7 +100,7 @@ class OptionForm:
 
 
 def frame_label(system: System, frame: object) -> str:
-    """What a form calls a frame: 0 (base), 3 (q3), tool."""
+    """Return the label of a frame in a form: 0 (base), 3 (q3), tool."""
     if frame == 0:
         return "0 (base)"
     if isinstance(frame, int) and frame in system.numbered:
@@ -111,7 +112,7 @@ def frame_label(system: System, frame: object) -> str:
 
 
 def _rows(system: System, entry: Entry, given: Given) -> tuple[OptionRow, ...]:
-    """The options of the entry, values that the system does not offer taken out of `given`."""
+    """Return the options of a model; values that are not offered are removed from `given`."""
     for option in entry.options:
         if option.name in given:
             offered = option.values(system, given)

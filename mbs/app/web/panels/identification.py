@@ -1,4 +1,4 @@
-"""The panel that identifies the robot from a record that its user uploads."""
+"""Panel that identifies the parameters of the robot from an uploaded record."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ from mbs.assembly import System
 from mbs.identification.identify import POOR
 from mbs.text import quoted
 
-# What an identification found: tables, residuals, and files to keep.
+# Results of an identification: tables, residuals, and files to download.
 
 
 _NOTHING = 1000.0
-"""Deviation that says nothing about a value [%]."""
+"""Relative deviation [%] from which it is not shown, because the value is not significant."""
 _PARAMETERS = (
     ("name", "Parameter", "left"),
     ("value", "Value", "right"),
@@ -62,11 +62,11 @@ _EFFORTS = (
 
 
 def show_results(app: App, found: Identified) -> None:
-    """Fill the present place of the page.
+    """Show the result of an identification at the present position of the page.
 
     Args:
-        app: of the page.
-        found: by the task.
+        app: app of the page.
+        found: result of the identification.
     """
     with ui.element("div").classes("app-result-head"):
         choice = (
@@ -164,7 +164,7 @@ def _table(columns: tuple[tuple[str, str, str], ...], rows: list[dict[str, Any]]
 
 
 def _terms(row: EstimateRow) -> str:
-    """The sum that a grouped parameter stands for; empty for one that stands for itself."""
+    """Return the sum that a grouped parameter represents; empty if it is not grouped."""
     terms = row.grouping.partition(" = ")[2]
     return "" if terms == row.name else terms
 
@@ -177,14 +177,14 @@ def _percent(value: float) -> str:
 
 _NOTE = "identification"
 _FOUND = "identified"
-"""Note of the document and what was found last, for a reload."""
+"""Name of the session note with the document and the last result, for a reload of the page."""
 _LONGEST_LIST = 12
 _COLUMNS = {"rotors": "rotors", "offsets": "offsets"}
 
 
 @dataclass(slots=True)
 class _IdentificationAsked:
-    """What the form holds."""
+    """Values of the form."""
 
     content: bytes = b""
     file: str = ""
@@ -209,7 +209,7 @@ def open_identification(app: App) -> None:
     """Open the panel for the present robot.
 
     Args:
-        app: of the page.
+        app: app of the page.
     """
     system = app.checked_system()
     if system is None:

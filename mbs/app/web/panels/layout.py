@@ -1,4 +1,4 @@
-"""The two sides of a panel: what is asked for at the left, the answer at the right."""
+"""Layout of a panel in two columns: the inputs at the left, the result at the right."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from mbs.app.web.document.document import Document
 
 
 def two_sides(width: str = "330px") -> tuple[ui.element, ui.element]:
-    """Two columns where the slot is; the right one takes the room that is left.
+    """Create two columns at the present position; the right one takes the remaining width.
 
     Args:
-        width: of the left one.
+        width: width of the left column.
     """
     with ui.element("div").style("display: flex; gap: 22px; align-items: start; width: 100%"):
         left = ui.element("div").style(
@@ -30,42 +30,44 @@ def two_sides(width: str = "330px") -> tuple[ui.element, ui.element]:
 
 
 def in_a_row() -> ui.element:
-    """Elements beside each other, on one middle line."""
+    """Create a container for elements next to each other, vertically centred."""
     return ui.element("div").style(
         "display: flex; flex-wrap: wrap; gap: 6px 12px; align-items: center; width: 100%"
     )
 
 
 def main_button(title: str, act: Callable[[], Any] | None = None) -> ui.button:
-    """The button that makes the answer."""
+    """Create the button that computes the result."""
     button = ui.button(title, on_click=act).props("unelevated no-caps dense")
     return button.style("padding: 3px 18px").mark(title.lower())
 
 
 def side_button(title: str, act: Callable[[], Any], words: str = "") -> ui.button:
-    """A button for something else, explained by a tooltip."""
+    """Create a secondary button with a tooltip."""
     button = ui.button(title, on_click=act).props("flat no-caps dense")
     return button.tooltip(words) if words else button
 
 
 def waiting_note(sentence: str) -> None:
-    """What stands at the right before there is an answer."""
+    """Show a note at the place of a result that does not exist yet."""
     ui.label(sentence).classes("app-note")
 
 
 _CHANGED = "The robot has changed since this was made."
 _ANSWER = 2
-"""Elements that an answer has at least; a note that waits for one is alone."""
+"""Minimum number of elements of a result; a note without result is a single element."""
 
 
 @contextmanager
 def new_answer(app: App, shown: ui.element, document: Document) -> Iterator[None]:
-    """The place of an answer, the old one taken away.
+    """Replace a result: clear its container, and add the elements of the block.
+
+    If the robot was changed since the computation, a note is shown.
 
     Args:
-        app: of the page.
-        shown: where the answer is.
-        document: the robot that it is of; where another one stands there by now, it says so.
+        app: app of the page.
+        shown: container of the result.
+        document: robot for which the result was computed.
     """
     shown.clear()
     with shown:
@@ -76,13 +78,13 @@ def new_answer(app: App, shown: ui.element, document: Document) -> Iterator[None
 
 @dataclass(frozen=True, slots=True)
 class Asking:
-    """A button that asks for an answer, where it is shown, and how.
+    """Computation of a result for a panel, with a button and a container for the result.
 
     Attributes:
-        app: of the page.
-        button: it is off while the answer is made.
-        shown: where the answer is.
-        show: puts an answer where the slot is.
+        app: app of the page.
+        button: button that starts the computation; it is disabled while the computation runs.
+        shown: container of the result.
+        show: callable that displays a result at the present position of the page.
     """
 
     app: App
@@ -91,7 +93,7 @@ class Asking:
     show: Callable[[Any], None]
 
     async def run(self, label: str, task: Callable[..., Any], *args: Any) -> None:
-        """Show what `task(system, *args)` returns; see `App.run`."""
+        """Show the result of `task(system, *args)`; see `App.run`."""
         document = self.app.document
         self.button.disable()
         try:
@@ -105,11 +107,11 @@ class Asking:
 
 
 def tell_of_changes(app: App, shown: ui.element) -> None:
-    """Write above an answer that the robot has changed since, once it has.
+    """Show a note above a result as soon as the robot changes.
 
     Args:
-        app: of the page.
-        shown: where the answer is; it is cleared before a new one.
+        app: app of the page.
+        shown: container of the result; it is cleared before a new result.
     """
 
     def changed() -> None:

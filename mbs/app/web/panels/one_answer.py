@@ -1,4 +1,4 @@
-"""A panel with the options of a model at the left and one answer at the right."""
+"""Panel with the options of a model at the left and a single result at the right."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from mbs.app.web.panels.layout import (
 
 @dataclass(frozen=True, slots=True)
 class PanelTexts:
-    """What a panel says.
+    """Texts of a panel.
 
     Attributes:
-        button: that asks for the answer.
-        waiting: before there is one.
-        label: of the task while it runs.
-        equations: title of the button that opens the model's equations.
-        explanation: of that button.
+        button: text of the button that computes the result.
+        waiting: note that is shown before there is a result.
+        label: label of the task while it runs.
+        equations: text of the button that opens the equations of the model.
+        explanation: tooltip of that button.
     """
 
     button: str
@@ -53,18 +53,18 @@ async def open_one_answer(
     width: str = "330px",
     language: str | None = None,
 ) -> None:
-    """Open the panel and ask with the options of last time.
+    """Open the panel and compute the result with the options of the last time.
 
     Args:
-        app: of the page.
-        key: of the model.
-        texts: of the panel.
-        task: `task(system, *arguments)` gives the answer.
-        arguments: of the task, by the options.
-        show: puts an answer where the slot is.
-        title: of the panel; that of the model when left out.
-        width: of the left side.
-        language: in which the equations open; the one of last time when left out.
+        app: app of the page.
+        key: key of the model.
+        texts: texts of the panel.
+        task: callable `task(system, *arguments)` that returns the result.
+        arguments: callable that returns the arguments of the task for given options.
+        show: callable that displays a result at the present position of the page.
+        title: title of the panel. Default: the title of the model.
+        width: width of the left side.
+        language: language in which the equations open. Default: the language of the last time.
     """
     one = entry(key)
     given = cast(Given, app.session.notes.setdefault(f"options {key}", {}))

@@ -1,4 +1,4 @@
-"""The panel of the optimizer: its passes, and what they save in every model."""
+"""Panel of the optimizer: its passes, and the operations that they save in every model."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ from mbs.app.web.panels.text_view import BEFORE, column, plain_table
 from mbs.app.web.session import Session
 from mbs.operations import PASSES, Count
 
-# Which passes of the optimizer a visitor wants.
+# Passes of the optimizer that the user has chosen.
 
 
 _NOTE = "optimizer"
 
 
 def passes_of(session: Session) -> tuple[str, ...]:
-    """The passes that equations are written after, in the order in which they are made."""
+    """Return the chosen passes in the order of application; empty if the optimizer is off."""
     settings = optimizer_settings(session)
     return tuple(p for p in EVERY_PASS if p in settings["passes"]) if settings["on"] else ()
 
 
 def optimizer_settings(session: Session) -> dict[str, Any]:
-    """Whether the optimizer is on, "on", and the names of its passes, "passes"; both may be set."""
+    """Return the mutable settings: "on" (whether it is on) and "passes" (names of passes)."""
     found = session.notes.setdefault(_NOTE, {"on": True, "passes": list(EVERY_PASS)})
     return cast(dict[str, Any], found)
 
 
 def optimizer_switch(session: Session, title: str) -> ui.checkbox:
-    """A box that turns the optimizer on and off."""
+    """Create a checkbox that turns the optimizer on and off."""
     settings = optimizer_settings(session)
 
     def changed() -> None:
@@ -53,7 +53,7 @@ def open_optimizer(app: App) -> None:
     """Open the panel.
 
     Args:
-        app: of the page.
+        app: app of the page.
     """
     settings = optimizer_settings(app.session)
     with app.open("Optimizer", key="optimizer"):

@@ -1,4 +1,4 @@
-"""Line charts of signals over time, as options of ECharts, whose library comes with NiceGUI."""
+"""Line charts of signals over time, as options of ECharts, which is part of NiceGUI."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ COLOURS = (
     "#c04bbb",
     "#5b8c2a",
 )
-"""Of lines, told apart on light and on dark ground."""
+"""Colours of lines, distinguishable on light and on dark backgrounds."""
 
 _MOST_POINTS = 12_000
 _GREY = "#868c96"
@@ -35,12 +35,12 @@ _FAINT = "rgba(134, 140, 150, 0.22)"
 
 
 def line_chart(time: Array, series: Mapping[str, Array], unit: str) -> dict[str, Any]:
-    """The options of a chart.
+    """Return the ECharts options of a line chart.
 
     Args:
-        time: (n,) [s].
-        series: name to (n,) values, all in one unit.
-        unit: of the values, "1" for none.
+        time: (n,) times [s].
+        series: name to values (n,), all in the same unit.
+        unit: unit of the values; "1" for none.
     """
     rows = kept_rows(list(series.values()), max(_MOST_POINTS // max(len(series), 1), 200))
     x = time[rows]
@@ -71,14 +71,14 @@ def line_chart(time: Array, series: Mapping[str, Array], unit: str) -> dict[str,
 
 
 def kept_rows(columns: list[Array], most: int) -> NDArray[np.intp]:
-    """Rows that a chart needs: the first, the last, and the extremes of every stretch.
+    """Return the rows that a chart needs: the first, the last, and the extremes of each interval.
 
     Args:
-        columns: (n,) each.
-        most: rows to keep about.
+        columns: signals, (n,) each.
+        most: approximate number of rows to keep.
 
     Returns:
-        increasing numbers of rows; all of them where there are no more than `most`.
+        increasing row indices; all rows if there are at most `most`.
     """
     n = len(columns[0]) if columns else 0
     if n <= most:
@@ -99,7 +99,7 @@ def _line(name: str, x: Array, y: Array) -> dict[str, Any]:
         "name": name,
         "type": "line",
         "showSymbol": False,
-        "lineStyle": {"width": 1.6},  # [px] thinner than the usual 2: many lines stay apart
+        "lineStyle": {"width": 1.6},  # [px] below the default 2, to separate many lines
         "emphasis": {"disabled": True},
         "data": points,
     }
@@ -124,7 +124,7 @@ def _axis(title: str, *, below: bool = False) -> dict[str, Any]:
     }
 
 
-# Small fields of forms that hand on what is typed or chosen, without polling.
+# Small fields of forms that report each change by a callback, without polling.
 
 
 _PROPS = "dense outlined hide-bottom-space"
@@ -135,12 +135,12 @@ Take = Callable[[Any], object]
 
 @dataclass(frozen=True, slots=True)
 class FieldLook:
-    """How a field looks, and what tests find it by.
+    """Appearance of a field, and its marker for tests.
 
     Attributes:
-        label: in its frame, "" for none.
-        width: of CSS.
-        marker: its name in the page.
+        label: label in the frame of the field; "" for none.
+        width: width in CSS.
+        marker: name of the field in the page.
     """
 
     label: str
@@ -149,12 +149,12 @@ class FieldLook:
 
 
 def text_field(look: FieldLook, value: str, take: Take) -> ui.input:
-    """A line of text.
+    """Create a field for a line of text.
 
     Args:
-        look: of the field.
-        value: at first.
-        take: called with each text.
+        look: appearance of the field.
+        value: initial text.
+        take: callable that is called with each new text.
     """
     field = ui.input(look.label or None, value=value, on_change=lambda e: take(e.value or ""))
     field.props(_PROPS).style(f"width: {look.width}").mark(look.marker)
@@ -163,13 +163,13 @@ def text_field(look: FieldLook, value: str, take: Take) -> ui.input:
 
 
 def choice_field(look: FieldLook, options: Mapping[str, str], value: str, take: Take) -> ui.select:
-    """One of some values.
+    """Create a field for the choice of a single value.
 
     Args:
-        look: of the field.
-        options: value to what is shown for it.
-        value: at first.
-        take: called with each choice.
+        look: appearance of the field.
+        options: value to its label.
+        value: initial value.
+        take: callable that is called with each new value.
     """
     field = ui.select(
         dict(options), label=look.label or None, value=value, on_change=lambda e: take(e.value)
@@ -182,13 +182,13 @@ def choice_field(look: FieldLook, options: Mapping[str, str], value: str, take: 
 def several_field(
     look: FieldLook, options: Mapping[str, str], value: Sequence[str], take: Take
 ) -> ui.select:
-    """Some of several values.
+    """Create a field for the choice of several values.
 
     Args:
-        look: of the field.
-        options: value to what is shown for it.
-        value: at first.
-        take: called with a list at each choice.
+        look: appearance of the field.
+        options: value to its label.
+        value: initial values.
+        take: callable that is called with the list of values at each change.
     """
     field = ui.select(
         dict(options),
@@ -202,12 +202,12 @@ def several_field(
 
 
 def _named(field: ui.element, look: FieldLook) -> None:
-    """A name for those who do not see the field, where it has no label."""
+    """Add an accessible name to a field without label, for screen readers."""
     if not look.label:
         field.props(f'aria-label="{look.marker}"')
 
 
-# The look of panels with forms and plots: small fields in rows and grids.
+# Styles of panels with forms and plots: small fields in rows and grids.
 
 
 _CSS = """
@@ -239,7 +239,7 @@ _DONE: WeakSet[Client] = WeakSet()
 
 
 def add_look() -> None:
-    """Give the page these styles, once."""
+    """Add these styles to the page, once."""
     client = ui.context.client
     if client not in _DONE:
         _DONE.add(client)
@@ -247,5 +247,5 @@ def add_look() -> None:
 
 
 def come_into_view(element: ui.element) -> None:
-    """Scroll what was filled into sight, where the page is too narrow to show it beside a form."""
+    """Scroll to an element, for pages that are too narrow to show it next to the form."""
     ui.run_javascript(f"getHtmlElement({element.id})?.scrollIntoView({{block: 'nearest'}})")

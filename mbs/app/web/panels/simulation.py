@@ -1,4 +1,4 @@
-"""The panel that simulates the robot, plots its motion and plays it in the picture."""
+"""Panel that simulates the robot, plots its motion and plays it in the picture."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from mbs.app.web.panels.plots import (
 from mbs.assembly import System
 from mbs.result import Result
 
-# What a visitor typed into the form of a simulation, and the settings that it stands for.
+# Texts of the form of a simulation, and the settings that they specify.
 
 
 Texts = dict[str, str]
-"""Fields of the form: "duration", "method" and so on, and "q0.j1", "law.j1", "kind.j1"."""
+"""Texts of the form by field: "duration", "method" and so on, and "q0.j1", "law.j1", "kind.j1"."""
 
 Row = tuple[str, str, str, bool]
-"""Name of a joint, unit of its position ("" for several), unit of its rate, and motor or not."""
+"""Name of a joint, unit of its position ("" for several), unit of its rate, whether actuated."""
 
 KINDS = {"tau": "effort", "q": "position", "v": "velocity", "a": "acceleration"}
-"""What a law of a joint gives."""
+"""Quantities that a law of a joint can prescribe."""
 
 PICTURE = "the configuration of the picture"
 TYPED = "typed positions"
@@ -52,23 +52,23 @@ _FIRST = {
 
 
 def first_texts(texts: Mapping[str, str]) -> Texts:
-    """The fields at first: what was typed before, the others by default."""
+    """Return the texts of all fields: as typed before, else by default."""
     return {**_FIRST, **texts}
 
 
 def chosen_rows(system: System) -> list[Row]:
-    """The joints that a start and laws are given for: in a closed system the independent ones."""
+    """Return the joints with start values and laws: the independent joints of a closed system."""
     units = {c.name: c.unit for c in system.coordinates}
     speeds = [system.speeds[k] for k in system.active]
     return [(s.name, units.get(s.name, ""), s.unit, s.actuated) for s in speeds]
 
 
 def settings_of(system: System, texts: Mapping[str, str], q: Sequence[float]) -> SimulationSettings:
-    """The settings of a form.
+    """Return the settings of a form.
 
     Args:
-        system: that moves; fields of joints that it does not have are left alone.
-        texts: of the form; empty ones are left out.
+        system: system to simulate; fields of other joints are ignored.
+        texts: texts of the form; empty texts are ignored.
         q: (nq,) configuration of the picture [rad or m].
     """
     rows = chosen_rows(system)
@@ -95,7 +95,7 @@ def _given(texts: Mapping[str, str], what: str, names: Sequence[str]) -> dict[st
     return {name: text for name, text in found.items() if text}
 
 
-# The form of a simulation: times, start, and what drives the joints.
+# Form of a simulation: times, start, and drives of the joints.
 
 
 _METHODS = {"dopri5": "dopri5, explicit", "rodas": "rodas, for stiff systems"}
@@ -106,14 +106,14 @@ _LAWS = (
 
 
 def build_form(system: System, texts: Texts) -> ui.button:
-    """Fields that write into `texts` as they are typed, and the button that runs.
+    """Create the fields of the form, which write into `texts`, and the button Run.
 
     Args:
-        system: that is to move.
-        texts: of the form, at first and later.
+        system: system to simulate.
+        texts: texts of the form; they are updated while the user types.
 
     Returns:
-        the button.
+        the button Run.
     """
     with ui.element("div").classes("app-form"):
         _text(texts, "duration", "Duration [s]", "96px")
@@ -168,7 +168,7 @@ def _choice(
     return choice_field(look, options, texts[key], partial(texts.__setitem__, key))
 
 
-# The signals of a result in the groups that plots show.
+# Signals of a result in the groups that the plots show.
 
 
 Array = NDArray[np.float64]
@@ -181,14 +181,14 @@ _KINDS = {"q": "Positions", "v": "Velocities", "a": "Accelerations", "tau": "Eff
 
 
 def groups_of(system: System, result: Result) -> dict[str, Charts]:
-    """The charts of every group: positions, velocities, and so on; each unit has a chart.
+    """Return the charts of every group, such as positions and velocities; a chart per unit.
 
     Args:
-        system: that moved.
-        result: its motion.
+        system: system that was simulated.
+        result: result of the simulation.
 
     Returns:
-        title of a group to its charts; groups without signals are left out.
+        title of a group to its charts; groups without signals are omitted.
     """
     joints = {f"{c.name}.{kind}" for c in (*system.coordinates, *system.speeds) for kind in _KINDS}
     groups: dict[str, Charts] = {title: {} for title in _KINDS.values()}
@@ -204,7 +204,7 @@ def groups_of(system: System, result: Result) -> dict[str, Charts]:
 
 
 def _place(name: str, joints: set[str]) -> tuple[str, str]:
-    """The group of a signal and what its line is called there."""
+    """Return the group of a signal and the label of its line."""
     if name in joints:
         stem, _, kind = name.rpartition(".")
         return _KINDS[kind], stem
@@ -223,11 +223,11 @@ _SPEEDS = {
     2.0: "2 x speed",
     5.0: "5 x speed",
 }
-"""Seconds of the motion in one of play."""
+"""Playback speeds: simulated seconds per second, and their labels."""
 
 
 class Player:
-    """Plays a film in the picture of the app: play, pause, and a slider over time."""
+    """Player of a movie in the picture of the app: play, pause, and a slider over time."""
 
     def __init__(self, app: App, film: Film) -> None:
         self._app, self._film = app, film
@@ -251,7 +251,7 @@ class Player:
         app.on_clear(self.stop)
 
     async def play(self) -> None:
-        """Play again and again, from the beginning."""
+        """Play the movie repeatedly from the beginning."""
         if not self._is_of_robot():
             return
         self._playing = True
@@ -260,7 +260,7 @@ class Player:
         await self._app.play(times, self._film.configurations, speed)
 
     def stop(self) -> None:
-        """Leave the picture where it is."""
+        """Stop; the picture remains as it is."""
         if self._playing:
             self._playing = False
             self._app.pause()
@@ -285,21 +285,21 @@ class Player:
         await self._keep(instant)
 
     async def _keep(self, instant: float) -> None:
-        """Make the configuration of this instant that of the app, its sliders included."""
+        """Set the configuration of the app, including its sliders, to that of this time [s]."""
         if not self._is_of_robot():
             return
         row = int(np.abs(self._film.times - instant).argmin())
         await self._app.set_configuration(self._film.configurations[row].tolist())
 
     def _is_of_robot(self) -> bool:
-        """Whether the robot of the film is still open; if not, this is told."""
+        """Return whether the robot of the movie is still open; if not, show an error."""
         if self._robot == self._app.session.robot:
             return True
         self._app.complain("the motion is of another robot; simulate this one")
         return False
 
     def _reached(self, instant: float) -> None:
-        """What the picture shows now, where it plays this film; a closed panel ends it."""
+        """Show the time [s] that the picture shows; stop if the panel was closed."""
         if self._slider.is_deleted:
             self.stop()
         elif self._playing:
@@ -313,14 +313,14 @@ def _told(instant: float) -> str:
 
 _NOTE = "simulation"
 _FILM = "simulated"
-"""Note of the document and what was simulated last, for a reload."""
+"""Name of the session note with the document and the last result, for a reload of the page."""
 
 
 def open_simulation(app: App) -> None:
     """Open the panel for the present robot.
 
     Args:
-        app: of the page.
+        app: app of the page.
     """
     system = app.checked_system()
     if system is None:
@@ -367,7 +367,7 @@ async def _run(app: App, texts: Texts, shown: ui.element) -> None:
 
 
 def _show(app: App, system: System, made: Film) -> Player:
-    """Plots of a motion, and what plays it."""
+    """Show plots of a motion and return its player."""
     result = made.result
 
     async def download() -> None:
@@ -405,7 +405,7 @@ def _draw(made: Film, charts: Charts) -> None:
 
 
 def _facts(system: System, made: Film) -> None:
-    """What the numbers say about the quality of the motion."""
+    """Show numbers that indicate the accuracy of the motion: energies and closure residual."""
     result = made.result
     energy = result["kinetic_energy"] + result["potential_energy"]
     told = [

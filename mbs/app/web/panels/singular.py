@@ -1,4 +1,4 @@
-"""The panel of singular configurations: the determinant of a Jacobian in factors."""
+"""Panel of singular configurations: the determinant of a Jacobian in factors."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ _TEXTS = PanelTexts(
 
 
 async def open_singular(app: App) -> None:
-    """Open the panel and factor the determinant with the options of last time.
+    """Open the panel and factor the determinant with the options of the last time.
 
     Args:
-        app: of the page.
+        app: app of the page.
     """
 
     def arguments(options: dict[str, Any]) -> tuple[Any, ...]:

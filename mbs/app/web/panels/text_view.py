@@ -1,4 +1,4 @@
-"""Source text as a panel shows it, with buttons to copy and to download it."""
+"""Display of source text in a panel, with buttons to copy and to download it."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from mbs.app.web.panels.layout import in_a_row
 from mbs.operations import Count, Step
 
 _LONGEST = 200_000
-"""Characters that are shown; all of them are copied and downloaded."""
+"""Maximum number of displayed characters; the complete text is copied and downloaded."""
 
 
 def text_view(app: App, text: str, file_name: str, height: str = "420px") -> None:
-    """Text in a box that scrolls, with its buttons.
+    """Show text in a scrolling box, with buttons to copy and download it.
 
     Args:
-        app: of the page.
-        text: to show.
-        file_name: for the download.
-        height: of the box at most.
+        app: app of the page.
+        text: text to show.
+        file_name: name of the downloaded file.
+        height: maximum height of the box.
     """
     text_buttons(app, text, file_name)
     shown = text
@@ -32,7 +32,7 @@ def text_view(app: App, text: str, file_name: str, height: str = "420px") -> Non
 
 
 def text_buttons(app: App, text: str, file_name: str) -> None:
-    """Buttons that copy a text and download it as a file."""
+    """Create buttons that copy a text and download it as a file."""
 
     def copy() -> None:
         ui.clipboard.write(text)
@@ -55,7 +55,7 @@ def _lines(text: str) -> str:
     return f"{count} line{'s' if count != 1 else ''}"
 
 
-# Numbers of operations as a small table.
+# Operation counts as a small table.
 
 
 _KINDS = {
@@ -71,14 +71,14 @@ _KINDS = {
 BEFORE = (
     "Before: the model as its recursion made it, constants folded and equal parts computed once."
 )
-"""What the operations before the optimizer are those of."""
+"""Explanation of the operation count before the optimizer."""
 
 
 def count_table(counts: Mapping[str, Count]) -> None:
-    """A column for each count, under its title.
+    """Show a table of operation counts, a column for each count.
 
     Args:
-        counts: numbers by what they are of, such as "before".
+        counts: column title, such as "before", to the operation count.
     """
     columns = [column("kind", "operations", "left")]
     columns += [column(title, title) for title in counts]
@@ -95,7 +95,7 @@ def count_table(counts: Mapping[str, Count]) -> None:
 
 
 def steps_table(steps: Sequence[Step]) -> None:
-    """The passes of the optimizer, in the order in which they were made."""
+    """Show a table of the passes of the optimizer, in the order in which they were applied."""
     columns = [
         column("name", "pass", "left"),
         column("before", "before"),
@@ -118,12 +118,12 @@ def steps_table(steps: Sequence[Step]) -> None:
 def plain_table(
     columns: Sequence[dict[str, Any]], rows: Sequence[dict[str, Any]], key: str
 ) -> ui.table:
-    """A dense table without frills.
+    """Create a dense table.
 
     Args:
-        columns: see `column`.
+        columns: column definitions, see `column`.
         rows: values by the names of columns.
-        key: field that tells rows apart.
+        key: field that identifies a row.
     """
     table = ui.table(columns=list(columns), rows=list(rows), row_key=key)
     table.props("dense flat bordered hide-bottom").classes("app-table")
@@ -131,11 +131,11 @@ def plain_table(
 
 
 def column(name: str, label: str, align: str = "right") -> dict[str, Any]:
-    """A column of a table, as Quasar takes it.
+    """Return a column definition of a Quasar table.
 
     Args:
-        name: of the field in the rows.
-        label: above it.
+        name: name of the field in the rows.
+        label: title of the column.
         align: "left" or "right".
     """
     return {"name": name, "label": label, "field": name, "align": align}

@@ -10,31 +10,32 @@
 #include "guard.h"
 #include "internal.h"
 
-/* Part of the largest velocity of all joints, that of the independent ones, below which tangent
- * coordinates are used: errors are magnified by the inverse. */
+/* Smallest grip (independent velocities / largest joint velocity) at which the joints are the
+ * states. Errors of the states are magnified by its inverse. Below it, tangent coordinates are
+ * used. */
 #define HOLD 0.1
-#define LEAVE 1.5  /* of that room, from which on the joints serve again: not at once, back and forth */
-#define NEAR 1e-6  /* of that room: importers find the limit to less, from either side */
-#define TURNED 0.5 /* of the tangents at the origin, 60 degrees: well before a chart ends (passage.c) */
-/* Move of a state for a difference, in typical sizes. Differences of sixth order err by its sixth power,
- * 1e-18 of a derivative, and by the rounding of accelerations, 1e-12 where derivatives are not refused
- * before, divided by it. */
+#define LEAVE 1.5  /* room above which the joints are the states again: hysteresis above 1 */
+#define NEAR 1e-6  /* tolerance of the room at 1: importers locate it better, on either side */
+#define TURNED 0.5 /* smallest alignment, 60 degrees: well before a chart ends (passage.c) */
+/* Displacement of the state in central differences, in typical sizes. The truncation error of sixth
+ * order is its sixth power, 1e-18 of a derivative. The rounding error is that of the accelerations,
+ * at most 1e-12, divided by the displacement. */
 #define DIFFERENCE 1e-3
-#define STEPS 12      /* lengths that are tried until one moves the state so far */
+#define STEPS 12      /* step lengths that are tried to displace the state by about DIFFERENCE */
 #define FIRST_STEP 1e-6
 #define SHORTER 0.1
 #define LONGER 100.0
-/* Largest error of derivatives of accelerations, part of the largest one; and of squared rates, for
- * derivatives that are zero. */
+/* Largest error of the derivatives of accelerations, relative to the largest derivative. IDLE:
+ * relative to squared rates, for derivatives that are zero. */
 #define INACCURATE 3e-6
 #define IDLE 1e-10
 
-/* A state of the tree, its slope, and that of the states. */
+/* State X of the tree and its derivative slope; derivative of the states (rate); outputs y. */
 typedef struct {
     double X[NT], slope[NT], rate[NX + 1], y[NY + 1];
 } found;
 
-/* Where the states are those of the independent joints. */
+/* Evaluate the model at the states x of the independent joints. Nonzero on failure. */
 static int by_joints(core *c, const double *x, found *f) {
     double z[NZ + 1];
     int i;
@@ -50,7 +51,7 @@ static int by_joints(core *c, const double *x, found *f) {
     return 0;
 }
 
-/* The motion from the last states that were on it. */
+/* Extrapolate the state of the tree from the last accepted state to the present time. */
 static void foretell(const core *c, double *guide) {
     static const passage_size size = MODEL_PASSAGE;
     const core_charts *m = &c->m.charts;
@@ -61,22 +62,24 @@ static void foretell(const core *c, double *guide) {
         guide[i] += 0.5 * dt * dt * m->slope[size.nq + i];
 }
 
-/* Where the states are coordinates of a chart, on the branch of a state near them. */
+/* Compute the state of the tree from chart coordinates y, on the branch of a state `guide` near it.
+ * */
 static int near_guide(core *c, const double *y, const double *guide, found *f) {
     memset(f->rate, 0, sizeof f->rate);
     return passage_state(c->passage, c->m.time, y, guide, f->X, f->slope, f->rate,
                          &c->m.charts.alignment);
 }
 
-/* Outputs there. */
+/* Compute the outputs at the state f->X. */
 static int chart_outputs(core *c, found *f) {
     double none[NT];
     if (core_call_tree(c, f->X, none, f->y)) return 1;
-    core_show_slope(f->slope, f->y); /* near the singular configuration itself from beside it */
+    core_show_slope(f->slope, f->y); /* valid in the singular configuration too */
     return 0;
 }
 
-/* The same on the branch that the last states on the motion lead to. */
+/* Evaluate the model at chart coordinates y, on the branch of the last accepted states. Nonzero on
+ * failure, or if the motion jumps to another branch. */
 static int by_chart(core *c, const double *y, found *f) {
     const core_charts *m = &c->m.charts;
     double guide[NT];
@@ -126,7 +129,7 @@ void charts_back(core *c, double time) {
     }
 }
 
-/* The motion is followed from here. */
+/* Make the present state the last accepted state, from which the motion is followed. */
 static void follow_from_here(core *c) {
     core_charts *m = &c->m.charts;
     m->time = c->m.time;
@@ -136,7 +139,8 @@ static void follow_from_here(core *c) {
     memcpy(c->m.configuration_z, c->m.values + DEPENDENTS, NZ * sizeof(double));
 }
 
-/* How far the state is from where the independent joints do not serve: 1 at the limit. */
+/* Margin of the independent joints as states: above 1 they can be used, 0 in a singular
+ * configuration. */
 static double room(core *c) {
     double grip = 0.0;
     if (passage_grip(c->passage, c->m.time, c->m.tree, MODEL_TREE_HELD, MODEL_TREE_UNITS, &grip))
@@ -144,7 +148,8 @@ static double room(core *c) {
     return fmin(passage_regularity(c->passage, c->m.time, c->m.tree) / PASSAGE_ON, grip / HOLD);
 }
 
-/* The coordinates of the next steps, which begin in the state of the tree. */
+/* Choose the coordinates of the next steps, which begin at the state of the tree: the joints if the
+ * room exceeds `least`, else tangent coordinates. */
 static core_status choose(core *c, double least) {
     core_charts *m = &c->m.charts;
     double *slots = c->m.values + SLOTS;
@@ -166,7 +171,7 @@ static core_status choose(core *c, double least) {
                           core_where(c));
 }
 
-/* The state of the tree by the joints, and the coordinates of the next steps. */
+/* Compute the state of the tree from the joints, and choose the coordinates of the next steps. */
 static core_status begin(core *c) {
     core_status status;
     c->m.charts.tangent = c->m.charts.loose = 0;
@@ -176,7 +181,7 @@ static core_status begin(core *c) {
     return choose(c, 1.0);
 }
 
-/* The joints are the states outside. */
+/* Copy the joint states to the states of the external integrator. */
 static void joints_are_states(core *c) {
     int i;
     for (i = 0; i < NX; i++) c->m.values[SLOTS + i] = c->m.values[STATES + i];
@@ -206,12 +211,12 @@ core_status charts_pause(core *c) {
     return c->m.charts.tangent ? CORE_OK : guard_pass(c);
 }
 
-/* Not positive where other coordinates are to be taken. */
+/* Event indicator: not positive if the coordinates must change. */
 static double indicator(core *c) {
     return c->m.charts.tangent ? c->m.charts.alignment - TURNED : room(c) - 1.0;
 }
 
-/* The states are on the motion, and no branch was left on the path to them. */
+/* Accept the present states, if the motion to them has not left its branch. */
 static core_status accept_states(core *c) {
     core_status status = c->m.charts.tangent ? CORE_OK : guard_pass(c);
     if (!status) follow_from_here(c);
@@ -238,7 +243,7 @@ core_status charts_completed(core *c, int *event) {
     return CORE_OK;
 }
 
-/* The jumps of events move the state of the tree, from which the next steps begin. */
+/* Make the jumps that are due. The next steps begin at the state of the tree after them. */
 static core_status settle_tree(core *c, int *jumped) {
 #if NK > 0 && !MODEL_CHARTS_ALONE
     core_charts *m = &c->m.charts;
@@ -286,8 +291,8 @@ core_status charts_update(core *c, int *changed) {
     return status;
 }
 
-/* Rates, outputs and joints a part of the distance along a direction; the state of the tree moves about
- * as fast as ahead. */
+/* Evaluate the model at a point displaced by `part` times the direction `along`. ahead (NT,):
+ * estimated derivative of the tree state along it, which selects the branch. */
 static int beside(core *c, const charts_tangent *along, const double *ahead, double part, found *f) {
     double *v = c->m.values, y[NX + 1], guide[NT];
     core_memory kept = c->m;
@@ -302,7 +307,7 @@ static int beside(core *c, const charts_tangent *along, const double *ahead, dou
     return status;
 }
 
-/* Largest velocity of the tree, of accelerations the square root, in typical sizes [1/s]. */
+/* Largest velocity, or square root of an acceleration, of the tree in typical sizes [1/s]. */
 static double typical_rate(const core *c) {
     static const passage_size size = MODEL_PASSAGE;
     double rate = 0.0;
@@ -314,7 +319,7 @@ static double typical_rate(const core *c) {
     return rate > 0.0 ? rate : 1.0;
 }
 
-/* How far two states and their slopes are apart, in typical sizes. */
+/* Distance of two states and their derivatives, in typical sizes. */
 static double distance(const found *a, const found *b, double rate) {
     static const passage_size size = MODEL_PASSAGE;
     double far = 0.0;
@@ -329,8 +334,8 @@ static double distance(const found *a, const found *b, double rate) {
     return far;
 }
 
-/* The part of a direction that moves the state by DIFFERENCE, and how fast the state of the tree moves;
- * 1 if there is none. */
+/* Find *step, the multiple of a direction that displaces the state by about DIFFERENCE, and ahead,
+ * the derivative of the tree state along the direction. Returns 1 on failure. */
 static int step_of(core *c, const charts_tangent *along, double rate, double *ahead, double *step) {
     double size = rate * fabs(along->dt), far, longest = HUGE_VAL;
     found f[2];
@@ -357,8 +362,8 @@ static int step_of(core *c, const charts_tangent *along, double rate, double *ah
     return beside(c, along, ahead, *step, f);
 }
 
-/* Derivatives of a number by central differences of three distances; *error: by which two of them
- * less exact ones differ. */
+/* Derivative by central differences of sixth order. d: f(k step) - f(-k step) for k = 1, 2, 3.
+ * *error: difference from the derivative of fourth order. */
 static double derivative(const double *d, double step, double *error) {
     double six = (45.0 * d[0] - 9.0 * d[1] + d[2]) / (60.0 * step);
     *error = fabs(six - (8.0 * d[0] - d[1]) / (12.0 * step));

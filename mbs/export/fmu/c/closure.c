@@ -11,40 +11,42 @@
 #define RESIDUAL REAL(2e-6)
 #define MOVE REAL(3e-4)
 #define NEXT REAL(1e-7)
-#define EQUAL REAL(1e-3) /* difference of distances that are equal, likewise */
+#define EQUAL REAL(1e-3) /* difference of distances that count as equal [rad, or loop sizes] */
 #else
-#define RESIDUAL REAL(1e-12) /* largest closure row, for coordinates of size 1 */
-#define MOVE REAL(1e-9)      /* largest last Newton move: the next one would be its square */
-#define NEXT REAL(1e-15)     /* largest next Newton move, as the last two of them foretell it */
-#define EQUAL REAL(1e-6)     /* difference of distances that are equal [rad, or sizes] */
+#define RESIDUAL REAL(1e-12) /* largest closure residual, for coordinates of size 1 */
+#define MOVE REAL(1e-9)      /* largest last Newton step; the next step would be its square */
+#define NEXT REAL(1e-15)     /* largest next Newton step, extrapolated from the last two steps */
+#define EQUAL REAL(1e-6)     /* difference of distances that count as equal [rad, or loop sizes] */
 #endif
 #define ITERATIONS 30
-#define REACH REAL(0.5) /* largest Newton move, in nominal sizes, that stays on the branch */
+#define REACH REAL(0.5) /* largest Newton step that stays on the branch, in nominal sizes */
 #define SMALLEST REAL(0.0009765625)
-#define STEEPEST REAL(1e4) /* nominal sizes that dependents move for one of the states */
-/* A start is followed from the start values in steps of this length at most, of the states that lead the
- * dependents, in nominal sizes; the first one is shorter and shows the slope. */
+#define STEEPEST REAL(1e4) /* largest change of dependents per change of a state, nominal sizes */
+/* Largest step of the continuation from the start values, in nominal sizes of the states that
+ * determine the dependents. FIRST: fraction of it that the first step, which finds the slope,
+ * takes. */
 #define STRIDE REAL(0.2)
 #define FIRST REAL(1e-3)
-/* Part of a move by which the dependents may end beside where their slope leads: on another branch
- * they differ by about the difference of the slopes, on the same one by half the step. */
+/* Largest deviation of the dependents from their linear extrapolation, relative to the step. On
+ * another branch it is about the difference of the slopes, on the same branch half the step. */
 #define BENT REAL(0.1)
-/* What a line that ends in a singular configuration may leave of its length, in nominal sizes:
- * Newton steps come to a millionth, and a branch that ends before its end does so anywhere. */
+/* Largest remaining length of a line that ends in a singular configuration, in nominal sizes.
+ * Newton steps reach a distance of 1e-6; a branch that ends earlier can leave any length. */
 #define LEFT REAL(1e-4)
-#define TRIALS 64 /* configurations from which a branch is looked for */
+#define TRIALS 64 /* number of initial configurations in the search for a branch */
 #define HALF_TURN REAL(3.14159265358979)
-/* Distance from the guesses below which no other configuration is looked for [rad, or sizes of the
- * mechanism]: branches that are nearer to each other meet there. */
+/* Distance from the guesses below which the search for other configurations ends [rad, or sizes of
+ * the mechanism]. Branches that are closer to each other meet there. */
 #define CLOSE REAL(0.1)
 #define UNBOUNDED REAL(HUGE_VAL)
 
-/* Where a Newton iteration stands: largest row before its last move, and that move. */
+/* Progress of a Newton iteration: largest residual before its last step, and size of that step. */
 typedef struct {
     real residual, move;
 } progress;
 
-/* The closure holds; or rows and moves shrink together so fast that it does after this move. */
+/* Whether the closure holds, or residual and step decrease so fast that it holds after this step.
+ * */
 static int converged(progress now, progress before, real size) {
     real ratio = now.move / before.move;
     if (now.residual < RESIDUAL * size && now.move < MOVE * size) return 1;
@@ -52,7 +54,7 @@ static int converged(progress now, progress before, real size) {
            now.move * ratio * ratio < NEXT * size;
 }
 
-/* One Newton step at x, z to next. */
+/* One Newton step from z to next, at the states x. Nonzero on failure. */
 static int newton_step(const loops *l, const real *x, const real *z, real *next, real *residual) {
     l->arg[0] = x;
     l->arg[1] = z;
@@ -62,7 +64,7 @@ static int newton_step(const loops *l, const real *x, const real *z, real *next,
     return mbs_closure(l->arg, l->res, l->iw, l->w, 0) || !real_finite(*residual);
 }
 
-/* Newton steps at x from z. reach: largest move that is trusted, in nominal sizes. */
+/* Newton iteration at x from z. reach: largest allowed step, in nominal sizes. */
 static int newton(const loops *l, const real *x, real *z, real reach) {
     progress before = {REAL(0.0), UNBOUNDED};
     real next[NZ];
@@ -85,7 +87,8 @@ static int newton(const loops *l, const real *x, real *z, real reach) {
     return CLOSURE_OPEN;
 }
 
-/* From the accepted configuration to x in one go, or along a straight line in shorter ones. */
+/* One Newton solve from the last accepted configuration. If it fails, continuation along a straight
+ * line in x in shorter steps. */
 SHARED int closure_solve(const loops *l, const real *x, real *z) {
     const real *from = l->x;
     real at[NX + 1], trial[NZ], done = REAL(0.0), part = REAL(1.0);
@@ -108,8 +111,8 @@ SHARED int closure_solve(const loops *l, const real *x, real *z) {
     return CLOSURE_OK;
 }
 
-/* From the accepted configuration to x along a straight line, on the branch that the slopes lead to: it also
- * goes on where branches cross. */
+/* Continuation from the accepted configuration to x along a straight line. Linear extrapolation of
+ * z keeps to the branch, also where branches cross. */
 static int follow(const loops *l, const real *x, real *z) {
     const real *from = l->x, *size = MODEL_NOMINAL;
     real at[NX + 1], trial[NZ], slope[NZ], length = REAL(0.0), done = REAL(0.0), largest, part;
@@ -129,7 +132,7 @@ static int follow(const loops *l, const real *x, real *z) {
         for (i = 0; i < NZ && status == CLOSURE_OK && known; i++) {
             real off = real_abs(trial[i] - z[i] - (to - done) * slope[i]);
             real most = real_max(length * size[DEPENDENTS + i], real_abs(slope[i]));
-            /* what Newton steps leave open may be more than a short move bends */
+            /* the error of the Newton solve may exceed the curvature of a short step */
             if (off > BENT * (to - done) * most + MOVE * size[DEPENDENTS + i])
                 status = CLOSURE_OPEN;
         }
@@ -149,7 +152,8 @@ static int follow(const loops *l, const real *x, real *z) {
     return CLOSURE_OK;
 }
 
-/* z at x on the branch of the model's start values; near them where parameters open the loops. */
+/* Compute z at x on the branch of the start values. If these do not close the loops, because
+ * parameters have changed, Newton steps begin at the start values of z. */
 static int from_start(const loops *l, const real *x, real *z) {
     const real *start = MODEL_START + DEPENDENTS;
     memcpy(z, start, NZ * sizeof *z);
@@ -171,8 +175,9 @@ static int any_guessed(const loops *l) {
     return 0;
 }
 
-/* Difference of two values of a dependent coordinate, of angles up to whole turns [rad or m]. Rounding
- * decides no sign of half a turn: bars in one line have such angles. */
+/* Difference of two values of dependent coordinate i [rad or m], of angles modulo a revolution.
+ * Half a revolution is always positive, so that rounding does not decide its sign for aligned bars.
+ * */
 static real difference(int i, real z, real other) {
     real d = z - other;
     if (!MODEL_TURNS[i]) return d;
@@ -180,7 +185,8 @@ static real difference(int i, real z, real other) {
     return d < EQUAL - HALF_TURN ? d + REAL(2.0) * HALF_TURN : d;
 }
 
-/* Largest distance from the guesses, of guessed coordinates or of all [rad, or sizes of the mechanism]. */
+/* Largest distance of z from the guesses [rad, or sizes of the mechanism]. all: 1 for all
+ * coordinates, 0 for the guessed coordinates. */
 static real distance_from_guess(const loops *l, const real *z, int all) {
     real far = REAL(0.0);
     int i;
@@ -190,7 +196,9 @@ static real distance_from_guess(const loops *l, const real *z, int all) {
     return far;
 }
 
-/* The order of mbs.loops.nearest: by guessed coordinates, by all, then the larger first difference. */
+/* Whether z is nearer to the guesses than `other`, in the order of mbs.loops.nearest: distance of
+ * the guessed coordinates, then of all, then the larger value of the first coordinate that differs.
+ * */
 static int is_nearer(const loops *l, const real *z, const real *other) {
     int i, all;
     for (all = 0; all < 2; all++) {
@@ -204,7 +212,8 @@ static int is_nearer(const loops *l, const real *z, const real *other) {
     return 0;
 }
 
-/* z with angles within half a turn of the guesses, if that closes the loops: not so across a gear. */
+/* Change angles of z by whole revolutions to within half a revolution of the guesses, if that
+ * closes the loops. Across a gear it does not. */
 static void unwind(const loops *l, const real *x, real *z) {
     real near[NZ];
     int i;
@@ -212,7 +221,7 @@ static void unwind(const loops *l, const real *x, real *z) {
     if (newton(l, x, near, REAL(1e-3)) == CLOSURE_OK) memcpy(z, near, sizeof near);
 }
 
-/* Numbers from -1 to 1, the same in every run. */
+/* Pseudo-random number from -1 to 1 for trial k and coordinate i, the same in every run. */
 static real scattered(unsigned k, unsigned i) {
     unsigned s = (k * 7919u + i * 104729u + 1u) & 0xffffffffu;
     int pass;
@@ -224,8 +233,9 @@ static real scattered(unsigned k, unsigned i) {
     return (real)s / REAL(2147483648.0) - REAL(1.0);
 }
 
-/* Where trial k starts: at the guesses, the other coordinates at the start values, near the configuration
- * that continues them, or anywhere; every second trial leaves the guesses too. */
+/* Initial z of trial k. Guessed coordinates begin at the guesses, at random in odd trials after the
+ * first two. Other coordinates begin at the start values (k = 0), at `near`, the configuration on
+ * the branch of the start values (k = 1), or at random. */
 static void trial_start(const loops *l, int k, const real *near, real *z) {
     int i;
     for (i = 0; i < NZ; i++) {
@@ -236,8 +246,9 @@ static void trial_start(const loops *l, int k, const real *near, real *z) {
     }
 }
 
-/* Of the configuration on the start values' branch and of those that Newton steps reach from other
- * places, the nearest to the guesses as in mbs.loops.nearest: one guess is enough to choose a branch. */
+/* Compute the z that is nearest to the guesses, as in mbs.loops.nearest, among the configuration on
+ * the branch of the start values and the solutions of Newton steps from the trial configurations.
+ * A guess of one coordinate is enough to select a branch. */
 static int near_guesses(const loops *l, const real *x, real *z) {
     real near[NZ], trial[NZ];
     int k, status = from_start(l, x, near);

@@ -1,7 +1,7 @@
 /* Dependent coordinates of closed loops, by Newton steps from a known configuration.
  *
- * FMUs and bare C libraries share this file and watch.h: no heap, no stdio, nothing kept between
- * calls, and numbers are `real`, see real.h.
+ * FMUs and bare C libraries share this file and watch.h. The code uses no heap and no stdio and
+ * keeps no data between calls. Numbers have the type `real` of real.h.
  */
 #ifndef MBS_CLOSURE_H
 #define MBS_CLOSURE_H
@@ -9,13 +9,14 @@
 #include "model.h"
 #include "real.h"
 
-/* NEARLY: of a start in a singular configuration, which Newton steps do not reach; z is beside it. */
+/* Status. OPEN: no solution. SINGULAR: the closure Jacobian is singular. NEARLY: the start is a
+ * singular configuration, which Newton steps do not reach; z is an extrapolation close to it. */
 enum { CLOSURE_OK, CLOSURE_OPEN, CLOSURE_SINGULAR, CLOSURE_NEARLY };
 
-/* What a run knows of its loops. */
+/* Closed loops of a run. z: dependent coordinates; x: states. */
 typedef struct {
     real *x, *z;       /* the last accepted configuration */
-    const real *guess; /* of z at the start; where it is not MODEL_START, it chooses the branch */
+    const real *guess; /* guess of z at the start; values other than MODEL_START select a branch */
     const real *p;     /* parameters */
     const real **arg;  /* scratch of the generated functions */
     real **res;
@@ -23,13 +24,14 @@ typedef struct {
     real *w;
 } loops;
 
-/* z of the configuration x, on the branch of the last accepted configuration. */
+/* Compute z (NZ,) at the states x (NX,), on the branch of the last accepted configuration. */
 SHARED int closure_solve(const loops *l, const real *x, real *z);
 
-/* The first configuration of a run: from the guesses, through the start values of the states. */
+/* Compute z at the start of a run, at the states x. If l->guess differs from the start values of
+ * the model, z is the solution nearest to it, otherwise the solution on the branch of the start. */
 SHARED int closure_start(const loops *l, const real *x, real *z);
 
-/* 1 where a small change of the states moves the dependent coordinates almost without bound. */
+/* Whether x, z is singular: a small change of x causes an almost unbounded change of z. */
 SHARED int closure_singular(const loops *l, const real *x, const real *z);
 
 #endif

@@ -56,8 +56,9 @@ core_status core_refuse(core *c, const char *format, ...) {
     return status;
 }
 
-/* No answer here. An integrator outside may try a shorter step; a co-simulation master may only go
- * back to a saved state, and some repeat a discarded step for ever, so for it this is an error. */
+/* Failed evaluation. An external integrator may try a shorter step. A co-simulation master can only
+ * return to a saved state, and some masters repeat a discarded step forever, so it gets an error.
+ * */
 core_status core_no_answer(core *c, const char *format, ...) {
     core_status status = c->m.mode & CONTINUOUS ? CORE_DISCARD : CORE_ERROR;
     va_list args;
@@ -143,11 +144,11 @@ core_status core_accept_states(core *c) {
     return status ? closure_failed(c, status) : core_accept_configuration(c, x, c->z);
 }
 
-/* What was calculated may be shown. */
+/* Check that the calculated values are finite, and mark them as up to date. */
 static core_status core_show(core *c) {
     const double *v = c->m.values;
     int i;
-    for (i = 0; i < INDICATORS; i++) /* those are looked at when they are shown */
+    for (i = 0; i < INDICATORS; i++) /* event indicators are checked when they are read */
         if (!isfinite(v[i]))
             return core_no_answer(c, "%s: %s is not finite at time %.9g; look for a singular "
                                   "configuration or a zero mass", c->name, MODEL_NAMES[i], c->m.time);
@@ -155,7 +156,7 @@ static core_status core_show(core *c) {
     return CORE_OK;
 }
 
-/* The same, where joints are the states outside. */
+/* The same check if the joint coordinates are the states for the external integrator. */
 static core_status show_joints(core *c) {
     double *v = c->m.values;
     memcpy(v + SLOTS, v + STATES, NS * sizeof *v);
@@ -164,7 +165,8 @@ static core_status show_joints(core *c) {
 }
 
 #ifdef MODEL_TREE
-/* In a singular configuration accelerations are those of the branch, which come from beside it. */
+/* Compute all values at a start in a singular configuration. The accelerations are those of the
+ * branch, computed from configurations on both sides. */
 static core_status show_start(core *c) {
     double none[NT], *v = c->m.values;
     int i;
@@ -287,7 +289,8 @@ core_status core_enter_initialization(core *c) {
     return CORE_OK;
 }
 
-/* States keep to their rules from the start on; parameters may be set later. */
+/* Rules of the states hold from initialization on. Rules of parameters alone are checked again
+ * later, because parameters may be set during a run. */
 core_status core_check_rules(core *c) {
 #ifdef MODEL_RULES
     double excess[MODEL_RULES];

@@ -1,9 +1,9 @@
 /* A model that runs: instance, modes, closed loops, integration, derivatives, saved states.
  *
- * Nothing here depends on a version of FMI; fmi2.c and fmi3.c are thin faces over it. A value
- * reference is a place in `values`, in the order of the enumeration below. All that makes one run
- * differ from another is in `core_memory`, a flat block, so a saved state is a copy of it. An
- * instance is a `core` of the caller; what it needs beside it comes from a `core_supply`.
+ * The core is independent of the FMI version; fmi2.c and fmi3.c are thin interfaces to it. A value
+ * reference is an index of `values`, in the order of the enumeration below. `core_memory` is a flat
+ * block with all data that a run changes, so a saved state is a copy of it. The caller allocates
+ * the instance `core`. Memory for saved states comes from a `core_supply`.
  */
 #ifndef MBS_CORE_H
 #define MBS_CORE_H
@@ -29,24 +29,25 @@ enum {
     MODES = PARAMETERS + NP,
     DEPENDENTS = MODES + NM,
     INDICATORS = DEPENDENTS + NZ,
-    SLOTS = INDICATORS + NK, /* the states where the integrator is outside and loops are closed, */
-    RATES = SLOTS + NS,      /* their derivatives, */
-    CHART = RATES + NS,      /* and the indicator of other coordinates: charts.h */
+    SLOTS = INDICATORS + NK, /* states of closed loops for an external integrator (charts.h) */
+    RATES = SLOTS + NS,      /* derivatives of these states */
+    CHART = RATES + NS,      /* indicator of a change of their coordinates */
     N_VALUES = CHART + NC,
-    TIME_REFERENCE = N_VALUES /* the independent variable, where the face has it as a variable */
+    TIME_REFERENCE = N_VALUES /* the independent variable time, a variable in FMI 3.0 only */
 };
 
-/* The states, and their derivatives, where the integrator is outside. */
+/* First indices of the states and their derivatives for an external integrator. */
 #if MODEL_TREE_OUTSIDE
 enum { OUTSIDE = SLOTS, OUTSIDE_RATES = RATES };
 #else
 enum { OUTSIDE = STATES, OUTSIDE_RATES = DERIVATIVES };
 #endif
 
-/* What co-simulation integrates: all coordinates of the tree where they are known, else the states. */
+/* Number of integrated coordinates: those of all joints of the tree if the model has closed loops
+ * with tree equations, else the states. */
 #ifdef MODEL_TREE
 #define NT MODEL_TREE
-/* They are what moves. */
+/* Whether the instance moves the coordinates of the tree. */
 #define ON_TREE(c) ((c)->m.cosimulation ? MODEL_TREE_INSIDE : MODEL_TREE_OUTSIDE)
 #else
 #define NT NX
@@ -57,9 +58,9 @@ enum { OUTSIDE = STATES, OUTSIDE_RATES = DERIVATIVES };
 #define CORE_TEXT 1024
 #define CORE_WHERE 512
 
-#define INPUT_ORDERS 3 /* derivatives of an input that a communication step may follow */
+#define INPUT_ORDERS 3 /* highest derivative of an input that extrapolates it in a step */
 
-/* Value references and integers as the version of FMI has them; 3.0 alone has adjoint derivatives. */
+/* Types of value references and integers: FMI 3.0 if adjoint derivatives exist, else FMI 2.0. */
 #ifdef MODEL_ADJOINT
 typedef uint32_t core_reference;
 typedef int32_t core_integer;
@@ -77,17 +78,18 @@ typedef enum {
     CONTINUOUS = 8,
     STEP = 16,
     TERMINATED = 32,
-    INTERMEDIATE = 64 /* within a communication step, where the host may look */
+    INTERMEDIATE = 64 /* intermediate update within a communication step: values can be read */
 } core_mode;
 
-/* Inputs are held; follow their derivatives; have followed them up to the present time. */
+/* Inputs: constant; extrapolated by their derivatives; extrapolated up to the present time. */
 typedef enum { INPUTS_HELD, INPUTS_MOVE, INPUTS_MOVED } core_input_motion;
 
 typedef void (*core_logger)(void *host, const char *name, core_status status, const char *message);
-/* Told after every internal step; 1: return at *until, or now where that has passed. */
+/* Callback after every internal step. A result of 1 requests that the communication step ends at
+ * *until, or at once if that time has passed. */
 typedef int (*core_watch)(void *host, double time, int may_return, double *until);
 
-/* Where the memory of saved states comes from: aligned for doubles; NULL: none is left. */
+/* Allocator of saved states: memory aligned for doubles, NULL if no memory is left. */
 typedef struct {
     void *(*take)(void *owner, size_t size);
     void (*drop)(void *owner, void *memory);
@@ -95,43 +97,44 @@ typedef struct {
 } core_supply;
 
 typedef struct {
-    int event, early; /* an event waits to be handled; the step ended before its end */
+    int event, early; /* whether an event is pending; whether the step ended before its end */
 } core_stop;
 
 #if MODEL_TREE_OUTSIDE
-/* Which coordinates the states are read in: charts.h. */
+/* Coordinates that the states stand for, see charts.h. */
 typedef struct {
-    int tangent;   /* local tangent coordinates */
-    int loose;     /* joints were set: they are to be the states again */
-    int settled;   /* the coordinates of the next steps are chosen */
-    double alignment; /* of the tangents with those of the chart: 1 there, 0 across */
-    double time, X[NT], slope[NT]; /* of the last states that were on the motion */
+    int tangent;   /* 1 if the states are local tangent coordinates */
+    int loose;     /* 1 if joint values were set, so that the joints become the states again */
+    int settled;   /* 1 if the coordinates of the next steps are chosen */
+    double alignment; /* alignment of the tangents with the chart: 1 at its origin, 0 orthogonal */
+    double time, X[NT], slope[NT]; /* last accepted time, tree state and its derivative */
 } core_charts;
 #endif
 
 typedef struct {
     int mode, cosimulation;
-    int stale;   /* the calculated values do not belong to the others any more */
-    int closed;  /* a configuration that closes the loops is known */
-    int inputs;  /* a core_input_motion */
-    double time, tolerance, stop; /* stop: the end of the experiment, HUGE_VAL where none is given */
+    int stale;   /* 1 if the calculated values are out of date */
+    int closed;  /* 1 if a configuration that closes the loops is known */
+    int inputs;  /* core_input_motion */
+    double time, tolerance, stop; /* stop: end of the experiment [s], HUGE_VAL if it has none */
     double values[N_VALUES + 1];
     double guess[NZ + 1];
-    double configuration_x[NX + 1], configuration_z[NZ + 1]; /* the last accepted configuration: warm start */
-    double input_time;                  /* to which the inputs and their derivatives belong */
-    double slopes[INPUT_ORDERS * NU + 1]; /* first derivatives of all inputs, then second ones */
+    /* last accepted configuration: warm start of the Newton steps */
+    double configuration_x[NX + 1], configuration_z[NZ + 1];
+    double input_time;                  /* time of `slopes` and the values of inputs [s] */
+    double slopes[INPUT_ORDERS * NU + 1]; /* first, second, third derivatives of all inputs */
     watched watched;
 #if NK > 0
-    double offset[NK]; /* added to an indicator that has not left zero yet: hysteresis */
+    double offset[NK]; /* hysteresis: added to an indicator that has not left zero yet */
     double events[EVENTS_MEMORY(NK)];
 #endif
 #ifdef MODEL_TREE
-    int loose; /* the tree is to be projected onto its rows first */
+    int loose; /* 1 if the tree state must be projected onto its rows before the next step */
     double tree[NT], passage[PASSAGE_MEMORY(NT)];
-    double slope[NT]; /* of it, where it starts or the integrator is outside */
-    double speeds[N_PASSIVE + 1]; /* of dependent joints: where they are not MODEL_START, they choose
-                                     the branch of a start in a singular configuration */
-    int singular; /* it is in such a start */
+    double slope[NT]; /* derivative of `tree`, at the start or for an external integrator */
+    double speeds[N_PASSIVE + 1]; /* start velocities of dependent joints: values other than
+                                     MODEL_START select the branch of a singular start */
+    int singular; /* 1 while the run is at a start in a singular configuration */
 #endif
 #if MODEL_TREE_OUTSIDE
     core_charts charts;
@@ -145,11 +148,11 @@ typedef struct {
     core_logger log;
     void *host;
     core_supply supply;
-    char text[CORE_TEXT], where[CORE_WHERE]; /* of the last message */
-    int discards; /* messages of discarded calls are asked for; those of errors always are */
-    int timed;    /* TIME_REFERENCE is a value reference */
-    int event_mode, early_return; /* the host of a co-simulation handles events; takes part steps */
-    core_watch watch;             /* or NULL */
+    char text[CORE_TEXT], where[CORE_WHERE]; /* last message, and its list of state values */
+    int discards; /* 1 to log discarded calls too; errors are always logged */
+    int timed;    /* 1 if TIME_REFERENCE is a value reference */
+    int event_mode, early_return; /* whether the host handles events, and accepts early returns */
+    core_watch watch;             /* callback after internal steps, or NULL */
     stepper solver;
 #if NK > 0
     events events;
@@ -171,7 +174,7 @@ typedef struct {
 
 typedef struct core_state core_state;
 
-/* 1: no memory is left. The name stays that of the caller. */
+/* Initialise an instance. Returns 1 if no memory is left. The caller keeps `name` alive. */
 int core_init(core *c, const char *name, int cosimulation, core_logger log, void *host,
               core_supply supply);
 void core_end(core *c);
@@ -189,7 +192,7 @@ core_status core_get(core *c, const core_reference *ref, size_t n, double *value
 core_status core_get_modes(core *c, const core_reference *ref, size_t n, core_integer *values);
 core_status core_set(core *c, const core_reference *ref, size_t n, const double *values);
 
-/* derivatives of unknowns by knowns, along a direction or against it */
+/* Derivatives of unknowns by knowns: Jacobian times seed, and transposed Jacobian times seed. */
 core_status core_directional(core *c, const core_reference *unknown, size_t n_unknown,
                              const core_reference *known, size_t n_known, const double *seed,
                              double *answer);
@@ -199,13 +202,13 @@ core_status core_adjoint(core *c, const core_reference *unknown, size_t n_unknow
                          double *answer);
 #endif
 
-/* events; changed: 1 where the states have jumped */
+/* Events. *changed: 1 if the states have jumped. */
 core_status core_enter_event_mode(core *c);
 core_status core_update_discrete_states(core *c, int *changed);
 
-/* model exchange */
+/* Model exchange. */
 core_status core_enter_continuous_mode(core *c);
-core_status core_completed_step(core *c, int *event); /* 1: event mode is to follow */
+core_status core_completed_step(core *c, int *event); /* *event: 1 if event mode must follow */
 core_status core_set_time(core *c, double time);
 core_status core_set_states(core *c, const double *x, size_t n);
 core_status core_get_states(core *c, double *x, size_t n);
@@ -213,8 +216,8 @@ core_status core_get_derivatives(core *c, double *xdot, size_t n);
 core_status core_get_nominals(core *c, double *nominal, size_t n);
 core_status core_get_indicators(core *c, double *indicators, size_t n);
 
-/* co-simulation; derivatives of inputs are taken at the start of the next step, those of outputs
- * are along the motion */
+/* Co-simulation. Derivatives of inputs refer to the start of the next step. Derivatives of outputs
+ * are time derivatives along the motion. */
 core_status core_do_step(core *c, double time, double h, core_stop *stop);
 core_status core_enter_step_mode(core *c);
 core_status core_set_input_slopes(core *c, const core_reference *ref, size_t n, const core_integer *order,

@@ -1,9 +1,9 @@
-/* Co-simulation: the integrator is inside. */
+/* Co-simulation, with an integrator inside the FMU. */
 #include "internal.h"
 
 #include <math.h>
 
-/* The host looks at the model, and may ask for an earlier end. */
+/* Call the intermediate update of the host, which may request an earlier end of the step. */
 static void let_look(core *c, double *end) {
     double until = *end;
     int asked;
@@ -14,7 +14,7 @@ static void let_look(core *c, double *end) {
     if (asked && c->early_return) *end = fmax(c->m.time, fmin(*end, until));
 }
 
-/* Internal steps up to the end, or to the first event where the host handles events. */
+/* Internal steps up to the end, or to the first event if the host handles events. */
 static core_status run(core *c, double end, core_stop *stop) {
     int hand_over = c->event_mode && c->early_return, changed;
     double until = end;

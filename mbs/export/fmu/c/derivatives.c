@@ -1,4 +1,4 @@
-/* Directional and adjoint derivatives and those by time, exact through closed loops. */
+/* Directional and adjoint derivatives and time derivatives, exact also for closed loops. */
 #include "internal.h"
 
 #include "charts.h"
@@ -6,14 +6,14 @@
 #include <math.h>
 #include <string.h>
 
-/* Numbers that belong to states, inputs, parameters and to what is calculated from them. */
+/* Seeds, or derivatives, of time, states, inputs, parameters and all calculated values. */
 typedef struct {
     double dt, dx[NX + 1], du[NU + 1], dp[NP + 1];
-    double dslot[NX + 1], drate[NX + 1]; /* states and their derivatives outside */
+    double dslot[NX + 1], drate[NX + 1]; /* states of the external integrator, their rates */
     double dxdot[NX + 1], dy[NY + 1], dm[NM + 1], dz[NZ + 1], dg[NK + 1];
 } tangents;
 
-/* 1 where these are local tangent coordinates. */
+/* Whether the states of the external integrator are local tangent coordinates. */
 static int in_chart(const core *c) {
 #if MODEL_TREE_OUTSIDE
     return !c->m.cosimulation && (c->m.mode & RUNNING) && c->m.charts.tangent;
@@ -23,7 +23,7 @@ static int in_chart(const core *c) {
 #endif
 }
 
-/* Where a reference has its seed; the kinds of variables follow each other, some of them empty. */
+/* Address of the seed of a value reference, or NULL if derivatives by it do not exist. */
 static double *known_of(const core *c, tangents *d, core_reference ref) {
     if (ref == TIME_REFERENCE && c->timed) return &d->dt;
     if (ref < DERIVATIVES) return in_chart(c) ? NULL : d->dx + (ref - STATES);
@@ -50,19 +50,20 @@ static double *unknown_of(tangents *d, core_reference ref) {
 
 #ifdef MODEL_SINES
 
-/* Squared sine below which rounding of the dependent positions can be seen in second derivatives. */
+/* Squared sine below which rounding of dependent positions is noticeable in second derivatives. */
 #define ROUNDED 2.5e-3
-/* Move of the states for a test of rounding, in nominal sizes. The exact derivatives differ by about
- * this part, and those of rounded positions by more where they have no accuracy. */
+/* Displacement of the states in the test of rounding, in nominal sizes. It changes exact
+ * derivatives by about this fraction, and derivatives without accuracy by more. */
 #define TRIAL_MOVE 1e-12
 #define TRIALS 3
-/* Largest effect of rounding, part of the derivatives. */
+/* Largest effect of rounding, relative to the derivatives. */
 #define ROUNDING 1e-5
-/* The same, part of squared speeds in nominal sizes, for derivatives that are zero. */
+/* Largest effect of rounding on derivatives that are zero, relative to squared speeds in nominal
+ * sizes. */
 #define ROUNDING_OF_SPEEDS 1e-10
 
-/* Accelerations along a direction of all states, in nominal sizes, a trial move away from the state;
- * the speeds are those of the state. */
+/* Compute the derivative of the accelerations along a direction of all states, in nominal sizes, at
+ * a configuration displaced by trial move number `trial`. Velocities stay those of the state. */
 static int trial_accelerations(core *c, int trial, double *accelerations) {
     static const double MOVES[TRIALS] = {-TRIAL_MOVE, TRIAL_MOVE, 2.0 * TRIAL_MOVE};
     const double *nominal = MODEL_NOMINAL;
@@ -101,7 +102,7 @@ static int trial_accelerations(core *c, int trial, double *accelerations) {
     return 0;
 }
 
-/* Derivatives do not depend on the last digits of the dependent positions. */
+/* Whether derivatives are independent of rounding errors of the dependent positions. */
 static int is_accurate(core *c) {
     double found[TRIALS][NX + N_PASSIVE + 1], size = 0.0, difference = 0.0, speed = 0.0;
     int i, k;
@@ -121,8 +122,8 @@ static int is_accurate(core *c) {
 
 #endif
 
-/* Second derivatives of the loops magnify the rounding of a closed configuration by the third power of
- * the inverse sine, and by squared speeds. They are refused where too little accuracy is left. */
+/* Check that derivatives are accurate. Second derivatives of the loops magnify rounding errors of a
+ * closed configuration by the third power of the inverse sine, and by squared speeds. */
 static core_status differentiable(core *c) {
 #ifdef MODEL_SINES
     double sines[2], sine;
@@ -148,7 +149,7 @@ core_status core_not_differentiable(core *c, double sine) {
                        core_where(c), sine);
 }
 
-/* All references can be used, all seeds are finite, and the calculated values are up to date. */
+/* Check references and seeds, and update the calculated values. */
 static core_status ready(core *c, const core_reference *unknown, size_t n_unknown, const core_reference *known,
                          size_t n_known, const double *seed, size_t n_seed) {
     core_status status;
@@ -202,7 +203,7 @@ static core_status move_in_chart(core *c, tangents *d) {
 
 #endif
 
-/* What changes with the seeds. */
+/* Compute the directional derivatives of all calculated values along the seeds in d. */
 static core_status move(core *c, tangents *d) {
     int i;
 #if MODEL_TREE_OUTSIDE
@@ -243,7 +244,7 @@ core_status core_directional(core *c, const core_reference *unknown, size_t n_un
 
 #ifdef MODEL_ADJOINT
 
-/* The seeds times what each known moves. */
+/* Adjoint derivative from one directional derivative for each known. */
 static core_status transposed(core *c, const core_reference *unknown, size_t n_unknown,
                               const core_reference *known, size_t n_known, const double *seed,
                               double *answer) {
@@ -298,7 +299,8 @@ core_status core_adjoint(core *c, const core_reference *unknown, size_t n_unknow
 
 #endif
 
-/* Inputs follow what was given of their derivatives, else they are constant. */
+/* Time derivatives of outputs. Inputs are extrapolated by their given derivatives, else constant.
+ * */
 core_status core_get_output_slopes(core *c, const core_reference *ref, size_t n, const core_integer *order,
                                    double *values) {
     core_status status;

@@ -1,4 +1,4 @@
-/* Model exchange, where the integrator is outside; and event mode, which co-simulation has too. */
+/* Model exchange, with an external integrator, and event mode, also of co-simulation. */
 #include "internal.h"
 
 #include "charts.h"

@@ -1,4 +1,4 @@
-/* FMI 2.0, model exchange and co-simulation: a thin face over core.c. */
+/* FMI 2.0 interface to core.c, for model exchange and co-simulation. */
 #include "fmi2_face.h"
 
 #include <math.h>
@@ -39,7 +39,7 @@ static fmi2Component no_instance(const fmi2CallbackFunctions *functions, const c
     return NULL;
 }
 
-#ifdef MODEL_BARE /* callbacks give all memory */
+#ifdef MODEL_BARE /* all memory comes from callbacks */
 
 static face *new_face(const fmi2CallbackFunctions *functions, size_t size) {
     face *f = functions->allocateMemory(1, size);
@@ -157,7 +157,7 @@ fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
     return n ? refused(c, "integer variables are modes, which events set") : fmi2OK;
 }
 
-/* No value reference of another type exists. */
+/* Error unless n is 0: no value reference of this type exists. */
 static fmi2Status none(fmi2Component c, size_t n, const char *message) {
     NEED(c);
     return n ? refused(c, message) : fmi2OK;

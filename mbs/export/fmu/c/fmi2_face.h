@@ -9,12 +9,12 @@ typedef struct {
     core model;
     fmi2CallbackLogger logger;
     fmi2ComponentEnvironment environment;
-    fmi2CallbackAllocateMemory allocate; /* where memory comes from by callbacks alone */
+    fmi2CallbackAllocateMemory allocate; /* used if all memory comes from callbacks (MODEL_BARE) */
     fmi2CallbackFreeMemory release;
     char name[];
 } face;
 
-/* Bytes of an instance whose name has so many letters. */
+/* Size of an instance in bytes. letters: length of its name. */
 #define INSTANCE_SIZE(letters) (sizeof(face) + (letters) + 1)
 
 #endif

@@ -1,4 +1,4 @@
-/* FMI 3.0, model exchange and co-simulation, a thin face over core.c: instances and values. */
+/* FMI 3.0 interface to core.c, part 1: instances and values, model exchange and co-simulation. */
 #include <math.h>
 #include <string.h>
 
@@ -61,7 +61,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
     return instantiate(name, token, 0, logging, environment, logger);
 }
 
-/* Inputs are not set within a step; all variables can be read. */
+/* Call the intermediate update callback. Inputs cannot be set; all variables can be read. */
 static int report(void *host, double time, int may_return, double *until) {
     face *f = host;
     fmi3Boolean asked = fmi3False;
@@ -178,7 +178,7 @@ fmi3Status fmi3SetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
     return none(c, n, "32-bit integers are modes, which events set");
 }
 
-/* No value reference of another type exists. */
+/* Getters and setters of types without variables. */
 #define NO_VARIABLES(type, text)                                                                \
     fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n,           \
                              fmi3##type value[], size_t n_values) {                             \

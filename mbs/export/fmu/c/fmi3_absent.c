@@ -1,4 +1,4 @@
-/* What FMI 3.0 has and these models have not: structural parameters, clocks, model partitions. */
+/* Functions of FMI 3.0 without use for these models: structural parameters, clocks, partitions. */
 #include "fmi3_face.h"
 
 fmi3Status fmi3EnterConfigurationMode(fmi3Instance c) {

@@ -1,4 +1,4 @@
-/* FMI 3.0: a call names variables; the elements of an array follow each other in the core. */
+/* FMI 3.0 arrays: expand the variables of a call into the consecutive elements of the core. */
 #include "fmi3_face.h"
 
 #ifdef MODEL_ARRAYS
@@ -7,7 +7,8 @@ static size_t size_of(fmi3ValueReference vr) {
     return vr < N_VALUES ? (size_t)MODEL_SIZES[vr] : 1;
 }
 
-/* The references, and orders, of all elements; 0: one is no variable, or no memory is left. */
+/* Allocate the references and orders of all elements. Returns 0 on failure: a reference is that of
+ * an array element, or no memory is left. */
 static int spread(fmi3Instance c, elements *e, const fmi3ValueReference vr[], size_t n,
                   const fmi3Int32 order[]) {
     size_t i, k = 0, j, count = 0;

@@ -1,4 +1,4 @@
-/* What the parts of the FMI 3.0 face share: an instance, its status and its refusals. */
+/* Declarations for the files of the FMI 3.0 interface: instance, status and error messages. */
 #ifndef MBS_FMI3_FACE_H
 #define MBS_FMI3_FACE_H
 
@@ -13,7 +13,7 @@ typedef struct {
     char name[];
 } face;
 
-/* Bytes of an instance whose name has so many letters. */
+/* Size of an instance in bytes. letters: length of its name. */
 #define INSTANCE_SIZE(letters) (sizeof(face) + (letters) + 1)
 
 #define MODEL(c) (&((face *)(c))->model)
@@ -30,21 +30,23 @@ static inline fmi3Status refused(fmi3Instance c, const char *message) {
     return as_fmi(core_refuse(MODEL(c), "%s: %s", MODEL(c)->name, message));
 }
 
-/* An array that belongs to something the model has not must be empty. */
+/* Return an error with this message unless the array of size n, of a kind that the model does not
+ * have, is empty. */
 static inline fmi3Status none(fmi3Instance c, size_t n, const char *message) {
     NEED(c);
     return n ? refused(c, message) : fmi3OK;
 }
 
-/* What a call is about, element by element: a variable may be an array. */
+/* Variables of a call, element by element, because a variable may be an array. */
 typedef struct {
     const core_reference *ref;
-    const core_integer *order; /* of derivatives, or NULL */
+    const core_integer *order; /* order of the derivative of each element, or NULL */
     size_t n;
-    void *own;
+    void *own; /* allocated memory, or NULL */
 } elements;
 
-/* 1; or 0 after a message, where the values are not one for each element of the variables. */
+/* Expand n variables into their elements. Returns 1, or 0 after an error message if n_values is not
+ * the number of elements. */
 int elements_begin(fmi3Instance c, elements *e, const fmi3ValueReference vr[], size_t n,
                    const fmi3Int32 order[], size_t n_values);
 void elements_end(fmi3Instance c, elements *e);

@@ -1,4 +1,4 @@
-/* FMI 3.0, the rest of the face: saved states, derivatives, model exchange, co-simulation. */
+/* FMI 3.0 interface, part 2: saved states, derivatives, model exchange, co-simulation. */
 #include "fmi3_face.h"
 
 fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state) {
@@ -57,8 +57,8 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_
         return as_fmi(status);                                                                  \
     }
 
-/* Along a direction there is a seed for each known and an answer for each unknown; against it the
- * other way round. */
+/* A directional derivative has a seed for each known and a result for each unknown. An adjoint
+ * derivative has a seed for each unknown and a result for each known. */
 DERIVATIVE(fmi3GetDirectionalDerivative, core_directional, n_seed, n_answer)
 DERIVATIVE(fmi3GetAdjointDerivative, core_adjoint, n_answer, n_seed)
 

@@ -14,7 +14,7 @@ static core_status passed(core *c) {
         c->name, c->m.watched.time, c->m.time, core_where(c));
 }
 
-/* The signs, velocities and accelerations at the present time. */
+/* Compute determinant signs, and velocities and accelerations of dependent joints, at this time. */
 static core_status look(core *c, watched *now) {
     const double *x = c->m.values + STATES;
     double z[NZ], xdot[NX + 1], y[NY + 1], J[WATCH_WORK];

@@ -1,17 +1,18 @@
-/* What watch.h watches, as the core sees it. */
+/* Checks of watch.h for an instance: detection of singular configurations between two steps. */
 #ifndef MBS_GUARD_H
 #define MBS_GUARD_H
 
 #include "core.h"
 
-/* What the next configuration is compared with is this one: after a start, a jump, or where
- * something that the accelerations depend on has changed. */
+/* Store the present configuration as the reference of the next comparison. Required after a start,
+ * a jump, or a change of an input or parameter of the accelerations. */
 core_status guard_restart(core *c);
 
-/* Compare the present configuration with the one before, and watch from here. */
+/* Compare the present configuration with the reference, then make it the reference. Error if the
+ * motion between the two passes a singular configuration. */
 core_status guard_pass(core *c);
 
-/* The next comparison is to begin with the configuration before it, as it is then. */
+/* Discard the reference, because a jump or a new input has made it invalid. */
 void guard_forget(core *c);
 
 #endif

@@ -1,4 +1,4 @@
-/* Inputs of a communication step: polynomials in time, from their derivatives at its start. */
+/* Inputs within a communication step: Taylor polynomials in time about its start. */
 #include "internal.h"
 
 #include <math.h>
@@ -6,7 +6,8 @@
 
 static double *slopes(core *c, int order) { return c->m.slopes + (order - 1) * NU; }
 
-/* Derivative number `first` of an input, `after` its derivatives were given. */
+/* Derivative of order `first` (0: value) of an input, `after` seconds after the start of the step.
+ * */
 static double extrapolated(core *c, int input, int first, double after) {
     double sum = 0.0;
     int order;

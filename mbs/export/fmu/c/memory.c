@@ -1,5 +1,5 @@
-/* Memory from the heap of C. Where there is none, leave this file out and give these two functions,
- * such as from arrays of your own. */
+/* Memory from the C heap. On a platform without a heap, leave this file out and write these two
+ * functions, for example with static arrays. */
 #include "memory.h"
 
 #include <stdlib.h>

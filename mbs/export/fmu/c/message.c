@@ -2,8 +2,8 @@
 
 #include <math.h>
 
-#define EXACT 22 /* the largest power of ten that a double is */
-#define MOST_DIGITS 15 /* of which a double keeps all */
+#define EXACT 22 /* exponent of the largest power of ten that a double represents exactly */
+#define MOST_DIGITS 15 /* number of decimal digits that a double always keeps */
 #define PLAIN -4 /* smaller powers of ten are written with an exponent, as printf does */
 
 void message_begin(message *m, char *text, size_t size) {
@@ -37,14 +37,15 @@ static double power(int exponent) {
     return p;
 }
 
-/* value 10^exponent, rounded once where the power is exact */
+/* Return value 10^exponent, with one rounding if the power is exact. */
 static double scaled(double value, int exponent) {
     for (; exponent > EXACT; exponent -= EXACT) value *= power(EXACT);
     for (; exponent < -EXACT; exponent += EXACT) value /= power(EXACT);
     return exponent < 0 ? value / power(-exponent) : value * power(exponent);
 }
 
-/* The digits of a positive number without zeros at their end, and its power of ten. */
+/* Compute the decimal digits of a positive number, rounded to `kept` digits, and its exponent.
+ * Returns the number of digits without trailing zeros. */
 static int digits_of(double value, int kept, char *digits, int *exponent) {
     double size = value, rounded;
     int k, count = kept;
@@ -76,7 +77,7 @@ void message_number(message *m, double value, int digits) {
     found[0] = '0';
     value = fabs(value);
     if (value > 0.0) count = digits_of(value, digits, found, &exponent);
-    first = exponent < PLAIN || exponent >= digits ? 0 : exponent; /* of the digit before the point */
+    first = exponent < PLAIN || exponent >= digits ? 0 : exponent; /* power of the first digit */
     if (first < 0) message_text(m, "0.");
     for (k = first + 1; k < 0; k++) letter(m, '0');
     for (k = 0; k < count || k <= first; k++) {
@@ -91,7 +92,7 @@ void message_number(message *m, double value, int digits) {
     whole(m, (unsigned long)exponent);
 }
 
-/* What follows a percent sign; the last letter of it. */
+/* Append one argument by the format after a percent sign. Returns the last letter of the format. */
 static const char *one(message *m, const char *at, va_list *args) {
     int digits = 6, value;
     if (*at == '.')

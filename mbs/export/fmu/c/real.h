@@ -1,4 +1,5 @@
-/* The numbers of what FMUs and bare C libraries share; a bare library has its own text in its place. */
+/* Number type of code that FMUs and bare C libraries share. A bare library has its own definitions.
+ * */
 #ifndef MBS_REAL_H
 #define MBS_REAL_H
 

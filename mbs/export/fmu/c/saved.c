@@ -1,22 +1,22 @@
-/* Saved states: copies of the memory of an instance. As bytes they carry what they are, of which
- * model, how long, and a checksum, since bytes from outside may have been changed in between.
+/* Saved states: copies of the memory of an instance. The serialized bytes contain format, model,
+ * size and a checksum, because they may have been changed outside.
  */
 #include "internal.h"
 
 #include <math.h>
 #include <string.h>
 
-/* Changes with the meaning of core_memory. */
+/* Format name; it changes when the contents of core_memory change. */
 #define FORMAT "mbs state 3"
 
 struct core_state {
-    unsigned checksum; /* of what follows; 0 where the state is not bytes */
+    unsigned checksum; /* checksum of the members below; 0 unless the state is serialized */
     char format[sizeof FORMAT], guid[sizeof MODEL_GUID];
     size_t size;
     core_memory m;
 };
 
-/* CRC-32 of IEEE 802.3, as zlib has it: no changed byte leaves it as it was. */
+/* CRC-32 of IEEE 802.3, as in zlib. A change of one byte always changes it. */
 static unsigned checksum(const char *bytes) {
     unsigned table[16], sum = 0xffffffffu, i, bit;
     size_t k;
@@ -44,7 +44,8 @@ core_status core_save(core *c, core_state **state) {
     return CORE_OK;
 }
 
-/* A co-simulation that waits in event mode needs a host which handles events. */
+/* Whether this instance can continue the saved mode: a co-simulation saved in event mode needs a
+ * host that handles events. */
 static int handled_here(const core *c, const core_memory *m) {
     return m->mode != EVENT || !m->cosimulation || c->event_mode;
 }
@@ -93,7 +94,7 @@ static int all_finite(const double *v, int n) {
 
 static int is_flag(int value) { return value == 0 || value == 1; }
 
-/* The mode is one that such an instance can be in. */
+/* Whether an instance of this kind can be in the saved mode. */
 static int possible_mode(const core_memory *m) {
     switch (m->mode) {
         case INSTANTIATED: case INITIALIZATION: case EVENT: case TERMINATED: return 1;
@@ -126,7 +127,7 @@ static int sane_watch(const watched *w) {
 static int sane_events(const core_memory *m) {
 #if NK > 0
     int i;
-    for (i = 0; i < EVENTS_MEMORY(NK) - NK; i++) /* all but the rates */
+    for (i = 0; i < EVENTS_MEMORY(NK) - NK; i++) /* all except the rates, which may be NaN */
         if (isnan(m->events[i])) return 0;
     for (i = 0; i < NK; i++)
         if (!isfinite(m->offset[i]) || m->offset[i] < 0.0) return 0;
@@ -143,7 +144,7 @@ static int sane_charts(const core_charts *m) {
 }
 #endif
 
-/* 1 when this could have been saved: bytes that come from outside may hold anything. */
+/* Whether core_save could have written these values. Bytes from outside may contain anything. */
 static int sane(const core_memory *m) {
     const double *v = m->values;
     int i;

@@ -1,4 +1,4 @@
-/* The equations as the solver of co-simulation sees them: loops closed at every evaluation. */
+/* Equations for the solver of co-simulation. Loops are closed at every evaluation. */
 #include "solver.h"
 
 #include "closure.h"
@@ -122,7 +122,8 @@ core_status core_start_tree(core *c) {
     return CORE_OK;
 }
 
-/* A singular start whose velocities choose no branch: which joint the loops do not hold. */
+/* Error for a singular start whose velocities select no branch. The message names the joint whose
+ * velocity the loops constrain least. */
 static core_status undetermined(core *c) {
     static const passage_size size = MODEL_PASSAGE;
     int k = passage_loosest(c->passage, c->m.time, c->m.tree, MODEL_TREE_UNITS), i, known = -1;
@@ -138,7 +139,7 @@ static core_status undetermined(core *c) {
         k < 0 || known < 0 ? "the joints" : MODEL_NAMES[known]);
 }
 
-/* The state of the tree at x and z, its passive velocities as they are given. */
+/* Set the state of the tree from the states, z and the given velocities of dependent joints. */
 static void place_tree(core *c, const double *z) {
     double *X = c->m.tree;
     int i;
@@ -176,7 +177,7 @@ core_status core_start_singular(core *c, double *z) {
                "such as %s, or start elsewhere", c->name, c->m.time, core_where(c),
             MODEL_NAMES[OUTPUTS + PASSIVE_V]);
     if (passage_slope(c->passage, c->m.time, X, c->m.slope, on)) return undetermined(c);
-    memcpy(X, on, sizeof(double) * (size_t)size.nq); /* where branches cross rows show 1e-8 */
+    memcpy(X, on, sizeof(double) * (size_t)size.nq); /* positions on the branch */
     c->m.singular = 1;
     core_show_tree(c);
     return CORE_OK;
@@ -225,8 +226,8 @@ int core_init_solver(core *c) {
 }
 
 #ifdef MODEL_APPROACHES
-/* Step behind an event [s], from which steps grow tenfold: a contact is met at any speed before two
- * bodies are through each other. */
+/* First step after an event [s]; later steps grow tenfold at most. Two bodies at any speed then
+ * meet in a detected contact before they pass through each other. */
 static const double AFTER_CONTACT = 1e-9;
 #endif
 

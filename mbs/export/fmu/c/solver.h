@@ -1,4 +1,4 @@
-/* The solver of co-simulation that model.h names: its memory and its scratch. */
+/* Solver of co-simulation that model.h selects: headers and size of its work memory. */
 #ifndef MBS_SOLVER_H
 #define MBS_SOLVER_H
 

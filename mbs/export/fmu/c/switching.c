@@ -1,8 +1,8 @@
-/* Events: modes, jumps, and indicators as an integrator outside sees them.
+/* Events: modes, jumps, and event indicators for an external integrator.
  *
- * An indicator that has not left zero, after a jump or at rest there, is shown with an offset, which
- * is larger than any value that it had below zero: outside no sign changes until it is clearly
- * positive, or falls again. It is never shown as zero.
+ * After a jump, or at rest on a contact, an indicator is near zero. The external integrator then
+ * gets it with an offset, which exceeds the magnitude of its negative values. So no sign changes
+ * until the indicator is clearly positive or decreases again. Its value is never exactly zero.
  */
 #include "internal.h"
 
@@ -15,20 +15,21 @@
 #include "guard.h"
 #include "message.h"
 
-#define PASSES 4 /* from a contact at rest each leaves a quarter of the distance */
+#define PASSES 4 /* iterations; near a contact at rest each reduces the distance to a quarter */
 
-/* Events that rounding of a time this long [s] cannot distinguish count as standing still. */
+/* Time [s] whose rounding error is the shortest interval of two events. Events at shorter intervals
+ * count as chattering. */
 #define CHATTER_SPAN 1e3
 
-/* The dependents are at hand where a step ends with an evaluation at its end, which looks for events
- * and the stages of an implicit method are not. */
+/* Whether z belongs to the end of the step: the last evaluation is at the end, unless events are
+ * located after the step or an implicit method has other stages. */
 #if NK > 0 || defined MODEL_RODAS
 #define ENDS_AT_HAND 0
 #else
 #define ENDS_AT_HAND 1
 #endif
 
-/* What events are looked for in: an integrator outside has the joints as its states, or the tree. */
+/* Whether events are evaluated on the state of the tree, else on the states of the joints. */
 #if MODEL_TREE_OUTSIDE
 #define EVENTS_ON_TREE(c) ((c)->m.cosimulation ? MODEL_TREE_INSIDE : (c)->m.charts.tangent)
 #define TAKE_STATES(c, tree) core_take_states(c, tree)
@@ -79,7 +80,7 @@ static core_status step_failed(core *c, int status) {
                           c->m.time, core_where(c), stepper_wanted_step(&c->solver), why);
 }
 
-/* What moves: the coordinates of the tree, or the states. */
+/* Coordinates that are integrated: those of the tree, or the states. */
 static double *moving(core *c) {
 #ifdef MODEL_TREE
     if (EVENTS_ON_TREE(c)) return c->m.tree;
@@ -87,8 +88,8 @@ static double *moving(core *c) {
     return c->m.values + STATES;
 }
 
-/* After something that its rows depend on has changed, the tree is projected onto them. The chart of
- * the last step may not be known any more. */
+/* Project the tree onto its closure rows after data of the rows have changed. The chart of the last
+ * step is discarded. */
 static core_status tighten(core *c) {
 #ifdef MODEL_TREE
     if (!EVENTS_ON_TREE(c) || !c->m.loose || !c->m.cosimulation) return CORE_OK;
@@ -113,7 +114,7 @@ void core_restart(core *c) {
     guard_forget(c);
 }
 
-/* The states follow what has changed; at_hand: the dependents are known. */
+/* Update the accepted configuration after a step or jump. at_hand: 1 if c->z is up to date. */
 static core_status accept(core *c, int at_hand) {
 #ifdef MODEL_TREE
     if (EVENTS_ON_TREE(c)) {
@@ -132,7 +133,7 @@ core_status core_step(core *c, double limit) {
     if (!status && !EVENTS_ON_TREE(c) && !c->m.watched.on) status = guard_restart(c);
     if (status) return status;
 #if NK > 0
-    c->events.near_at = NAN; /* the state may be another one */
+    c->events.near_at = NAN; /* the state may have changed */
     stopped = events_step(&c->events, x, limit);
 #else
     stopped = stepper_step(&c->solver, x, limit);
@@ -151,7 +152,7 @@ core_status core_step(core *c, double limit) {
 #define CALL(tree, f) mbs_##f(c->arg, c->res, c->iw, c->w, 0)
 #endif
 
-/* The arguments of a function of events; dependents of the states alone have to be found. */
+/* Set the arguments of an event function at x. On the joint states the loops are closed first. */
 static int place(core *c, const double *t, const double *x) {
     if (!EVENTS_ON_TREE(c) && closure_solve(&c->loops, x, c->z)) return 1;
     core_point(c, t, x, c->z);
@@ -165,7 +166,8 @@ static int indicators(void *user, double t, const double *x, double *g) {
     return CALL(EVENTS_ON_TREE(c), indicators);
 }
 
-/* Right after the indicators at the same place: the dependent coordinates are there. */
+/* Rates of the indicators along the motion. Call it right after `indicators` at the same x, which
+ * computes the dependent coordinates. */
 static int rates(void *user, double t, const double *x, double *rise) {
     core *c = user;
     double du[NU + 1];
@@ -176,7 +178,8 @@ static int rates(void *user, double t, const double *x, double *rise) {
     return CALL(EVENTS_ON_TREE(c), rates);
 }
 
-/* Where an integrator outside has charts and needs no events, indicators stay positive. */
+/* 1 if an external integrator has charts and needs no other events: all indicators stay positive.
+ * */
 #ifndef MODEL_CHARTS_ALONE
 #define MODEL_CHARTS_ALONE 0
 #endif
@@ -229,7 +232,7 @@ core_status core_first_modes(core *c) {
     return CORE_OK;
 }
 
-/* Where the integrator is outside, the solver only knows what time it is. */
+/* Prepare the solver for events. With an external integrator it holds only the present time. */
 static void synchronize(core *c) {
     core_prepare_solver(c);
     if (c->m.cosimulation) return;
@@ -237,7 +240,7 @@ static void synchronize(core *c) {
     stepper_start(&c->solver, c->m.time);
 }
 
-/* Offsets of those that cannot fire yet. */
+/* Set the offsets of indicators that cannot fire yet. */
 static void set_offsets(core *c) {
     const double *armed = events_armed(&c->events), *value = events_seen(&c->events);
     int k;
@@ -258,7 +261,7 @@ core_status core_start_events(core *c) {
 
 int core_pending(const core *c) { return events_pending(&c->events); }
 
-/* Does the present state ask for a jump? */
+/* Find the events that are due in the present state. */
 static int find(core *c) {
     synchronize(c);
     if (c->m.cosimulation || core_pending(c)) return events_look(&c->events, moving(c));
@@ -266,9 +269,9 @@ static int find(core *c) {
 }
 
 #if MODEL_TREE_OUTSIDE
-/* An integrator outside finds events a little late. Where tangent coordinates are its states, the state
- * goes back along its motion to where the first of the pending indicators was zero, so that bounces
- * that follow each other do not lead further and further beyond a limit. */
+/* Move the state back to the time when the first pending indicator was zero. An external integrator
+ * locates events slightly late; without this step, successive bounces in tangent coordinates would
+ * move further and further beyond a limit. */
 static core_status go_back(core *c) {
     double value[NK], rise[NK], X[NT], slope[NT];
     int pass, k, first = -1;
@@ -284,7 +287,7 @@ static core_status go_back(core *c) {
         beyond = -value[first];
         memcpy(X, c->m.tree, sizeof X);
         memcpy(slope, c->m.slope, sizeof slope);
-        do { /* less where it would not fall yet, or be further before the limit than beyond it */
+        do { /* halve the step back if it ends before the approach, or too far before the limit */
             memcpy(c->m.tree, X, sizeof X);
             memcpy(c->m.slope, slope, sizeof slope);
             charts_back(c, back);
@@ -314,7 +317,7 @@ static core_status settle(core *c, int *changed) {
     memcpy(before, x, size);
     LEAVE_START(c);
 #ifdef MODEL_TREE
-    if (EVENTS_ON_TREE(c)) passage_forget(c->passage); /* a chart ends where modes change */
+    if (EVENTS_ON_TREE(c)) passage_forget(c->passage); /* new modes, new chart */
 #endif
     status = events_settle(&c->events, x, fmax(c->m.time, CHATTER_SPAN));
     c->m.stale = 1;
@@ -327,7 +330,7 @@ static core_status settle(core *c, int *changed) {
 
 core_status core_settle(core *c, int *changed) {
     core_status status = settle(c, changed);
-    if (!c->m.cosimulation) TAKE_STATES(c, 1); /* as the passage has them */
+    if (!c->m.cosimulation) TAKE_STATES(c, 1); /* the solver keeps the tree as state */
     return status;
 }
 

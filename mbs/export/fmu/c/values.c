@@ -1,5 +1,5 @@
-/* Values by their references: modes are integers, all other variables are real. Hosts that know real
- * numbers alone, such as CasADi, read modes as such too. */
+/* Values by value reference. Modes are integers, all other variables are real. Modes can also be
+ * read as real numbers, for hosts without integers such as CasADi. */
 #include "internal.h"
 
 #include "charts.h"
@@ -15,12 +15,12 @@ static core_status known_reference(core *c, core_reference ref) {
                        (unsigned)ref, (int)N_VALUES - 1);
 }
 
-/* Whether a reference is one of a kind, of which there may be none. */
+/* Whether first <= ref < end, for a kind of variables that may be empty. */
 static int among(core_reference ref, core_reference first, core_reference end) { return ref - first < end - first; }
 
 static int is_mode(core_reference ref) { return among(ref, MODES, DEPENDENTS); }
 
-/* 1 for what is there without calculation. */
+/* Whether a value is stored and needs no calculation. */
 static int given(const core *c, core_reference ref) {
     if (ref < DERIVATIVES) return !NS || (c->m.mode & (INSTANTIATED | INITIALIZATION)) != 0;
     if (among(ref, INPUTS, OUTPUTS)) return 1;
@@ -71,7 +71,7 @@ core_status core_get_modes(core *c, const core_reference *ref, size_t n, core_in
     return status;
 }
 
-/* Velocities of dependent joints, whose starts choose a branch where they are given. */
+/* Whether ref is the velocity of a dependent joint. Its start value selects a branch. */
 static int is_speed(unsigned ref) {
 #ifdef MODEL_TREE
     return among(ref, OUTPUTS + PASSIVE_V, OUTPUTS + PASSIVE_V + N_PASSIVE);
@@ -81,7 +81,7 @@ static int is_speed(unsigned ref) {
 #endif
 }
 
-/* Modes in which a variable may be set; 0: it is calculated. */
+/* Modes in which a variable may be set, 0 for a calculated variable. */
 static int settable(const core *c, core_reference ref) {
     int before = INSTANTIATED | INITIALIZATION;
     if (ref < DERIVATIVES && NS) return c->m.cosimulation ? before : before | EVENT;
@@ -95,7 +95,7 @@ static int settable(const core *c, core_reference ref) {
     return among(ref, DEPENDENTS, INDICATORS) ? before : 0;
 }
 
-/* The smallest normal number as a bound means more than zero. */
+/* Check the bounds of a parameter. The smallest normal number as lower bound means "positive". */
 static core_status within_bounds(core *c, core_reference ref, double value) {
     double low = MODEL_MIN[ref], high = MODEL_MAX[ref];
     const char *name = MODEL_NAMES[ref];
@@ -124,7 +124,7 @@ static core_status settable_value(core *c, core_reference ref, double value) {
     return among(ref, PARAMETERS, MODES) ? within_bounds(c, ref, value) : CORE_OK;
 }
 
-/* Something that the slopes depend on changed. */
+/* Mark calculated values as out of date after a change of data on which derivatives depend. */
 static void changed(core *c) {
     c->m.stale = 1;
     if (c->m.mode & (INSTANTIATED | INITIALIZATION))
@@ -133,7 +133,8 @@ static void changed(core *c) {
         core_restart(c);
 }
 
-/* A guess equal to the start value in the model description says nothing: many hosts write all. */
+/* Store a guess of a dependent coordinate. A guess equal to the start value of the model
+ * description has no effect, because many hosts set all start values. */
 static void set_guess(core *c, core_reference ref, double value) {
     if (c->m.guess[ref - DEPENDENTS] == value) return;
     c->m.guess[ref - DEPENDENTS] = value;
@@ -151,8 +152,8 @@ static void set_speed(core *c, unsigned ref, double value) {
 #endif
 }
 
-/* States of the independent joints under their other names; before the start, one that is equal to
- * its value in the model description says nothing. */
+/* Set a state of an independent joint by its reference for external integrators. Before the start,
+ * a value equal to that in the model description has no effect. */
 static void set_slot(core *c, core_reference ref, double value) {
     int before = (c->m.mode & (INSTANTIATED | INITIALIZATION)) != 0;
     double *at = c->m.values + (before ? ref - SLOTS + STATES : ref);
@@ -161,7 +162,8 @@ static void set_slot(core *c, core_reference ref, double value) {
     changed(c);
 }
 
-/* Where joints are no states in event mode, they become so before they, or lengths, are set. */
+/* Make the joints the states, if they are not, before event mode sets a joint value or a parameter.
+ * */
 static core_status joints_set(core *c, core_reference ref) {
 #if MODEL_TREE_OUTSIDE
     int ours = ref < DERIVATIVES || ref >= PARAMETERS;

@@ -4,14 +4,14 @@
 
 #if NB > 0
 
-/* Part of the velocities that may differ from what the accelerations at the ends make of a step. A
- * smooth motion differs by the cube of the step, a few hundredths in the longest steps that hosts
- * make; where branches cross under an angle, velocities change by about their own size. */
+/* Largest difference between the change of a velocity and the trapezoidal integral of its
+ * acceleration, relative to the velocity. In a smooth motion it is of third order in the step, a
+ * few hundredths in the longest usual steps. At a crossing of branches it is about 1. */
 #define KINK REAL(0.25)
 
-/* Part of their nominal values below which velocities are at rest, as on a stop: what changes there is
- * the rounding of the equations of closure, some 1e-13 (1e-5 in single precision). A motion as slow
- * takes a year for a revolution (half a day). */
+/* Velocity that counts as rest, relative to the nominal value. A mechanism at rest on a stop shows
+ * rounding errors of the closure equations, about 1e-13 (1e-5 in single precision). At the limit a
+ * revolution takes a year (half a day in single precision). */
 #ifdef REAL_IS_FLOAT
 #define REST REAL(1e-4)
 #else
@@ -20,7 +20,7 @@
 
 #define AT(i, j) J[MODEL_COLUMNS[first + (j)] * NZ + MODEL_ROWS[first + (i)]]
 
-/* Elimination with row exchanges, block after block. */
+/* Gaussian elimination with row exchanges, block by block. */
 SHARED int watch_signs(const loops *l, const real *x, const real *z, real *sign, real *J) {
     int b, i, j, k, first = 0;
     l->arg[0] = x;
@@ -50,7 +50,8 @@ SHARED int watch_signs(const loops *l, const real *x, const real *z, real *sign,
     return 0;
 }
 
-/* Velocities changed by other than what the accelerations make of the step. */
+/* Whether a velocity change differs from the trapezoidal integral of the acceleration: an impact or
+ * discontinuity. */
 static int kinked(const watched *a, const watched *b, const real *unit) {
     real h = b->time - a->time, size = REAL(0.0), most = REAL(0.0);
     int i;

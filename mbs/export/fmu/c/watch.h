@@ -1,22 +1,22 @@
-/* What is watched between two accepted configurations: no leap without notice.
+/* Detection of singular configurations between two accepted configurations.
  *
- * Where the independent joints lose their hold on the dependent ones, branches of motion meet, and a
- * step may end on another one: every row of the closure holds there, energy does not. Two things
- * show it. The determinant of a diagonal block of the slopes of the closure changes its sign: the
- * step has passed a singular configuration. Or velocities of dependent joints change by other than
- * what their accelerations at both ends make of the step: the motion has a kink.
+ * In a singular configuration the independent joints do not determine the dependent joints, and
+ * branches of motion meet. A step across it may end on another branch, on which all closure rows
+ * hold but energy is not conserved. Two signs reveal such a step. The determinant of a diagonal
+ * block of the closure Jacobian changes its sign. Or the change of a dependent velocity differs
+ * from the trapezoidal integral of its acceleration, so that the motion has a kink.
  */
 #ifndef MBS_WATCH_H
 #define MBS_WATCH_H
 
 #include "closure.h"
 
-#ifndef WATCHED /* the header of a bare library has it */
+#ifndef WATCHED /* the header of a bare library defines this structure itself */
 typedef struct {
     int on;
     real time;
     real sign[NB + 1];
-    real v[N_PASSIVE + 1], a[N_PASSIVE + 1]; /* of the dependent joints */
+    real v[N_PASSIVE + 1], a[N_PASSIVE + 1]; /* velocities and accelerations of dependent joints */
 } watched;
 #endif
 
@@ -24,11 +24,11 @@ typedef struct {
 
 #if NB > 0
 
-/* The signs of the determinants of the diagonal blocks at a configuration; 1 where one is singular.
- * J: WATCH_WORK numbers. */
+/* Compute the sign (+1 or -1) of the determinant of each diagonal block (NB,). Returns 1 if a block
+ * is singular. J: scratch memory of WATCH_WORK numbers. */
 SHARED int watch_signs(const loops *l, const real *x, const real *z, real *sign, real *J);
 
-/* 1 where what lies between two configurations is no smooth motion; unit: of v. */
+/* Whether the motion between two configurations is not smooth. unit: typical sizes of v. */
 SHARED int watch_differ(const watched *before, const watched *now, const real *unit);
 
 #endif

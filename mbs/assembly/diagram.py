@@ -1,4 +1,4 @@
-"""The picture of a connection graph: bodies as boxes, joints between them, cut joints dashed."""
+"""Diagram of the connection graph: bodies as boxes, joints between them, cut joints dashed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mbs.errors import ExportError
 from mbs.files import PathLike, path_of, write_text
 from mbs.palette import PALETTE, Theme
 
-# The connection graph of a system: which bodies there are, and which joints join them.
+# Connection graph of a system: rigid links (nodes) and joints (edges).
 
 
 _KINDS = {
@@ -27,7 +27,7 @@ _MOST_NAMES = 3
 
 @dataclass(frozen=True, slots=True)
 class ConnectionNode:
-    """A rigid link: its number, 0 for the base, and the names of its bodies, a line each."""
+    """Rigid link: its number (0 for the base) and the names of its bodies, one per line."""
 
     number: int
     lines: tuple[str, ...]
@@ -35,14 +35,14 @@ class ConnectionNode:
 
 @dataclass(frozen=True, slots=True)
 class ConnectionEdge:
-    """A joint or constraint.
+    """Joint or constraint.
 
     Attributes:
-        name: of the joint.
-        kind: in words.
-        driven: whether a motor moves it.
+        name: name of the joint.
+        kind: kind of the joint as text.
+        driven: whether the joint is actuated.
         cut: whether it closes a loop.
-        ends: numbers of the links that it joins; in the tree the one nearer to the base first.
+        ends: numbers of the two links. In the spanning tree, the link nearer to the base is first.
     """
 
     name: str
@@ -54,13 +54,13 @@ class ConnectionEdge:
 
 @dataclass(frozen=True, slots=True)
 class Connections:
-    """A spanning tree of links, and the joints that were cut.
+    """Spanning tree of links, and the cut joints.
 
     Attributes:
-        nodes: by number of the link.
-        children: for each link the joints of the tree that go away from the base.
-        cuts: the joints that close loops.
-        remarks: couplings of coordinates, in sentences.
+        nodes: dict from link number to link.
+        children: dict from link number to the joints of the tree on its distal side.
+        cuts: joints that close loops.
+        remarks: sentences on couplings of coordinates.
     """
 
     nodes: dict[int, ConnectionNode]
@@ -70,7 +70,10 @@ class Connections:
 
 
 def connections(system: SystemData) -> Connections:
-    """The graph of a system; welds join nothing, since what they hold is one link."""
+    """Return the connection graph of a system.
+
+    Fixed joints are no edges, because the bodies that they join are one link.
+    """
     edges = [_edge(system, k) for k, row in enumerate(system.joints) if row.part is None]
     edges = [edge for edge in edges if edge.ends[0] != edge.ends[1]]
     numbers = sorted({0, *(end for edge in edges for end in edge.ends)})
@@ -116,27 +119,27 @@ def _remarks(system: SystemData) -> tuple[str, ...]:
     )
 
 
-# Where the parts of a connection graph go: layers from the base downwards, a long chain wrapped.
+# Layout of a connection graph: layers from the base downwards; a long chain is wrapped.
 #
-# A joint that was cut hangs as a leaf below one of its links; a line leads from it to the other.
+# A cut joint is a leaf below one of its links, with a line to its other link.
 
 
 LINE, LETTER = 15.0, 6.9
 """Height of a line of text and width of a letter [px]."""
 
 LEVEL = 104.0
-"""Distance of the middles of two boxes above each other [px]: three lines each, a pill between."""
+"""Vertical distance of box middles [px]: boxes of three lines, with a joint label between."""
 PILL = 21.0
-"""Height of the pill that names a joint [px]: a line of text and a little."""
+"""Height of the label (pill) of a joint [px]: a line of text and a margin."""
 _PAD, _GAP = 11.0, 18.0
-"""Beside a text in its box, and between two boxes [px]."""
+"""Horizontal margin of a text in its box, and gap between two boxes [px]."""
 _LONGEST = 8
-"""A chain of more links than this goes on beside itself."""
+"""Largest number of moving links of a chain in one column. Longer chains have more columns."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlacedNode:
-    """A link: the middle of its box, and its size [px]."""
+    """Link with the middle and size of its box [px]."""
 
     node: ConnectionNode
     x: float
@@ -147,7 +150,7 @@ class PlacedNode:
 
 @dataclass(frozen=True, slots=True)
 class PlacedEdge:
-    """A joint: the middle of its pill, and its width [px]; below or beside the first link."""
+    """Joint with the middle and width of its label [px], below or next to its first link."""
 
     edge: ConnectionEdge
     x: float
@@ -157,7 +160,10 @@ class PlacedEdge:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Links, joints of the tree and cut joints, in a picture of this width and height [px]."""
+    """Positions of links, tree joints and cut joints, and size of the picture [px].
+
+    ancestors: dict from link number to the numbers of the links between it and the base.
+    """
 
     nodes: dict[int, PlacedNode]
     tree: tuple[PlacedEdge, ...]
@@ -168,7 +174,7 @@ class Layout:
 
 
 def layout(graph: Connections) -> Layout:
-    """Places for a graph."""
+    """Compute the layout of a connection graph."""
     hung = _hang(graph)
     draft = _DiagramSoFar(graph, hung, {}, [], [], {})
     chain = _chain(graph) if not graph.cuts else []
@@ -185,7 +191,7 @@ def layout(graph: Connections) -> Layout:
 
 
 def _chain(graph: Connections) -> list[int]:
-    """The links one after the other where none branches; empty where one does."""
+    """Return the link numbers of an unbranched chain in order, or an empty list."""
     here, found = 0, [0]
     while graph.children[here]:
         if len(graph.children[here]) > 1:
@@ -196,7 +202,7 @@ def _chain(graph: Connections) -> list[int]:
 
 
 def _hang(graph: Connections) -> dict[int, tuple[ConnectionEdge, ...]]:
-    """For each link the cut joints that hang below it: the link that fewer of them join."""
+    """Return for each link the cut joints below it. A cut joint belongs to its link with fewer."""
     count = Counter(end for edge in graph.cuts for end in edge.ends)
     depth = _depths(graph)
     hung: dict[int, tuple[ConnectionEdge, ...]] = dict.fromkeys(graph.nodes, ())
@@ -230,13 +236,13 @@ def pill_width(edge: ConnectionEdge) -> float:
 
 def _box_size(node: ConnectionNode) -> tuple[float, float]:
     width = max(_text_width(line) for line in node.lines)
-    # no narrower than the word "base" looks well in, and 7 above and below the lines [px]
+    # smallest width, for the word "base", and margins of 7 above and below the text [px]
     return max(width, 56.0), LINE * len(node.lines) + 14
 
 
 @dataclass(frozen=True, slots=True)
 class _DiagramSoFar:
-    """What is placed so far."""
+    """Layout under construction: positions of the parts that are placed."""
 
     graph: Connections
     hung: dict[int, tuple[ConnectionEdge, ...]]
@@ -246,18 +252,18 @@ class _DiagramSoFar:
     ancestors: dict[int, frozenset[int]]
 
     def width(self, number: int) -> float:
-        """Of a link with all that is below it."""
+        """Return the width of a link with all parts below it [px]."""
         below = [self.branch(edge) for edge in self.graph.children[number]]
         below += [pill_width(edge) for edge in self.hung[number]]
         needed = sum(below) + _GAP * max(0, len(below) - 1)
         return max(_box_size(self.graph.nodes[number])[0], needed)
 
     def branch(self, edge: ConnectionEdge) -> float:
-        """Width of a joint with all that is below it."""
+        """Return the width of a joint with all parts below it [px]."""
         return max(pill_width(edge), self.width(edge.ends[1]))
 
     def place(self, number: int, left: float, y: float, above: frozenset[int]) -> None:
-        """Put a link, and all below it, to the right of an edge."""
+        """Place a link and all parts below it, to the right of x = left."""
         wide = self.width(number)
         self.put(number, left + wide / 2, y, above)
         edges = self.graph.children[number]
@@ -275,13 +281,13 @@ class _DiagramSoFar:
             start += width + _GAP
 
     def put(self, number: int, x: float, y: float, above: frozenset[int]) -> None:
-        """Put a link."""
+        """Place a link."""
         node = self.graph.nodes[number]
         self.nodes[number] = PlacedNode(node, x, y, *_box_size(node))
         self.ancestors[number] = above
 
     def wrap(self, chain: list[int]) -> None:
-        """Put a chain in columns of like length, each from top to bottom."""
+        """Place a chain in columns of similar length, each from top to bottom."""
         columns = -(-len(chain) // _LONGEST)
         rows = -(-len(chain) // columns)
         edges = [self.graph.children[number][0] for number in chain[:-1]]
@@ -295,23 +301,23 @@ class _DiagramSoFar:
                 self.tree.append(PlacedEdge(edge, x, (row - 0.5) * LEVEL + 3, pill_width(edge)))
 
     def branch_alone(self, edge: ConnectionEdge) -> float:
-        """Width of a joint with the link below it."""
+        """Return the width of a joint with the link below it [px]."""
         return max(pill_width(edge), _box_size(self.graph.nodes[edge.ends[1]])[0])
 
 
 _MARGIN, _TITLE, _FOOT = 26.0, 46.0, 40.0
-"""Around a diagram, above it for its title, and below it for the key [px]."""
+"""Margin around a diagram, height of its title, and height of the key below it [px]."""
 _ASIDE = 14.0
-"""Between two lines that lead around a diagram [px]."""
+"""Distance of two lines on the right side of a diagram [px]."""
 _KEY = (("passive", "passive joint"), ("active", "driven joint"), ("loop", "cut to open a loop"))
 
 
 @dataclass(frozen=True, slots=True)
 class Diagram:
-    """A picture of bodies and joints, as a notebook shows it.
+    """Diagram of bodies and joints, which a notebook displays.
 
     Attributes:
-        svg: the text of an SVG file.
+        svg: text of an SVG file.
     """
 
     svg: str = field(repr=False)
@@ -323,7 +329,7 @@ class Diagram:
         """Write an .svg file.
 
         Raises:
-            ExportError: the ending is another one, or the file cannot be written.
+            ExportError: the file extension is not .svg, or the file cannot be written.
         """
         if path_of(path).suffix.lower() != ".svg":
             raise ExportError(f"{path_of(path)}: a diagram is saved as .svg; change the ending")
@@ -331,17 +337,17 @@ class Diagram:
 
 
 def diagram(system: SystemData) -> Diagram:
-    """Return the picture of the connection graph: spanning tree from the base down, cut joints."""
+    """Draw the connection graph of a system: spanning tree from the base downwards, cut joints."""
     graph = connections(system)
     placed = layout(graph)
     aside = sum(_rises(placed, pill) for pill in placed.cuts)
-    # no narrower than the key below it [px]
+    # smallest width: that of the key [px]
     width = max(
         placed.width + _ASIDE * aside, 440.0, LETTER * max(map(len, graph.remarks), default=0)
     )
     total = width + 2 * _MARGIN
     top = _ascent(placed)
-    # below the boxes, for the lines of joints that were cut [px]
+    # height below the boxes for the lines of cut joints [px]
     room = 34.0 + 3.0 * len(graph.cuts) if graph.cuts else 14.0
     height = placed.height + top + _TITLE + _FOOT + room + LINE * len(graph.remarks)
     shift = (width - placed.width - _ASIDE * aside) / 2 + _MARGIN
@@ -358,7 +364,7 @@ def diagram(system: SystemData) -> Diagram:
 
 
 def drawn(system: SystemData, path: PathLike | None) -> Diagram:
-    """`diagram`, written to a file where one is named."""
+    """Return `diagram(system)`, and write it to a file if path is not None."""
     made = diagram(system)
     if path is not None:
         made.save(path)
@@ -366,7 +372,7 @@ def drawn(system: SystemData, path: PathLike | None) -> Diagram:
 
 
 def _ascent(placed: Layout) -> float:
-    """How far the picture reaches above the middle of the base [px]."""
+    """Return the height of the picture above the middle of the base [px]."""
     box = placed.nodes[0].height / 2
     return max(box, *(PILL / 2 + 16 - pill.y for pill in placed.tree))
 
@@ -423,7 +429,7 @@ def _box(placed: PlacedNode) -> str:
         f'<rect class="body{" base" if base else ""}" x="{left:.1f}" y="{top:.1f}"'
         f' width="{placed.width:.1f}" height="{placed.height:.1f}" rx="7"/>'
     )
-    # 4.3 px take the middle of letters down to the line on which they stand
+    # 4.3 px: distance from the middle of letters to their baseline
     start = placed.y - LINE * (len(placed.node.lines) - 1) / 2 + 4.3
     kind = ' class="onbase"' if base else ""
     texts = (
@@ -471,13 +477,13 @@ def _wire(path: str, more: str = "") -> str:
 
 
 def _rises(placed: Layout, pill: PlacedEdge) -> bool:
-    """Whether a cut joint leads back to a link above the one it hangs on."""
+    """Whether the other link of a cut joint is an ancestor of the link that it is drawn below."""
     owner, other = pill.edge.ends
     return other in placed.ancestors[owner]
 
 
 def _descent(node: PlacedNode, pill: PlacedEdge) -> str:
-    """From a link down to a joint below it, or over to the top of the next column."""
+    """Return the SVG path from a link to a joint below it or at the top of the next column."""
     foot = node.y + node.height / 2
     if pill.y > foot:
         bend = (foot + pill.y - PILL / 2) / 2
@@ -492,7 +498,7 @@ def _descent(node: PlacedNode, pill: PlacedEdge) -> str:
 
 
 def _round(pill: PlacedEdge, other: PlacedNode, lane: float) -> str:
-    """Along the right side of the picture up to a link."""
+    """Return the SVG path from a cut joint along the right side (x = lane) up to a link."""
     foot, side = pill.y + PILL / 2, other.x + other.width / 2
     low = foot + 12
     return (
@@ -502,7 +508,10 @@ def _round(pill: PlacedEdge, other: PlacedNode, lane: float) -> str:
 
 
 def _across(pill: PlacedEdge, other: PlacedNode, order: int, placed: Layout) -> str:
-    """Down from a joint and over to the bottom of a link, or to its side if others hang there."""
+    """Return the SVG path from a cut joint to the bottom of a link.
+
+    It ends at the side of the link if joints are drawn below the link. order: number of the line.
+    """
     foot = pill.y + PILL / 2
     busy = any(edge.edge.ends[0] == other.node.number for edge in (*placed.tree, *placed.cuts))
     if busy:
@@ -514,7 +523,7 @@ def _across(pill: PlacedEdge, other: PlacedNode, order: int, placed: Layout) -> 
             f"M{start:.1f} {pill.y:.1f}H{lane + bend:.1f}q{-bend} 0 {-bend} {-6 * up}"
             f"V{y + 6 * up:.1f}q0 {-6 * up} {-bend} {-6 * up}H{x:.1f}"
         )
-    # Several lines enter a box left and right of its middle, 7 px apart.
+    # lines end left and right of the middle of a box, 7 px apart, and not at its corners
     side = -1 if order % 2 else 1
     # 42 % of the width is just inside the corner
     x = other.x + side * min(7.0 * (order // 2), 0.42 * other.width)
@@ -524,7 +533,7 @@ def _across(pill: PlacedEdge, other: PlacedNode, order: int, placed: Layout) -> 
 
 
 def _notes(remarks: tuple[str, ...], height: float) -> Iterator[str]:
-    """Couplings in words, and the key."""
+    """Yield the texts of the couplings, and the key."""
     y = height - 18
     for k, remark in enumerate(remarks):
         row = y - 26 - LINE * (len(remarks) - 1 - k)

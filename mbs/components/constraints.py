@@ -72,7 +72,7 @@ class Rod(Constraint):
         Constraint.__post_init__(self)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return the lengthening, to first order; its effort is the force that pushes the ends."""
+        """Return the lengthening, to first order; its effort pushes the two ends apart."""
         length = to_sx(self.length, symbols)
         return [("force along", (casadi.sumsqr(pose.p) - length**2) / (2 * length))]
 
@@ -117,7 +117,7 @@ class ConstantVelocity(_AxisConstraint):
     """
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return rows for coincident origins and no rotation of frame_b about the z axis."""
+        """Return rows for coincident origins and a rotation axis of frame_b in the x-y plane."""
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "xyz"), orientation_rows(pose)[2]]
 

@@ -1,4 +1,4 @@
-"""Pictures of mechanisms: scenes for any viewer, files and notebooks, graphs of connections."""
+"""Pictures of mechanisms: scenes for any viewer, picture files, notebooks, connection graphs."""
 
 from mbs.assembly.diagram import Diagram
 from mbs.view.page import SCRIPTS as SCRIPTS

@@ -1,7 +1,7 @@
-"""A scene as plain areas and lines in a plane: the drawing of documents and icons.
+"""Plane drawing of a scene with areas and lines, for documents and icons.
 
-The shapes are those of the scene, seen from far away; joints are drawn over the links that they
-join, so that each is seen.
+It is the orthographic projection of the shapes of the scene. Joints are drawn over the links that
+they join, so that each joint is visible.
 """
 
 from __future__ import annotations
@@ -38,30 +38,29 @@ LETTERS = 3.2
 """Height of the letters, in units of the drawing."""
 
 _SIZE = 100.0
-"""Width or height of a drawing, the larger one; lengths and widths of lines below are in this
-unit."""
-_PARALLEL = 1e-6  # sine of the angle up to which axes are parallel: files hold six digits
+"""Larger side of a drawing in drawing units, the unit of all lengths and line widths below."""
+_PARALLEL = 1e-6  # largest sine of the angle of parallel axes: files contain six digits
 _ROUND = np.linspace(0.0, 2.0 * math.pi, 32, endpoint=False)
 _CIRCLE = np.column_stack([np.cos(_ROUND), np.sin(_ROUND), np.zeros(32)])
 _LIGHT = np.array([0.08, 0.2, 0.1])
-"""How much lighter sides are that look to the right, upwards and at the eye."""
+"""Increase of brightness of box faces by the components of their normal: right, up, to the eye."""
 
 _ORDER = ("base", "link", "force", "axis", "joint", "loop", "frame")
-"""Roles from back to front; joints and loops are one group."""
+"""Roles from back to front. Joints and loops are one group."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """A line through points, closed into an area or not.
+    """Polyline or polygon.
 
     Attributes:
-        role: of the primitive that it draws, or "mass" for a centre of mass.
+        role: role of the primitive that it draws, or "mass" for a centre of mass.
         colour: name in the palette, or "axes.0" for the first colour of the axes.
-        points: in the plane, y upwards, in the unit of the drawing.
-        closed: the last point is joined to the first one.
-        opacity: of the area; 0 leaves it empty.
-        width: of the line, in the unit of the drawing.
-        bright: how light the area is, 1 as the palette has it.
+        points: points in the plane, y upwards, in drawing units.
+        closed: whether the last point is joined to the first.
+        opacity: opacity of the area, 0 for no fill.
+        width: line width in drawing units.
+        bright: brightness of the area relative to the colour in the palette.
     """
 
     role: str
@@ -75,7 +74,7 @@ class Stroke:
 
 @dataclass(frozen=True, slots=True)
 class Name:
-    """A text beside a point, in a colour of the palette."""
+    """Text with its lower left corner at a point, in a colour of the palette."""
 
     colour: str
     text: str
@@ -84,12 +83,12 @@ class Name:
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A mechanism in a plane; the longer side is about 100 units.
+    """Plane drawing of a mechanism. Its longer side is about 100 units.
 
     Attributes:
-        strokes: from back to front.
-        names: of joints, links, force elements and frames.
-        caption: how one looks at it.
+        strokes: lines and areas from back to front.
+        names: names of joints, links, force elements and frames.
+        caption: description of the view.
     """
 
     strokes: tuple[Stroke, ...]
@@ -97,7 +96,7 @@ class Drawing:
     caption: str = ""
 
     def bounds(self) -> tuple[float, float, float, float]:
-        """Left, lower, right and upper end of the strokes; a unit square without any."""
+        """Return left, lower, right and upper bound of the strokes, a unit square without strokes."""
         points = [point for stroke in self.strokes for point in stroke.points]
         if not points:
             return 0.0, 0.0, 1.0, 1.0
@@ -107,13 +106,13 @@ class Drawing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Eye:
-    """An orthographic view of posed links.
+    """Orthographic view of posed links.
 
     Attributes:
-        axes: (3, 3) rows: unit vectors to the right, upwards, towards the eye.
-        caption: what one looks at, in words.
-        poses: (links + 1, 3, 4) of the base and every link.
-        scale: units of the drawing a metre.
+        axes: unit vectors (3, 3) by rows: to the right, upwards, towards the eye.
+        caption: description of the view.
+        poses: poses (links + 1, 3, 4) of the base and every link.
+        scale: drawing units per metre.
     """
 
     axes: Array
@@ -122,11 +121,11 @@ class _Eye:
     scale: float = 1.0
 
     def seen(self, points: Array) -> Array:
-        """(..., 3) points of the base frame: right, up, near."""
+        """Project points (..., 3) of the base frame to right, up, near (..., 3) in drawing units."""
         return np.array(self.scale * (points @ self.axes.T))
 
     def project(self, link: int, points: Sequence[Vector] | Vector | Array) -> Array:
-        """(..., 3) points in the frame of a link: right, up, near."""
+        """Project points (..., 3) of a link frame to right, up, near (..., 3) in drawing units."""
         R, p = self.poses[link, :, :3], self.poses[link, :, 3]
         return self.seen(np.array(points) @ R.T + p)
 
@@ -136,20 +135,20 @@ def drawing(
     q: Mapping[str, float] | Sequence[float] | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Drawing:
-    """The drawing of a mechanism: in the plane of its motion if it has one, else from an angle.
+    """Draw a mechanism in the plane of its motion, or at an angle from above if it is spatial.
 
     Args:
-        system: open or closed; every symbol in its geometry has a value.
+        system: mechanism, open or closed. Every symbol in its geometry has a value.
         q: positions, as for `scene`.
-        parameters: values of symbols, the others at their defaults.
+        parameters: values of symbols. Other symbols have their default values.
 
     Raises:
-        ModelError: as for `scene`.
+        ModelError: the same errors as of `scene`.
     """
     made = scene(system, q, parameters=parameters)
     at = pose_links(system, made.q, made.parameters)
     eye = _eye(at, np.array(made.views["iso"]))
-    # links as bars, also where the description says what they look like
+    # draw links as bars, also if they have visual shapes
     out = made.hidden(("visual",))
     shapes = [
         replace(item, role="base" if item.link == 0 else "link")
@@ -166,7 +165,10 @@ def drawing(
 
 
 def _eye(at: PosedLinks, iso: Array) -> _Eye:
-    """Into the plane in which everything moves where there is one, right and up positive."""
+    """Return the view along the normal of the plane of motion, or from `iso` if it is spatial.
+
+    In the plane, positive directions point to the right and upwards.
+    """
     normal = plane_normal(at)
     prismatic_axes = [
         at.directions[axis.direction]
@@ -190,7 +192,7 @@ def _eye(at: PosedLinks, iso: Array) -> _Eye:
 
 
 def _strokes(shapes: Iterable[Primitive], eye: _Eye) -> Iterator[Stroke]:
-    """What every shape looks like: by roles, and far ones first among those of one group."""
+    """Yield the strokes of all shapes by role, and from far to near within a role."""
     drawn = []
     for item in shapes:
         group = _ORDER.index("joint" if item.role == "loop" else item.role)
@@ -201,7 +203,7 @@ def _strokes(shapes: Iterable[Primitive], eye: _Eye) -> Iterator[Stroke]:
 
 
 def _parts(item: Primitive, eye: _Eye) -> tuple[list[Stroke], float]:
-    """The strokes of a shape, and how near its middle is."""
+    """Return the strokes of a shape and the depth of its middle, larger if nearer."""
     if isinstance(item, (SpanShape, SpringShape)):
         start, end = (eye.project(k, at) for k, at in zip(item.links, item.ends, strict=True))
         middle = float((start + end)[2]) / 2
@@ -233,7 +235,7 @@ def _parts(item: Primitive, eye: _Eye) -> tuple[list[Stroke], float]:
         return _tripod(item, eye)
     assert isinstance(item, AxisShape), f"{type(item).__name__} has no strokes"
     ends = list(eye.project(item.link, (item.a, item.b)))
-    # thin, and none of an axis that is seen end on, in units of the drawing
+    # thin line (drawing units); no line for an axis along the view direction
     line = Stroke(item.role, item.colour, _path(np.array(ends)), width=0.3)
     long = math.dist(*line.points) > 0.01 * _SIZE
     return [line] * long, float((ends[0] + ends[1])[2]) / 2
@@ -249,14 +251,14 @@ def _capsule(ends: Sequence[Array], radius: float) -> Array:
 
 
 def _cylinder(item: CylinderShape, eye: _Eye) -> tuple[list[Stroke], float]:
-    """Its outline, the end that is seen, and the bore there."""
+    """Return the outline of a cylinder, its visible end and the bore, and its depth."""
     a, b = np.array(item.a), np.array(item.b)
     across = _CIRCLE @ rotation_onto(b - a).T
     rings = [eye.project(item.link, end + item.radius * across) for end in (a, b)]
     heads = [ring[:, 2].mean() for ring in rings]
     near = int(heads[1] > heads[0])
-    # one end is seen unless they are rotated from the eye to 3 degrees; it is lighter than the
-    # outline
+    # an end is visible if the axis is more than 3 degrees out of the picture plane; it is lighter
+    # than the outline
     parts = [_area(item, hull(np.vstack(rings)[:, :2]))]
     if abs(heads[1] - heads[0]) > 0.05 * eye.scale * np.linalg.norm(b - a):
         parts.append(_area(item, rings[near][:, :2], bright=1.12))
@@ -267,28 +269,27 @@ def _cylinder(item: CylinderShape, eye: _Eye) -> tuple[list[Stroke], float]:
 
 
 def _box(item: BoxShape, eye: _Eye) -> tuple[list[Stroke], float]:
-    """The sides that are seen."""
+    """Return the visible faces of a box and its depth."""
     pose = np.array(item.pose).reshape(3, 4)
     local = BOX_CORNERS * np.array(item.size) @ pose[:, :3].T + pose[:, 3]
     corners = eye.project(item.link, local)
     parts = []
-    # a side that is seen edge on is left out; others are a tenth darker than bars,
-    # and lighter by the light on them
+    # faces seen edge-on are left out; brightness is 0.9 of that of bars plus the light on the face
     for side in BOX_FACES:
         outside = np.cross(corners[side[2]] - corners[side[0]], corners[side[3]] - corners[side[1]])
         size = float(np.linalg.norm(outside))
-        if outside[2] > 1e-3 * size:  # it looks at the eye
+        if outside[2] > 1e-3 * size:  # the face points to the eye
             bright = round(0.9 + float(outside @ _LIGHT) / size, 2)
             parts.append(_area(item, corners[list(side), :2], bright=bright))
     return parts, float(corners[:, 2].mean())
 
 
 def _tripod(item: FrameShape, eye: _Eye) -> tuple[list[Stroke], float]:
-    """Its three axes, but one that points at the eye."""
+    """Return the axes of a frame, except an axis that points to the eye, and its depth."""
     pose = np.array(item.pose).reshape(3, 4)
     ends = pose[:, 3] + item.length * pose[:, :3].T
     points = eye.project(item.link, np.vstack([pose[:, 3], ends]))
-    # an axis that points at the eye to 3 degrees would be a dot
+    # an axis within 3 degrees of the view direction would be a dot
     lines = [
         Stroke(item.role, f"{item.colour}.{k}", _path(points[[0, k + 1]]), width=0.6)
         for k in range(3)
@@ -298,11 +299,11 @@ def _tripod(item: FrameShape, eye: _Eye) -> tuple[list[Stroke], float]:
 
 
 def _coil(item: SpringShape, start: Array, end: Array, radius: float) -> Stroke:
-    """A zigzag; a line where its ends are one place on the drawing."""
+    """Return a spring as a zigzag, or as a line if its ends coincide in the drawing."""
     start, along = start[:2], (end - start)[:2]
     length = float(np.linalg.norm(along))
-    # no length but rounding, in hundredths of the drawing; straight ends of 3/20, eight coils
-    # between
+    # length below 1e-9 drawing units is rounding; straight ends of 3/20 of the length and eight
+    # corners between them
     if length < 1e-9:
         return Stroke(item.role, item.colour, _path(np.array([start, end[:2]])), width=0.8)
     across = np.array([-along[1], along[0]]) / length
@@ -313,8 +314,8 @@ def _coil(item: SpringShape, start: Array, end: Array, radius: float) -> Stroke:
 
 
 def _grounds(at: PosedLinks, eye: _Eye) -> Iterator[Stroke]:
-    """A line with hatches under every end of a force element on the base."""
-    # lengths in hundredths of the drawing
+    """Yield a hatched ground line under every end of a force element on the base."""
+    # lengths in drawing units
     for force in at.parts.forces:
         for link, column in zip(force.links, force.points, strict=True):
             if link == 0:
@@ -327,7 +328,7 @@ def _grounds(at: PosedLinks, eye: _Eye) -> Iterator[Stroke]:
 def _masses(at: PosedLinks, eye: _Eye) -> Iterator[Stroke]:
     for link in at.parts.links:
         if link.mass_centre is not None:
-            # a dot of 1.6 hundredths of the drawing
+            # dot with a diameter of 1.6 drawing units
             dot = eye.seen(at.points[link.mass_centre])[:2] + 0.8 * _CIRCLE[:, :2]
             yield Stroke("mass", "text", _path(dot), closed=True, opacity=1.0)
 
@@ -353,19 +354,22 @@ def _names(at: PosedLinks, eye: _Eye) -> Iterator[Name]:
         yield name("force", force.name, force.points)
 
 
-# Names beside points, where they do not cover each other.
+# Placement of names next to points without overlaps.
 
-_WIDTH = 0.58  # of a letter, in heights
+_WIDTH = 0.58  # mean width of a letter relative to its height
 _Room = tuple[float, float, float, float]
 _SHIFTS = ((4.0, 2.4), (4.0, -5.0), (-4.0, 2.4), (-4.0, -5.0), (0.0, 5.4), (0.0, -8.0))
-"""Where a name is tried beside its point, in units of the drawing: clear of the sign of a joint."""
+"""Offsets of a name from its point that are tried, in drawing units, outside the joint symbol."""
 _FURTHER = (1.0, 1.8, 2.8)
-"""Times these shifts, where it has no room nearer."""
-_SIGN = 3.0  # half the side of a square about a joint
+"""Factors of these offsets, tried in order until the name has room."""
+_SIGN = 3.0  # half the side of the square that a joint symbol occupies [drawing units]
 
 
 def placed(names: Iterable[Name]) -> tuple[Name, ...]:
-    """Names where there is room beside their points; those of one colour at a point are one."""
+    """Place names next to their points without overlaps.
+
+    Names of the same colour at the same point are joined by commas.
+    """
     groups: dict[tuple[str, Point], list[str]] = {}
     for name in names:
         key = name.colour, (round(name.point[0], 1), round(name.point[1], 1))
@@ -385,7 +389,7 @@ def placed(names: Iterable[Name]) -> tuple[Name, ...]:
 
 
 def _free_room(text: str, point: Point, taken: list[_Room]) -> tuple[Point, _Room]:
-    """The first room about the point that is free, else the first one."""
+    """Return corner and rectangle of the first free position of a text, or the first position."""
     tried = [
         _room(text, point, (dx * far, dy * far))
         for far, (dx, dy) in itertools.product(_FURTHER, _SHIFTS)
@@ -412,9 +416,9 @@ def _path(points: Array) -> tuple[Point, ...]:
 
 
 def hull(points: Array) -> Array:
-    """The convex hull of (k, 2) points, counterclockwise.
+    """Return the convex hull of points (k, 2), counterclockwise.
 
-    Source: Andrew 1979, the monotone chain.
+    Source: Andrew 1979, monotone chain algorithm.
     """
     rows = sorted({(round(float(x), 9), round(float(y), 9)) for x, y in points})
     lower, upper = _chain(rows), _chain(rows[::-1])

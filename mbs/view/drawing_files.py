@@ -1,4 +1,4 @@
-"""A drawing as SVG text, and as a small PNG picture without names."""
+"""Drawing as SVG text, and as a small PNG picture without names."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from mbs.view.primitives import rgb
 SIZE = 200
 """Width and height of the PNG picture in pixels."""
 
-_LETTER = 0.6  # width of a letter in heights, for the room that names need
+_LETTER = 0.6  # width of a letter relative to its height, for the bounds of names
 _MARGIN = 4.0
-_LEAST = (80.0, 30.0)  # width and height of a drawing that holds little
-_EDGE = 0.62  # how bright the edge of an area is, beside the area
+_LEAST = (80.0, 30.0)  # smallest width and height of a drawing, without margins
+_EDGE = 0.62  # brightness of the edge of an area relative to its colour
 
 _SHAPES = """\
 .drawing path { fill: none; stroke-linejoin: round; stroke-linecap: round; }
@@ -30,13 +30,12 @@ _SHAPES = """\
 
 
 def svg(drawing: Drawing, title: str, *themes: Theme) -> str:
-    """The element `svg` of a drawing.
+    """Return the element `svg` of a drawing.
 
     Args:
-        drawing: what is shown.
-        title: what it is, for those who do not see it.
-        themes: "light" where nothing else is asked for; the drawing follows the choice of its
-            reader without any.
+        drawing: drawing to write.
+        title: title of the drawing, for screen readers.
+        themes: fixed theme, such as "light". Without a theme the drawing follows the browser.
     """
     left, lower, right, upper = _room(drawing)
     width, height = right - left, upper - lower
@@ -53,13 +52,13 @@ def svg(drawing: Drawing, title: str, *themes: Theme) -> str:
 
 
 def standalone(drawing: Drawing, title: str) -> str:
-    """A file of its own, without names, for an icon."""
+    """Return the text of an SVG file without names, for an icon."""
     bare = svg(Drawing(drawing.strokes), title, "light")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{bare}\n'
 
 
 def _style(drawing: Drawing, themes: tuple[Theme, ...]) -> str:
-    """Rules for the colours that are used."""
+    """Return the style rules of the colours in the drawing."""
     if themes:
         return _SHAPES + "".join(_rules(drawing, theme) for theme in themes)
     dark = "@media (prefers-color-scheme: dark) {\n" + _rules(drawing, "dark") + "}\n"
@@ -86,7 +85,7 @@ def _named(colour: str) -> str:
 
 
 def _class(stroke: Stroke) -> str:
-    """One name for a colour, its brightness, and whether it is a line or an area."""
+    """Return the class name for colour, brightness, and kind (line or area) of a stroke."""
     if not stroke.opacity:
         return f"{_named(stroke.colour)}-line"
     return f"{_named(stroke.colour)}-{100 * stroke.bright:.0f}"
@@ -98,11 +97,11 @@ def _hex(colour: str, theme: Theme, bright: float = 1.0) -> str:
 
 
 def _room(drawing: Drawing) -> tuple[float, float, float, float]:
-    """The bounds of strokes and names, with a margin."""
+    """Return the bounds of strokes and names, with a margin: left, lower, right, upper."""
     left, lower, right, upper = drawing.bounds()
     for name in drawing.names:
         x, y = name.point
-        # below the line letters reach by a third of their height
+        # letters extend 0.3 of their height below the baseline
         left, lower = min(left, x), min(lower, y - 0.3 * LETTERS)
         right, upper = max(right, x + _LETTER * LETTERS * len(name.text)), max(upper, y + LETTERS)
     wide = max(_MARGIN, (_LEAST[0] - right + left) / 2)
@@ -111,7 +110,7 @@ def _room(drawing: Drawing) -> tuple[float, float, float, float]:
 
 
 def _text(name: Name, left: float, upper: float) -> str:
-    """A name, on a halo that keeps it apart from the lines behind it."""
+    """Return the text elements of a name and of a halo that separates it from lines below it."""
     place = f'x="{name.point[0] - left:.2f}" y="{upper - name.point[1]:.2f}"'
     text = escape(name.text)
     halo = f'<text class="halo" aria-hidden="true" {place}>{text}</text>'
@@ -130,21 +129,21 @@ def _path(stroke: Stroke, left: float, upper: float) -> str:
     )
 
 
-# The PNG picture: areas and lines laid over each other, with smooth edges.
+# PNG picture: antialiased areas and lines, drawn over each other.
 
-_SPACE = 12.0  # around the drawing [pixels]
-_THIN = 1.5  # the least width of a line [pixels]
+_SPACE = 12.0  # margin around the drawing [pixels]
+_THIN = 1.5  # smallest line width [pixels]
 _LEFT_OUT = ("axis", "frame", "mass")
 _GRID = np.stack(np.meshgrid(np.arange(SIZE) + 0.5, np.arange(SIZE) + 0.5), axis=-1)
-"""(SIZE, SIZE, 2) middle of each pixel, x to the right and y down."""
+"""Middle of each pixel (SIZE, SIZE, 2), x to the right and y down."""
 
 
 def icon(drawing: Drawing) -> bytes:
-    """A PNG file of the drawing on a transparent ground, without frames, axes and names."""
+    """Return a PNG file of the drawing with transparent background and no frames, axes, names."""
     image = np.zeros((SIZE, SIZE, 4))
     shown = Drawing(tuple(s for s in drawing.strokes if s.role not in _LEFT_OUT))
     left, lower, right, upper = shown.bounds()
-    # a drawing that is one point has no scale: any one will do
+    # 1e-9: arbitrary scale of a drawing that is a single point
     scale = (SIZE - 2 * _SPACE) / max(right - left, upper - lower, 1e-9)
     middle = np.array([left + right, lower + upper]) / 2
     for stroke in shown.strokes:
@@ -154,7 +153,7 @@ def icon(drawing: Drawing) -> bytes:
 
 
 def png(pixels: np.ndarray[tuple[int, int, int], np.dtype[np.uint8]]) -> bytes:
-    """A PNG file of (rows, columns, 4) red, green, blue and opacity.
+    """Encode pixels (rows, columns, 4) of red, green, blue and opacity as a PNG file.
 
     Source: W3C 2003, sections 5 and 7.
     """
@@ -171,7 +170,7 @@ def _chunk(kind: bytes, content: bytes) -> bytes:
 
 
 def _paint(image: Array, stroke: Stroke, points: Array, width: float) -> None:
-    """Area first, then the line, over what is there; only in the window that the stroke needs."""
+    """Draw a stroke over the image: first its area, then its line, within its bounding window."""
     first = np.clip(np.floor(points.min(axis=0) - width), 0, SIZE).astype(int)
     last = np.clip(np.ceil(points.max(axis=0) + width), 0, SIZE).astype(int)
     window = slice(first[1], last[1]), slice(first[0], last[0])
@@ -189,9 +188,9 @@ def _paint(image: Array, stroke: Stroke, points: Array, width: float) -> None:
 
 
 def _cover(image: Array, opacity: Array, colour: Array) -> None:
-    """Lay a colour over the picture.
+    """Blend a colour over the image.
 
-    Source: Porter & Duff 1984, the operator over.
+    Source: Porter & Duff 1984, operator `over`.
     """
     total = opacity + image[..., 3] * (1 - opacity)
     share = np.where(total > 0, opacity / np.where(total > 0, total, 1), 0)[..., None]
@@ -200,7 +199,7 @@ def _cover(image: Array, opacity: Array, colour: Array) -> None:
 
 
 def _distance(grid: Array, a: Array, b: Array) -> Array:
-    """From each pixel to the line from a to b."""
+    """Return the distance of each pixel from the line segment a to b."""
     along, length, start = b - a, float((b - a) @ (b - a)), grid - a
     if length == 0:
         share = np.zeros(grid.shape[:2])
@@ -212,7 +211,7 @@ def _distance(grid: Array, a: Array, b: Array) -> Array:
 
 
 def _inside(grid: Array, sides: list[tuple[Array, Array]]) -> Array:
-    """Whether the middle of each pixel is in the polygon: a ray crosses its sides oddly."""
+    """Return 1 for pixels inside a polygon, else 0: a ray from inside has odd crossings."""
     odd = np.zeros(grid.shape[:2], dtype=bool)
     x, y = grid[..., 0], grid[..., 1]
     for (ax, ay), (bx, by) in sides:

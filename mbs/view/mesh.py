@@ -1,4 +1,4 @@
-"""Primitives as small flat faces, for pictures that are made without a browser."""
+"""Conversion of primitives to small flat faces, for pictures without a browser."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from mbs.view.primitives import (
 
 _SIDES = 14
 _PIECES = 8
-"""A long bar is cut into so many, since faces are sorted by their middles."""
+"""Number of pieces of a long bar. Short faces are needed, because faces are sorted by middle."""
 
 _TURNS = 8
 BOX_CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -35,14 +35,14 @@ BOX_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Faces:
-    """Faces of one colour in one frame.
+    """Faces of the same colour in one frame.
 
     Attributes:
-        corners: (n, 4, 3) [m]; seen from outside they run anticlockwise. A line has its two ends
-            twice.
+        corners: corners (n, 4, 3) of faces [m], counterclockwise as seen from outside. A line has
+            each of its two ends twice.
         colour: name in the palette, or "axes.0" for the first colour of the axes.
-        kind: closed, seen from outside only; open, seen from both sides; line.
-        opacity: 1 hides what is behind.
+        kind: "closed" (visible from outside only), "open" (visible from both sides) or "line".
+        opacity: opacity, 1 for opaque faces.
     """
 
     corners: Array
@@ -52,11 +52,11 @@ class Faces:
 
 
 def faces_of(item: Primitive, size: float) -> Iterator[Faces]:
-    """Faces of a primitive in the frame of its link.
+    """Yield the faces of a primitive in the frame of its link.
 
     Args:
-        item: any but a label, which has none, and what is stretched between two links.
-        size: of the mechanism [m], for the dashes of axes.
+        item: primitive on a single link. A label has no faces.
+        size: size of the mechanism [m], for the dashes of axes.
     """
     if isinstance(item, (BarShape, CylinderShape)):
         yield Faces(_round(item), item.colour)
@@ -73,7 +73,7 @@ def faces_of(item: Primitive, size: float) -> Iterator[Faces]:
         yield Faces(_pose(_cuboid(np.array(item.size)), item.pose), item.colour)
     elif isinstance(item, MeshShape):
         corners = np.reshape(item.points, (-1, 3))[np.reshape(item.triangles, (-1, 3))]
-        # files do not agree on which side is outside
+        # visible from both sides, because the orientation in mesh files is not reliable
         yield Faces(_pose(corners[:, [0, 1, 2, 2]], item.pose), item.colour, "open")
     elif isinstance(item, PlateShape):
         yield Faces(_fan(np.array(item.points)), item.colour, "open", item.opacity)
@@ -86,7 +86,7 @@ def faces_of(item: Primitive, size: float) -> Iterator[Faces]:
 
 
 def stretch(item: SpanShape | SpringShape, a: Array, b: Array) -> Faces:
-    """Faces of what lies between two points of the base frame."""
+    """Return the faces of a bar or spring between points a and b of the base frame."""
     if isinstance(item, SpanShape):
         bar = _round(CylinderShape(item.role, 0, item.colour, tuple(a), tuple(b), item.radius))
         return Faces(bar, item.colour)
@@ -100,7 +100,7 @@ def stretch(item: SpanShape | SpringShape, a: Array, b: Array) -> Faces:
 
 
 def revolve(profile: Array, sides: int = _SIDES) -> Array:
-    """(n, 4, 3) faces of a profile (k, 2) of radius and height, revolved about z."""
+    """Return the faces (n, 4, 3) of a profile (k, 2) of radius and height, revolved about z."""
     angle = np.linspace(0, 2 * np.pi, sides + 1)
     round_ = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     rings = np.concatenate(
@@ -116,7 +116,7 @@ def revolve(profile: Array, sides: int = _SIDES) -> Array:
 
 
 def rotation_onto(direction: Array) -> Array:
-    """A rotation whose z axis is a direction; none where that has no length."""
+    """Return a rotation matrix whose z axis has the given direction, or the identity for zero."""
     length = float(np.linalg.norm(direction))
     if length == 0:
         return np.eye(3)
@@ -144,7 +144,7 @@ def _round(item: BarShape | CylinderShape) -> Array:
 
 
 def _cuboid(size: Array) -> Array:
-    """Faces about the origin, cut across the longest side."""
+    """Return the faces of a cuboid about the origin, divided along its longest side."""
     longest = int(np.argmax(size))
     faces = []
     for corners in BOX_CORNERS[np.array(BOX_FACES)]:
@@ -158,7 +158,7 @@ def _cuboid(size: Array) -> Array:
 
 
 def _arrow(length: float) -> Array:
-    # in parts of the length: a shaft of three hundredths, a head of a fifth
+    # relative to the length: shaft radius 0.03, head length 0.2
     profile = [[0, 0], [0.03, 0], [0.03, 0.4], [0.03, 0.8], [0.08, 0.8], [0, 1]]
     return revolve(length * np.array(profile), 8)
 
@@ -173,8 +173,7 @@ def _fan(points: Array) -> Array:
 
 
 def _dashes(a: Array, b: Array, size: float) -> Array:
-    # dashes and gaps, three hundredths of the size of the mechanism together, look the same on all
-    # axes
+    # a dash and a gap together are 0.032 of the size of the mechanism on all axes
     count = max(1, round(float(np.linalg.norm(b - a)) / (0.032 * size)))
     starts = np.arange(count) / count
     first = a + starts[:, None] * (b - a)

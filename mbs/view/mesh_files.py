@@ -1,4 +1,4 @@
-"""Meshes of bodies, read by trimesh, with no more triangles than a picture shows."""
+"""Mesh files of bodies, read by trimesh and simplified for pictures."""
 
 from __future__ import annotations
 
@@ -24,20 +24,21 @@ from mbs.text import install_command, quoted, shortened
 from mbs.view.posed import Array
 
 MOST_TRIANGLES = 2000
-"""Of one mesh in a picture: a robot of thirty meshes stays under a second and two megabytes."""
+"""Largest number of triangles of a mesh in a picture. A robot of 30 meshes then takes less than
+1 s and 2 MB."""
 _UNIT = re.compile(rb"<(?:\w+:)?unit\b[^<>]{0,200}?\bmeter\s*=\s*[\"']([^\"']{1,40})[\"']")
 _MOST_READ = 5_000_000
-"""Triangles of a file: more are gigabytes in memory."""
+"""Largest number of triangles of a file. More triangles need gigabytes of memory."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
-    """The surface of a body.
+    """Triangle mesh of the surface of a body.
 
     Attributes:
-        points: (n, 3) corners [m].
-        triangles: (m, 3) numbers of points, anticlockwise seen from outside.
-        of: how many triangles the file has, m or more.
+        points: corners (n, 3) [m].
+        triangles: indices (m, 3) of points, counterclockwise as seen from outside.
+        of: number of triangles in the file, at least m.
     """
 
     points: Array
@@ -46,19 +47,19 @@ class Mesh:
 
 
 def read_mesh(path: PathLike) -> Mesh:
-    """The triangles of a mesh file, thinned out where there are many.
+    """Read the triangles of a mesh file, and simplify a mesh of too many triangles.
 
-    Nothing but this file is read: neither materials nor textures that it names.
+    Materials and textures, which the file refers to, are not read.
 
     Args:
-        path: a .stl, .obj or .dae file; lengths of the last in the unit that it says, of the
-            others in m.
+        path: .stl, .obj or .dae file. Lengths in a .dae file are in the unit of the file, in other
+            files in m.
 
     Raises:
-        ModelError: trimesh is not installed, the file is missing, or it holds no triangles.
+        ModelError: trimesh is not installed, the file is missing, or it contains no triangles.
     """
     stamp = 0
-    with contextlib.suppress(OSError, ValueError):  # read_bytes says what is wrong
+    with contextlib.suppress(OSError, ValueError):  # read_bytes reports the error
         stamp = os.stat(path).st_mtime_ns
     return _read(str(path), stamp)
 
@@ -74,7 +75,7 @@ def _read(path: str, stamp: int) -> Mesh:
     except MbsError as error:
         raise ModelError(str(error)) from None
     try:
-        # a file like this one has no folder: what it names cannot be looked for
+        # a BytesIO has no folder, so that files it refers to cannot be opened
         plain = _without_materials(content) if kind == "dae" else content
         scene = trimesh.load_scene(
             io.BytesIO(plain), file_type=kind, process=False, skip_materials=True
@@ -82,7 +83,7 @@ def _read(path: str, stamp: int) -> Mesh:
         points, triangles = _join(scene)
         if kind == "dae":
             points = points * _unit(content)
-    except Exception as error:  # the libraries raise whatever malformed files make of them
+    except Exception as error:  # malformed files cause arbitrary exceptions in libraries
         reason = quoted(str(error) or type(error).__name__)
         raise ModelError(f"{shortened(path)}: the mesh cannot be read: {reason}") from None
     if not len(triangles) or len(triangles) > _MOST_READ or not np.isfinite(points).all():
@@ -104,13 +105,13 @@ def _module(name: str, path: str) -> Any:
 
 
 def _join(scene: Any) -> tuple[Array, NDArray[np.int64]]:
-    """All meshes of a file in its frame."""
+    """Return points (n, 3) and triangles (m, 3) of all meshes of a file in the frame of the file."""
     points, triangles, count = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], 0
     for node in scene.graph.nodes_geometry:
         pose, name = scene.graph[node]
         mesh = scene.geometry[name]
         if not hasattr(mesh, "faces"):
-            continue  # lines and clouds of points
+            continue  # lines or point clouds
         corners, faces = np.array(mesh.vertices, dtype=float), np.array(mesh.faces)
         points.append(corners @ pose[:3, :3].T + pose[:3, 3])
         # the faces of a mirrored mesh are reversed
@@ -121,7 +122,7 @@ def _join(scene: Any) -> tuple[Array, NDArray[np.int64]]:
 
 
 def _without_materials(content: bytes) -> bytes:
-    """A COLLADA file of surfaces alone: pycollada drops those whose materials are broken."""
+    """Remove materials from a COLLADA file: pycollada drops surfaces with invalid materials."""
     root = ElementTree.fromstring(content)
     for element in list(root.iter()):
         for inner in list(element):
@@ -136,7 +137,7 @@ _MATERIALS = {"bind_material"} | {
 
 
 def _unit(content: bytes) -> float:
-    """Metres that a length of 1 in a COLLADA file is."""
+    """Return the length unit of a COLLADA file [m]."""
     found = _UNIT.search(content)
     unit = float(found[1]) if found else 1.0
     if not 0 < unit < np.inf:
@@ -145,14 +146,17 @@ def _unit(content: bytes) -> float:
 
 
 def thin(points: Array, triangles: NDArray[np.int64], most: int = MOST_TRIANGLES) -> Mesh:
-    """The mesh with at most so many triangles: corners in one cell of a grid become one.
+    """Simplify a mesh: all corners in a cell of a grid are merged at their mean.
 
-    Source: Rossignac & Borrel 1993, vertices clustered in cells, each at their mean.
+    Source: Rossignac & Borrel 1993, vertex clustering.
 
     Args:
-        points: (n, 3) corners.
-        triangles: (m, 3) numbers of points.
-        most: number of triangles.
+        points: corners (n, 3) [m].
+        triangles: indices (m, 3) of points.
+        most: largest number of triangles.
+
+    Raises:
+        ModelError: no grid reduces the mesh to this number of triangles.
     """
     count = len(triangles)
     for cells in _cells(most):
@@ -176,12 +180,12 @@ def thin(points: Array, triangles: NDArray[np.int64], most: int = MOST_TRIANGLES
 
 
 def _cells(most: int) -> Iterator[int | None]:
-    """None for the mesh as it is, then ever coarser grids, by their cells along the longest side.
+    """Yield None for the original mesh, then numbers of cells along the longest side, decreasing.
 
-    A surface crosses some 6 cells of the square of their number, with two triangles each.
+    A surface intersects about 6 n^2 of the n^3 cells, with two triangles each.
     """
     yield None
-    # from a grid that is certainly too fine, for a flat or thin mesh, by a sixth each time
+    # start with a grid that is too fine even for a flat or thin mesh, and reduce by a sixth
     cells = 8.0 * np.sqrt(most)
     while cells > 1:
         yield int(cells)

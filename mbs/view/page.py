@@ -1,4 +1,4 @@
-"""An HTML file that shows a scene: everything is in it, so that it works offline."""
+"""Self-contained HTML file that shows a scene offline."""
 
 from __future__ import annotations
 
@@ -17,38 +17,38 @@ from mbs.text import did_you_mean
 from mbs.view.posed import Array
 from mbs.view.scene import Scene
 
-# The files that show a scene in a browser.
+# Files of the viewer in a browser.
 
 
 SCRIPTS = ("three.bundle.js", "shapes.js", "viewer.js")
-"""Scripts of the viewer, in the order in which they are loaded."""
+"""Scripts of the viewer in loading order."""
 
 STYLES = ("viewer.css",)
 """Styles of the viewer."""
 
 
 def assets_folder() -> Path:
-    """The folder with the scripts and styles of the viewer, for a server to hand out."""
+    """Return the folder with the scripts and styles of the viewer, for a web server."""
     return Path(__file__).parent / "assets"
 
 
 def asset(name: str) -> str:
-    """The text of one of these files."""
+    """Return the text of a script or style of the viewer."""
     return (assets_folder() / name).read_text(encoding="utf-8")
 
 
-# How a picture looks: from where, on which background, and what is shown.
+# Appearance of a picture: view direction, theme and visible roles.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """How a picture looks.
+    """Appearance of a picture.
 
     Attributes:
-        view: iso, front, side or top.
-        theme: light or dark, or auto: what the browser prefers, and light in other files.
-        shown: roles that are shown besides the usual ones: "label", "link frame".
-        hidden: roles that are left out, such as "visual".
+        view: view direction: iso, front, side or top.
+        theme: light, dark or auto. auto follows the browser, and is light in other files.
+        shown: roles that are shown in addition to the default: "label", "link frame".
+        hidden: roles that are hidden, such as "visual".
     """
 
     view: str = "iso"
@@ -60,10 +60,10 @@ class Look:
 def look_of(
     made: Scene, view: str, theme: str, shown: Collection[str], hidden: Collection[str] = ()
 ) -> Look:
-    """How a picture of a scene looks.
+    """Check the options of a picture of a scene and return them as a Look.
 
     Raises:
-        ModelError: there is no such view, theme or role.
+        ModelError: a view, theme or role is unknown.
     """
     themes: dict[str, Literal["auto", "light", "dark"]]
     themes = {"auto": "auto", "light": "light", "dark": "dark"}
@@ -94,14 +94,14 @@ def page(
     times: Array | None = None,
     poses: Array | None = None,
 ) -> str:
-    """The text of an HTML file.
+    """Return the text of an HTML file.
 
     Args:
-        scene: what it shows.
-        look: how it looks.
-        speed: seconds of the motion a second.
-        times: (n,) of a motion [s]; none for a picture that stands.
-        poses: (n, 12 links) as `Scene.motion` gives them.
+        scene: scene to show.
+        look: appearance of the picture.
+        speed: seconds of the motion per second.
+        times: times (n,) of a motion [s], None for a still picture.
+        poses: poses (n, 12 links) from `Scene.motion`.
     """
     scripts = [*(asset(name) for name in SCRIPTS), asset("bar.js")]
     styles = [*(asset(name) for name in STYLES), asset("bar.css")]
@@ -130,7 +130,7 @@ def page(
 
 
 def iframe(text: str) -> str:
-    """An HTML file as a part of another page, such as a notebook."""
+    """Return an iframe element that shows an HTML file in another page, such as a notebook."""
     source = html.escape(text, quote=True)
     look = f"width: 100%; height: {_HEIGHT}px; border: 0; border-radius: 6px"
     allowed = "allow-scripts allow-downloads"
@@ -138,11 +138,11 @@ def iframe(text: str) -> str:
 
 
 def _pack(times: Array, poses: Array) -> dict[str, object]:
-    """A motion as the script reads it: poses are 32-bit numbers in base 64."""
+    """Encode a motion for the script: poses as 32-bit floats in base 64."""
     data = base64.b64encode(np.ascontiguousarray(poses, dtype="<f4").tobytes())
     return {"times": [round(float(t), 6) for t in times], "packed": data.decode("ascii")}
 
 
 def _data(value: object) -> str:
-    """JSON that may stand in a script element."""
+    """Return JSON that is safe inside a script element."""
     return json.dumps(value, allow_nan=False).replace("<", "\\u003c")

@@ -1,4 +1,4 @@
-"""A scene painted on a matplotlib figure: far faces first, each with the light it gets."""
+"""Painting of a scene on a matplotlib figure: shaded faces from far to near, and video files."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from mbs.view.posed import Array
 from mbs.view.primitives import LabelShape, SpanShape, SpringShape, rgb
 from mbs.view.scene import Scene
 
-# Where a picture is seen from, and how points of space fall on it.
+# Camera and perspective projection.
 
 
 FIELD = np.radians(32.0)
-"""Angle between the lower and the upper edge, as in the viewer."""
+"""Vertical field of view [rad], as in the viewer."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
-    """A perspective view.
+    """Perspective view.
 
     Attributes:
-        place: of the eye [m].
-        axes: (3, 3) rows: to the right, upwards, towards the eye.
-        away: distance of the eye from the middle of the picture [m].
+        place: position (3,) of the eye in the base frame [m].
+        axes: unit vectors (3, 3) by rows: to the right, upwards, towards the eye.
+        away: distance of the eye from the middle of the mechanism [m].
     """
 
     place: Array
@@ -46,7 +46,10 @@ class Camera:
     away: float
 
     def seen(self, points: Array) -> tuple[Array, Array]:
-        """Places (..., 2) on the picture, whose height is 2, and depths (...), larger nearer."""
+        """Project points (..., 3) to the picture, which has the height 2.
+
+        Returns positions (..., 2) in the picture, and depths (...) [m], larger if nearer.
+        """
         local = (points - self.place) @ self.axes.T
         depth = local[..., 2]
         flat = local[..., :2] / (-depth[..., None] * np.tan(FIELD / 2))
@@ -54,10 +57,10 @@ class Camera:
 
 
 def camera(scene: Scene, view: str) -> Camera:
-    """The camera that looks at a scene from one of its views.
+    """Return the camera of a view of a scene.
 
     Raises:
-        ModelError: there is no such view.
+        ModelError: the view is unknown.
     """
     if view not in scene.views:
         raise ModelError(
@@ -66,35 +69,35 @@ def camera(scene: Scene, view: str) -> Camera:
     out, up = np.array(scene.views[view]), np.array(scene.up)
     right = np.cross(up, out)
     right = right / np.linalg.norm(right)
-    # the sphere around the mechanism, and a little room, fill the height
+    # the bounding sphere and a margin of 6 percent fill the height
     away = 1.06 * scene.bounds.radius / float(np.sin(FIELD / 2))
     axes = np.vstack([right, np.cross(out, right), out])
     return Camera(np.array(scene.bounds.center) + away * out, axes, away)
 
 
 _LIGHT = np.array([0.35, 0.85, 0.55])
-"""Towards the light: right, up, towards the eye."""
+"""Direction to the light: right, up, towards the eye."""
 
 _INCHES = (8.0, 5.5)
-"""Width and height of a picture: as wide as a page of text."""
+"""Width and height of a picture [inches]: the width of a page of text."""
 _LINE = 1.1
-"""Width of a line [points]."""
+"""Line width [points]."""
 _SEAM = 0.35
-"""Width of the edge that closes the seam between two faces [points]."""
+"""Width of the edges of faces [points], which hide the gaps between them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Painter:
-    """A scene made ready, painted at any poses.
+    """Painter of a scene at any poses of its links.
 
     Attributes:
-        scene: what is painted.
-        eye: where it is seen from.
+        scene: scene to paint.
+        eye: camera.
         theme: light or dark.
         shown: roles that are painted.
-        solid: faces on links, with the number of the link.
-        figure: the matplotlib Figure.
-        axes: its axes.
+        solid: pairs of link number and faces in the link frame.
+        figure: matplotlib Figure.
+        axes: axes of the figure.
     """
 
     scene: Scene
@@ -106,7 +109,7 @@ class Painter:
     axes: Any
 
     def paint(self, poses: Sequence[float] | Array) -> Any:
-        """Paint the scene at poses (12 links,), as `Scene.poses` gives them; the Figure."""
+        """Paint the scene at poses (12 links,) from `Scene.poses`. Returns the Figure."""
         matplotlib = optional_module("matplotlib.collections", "plot")
         axes, link_poses = self.axes, np.reshape(poses, (-1, 3, 4))
         axes.clear()
@@ -115,7 +118,8 @@ class Painter:
         width, height = _INCHES
         axes.set_xlim(-width / height, width / height)
         axes.set_ylim(-1, 1)
-        # widths in points: the ground stays behind, the seams of its shadow are closed
+        # line widths in points; zorder=0 draws the ground first, and the outline of shadow
+        # polygons hides the gaps between them
         segments, tints = self._grid()
         axes.add_collection(
             matplotlib.LineCollection(segments, colors=tints, linewidths=0.6, zorder=0)
@@ -136,7 +140,7 @@ class Painter:
         return self.figure
 
     def _faces(self, link_poses: Array) -> tuple[Array, Array, Array, Array]:
-        """Corners on the picture, colours, widths of edges: far ones first; and the shadow."""
+        """Return corners in the picture, colours and edge widths, far faces first, and the shadow."""
         every = [
             (self._transformed_corners(faces, link_poses[link]), faces)
             for link, faces in self.solid
@@ -159,7 +163,7 @@ class Painter:
         return np.array(faces.corners @ pose[:, :3].T + pose[:, 3])
 
     def _light(self, corners: Array, faces: Faces) -> tuple[Array, Array, Array]:
-        """The faces that are seen, their colours under the light and the widths of their edges."""
+        """Return corners of the visible faces, their shaded colours and their edge widths."""
         colour = self._colour(faces.colour)
         if faces.kind == "line":
             rows = np.tile([*colour, 1.0], (len(corners), 1))
@@ -174,8 +178,7 @@ class Painter:
             corners, normal = corners[kept], normal[kept]
         else:
             normal = normal * np.sign(outside)[:, None]
-        # light from everywhere, from the sun and from the sky, of which a face away from all has
-        # half
+        # brightness: ambient light 0.58, up to 0.5 of direct light, and 0.06 more for upward faces
         sun = _LIGHT / np.linalg.norm(_LIGHT) @ self.eye.axes
         bright = (
             0.58 + 0.5 * np.clip(normal @ sun, 0, 1) + 0.06 * (normal @ np.array(self.scene.up))
@@ -186,9 +189,9 @@ class Painter:
         return corners, np.hstack([rows, alpha]), np.full(len(corners), seam)
 
     def _shadow(self, corners: Array) -> Array:
-        """Faces where the light throws them on the ground."""
+        """Return the projections of faces on the ground along the light, in the picture."""
         up, center = np.array(self.scene.up), np.array(self.scene.floor.center)
-        # from high up, a little from the right and from behind, so that shadows stay short
+        # steep light, slightly from the right and from behind, so that shadows are short
         sun = up + 0.25 * self.eye.axes[0] - 0.1 * self.eye.axes[2]
         height = (corners - center) @ up / float(sun @ up)
         flat: Array = self.eye.seen(corners - height[..., None] * sun)[0]
@@ -206,7 +209,7 @@ class Painter:
         middle = np.linalg.norm(lines.mean(axis=1), axis=1)
         points = np.array(floor.center) + lines @ np.vstack([right, np.cross(up, right)])
         flat, depth = self.eye.seen(points)
-        # what is beside the eye or behind it is not seen; lines fade out with the distance
+        # lines next to or behind the eye are left out; lines fade out with the distance
         kept = (depth < -0.05 * self.eye.away).all(axis=1) & (middle < floor.reach)
         part = np.clip(1 - middle[kept] / floor.reach, 0, 1) ** 1.4
         far, near_colour = self._colour("background"), self._colour("grid")
@@ -214,7 +217,7 @@ class Painter:
 
     def _labels(self, link_poses: Array) -> None:
         effects = optional_module("matplotlib.patheffects", "plot")
-        # in points, then in half heights of the picture: beside the point, one above the other
+        # halo and font in points; offsets in half picture heights: next to the point, stacked
         halo = [effects.withStroke(linewidth=2.5, foreground=self._colour("background"))]
         for item in self.scene.primitives:
             if isinstance(item, LabelShape) and item.role in self.shown:
@@ -232,7 +235,7 @@ class Painter:
         return float(value) if isinstance(value, (int, float)) else 0.0
 
     def _mix(self, first: Array, second: Array, part: float) -> Array:
-        # the theme says how dark shadows are on the page; here they are somewhat lighter
+        # the palette value is for the browser viewer; here shadows are lighter by 0.6
         return np.array(first + 0.6 * part * (second - first))
 
 
@@ -243,17 +246,17 @@ def painter(
     shown: Collection[str] = (),
     hidden: Collection[str] = (),
 ) -> Painter:
-    """A painter for a scene.
+    """Return a painter of a scene.
 
     Args:
-        scene: what is painted.
-        view: iso, front, side or top.
+        scene: scene to paint.
+        view: view direction: iso, front, side or top.
         theme: light or dark.
-        shown: roles that are painted besides the usual ones, such as "label".
-        hidden: roles that are left out, such as "visual".
+        shown: roles that are painted in addition to the default, such as "label".
+        hidden: roles that are hidden, such as "visual".
 
     Raises:
-        ModelError: matplotlib is missing, or there is no such view.
+        ModelError: matplotlib is missing, or the view is unknown.
     """
     optional_module("matplotlib", "plot")
     figures = optional_module("matplotlib.figure", "plot")
@@ -272,19 +275,19 @@ def painter(
     return Painter(scene, camera(scene, view), theme, roles, solid, figure, axes)
 
 
-# Files of pictures made without a browser: PNG and SVG, GIF by Pillow, MP4 by ffmpeg.
+# Picture files: PNG and SVG by matplotlib, GIF by Pillow, MP4 by ffmpeg.
 
 
 Image = npt.NDArray[np.uint8]
 
 _DOTS, _FILM_DOTS = 110.0, 80.0
-"""Dots an inch: 880 and 640 pixels of width, of which films have many pictures."""
+"""Dots per inch of pictures and of animations, for a width of 880 and 640 pixels."""
 
 _COLOURS = 256
 
 
 def save_still(painter: Painter, poses: Array, path: PathLike) -> None:
-    """Write one picture in the format that the ending names: .png or .svg.
+    """Write a still picture as .png or .svg, by the file extension.
 
     Raises:
         ExportError: the file cannot be written.
@@ -300,7 +303,7 @@ def save_still(painter: Painter, poses: Array, path: PathLike) -> None:
 
 
 def save_gif(painter: Painter, poses: Array, path: PathLike, fps: float) -> None:
-    """Write a motion (n, 12 links) as a GIF that starts again at its end.
+    """Write a motion with poses (n, 12 links) as a looping GIF. fps: frames per second.
 
     Raises:
         ExportError: the file cannot be written.
@@ -324,10 +327,10 @@ def save_gif(painter: Painter, poses: Array, path: PathLike, fps: float) -> None
 
 
 def save_mp4(painter: Painter, poses: Array, path: PathLike, fps: float) -> None:
-    """Write a motion (n, 12 links) as an MP4 file (H.264).
+    """Write a motion with poses (n, 12 links) as an MP4 file (H.264). fps: frames per second.
 
     Raises:
-        ExportError: ffmpeg is not there or fails, or the file cannot be written.
+        ExportError: ffmpeg is not installed or fails, or the file cannot be written.
     """
     program = shutil.which("ffmpeg")
     if program is None:
@@ -353,7 +356,7 @@ def _feed(command: list[str], frames: Iterator[Image], path: PathLike) -> None:
         try:
             for frame in frames:
                 process.stdin.write(frame.tobytes())
-        except BrokenPipeError:  # it has stopped; its words say why
+        except BrokenPipeError:  # ffmpeg has stopped; its error output contains the reason
             pass
         _, words = process.communicate()
     if process.returncode:
@@ -362,7 +365,7 @@ def _feed(command: list[str], frames: Iterator[Image], path: PathLike) -> None:
 
 
 def _frames(painter: Painter, poses: Array) -> Iterator[Image]:
-    """(height, width, 3) pictures, of even height and width."""
+    """Yield frames (height, width, 3) with even height and width, as H.264 requires."""
     canvases = optional_module("matplotlib.backends.backend_agg", "plot")
     painter.figure.set_dpi(_FILM_DOTS)
     canvas: Any = canvases.FigureCanvasAgg(painter.figure)

@@ -1,4 +1,4 @@
-"""Pictures and films of mechanisms: for a notebook, and for files of several kinds."""
+"""Pictures and animations of mechanisms, for notebooks and files of several formats."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from mbs.view.scene import Scene, scene
 _ENDINGS = (".html", ".png", ".svg", ".gif", ".mp4")
 _MOST_FRAMES = 5000
 _GIF_FPS = 20.0
-"""Pictures a second of a GIF, about: its times are in hundredths of a second, and its files
-large."""
+"""Approximate frames per second of a GIF. GIF times have a resolution of 0.01 s, and more frames
+make large files."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Picture:
-    """A mechanism, standing or moving. A notebook shows it as it is.
+    """Still picture or animation of a mechanism, which a notebook displays.
 
     Attributes:
-        scene: what is shown.
-        poses: (n, 12 links) of each picture, one if it stands.
-        times: (n,) of each picture [s].
-        look: how it looks.
-        speed: seconds of the motion a second.
+        scene: shapes of the mechanism.
+        poses: poses (n, 12 links) of the base and links in each frame. n is 1 for a still picture.
+        times: time (n,) of each frame [s].
+        look: appearance of the picture.
+        speed: seconds of the motion per second.
     """
 
     scene: Scene
@@ -48,12 +48,12 @@ class Picture:
 
     @property
     def html(self) -> str:
-        """The text of an HTML file with everything in it, which works offline."""
+        """Text of a self-contained HTML file, which works offline."""
         motion = (self.times, self.poses) if len(self.times) > 1 else ()
         return page(self.scene, self.look, self.speed, *motion)
 
     def __repr__(self) -> str:
-        """One line; a notebook shows the picture."""
+        """Return a one-line description."""
         moving = f", {len(self.times)} pictures" if len(self.times) > 1 else ""
         return f"<Picture of {self.scene.system.name}{moving}>"
 
@@ -61,16 +61,17 @@ class Picture:
         return iframe(self.html)
 
     def save(self, path: PathLike) -> None:
-        """Write a file in the format that its ending names.
+        """Write a file in the format of its extension.
 
         Args:
-            path: .html; .png or .svg, the first picture of a motion; .gif or .mp4 of a motion, the
-                latter by ffmpeg. It is replaced as a whole, or left alone.
+            path: file with the extension .html, .png, .svg, .gif or .mp4. A .png or .svg file shows
+                the first frame of a motion. .gif and .mp4 need a motion, and .mp4 needs ffmpeg. An
+                existing file is replaced only if the export succeeds.
 
         Raises:
-            ExportError: the ending is another one, ffmpeg is missing, or the file cannot be
+            ExportError: the extension is unknown, ffmpeg is missing, or the file cannot be
                 written.
-            ModelError: matplotlib is missing, which makes all but .html.
+            ModelError: matplotlib is missing, which all formats except .html need.
         """
         ending = path_of(path).suffix.lower()
         if ending not in _ENDINGS:
@@ -113,21 +114,22 @@ def show(
     shown: Collection[str] = (),
     hidden: Collection[str] = (),
 ) -> Picture:
-    """A picture of a mechanism at one configuration.
+    """Return a picture of a mechanism at a configuration.
 
     Args:
-        system: open or closed; every symbol in its geometry has a value.
-        q: positions [rad or m]: all of them, or some by name, the others as assembled; the loops
-            are closed at those named, as `mbs.loops.solve` does. The assembled configuration when
-            left out.
+        system: mechanism, open or closed. Every symbol in its geometry has a value.
+        q: all positions (nq,), or a dict of some positions by name [rad or m]. Other positions are
+            those of the assembled configuration, and `mbs.loops.solve` closes the loops at the
+            given positions. By default the assembled configuration.
         path: file to write, see `Picture.save`.
-        parameters: values of symbols, the others at their defaults.
-        view: iso, front, side or top.
-        theme: light or dark, or auto: what the browser prefers, and light in other files.
-        shown: roles that are shown besides the usual ones: "label" for the names of joints, "link
-            frame" for the frame of every link, "joint" and "frame" of a mechanism whose links are
-            drawn as they look.
-        hidden: roles that are left out: without "visual" such a mechanism is its joints and bars.
+        parameters: values of symbols. Other symbols have their default values.
+        view: view direction: iso, front, side or top.
+        theme: light, dark or auto. auto follows the browser, and is light in other files.
+        shown: roles that are shown in addition to the default: "label" for the names of joints,
+            "link frame" for the frame of every link. Also "joint" and "frame" for a mechanism with
+            visual shapes (from its file).
+        hidden: roles that are hidden. If "visual" is hidden, bars and joints replace the visual
+            shapes.
 
     Raises:
         ModelError: a name is unknown, or a symbol has no value.
@@ -159,23 +161,23 @@ def animate(
     shown: Collection[str] = (),
     hidden: Collection[str] = (),
 ) -> Picture:
-    """A film of a simulated or measured motion.
+    """Return an animation of a simulated or measured motion.
 
     Args:
-        result: with a signal `name.q` for every coordinate.
-        system: whose motion it is; what was simulated when left out.
+        result: result with a signal `name.q` for every coordinate.
+        system: mechanism that moves. By default the simulated system.
         path: file to write, see `Picture.save`.
-        parameters: values of symbols, the others at their defaults.
-        fps: pictures a second.
-        speed: seconds of the motion a second, below one for slow motion.
-        view: as for `show`.
-        theme: as for `show`.
-        shown: as for `show`.
-        hidden: as for `show`.
+        parameters: values of symbols. Other symbols have their default values.
+        fps: frames per second.
+        speed: seconds of the motion per second, below 1 for slow motion.
+        view: view direction: iso, front, side or top.
+        theme: light, dark or auto, see `show`.
+        shown: roles that are shown in addition to the default, see `show`.
+        hidden: roles that are hidden, see `show`.
 
     Raises:
-        ModelError: the result has no system or not the positions of this one, a name is unknown,
-            or there would be too many pictures.
+        ModelError: the result has no system or not the positions of this system, a name is
+            unknown, or the animation has more than 5000 frames.
         ExportError: the file cannot be written.
     """
     whose = _owner(result, system)
@@ -202,7 +204,7 @@ def _owner(result: Result, system: System | None) -> System:
 
 
 def _times(result: Result, fps: float, speed: float) -> Array:
-    """(n,) instants of the pictures [s]."""
+    """Return the times (n,) of the frames [s]."""
     for name, value in (("fps", fps), ("speed", speed)):
         if not (isinstance(value, (int, float)) and 0 < value < np.inf):
             raise ModelError(f"{name} is {quoted(value)}; give a number above zero")
@@ -218,7 +220,7 @@ def _times(result: Result, fps: float, speed: float) -> Array:
 
 
 def _positions(result: Result, system: System, times: Array) -> Array:
-    """(n, nq) positions at these instants, on straight lines between the rows of the result."""
+    """Return the positions (n, nq) at the times, by linear interpolation of the result."""
     names = [f"{coordinate.name}.q" for coordinate in system.coordinates]
     for name in names:
         if name not in result:

@@ -1,4 +1,4 @@
-"""A mechanism at one configuration: where its links are, and how large the picture is."""
+"""Mechanism at a configuration: poses of its links, and sizes, bounds and views of its picture."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ Values = Mapping[str, float] | Sequence[float] | None
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosedLinks:
-    """A system whose links have poses.
+    """System with the poses of its links at a configuration.
 
     Attributes:
-        system: the mechanism.
-        parameters: value of every symbol; NaN if the picture needs none.
-        parts: its skeleton.
-        points: (n, 3) of the skeleton, in the base frame [m].
-        directions: (m, 3) of the skeleton, in the base frame.
-        poses: (links + 1, 3, 4) R|p of the base and every link.
-        up: unit vector against gravity; z of the outer world if there is no gravity.
+        system: mechanism.
+        parameters: value of every symbol, NaN for a symbol without value outside the geometry.
+        parts: skeleton of the mechanism.
+        points: points (n, 3) of the skeleton in the base frame [m].
+        directions: unit directions (m, 3) of the skeleton in the base frame.
+        poses: poses (links + 1, 3, 4) [R p] of the base and every link in the base frame.
+        up: unit vector against gravity in the base frame. Without gravity, z of the outer world.
     """
 
     system: System
@@ -45,44 +45,44 @@ class PosedLinks:
     up: Array
 
     def local(self, link: int, point: Array) -> Vector:
-        """A point of the base frame in the frame of a link."""
+        """Transform a point from the base frame to the frame of a link."""
         R, p = self.poses[link, :, :3], self.poses[link, :, 3]
         return three(R.T @ (point - p))
 
     def local_direction(self, link: int, direction: Array) -> Vector:
-        """A direction of the base frame in the frame of a link."""
+        """Transform a direction from the base frame to the frame of a link."""
         return three(self.poses[link, :, :3].T @ direction)
 
     def local_pose(self, link: int, R: Array, p: Array) -> Rows:
-        """The pose (R, p) in the base frame, seen from a link."""
+        """Transform a pose (R, p) from the base frame to the frame of a link."""
         R_link = self.poses[link, :, :3].T @ R
         place = np.array(self.local(link, p)).reshape(3, 1)
         return rows(np.hstack([R_link, place]))
 
 
 def three(values: Array) -> Vector:
-    """The elements of a vector."""
+    """Convert a vector (3,) to a tuple of floats."""
     x, y, z = (float(value) for value in values)
     return x, y, z
 
 
 def rows(pose: Array) -> Rows:
-    """The elements of R|p, row by row."""
+    """Convert a pose [R p] (3, 4) to a tuple of floats by rows."""
     return tuple(float(value) for value in np.ravel(pose))
 
 
 def pose_links(
     system: System, q: Sequence[float], parameters: Mapping[str, float] | None
 ) -> PosedLinks:
-    """The links and the skeleton at positions q.
+    """Return the poses of the links and the points of the skeleton at positions q.
 
     Args:
-        system: open or closed; every symbol in its geometry has a value.
-        q: (nq,) [rad or m].
-        parameters: values of symbols, the others at their defaults.
+        system: mechanism, open or closed. Every symbol in its geometry has a value.
+        q: positions (nq,) [rad or m].
+        parameters: values of symbols. Other symbols have their default values.
 
     Raises:
-        ModelError: a symbol has no value, or a place is no number.
+        ModelError: a symbol has no value, or a position is not a number.
     """
     p = system.parameter_values(parameters, picture_symbols(system))
     parts = skeleton(system)
@@ -104,7 +104,7 @@ def pose_links(
 
 
 def picture_symbols(system: System) -> frozenset[str]:
-    """Names of the symbols on which the places of links, joints and frames depend."""
+    """Return the names of the symbols on which poses of links, joints and frames depend."""
 
     def found() -> frozenset[str]:
         if not system.parameters:
@@ -122,21 +122,23 @@ def picture_symbols(system: System) -> frozenset[str]:
 
 
 def _up(gravity: Array, z: Array) -> Array:
-    """The direction against gravity; z without gravity, or if its symbol has no value.
+    """Return the direction against gravity, or z if gravity is zero or its symbol has no value.
 
     Args:
-        gravity: acceleration in the base frame [m/s^2].
-        z: axis of the outer world in the base frame.
+        gravity: acceleration (3,) in the base frame [m/s^2].
+        z: z axis (3,) of the outer world in the base frame.
     """
     size = float(np.linalg.norm(gravity))
     return -gravity / size if size > 0 else z
 
 
 def pose_rows(system: System, q: Array, p: Sequence[float]) -> Array:
-    """(12 (links + 1), n) rows of R|p of the base and every link at the columns of q (nq, n).
+    """Return the poses (12 (links + 1), n) of the base and every link at columns q (nq, n).
+
+    A pose is the rows of [R p], 12 numbers.
 
     Raises:
-        ModelError: a symbol has no value, or a place is no number.
+        ModelError: a symbol has no value, or a position is not a number.
     """
     function = _pose_function(system)
     if not system.parameters:
@@ -146,7 +148,7 @@ def pose_rows(system: System, q: Array, p: Sequence[float]) -> Array:
 
 
 def _placed(p: Sequence[float]) -> list[float]:
-    """The parameters with a number for each symbol without a value: no place depends on it."""
+    """Replace NaN of symbols without value by 0. No pose depends on these symbols."""
     return [0.0 if np.isnan(value) else value for value in p]
 
 
@@ -164,31 +166,33 @@ def _pose_function(system: System) -> Function:
 
 
 def position_of(system: System, q: Values) -> list[float]:
-    """(nq,) positions from a sequence, or from names, the others as in the assembled configuration.
+    """Return positions (nq,) from a sequence, or from a dict by name.
+
+    Positions without a name in the dict are those of the assembled configuration.
 
     Raises:
-        ModelError: a name is unknown, or the numbers do not fit.
+        ModelError: a name is unknown, or the number of positions is wrong.
     """
     values = system.position(q)
     return values
 
 
-# How large a picture is and where it is seen from: sizes, bounds, ground and directions.
+# Sizes, bounds, ground and view directions of a picture.
 
 
 _NICE = (1.0, 2.0, 5.0)
-"""Widths of cells that people count with, times powers of ten."""
+"""Allowed cell widths of the ground grid, times powers of ten: easy to count."""
 SAME_POINT = 1e-6
-"""Distance, in parts of the size of a mechanism, below which two points are one in a picture:
-rounding is less, and a pixel a thousand times more."""
+"""Distance below which two points coincide in a picture, relative to the size of the mechanism.
+Rounding errors are smaller, and a pixel is 1000 times larger."""
 
 
 @dataclass(frozen=True, slots=True)
 class Measures:
-    """Sizes of what has none of its own [m].
+    """Sizes of shapes without own dimensions [m].
 
     Attributes:
-        size: of the mechanism.
+        size: size of the mechanism.
         joint: radius of a revolute joint.
         bar: radius of a link.
         frame: length of the axes of a frame.
@@ -202,7 +206,7 @@ class Measures:
 
 @dataclass(frozen=True, slots=True)
 class BoundingSphere:
-    """A sphere that contains the mechanism: center and radius [m], in the base frame."""
+    """Sphere that contains the mechanism: center in the base frame and radius [m]."""
 
     center: Vector
     radius: float
@@ -210,7 +214,7 @@ class BoundingSphere:
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """The grid of the ground: its center, the width of a cell and how far it reaches [m]."""
+    """Ground grid: center in the base frame, width of a cell, and half of its extent [m]."""
 
     center: Vector
     step: float
@@ -218,14 +222,14 @@ class Floor:
 
 
 def measures(scene: PosedLinks, solid_points: Array) -> Measures:
-    """Sizes from the extent of a mechanism and from how long its links are.
+    """Compute sizes of shapes from the extent of a mechanism and the lengths of its links.
 
     Args:
-        scene: where it is.
-        solid_points: (k, 3) corners of solids, in the base frame [m].
+        scene: posed links.
+        solid_points: corners (k, 3) of solids in the base frame [m].
     """
     world = [frame.origin for frame in scene.parts.frames if frame.name == OUTER_WORLD]
-    own = np.delete(scene.points, world, axis=0)  # a mount far away leaves the sizes as they are
+    own = np.delete(scene.points, world, axis=0)  # a distant mount has no effect
     every = np.vstack([np.zeros((1, 3)), own, solid_points])
     size = float(np.linalg.norm(np.ptp(every, axis=0)))
     lengths = [
@@ -236,14 +240,14 @@ def measures(scene: PosedLinks, solid_points: Array) -> Measures:
     lengths = [length for length in lengths if length > SAME_POINT * size]
     if size == 0:
         size = 4 * _gyration(scene)
-    # joints are seen at any size, and leave most of a usual link free; links are thinner than
-    # joints
+    # fractions of the size and link length: joints are visible and leave most of a link free;
+    # links are thinner than joints
     joint = min(0.028 * size, 0.2 * float(np.median(lengths))) if lengths else 0.028 * size
     return Measures(size, joint, 0.62 * joint, max(3.6 * joint, 0.07 * size))
 
 
 def _gyration(scene: PosedLinks) -> float:
-    """A length from the inertia of the bodies; 1 m where they have none."""
+    """Return the largest radius of gyration of the links [m], or 1 m without inertia."""
     system = scene.system
     found = 0.0
     for link in system.tree.links:
@@ -255,7 +259,10 @@ def _gyration(scene: PosedLinks) -> float:
 
 
 def bounds_of(points: Array, margin: float) -> BoundingSphere:
-    """The sphere about a cuboid that contains points (n, 3), a margin wider [m]."""
+    """Return a sphere, about the middle of the bounding box, that contains points (n, 3).
+
+    margin: additional radius [m].
+    """
     low, high = points.min(axis=0), points.max(axis=0)
     middle = three((low + high) / 2)
     reach = float(np.linalg.norm(points - (low + high) / 2, axis=1).max())
@@ -263,12 +270,12 @@ def bounds_of(points: Array, margin: float) -> BoundingSphere:
 
 
 def floor_of(points: Array, up: Array, bounds: BoundingSphere, gap: float = 0.0) -> Floor:
-    """A ground that is a gap [m] below points (n, 3) and below the base frame."""
+    """Return the ground at distance gap [m] below points (n, 3) and the base frame."""
     lowest = min(0.0, float((points @ up).min())) - gap
     center = np.array(bounds.center)
     center = center + (lowest - float(center @ up)) * up
     step = _nice(bounds.radius / 5)
-    # so far that its end fades out behind the mechanism
+    # so large that its border fades out in the distance
     return Floor(three(center), step, 3.2 * bounds.radius)
 
 
@@ -278,13 +285,13 @@ def _nice(value: float) -> float:
 
 
 def views(scene: PosedLinks) -> dict[str, Vector]:
-    """Unit vectors from a mechanism towards who looks at it, by the name of the view.
+    """Return unit vectors from the mechanism towards the viewer in the base frame, by view name.
 
-    The front of a mechanism that moves in a plane is the side from which the plane is seen.
+    The front view of a mechanism that moves in a vertical plane is along the normal of the plane.
     """
     up = scene.up
-    # cosines that say which directions are about the same, and parts of front, right and up that
-    # show a plane almost from its front, what lies level from above, and all else from a corner
+    # limits of cosines of nearly equal directions; weights of front, right and up: a vertical
+    # plane is seen almost from its front, a level mechanism from above, others from a corner
     right = _unit(np.cross(up, [0.0, 0.0, 1.0]) if abs(up[0]) > 0.9 else _across(up))
     front = np.cross(right, up)
     normal = plane_normal(scene)
@@ -301,21 +308,24 @@ def views(scene: PosedLinks) -> dict[str, Vector]:
 
 
 def _is_level(scene: PosedLinks) -> bool:
-    """Whether everything lies near a level plane."""
-    # in parts of how far it extends: links of some thickness above each other
+    """Whether all points are near a level plane, and all revolute axes are parallel."""
+    # height relative to the extent, for links of some thickness above each other
     heights = scene.points @ scene.up
     spread = float(np.linalg.norm(np.ptp(scene.points, axis=0)))
     return bool(np.ptp(heights) < 0.12 * spread) and plane_normal(scene) is not None
 
 
 def _across(up: Array) -> Array:
-    """The x axis, made level."""
+    """Return the component of the x axis orthogonal to up."""
     x = np.array([1.0, 0.0, 0.0])
     return x - float(x @ up) * up
 
 
 def plane_normal(scene: PosedLinks) -> Array | None:
-    """The common direction of all revolute axes; None where they differ, or where there is none."""
+    """Return the common direction of all revolute axes.
+
+    None if the axes differ, or without revolute joints, or with a free or spherical joint.
+    """
     axes = [
         scene.directions[axis.direction]
         for joint in scene.parts.joints
@@ -325,7 +335,7 @@ def plane_normal(scene: PosedLinks) -> Array | None:
     kinds = {joint.kind for joint in scene.parts.joints}
     if not axes or kinds & {"free", "spherical"}:
         return None
-    # parallel to a thousandth of a radian, as a drawing shows
+    # parallel within about 0.001 rad, which is not visible in a drawing
     same = all(abs(float(axis @ axes[0])) > 1 - 1e-6 for axis in axes)
     return np.array(axes[0]) if same else None
 

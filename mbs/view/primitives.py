@@ -1,7 +1,7 @@
-"""What a scene is made of: simple shapes in the frames of links, free of how they are drawn.
+"""Primitives of a scene: simple shapes in the frames of links, independent of the viewer.
 
-Every primitive has a role, by which a viewer shows and hides it, and the name of a colour, or
-"#rrggbb".
+Every primitive has a role, by which a viewer shows or hides it, and a colour: a name in the palette
+or "#rrggbb". `link` is the number of its link, 0 for the base.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from mbs.palette import LINK_COLOURS, PALETTE, Theme
 
 Vector = tuple[float, float, float]
 Rows = tuple[float, ...]
-"""A pose: the rows of R|p, 12 numbers."""
+"""Pose as 12 numbers: the rows of [R p]."""
 
 
 @dataclass(frozen=True, slots=True)
 class BarShape:
-    """A round bar with rounded ends from a to b [m], in the frame of the link."""
+    """Round bar with hemispherical ends from a to b [m] in the link frame. radius: in m."""
 
     role: str
     link: int
@@ -32,7 +32,7 @@ class BarShape:
 
 @dataclass(frozen=True, slots=True)
 class CylinderShape:
-    """A cylinder from a to b [m], with a bore where that is above zero [m]."""
+    """Cylinder from a to b [m] in the link frame. bore: radius of its bore [m], 0 if solid."""
 
     role: str
     link: int
@@ -45,7 +45,7 @@ class CylinderShape:
 
 @dataclass(frozen=True, slots=True)
 class BallShape:
-    """A sphere at a point [m]."""
+    """Sphere about a point [m] in the link frame."""
 
     role: str
     link: int
@@ -56,7 +56,7 @@ class BallShape:
 
 @dataclass(frozen=True, slots=True)
 class BoxShape:
-    """A cuboid with these sides [m] about the origin of a pose."""
+    """Cuboid with side lengths `size` [m], centred at a pose in the link frame."""
 
     role: str
     link: int
@@ -67,7 +67,10 @@ class BoxShape:
 
 @dataclass(frozen=True, slots=True)
 class RingShape:
-    """A ring about an axis through a point: radius of its middle line and of the tube [m]."""
+    """Ring (torus) about an axis through a point in the link frame.
+
+    radius: radius of its centre line [m]. tube: radius of the tube [m].
+    """
 
     role: str
     link: int
@@ -80,7 +83,7 @@ class RingShape:
 
 @dataclass(frozen=True, slots=True)
 class PlateShape:
-    """A thin polygon with these corners [m]."""
+    """Thin convex polygon with corners `points` [m] in the link frame."""
 
     role: str
     link: int
@@ -91,11 +94,11 @@ class PlateShape:
 
 @dataclass(frozen=True, slots=True)
 class MeshShape:
-    """A surface of triangles: its points [m] in the frame of a pose, and three numbers each.
+    """Triangle mesh at a pose in the link frame.
 
     Attributes:
-        points: x, y and z of one point after another.
-        triangles: numbers of points, three for each triangle.
+        points: coordinates x, y, z [m] of all points, in sequence.
+        triangles: indices of points, three for each triangle.
     """
 
     role: str
@@ -108,7 +111,7 @@ class MeshShape:
 
 @dataclass(frozen=True, slots=True)
 class FrameShape:
-    """Three arrows along the axes of a frame: pose, and their length [m]."""
+    """Three arrows of a length [m] along the axes of a pose in the link frame."""
 
     role: str
     link: int
@@ -119,7 +122,7 @@ class FrameShape:
 
 @dataclass(frozen=True, slots=True)
 class AxisShape:
-    """A dashed line from a to b [m]."""
+    """Dashed line from a to b [m] in the link frame."""
 
     role: str
     link: int
@@ -130,7 +133,7 @@ class AxisShape:
 
 @dataclass(frozen=True, slots=True)
 class LabelShape:
-    """A text beside a point [m], above as many others that are there as `row` says."""
+    """Text next to a point [m] in the link frame. row: number of texts below it at this point."""
 
     role: str
     link: int
@@ -142,9 +145,9 @@ class LabelShape:
 
 @dataclass(frozen=True, slots=True)
 class SpanShape:
-    """A round bar between points on two links, however far apart they are.
+    """Round bar of variable length between points on two links.
 
-    `ends` are in the frames of the two links [m].
+    ends: points in the frames of the two links [m].
     """
 
     role: str
@@ -156,7 +159,10 @@ class SpanShape:
 
 @dataclass(frozen=True, slots=True)
 class SpringShape:
-    """A coil between points on two links; `length` is the one at which its wire is round [m]."""
+    """Coil spring of variable length between points on two links.
+
+    ends: points in the frames of the two links [m]. length: length at which its wire is round [m].
+    """
 
     role: str
     links: tuple[int, int]
@@ -183,15 +189,15 @@ Primitive = (
 
 
 def link_colour(number: int) -> str:
-    """The name of the colour of a link, 0 for the base."""
+    """Return the colour name of a link. number: 0 for the base."""
     return "base" if number == 0 else LINK_COLOURS[(number - 1) % len(LINK_COLOURS)]
 
 
 def rgb(name: str, theme: Theme) -> NDArray[np.float64]:
-    """Red, green and blue from 0 to 1 of a colour.
+    """Return red, green and blue (3,) of a colour, from 0 to 1.
 
     Args:
-        name: in the palette; "axes.0" is the first colour of the axes, "#rrggbb" one of its own.
+        name: name in the palette, "axes.0" for the first colour of the axes, or "#rrggbb".
         theme: light or dark.
     """
     text = name

@@ -1,4 +1,4 @@
-"""A mechanism as simple shapes on its links, for any viewer."""
+"""Scene: simple shapes on the links of a mechanism, for any viewer."""
 
 from __future__ import annotations
 
@@ -51,31 +51,31 @@ from mbs.view.shapes import (
 )
 
 HIDDEN = ("link frame", "label")
-"""Roles that are not shown until asked for."""
+"""Roles that are hidden by default."""
 COVERED = ("skeleton", "joint", "axis", "frame")
-"""Roles that are not shown either where links are drawn as they look, which they would cover."""
+"""Roles that are also hidden by default if links have visual shapes."""
 
-_MARGIN = 0.6  # of the length of the axes of frames, which reach beyond what they stand on
+_MARGIN = 0.6  # margin of the bounds, relative to the length of frame axes, which extend further
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """Shapes on links, and where they are seen from; lengths in m, in the frames of the links.
+    """Shapes of a mechanism in the frames of its links [m], and view directions.
 
     Attributes:
-        system: the mechanism.
-        primitives: the shapes, each with its link (0 the base) and its role: link, joint, axis,
-            frame, loop, force, base, label, link frame; visual for what the description says that
-            a link looks like, and skeleton for the bars of these links.
+        system: mechanism.
+        primitives: shapes, each with its link (0 for the base) and its role: link, joint, axis,
+            frame, loop, force, base, label, link frame. Shapes of links from the mechanism file
+            have the role visual, and the bars of these links the role skeleton.
         links: names of the base and the links.
-        up: unit vector against gravity.
-        size: of the mechanism [m].
-        bounds: a sphere that contains it at the configuration q.
-        floor: the ground grid.
-        views: unit vectors towards who looks: iso, front, side, top.
-        q: (nq,) configuration that it was made at.
-        parameters: values of the symbols that have one.
-        notes: sentences on meshes that are missing or were thinned out.
+        up: unit vector against gravity, in the base frame.
+        size: size of the mechanism [m].
+        bounds: sphere that contains the mechanism at the configuration q, in the base frame.
+        floor: ground grid, in the base frame.
+        views: unit vectors towards the viewer in the base frame: iso, front, side, top.
+        q: configuration (nq,) at which the scene was made.
+        parameters: values of the symbols that have a value.
+        notes: sentences on meshes that are missing or simplified.
     """
 
     system: System
@@ -91,26 +91,28 @@ class Scene:
     notes: tuple[str, ...] = ()
 
     def hidden(self, left_out: Collection[str] = ()) -> tuple[str, ...]:
-        """Roles that are not shown until asked for.
+        """Return the roles that are hidden by default.
 
         Args:
-            left_out: roles that are not to be shown; without "visual" the mechanism is its joints
-                and bars again.
+            left_out: further roles to hide. If it contains "visual", bars and joints are shown.
         """
         visual = any(item.role == "visual" for item in self.primitives)
         covered = COVERED if visual and "visual" not in left_out else ()
         return tuple(dict.fromkeys([*HIDDEN, *covered, *left_out]))
 
     def poses(self, q: Values = None, parameters: Mapping[str, float] | None = None) -> list[float]:
-        """Where the base and the links are: 12 numbers each, the rows of R|p in the base frame.
+        """Return the poses of the base and the links: 12 numbers each, the rows of [R p].
+
+        R is the rotation matrix and p the origin of the link frame in the base frame. Loops are not
+        closed.
 
         Args:
-            q: (nq,) positions [rad or m], or by name, the others as in the assembled
-                configuration; that of the scene when left out. Loops are not closed here.
-            parameters: values of symbols, the others as in the scene.
+            q: positions (nq,) [rad or m], or a dict of some positions by name, with others as in
+                the assembled configuration. By default the configuration of the scene.
+            parameters: values of symbols. Other symbols have the values of the scene.
 
         Raises:
-            ModelError: a name is unknown, or the numbers do not fit.
+            ModelError: a name is unknown, or the number of positions is wrong.
         """
         place = self.q if q is None else position_of(self.system, q)
         p = self._values(parameters)
@@ -118,7 +120,7 @@ class Scene:
         return flat
 
     def motion(self, q: Array) -> Array:
-        """(n, 12 links) poses, as `poses` gives them, at each of n configurations q (n, nq)."""
+        """Return the poses (n, 12 links), as in `poses`, at configurations q (n, nq)."""
         p = self._values(None)
         return pose_rows(self.system, np.transpose(q), p).T
 
@@ -127,18 +129,18 @@ class Scene:
         return self.system.parameter_values(values, picture_symbols(self.system))
 
     def spanning(self, q: Array) -> Scene:
-        """The same scene with bounds and ground for all of n configurations q (n, nq)."""
+        """Return a copy with bounds and ground for all configurations q (n, nq)."""
         marks = _marks(self.primitives)
         poses = self.motion(q).reshape(len(q), -1, 3, 4)
         points = np.vstack([poses[:, k, :, :3] @ at + poses[:, k, :, 3] for k, at in marks])
         up, radius = np.array(self.up), self.bounds.radius
-        # room for what is drawn around points, in parts of the radius
+        # margin for shapes around the points, relative to the radius
         bounds = bounds_of(points, 0.08 * radius)
         ground = float(np.array(self.floor.center) @ up) * up
         return replace(self, bounds=bounds, floor=floor_of(np.vstack([points, ground]), up, bounds))
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain numbers, texts, lists and dicts, as JSON has them."""
+        """Return the scene as a dict that can be converted to JSON."""
         return {
             "name": self.system.name,
             "links": list(self.links),
@@ -157,19 +159,18 @@ class Scene:
 def scene(
     system: System, q: Values = None, *, parameters: Mapping[str, float] | None = None
 ) -> Scene:
-    """The shapes that stand for a mechanism.
+    """Return the scene of a mechanism: shapes of links, joints, force elements and frames.
 
-    Links are drawn as their shapes say, where the description has them; bodies that were described
-    by their dimensions as they are, the other links as bars between their joints. Sizes of joints
-    and frames follow from the size of the mechanism.
+    Links with visual shapes in the mechanism file are drawn with these shapes, and bodies that are
+    defined by their dimensions with these dimensions. Other links are bars between their joints.
+    Sizes of joints and frames follow from the size of the mechanism. Loops are not closed.
 
     Args:
-        system: open or closed. Symbols on which places of links depend need a value; masses and
-            gravity need none.
-        q: configuration that bounds and ground are for, and the poses unless others are asked for:
-            (nq,) [rad or m], or by name; the assembled one when left out. Loops are not closed
-            here.
-        parameters: values of symbols, the others at their defaults.
+        system: mechanism, open or closed. Symbols in the geometry need a value; masses and gravity
+            do not.
+        q: configuration for bounds, ground and default poses: (nq,) [rad or m], or a dict of some
+            positions by name. By default the assembled configuration.
+        parameters: values of symbols. Other symbols have their default values.
 
     Raises:
         ModelError: `system` is not a System, a name is unknown, or a symbol has no value.
@@ -222,7 +223,10 @@ def scene(
 
 
 def _gap(system: System) -> float:
-    """How far the ground is below, in radii of joints: wheels touch it, arms stand above it."""
+    """Return the height of the mechanism above the ground in joint radii.
+
+    It is zero with wheels or a free joint.
+    """
     kinds = {joint.kind for joint in system.joints}
     return 0.0 if kinds & {"rollingdisc", "free"} else 4.0
 
@@ -232,7 +236,7 @@ def _plain(item: Primitive) -> dict[str, Any]:
 
 
 def _marks(primitives: tuple[Primitive, ...]) -> list[tuple[int, Array]]:
-    """Points of shapes on their links, which bound a motion."""
+    """Return link and point of shapes, from which the bounds of a motion are computed."""
     found: list[tuple[int, Array]] = []
     for item in primitives:
         if isinstance(item, (BarShape, CylinderShape)):

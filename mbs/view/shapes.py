@@ -1,4 +1,4 @@
-"""What links, joints and force elements look like."""
+"""Shapes of links, joints, force elements and frames in a scene."""
 
 from __future__ import annotations
 
@@ -41,7 +41,10 @@ from mbs.view.primitives import (
 
 
 def joint_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
-    """Every joint: cylinders about axes, boxes along them, spheres; and their names."""
+    """Yield the shapes and names of the joints.
+
+    Revolute axes are cylinders, prismatic axes boxes, and joints without axes spheres.
+    """
     for joint in _shown(scene):
         if joint.kind == "rollingdisc":
             yield from _wheel(scene, joint, sizes)
@@ -52,14 +55,14 @@ def joint_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
 
 
 def _shown(scene: PosedLinks) -> Iterator[SkeletonJoint]:
-    """All but those that leave a body free, or weld it without closing a loop."""
+    """Yield the joints that are drawn: not free joints, and fixed joints only if they close loops."""
     for joint in scene.parts.joints:
         if joint.kind != "free" and (joint.kind != "fixed" or joint.cut):
             yield joint
 
 
 def _labels(scene: PosedLinks, sizes: Measures) -> Iterator[LabelShape]:
-    """The names of joints, one above the other where they are at one place."""
+    """Yield the names of joints. Names of joints at the same point are placed above each other."""
     taken: list[Array] = []
     for joint in _shown(scene):
         side = 1 if joint.kind == "rollingdisc" else 0
@@ -71,7 +74,7 @@ def _labels(scene: PosedLinks, sizes: Measures) -> Iterator[LabelShape]:
 
 
 def _look(scene: PosedLinks, joint: SkeletonJoint) -> tuple[str, str]:
-    """Role and colour."""
+    """Return role and colour of a joint."""
     if joint.cut:
         return "loop", "loop"
     driven = any(c.actuated for c in scene.system.speeds if c.joint == joint.name)
@@ -79,7 +82,7 @@ def _look(scene: PosedLinks, joint: SkeletonJoint) -> tuple[str, str]:
 
 
 def _join(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
-    """A bar between frames that do not coincide, spheres where a joint has no axes."""
+    """Yield a bar between joint frames that do not coincide, and spheres of joints without axes."""
     role, colour = _look(scene, joint)
     a, b = (scene.points[k] for k in joint.points)
     ends = scene.local(joint.links[0], a), scene.local(joint.links[1], b)
@@ -96,8 +99,8 @@ def _join(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[
 def _axes(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
     role, colour = _look(scene, joint)
     carriers = _carriers(scene, joint)
-    # in radii of a joint: where there are several axes each is smaller, so that all are seen; a
-    # prismatic joint is a box of about the volume of the cylinder of a revolute joint
+    # lengths in joint radii: several axes are smaller, so that all are visible; the box of a
+    # prismatic joint has about the volume of the cylinder of a revolute joint
     shrink = 1.0 if len(joint.axes) == 1 else 0.8
     for (link, column), axis in zip(carriers, joint.axes, strict=True):
         direction, center = scene.directions[axis.direction], scene.points[column]
@@ -115,7 +118,7 @@ def _axes(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[
 
 
 def _carriers(scene: PosedLinks, joint: SkeletonJoint) -> list[tuple[int, int]]:
-    """For each axis the link that it is fixed on, and the point that it goes through."""
+    """Return for each axis the link that it is fixed on and the index of a point on it."""
     if joint.cut:
         return [(joint.links[min(k, 1)], joint.points[min(k, 1)]) for k in range(len(joint.axes))]
     system = scene.system
@@ -132,10 +135,13 @@ def _around(scene: PosedLinks, link: int, center: Array, half: Array) -> tuple[V
 
 
 def _seat(scene: PosedLinks, joint: SkeletonJoint, direction: Array, length: float) -> Array:
-    """Where a prismatic joint sits, seen from frame_b: beside a sphere that is there too."""
+    """Return the offset (3,) of the box of a prismatic joint from frame_b, along the axis.
+
+    length: length of the box. The offset keeps the box clear of the sphere of another joint.
+    """
     a, b = (scene.points[k] for k in joint.points)
     back = float((a - b) @ direction)
-    # in lengths of the box: towards frame_a where that is far, beside a sphere that is near
+    # limits in box lengths: towards a distant frame_a, else clear of a sphere near frame_b
     if abs(back) > 2.5 * length:
         return np.array(np.sign(back) * 1.1 * length * direction)
     crowded = any(
@@ -155,21 +161,21 @@ def _wheel(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator
         return
     link, center = joint.links[1], scene.points[joint.points[1]]
     axis = scene.poses[link, :, :3] @ _rotation(scene, cut) @ np.array(disc.axis, dtype=float)
-    # a tire, no thicker than joints are
+    # radius of the tire, not thicker than joints
     tube = min(0.06 * radius, 0.7 * sizes.joint)
     direction, at = scene.local_direction(link, axis), scene.local(link, center)
     yield RingShape("loop", link, "loop", at, direction, radius - tube, tube)
 
 
 def _rotation(scene: PosedLinks, cut: Cut) -> Array:
-    """Frame_b of a cut joint in its link's frame."""
+    """Return the rotation matrix (3, 3) of frame_b of a cut joint in its link frame."""
     system = scene.system
     R = casadi.Function("R", [system.p], [casadi.densify(cut.pose_b.R)])
     return np.array(R([scene.parameters[p.name] for p in system.parameters]))
 
 
 def force_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
-    """Springs as coils, other elements between two points as bars."""
+    """Yield springs as coils, and other force elements between two points as bars."""
     for force in scene.parts.forces:
         a, b = (scene.points[k] for k in force.points)
         ends = scene.local(force.links[0], a), scene.local(force.links[1], b)
@@ -177,11 +183,11 @@ def force_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
 
 
 def figures(scene: PosedLinks, notes: list[str]) -> Iterator[Visual]:
-    """What components look like at their frames.
+    """Yield the shapes of force elements at their frames.
 
     Args:
-        scene: where they are.
-        notes: takes a sentence for each mesh that is missing or was thinned out.
+        scene: posed links.
+        notes: list that receives a sentence for each mesh that is missing or simplified.
     """
     system = scene.system
     values = list(scene.parameters.values())
@@ -198,7 +204,7 @@ def figures(scene: PosedLinks, notes: list[str]) -> Iterator[Visual]:
 def _drawn(
     shape: Shape, link: int, colour: str, pose: Array, notes: list[str], role: str
 ) -> Iterator[Visual]:
-    """A shape of a description at a pose; one that cannot be drawn is noted."""
+    """Yield a shape of the mechanism file at a pose (3, 4). A missing mesh adds a note instead."""
     if shape.colour is not None:
         colour = "#" + "".join(f"{round(255 * part):02x}" for part in shape.colour)
     try:
@@ -211,22 +217,22 @@ def _drawn(
 def _element(
     force: SkeletonForce, ends: tuple[Vector, Vector], length: float, sizes: Measures
 ) -> SpringShape | SpanShape:
-    # springs as wide as joints, other elements thin
+    # diameters: springs are as wide as joints, other elements thinner
     if force.shape == "coil":
         nominal = max(length, 4 * sizes.joint)
         return SpringShape("force", force.links, "force", ends, 0.8 * sizes.joint, nominal)
     return SpanShape("force", force.links, "force", ends, 0.35 * sizes.bar)
 
 
-# What links, the base and frames look like.
+# Shapes of links, the base and frames.
 
 
 _THIN = 0.35
-"""Opacity of a plate between the joints of a link, through which its bars are seen."""
+"""Opacity of the plate between the joints of a link. Its bars are visible through it."""
 
 
 def solid_shapes(scene: PosedLinks) -> Iterator[BoxShape | CylinderShape]:
-    """The bodies that were described by their dimensions, as they are."""
+    """Yield the bodies that are defined by their dimensions (Box and Cylinder)."""
     for body in scene.system.bodies:
         if body.solid is not None:
             pose = _body_pose(scene, body.name)
@@ -236,7 +242,7 @@ def solid_shapes(scene: PosedLinks) -> Iterator[BoxShape | CylinderShape]:
 
 
 def _body_pose(scene: PosedLinks, name: str) -> Array:
-    """(3, 4) pose of the reference frame of a body in its link's frame."""
+    """Return the pose (3, 4) of the reference frame of a body in its link frame."""
     system = scene.system
     _, place = system.frames[name]
     both = casadi.densify(casadi.horzcat(place.R, place.p))
@@ -265,15 +271,15 @@ def _solid(
 
 
 Visual = BoxShape | CylinderShape | BarShape | BallShape | MeshShape
-"""What a shape of a description is drawn as."""
+"""Primitives that draw the shapes of a mechanism file."""
 
 
 def visual_shapes(scene: PosedLinks, notes: list[str]) -> Iterator[Visual]:
-    """What the description says that links look like; what cannot be drawn is noted.
+    """Yield the visual shapes of the links from the mechanism file.
 
     Args:
-        scene: where it is.
-        notes: takes a sentence for each mesh that is missing or was thinned out.
+        scene: posed links.
+        notes: list that receives a sentence for each mesh that is missing or simplified.
     """
     system = scene.system
     if not system.shapes:
@@ -316,7 +322,7 @@ def _visual(
 def _surface(
     link: int, colour: str, pose: Array, points: Array, triangles: NDArray[np.int64], role: str
 ) -> MeshShape:
-    # six digits of the largest of its lengths, less than a pixel of any picture
+    # round to six digits of the largest coordinate, which is less than a pixel
     digits = 6 - int(np.ceil(np.log10(max(float(np.abs(points).max()), 1e-300))))
     flat = tuple(np.round(points, min(digits, 300)).ravel().tolist())
     return MeshShape(role, link, colour, rows(pose), flat, tuple(triangles.ravel().tolist()))
@@ -330,7 +336,7 @@ def _unit_ball() -> tuple[Array, NDArray[np.int64]]:
 
 
 def corners(scene: PosedLinks, solid: Visual) -> Array:
-    """(k, 3) points of the base frame that span a solid."""
+    """Return points (k, 3) in the base frame that bound a solid."""
     R, p = scene.poses[solid.link, :, :3], scene.poses[solid.link, :, 3]
     if isinstance(solid, BallShape):
         around = solid.radius * np.vstack([np.eye(3), -np.eye(3)])
@@ -351,13 +357,13 @@ def corners(scene: PosedLinks, solid: Visual) -> Array:
 def link_shapes(
     scene: PosedLinks, sizes: Measures, solids: list[BoxShape | CylinderShape], seen: set[int]
 ) -> Iterator[Primitive]:
-    """Bars from joint to joint, polygons filled, spheres where a link is nothing but a point.
+    """Yield links as bars between their joints, plates for polygons, spheres for point masses.
 
     Args:
-        scene: where it is.
-        sizes: of what has none of its own.
-        solids: the bodies that were described by their dimensions.
-        seen: links that are drawn as they look; their bars are their skeleton.
+        scene: posed links.
+        sizes: sizes of shapes without own dimensions.
+        solids: bodies that are defined by their dimensions. A bar inside a solid is left out.
+        seen: indices of links with visual shapes. Their bars get the role "skeleton".
     """
     for item in _bars(scene, sizes, solids):
         yield replace(item, role="skeleton") if item.link in seen else item
@@ -379,7 +385,7 @@ def _bars(
 
 
 def _holds(solid: BoxShape | CylinderShape, point: tuple[float, ...], sizes: Measures) -> bool:
-    """Whether a point of the link lies in a solid."""
+    """Whether a point in the link frame is inside a solid."""
     slack, at = SAME_POINT * sizes.size, np.array(point)
     if isinstance(solid, BoxShape):
         pose = np.array(solid.pose).reshape(3, 4)
@@ -404,7 +410,7 @@ def _plate(scene: PosedLinks, link: SkeletonLink) -> Iterator[PlateShape]:
 def _point_link(
     scene: PosedLinks, link: SkeletonLink, sizes: Measures
 ) -> Iterator[BallShape | BarShape]:
-    """A link without extent: a sphere where only a mass is, a flange where a joint carries it."""
+    """Yield a link without extent: a sphere for a free mass, a short bar (flange) at a joint."""
     number, colour = link.number, link_colour(link.number)
     joints = [
         scene.points[point]
@@ -413,7 +419,7 @@ def _point_link(
         if side == number and joint.kind != "free"
     ]
     frames = [f for f in scene.parts.frames if f.link == number]
-    # a sphere for a body without joints, a stub that is seen beside the one joint
+    # sphere of a body without joints, or short bar that is longer than the joint
     if link.mass_centre is not None and not joints:
         at = scene.local(number, scene.points[link.mass_centre])
         yield BallShape("link", number, colour, at, 2.5 * sizes.bar)
@@ -425,7 +431,7 @@ def _point_link(
 def base_shapes(
     scene: PosedLinks, sizes: Measures, floor: float, seen: set[int]
 ) -> Iterator[Primitive]:
-    """The base: bars between its joints, a column below the only one."""
+    """Yield the base: bars between its joints, or a column if all joints are at one point."""
     for item in _base_bars(scene, sizes, floor):
         yield replace(item, role="skeleton") if 0 in seen else item
 
@@ -442,7 +448,7 @@ def _base_bars(
     if not points:
         return
     ends = np.array(points)
-    # somewhat thicker than links; a column where all joints are at one point, but for rounding
+    # bars are thicker than links; a column if all joints are at one point, except for rounding
     for a, b in link_outline(ends, len(ends)):
         yield BarShape("base", 0, "base", three(ends[a]), three(ends[b]), 1.1 * sizes.bar)
     if np.ptp(ends, axis=0).max() <= 1e-9 * sizes.size:
@@ -456,7 +462,7 @@ def _column(
     if OUTER_WORLD in scene.system.frames:  # a mounted base need not be above the ground
         foot = np.zeros(3)
     height = float(np.linalg.norm(top - foot))
-    # as thick as a joint, on a foot three times as wide; none where the joint is on the ground
+    # nearly as thick as a joint, on a foot three times as wide; no column for a joint on the ground
     if height > 1e-9 * sizes.size:
         pad = foot + min(0.5 * sizes.joint / height, 1.0) * (top - foot)
         yield CylinderShape("base", 0, "base", three(foot), three(top), 0.8 * sizes.joint)
@@ -464,13 +470,13 @@ def _column(
 
 
 def frame_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[FrameShape]:
-    """The base frame and those that have a name; then the frame of every link."""
+    """Yield the base frame and the named frames, then the frame of every link."""
     identity = tuple(float(x) for x in np.eye(3, 4).ravel())
     yield FrameShape("frame", 0, identity, sizes.frame)
     for frame in scene.parts.frames:
         R = scene.directions[list(frame.directions)].T
         pose = scene.local_pose(frame.link, R, scene.points[frame.origin])
         yield FrameShape("frame", frame.link, pose, sizes.frame)
-    # shorter than the frames that have a name
+    # axes shorter than those of named frames
     for number in range(1, len(scene.poses)):
         yield FrameShape("link frame", number, identity, 0.75 * sizes.frame)

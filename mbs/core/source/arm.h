@@ -1,26 +1,28 @@
-/* A serial arm: its pose, its Jacobian, and the displacement to a target pose.  Re-entrant: no
- * globals and no allocation. Poses are 4x4, row by row; their last rows are not read. * Lengths are
- * divided by the length of the arm wherever they are combined with angles. */
+/* A serial arm: its pose, its Jacobian, and the displacement to a target pose.
+ *
+ * Re-entrant: no globals and no allocation. Poses are 4x4, row by row; their last rows are not
+ * read. Lengths are divided by the length of the arm wherever they are combined with angles.
+ */
 #ifndef MBS_ARM_H
 #define MBS_ARM_H
 
-enum { ARM_JOINTS = 64, /* largest number of joints */ ARM_STEPS = 60 /* most steps of a descent */
-};
+enum { ARM_JOINTS = 64, /* most joints */ ARM_STEPS = 60 /* most steps of a descent */ };
 
 typedef struct {
     int n;
     const double *gaps; /* (n + 1, 4, 4) constant transforms before, between and after joints */
-    const unsigned char *prismatic; /* (n,) 1 for a joint prismatic along z, 0 for revolute about z
-    */ double length;               /* typical length of the arm [m] */
+    const unsigned char *prismatic; /* (n,) whether prismatic along z, else revolute about z */
+    double length;               /* typical length of the arm [m] */
 } arm;
 
 /* Configuration, and its pose, displacement to the target and Jacobian. */
 typedef struct {
     double T[16];            /* pose of the end frame */
-    double gap[6];           /* displacement to the target, [translation / length; rotation vector]
-    */ double cost;             /* |gap|^2 */ double q[ARM_JOINTS];    /* positions [rad or m] */
-    double J[ARM_JOINTS][6]; /* velocity [V / length; w] of the end frame for unit velocity of each
-                                joint, in the base; lengths in arm lengths */
+    double gap[6];           /* to the target, [translation / length; rotation vector] */
+    double cost;             /* |gap|^2 */
+    double q[ARM_JOINTS];    /* positions [rad or m] */
+    double J[ARM_JOINTS][6]; /* velocity [V / length; w] of the end frame for unit velocity of
+                                each joint, in the base; lengths in arm lengths */
 } configuration;
 
 void configuration_copy(const arm *a, configuration *to, const configuration *from);
@@ -60,7 +62,7 @@ void arm_reach_sphere(const arm *a, const double *target, const double *centre, 
 
 /* Follows a self-motion from points[0] (x = q / unit) along a tangent, with residuals up to
  * `limit`. If `sided`, the path stays on its curve where other curves pass close by. Returns the
- * number of points, * most + 1 at most; sets *closed if the last point equals the first. */
+ * number of points, most + 1 at most; sets *closed if the last point equals the first. */
 long long arm_walk(const arm *a, const double *target, const double *tangent, double limit,
                    long long most, int sided, double *points, int *closed);
 

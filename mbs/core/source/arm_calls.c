@@ -10,8 +10,7 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-/* Polishes q (count, n) for target poses (4, 4) with a stride in doubles; stride 0: one pose for
- * all. */
+/* Polishes q (count, n) for target poses (4, 4) `stride` doubles apart; 0: one pose. */
 EXPORT void mbs_polish(const arm *a, const double *target, long long stride, long long count,
                        double *q, double *residual) {
     long long i;
@@ -19,8 +18,7 @@ EXPORT void mbs_polish(const arm *a, const double *target, long long stride, lon
         residual[i] = arm_polish(a, target + i * stride, q + i * a->n);
 }
 
-/* Corrects x (count, n) with held (count, n) and value (count,), see arm_correct; targets as above.
-*/
+/* Corrects x (count, n) with held (count, n) and value (count,), see arm_correct. */
 EXPORT void mbs_correct(const arm *a, const double *target, long long stride, long long count,
                         const double *held, const double *value, int iterations, double *x) {
     long long i;
@@ -28,7 +26,7 @@ EXPORT void mbs_correct(const arm *a, const double *target, long long stride, lo
         arm_correct(a, target + i * stride, held + i * a->n, value[i], iterations, x + i * a->n);
 }
 
-/* Computes residual (count,) of q (count, n), see arm_residual; targets as above. */
+/* Computes residual (count,) of q (count, n), see arm_residual. */
 EXPORT void mbs_residual(const arm *a, const double *target, long long stride, long long count,
                          const double *q, double *residual) {
     double T[16];
@@ -39,8 +37,7 @@ EXPORT void mbs_residual(const arm *a, const double *target, long long stride, l
     }
 }
 
-/* Computes gap (count, 6) and J (count, n, 6) of q (count, n), see arm_examine; targets as above.
-*/
+/* Computes gap (count, 6) and J (count, n, 6) of q (count, n), see arm_examine. */
 EXPORT void mbs_examine(const arm *a, const double *target, long long stride, long long count,
                         const double *q, double *gap, double *J) {
     configuration p;
@@ -111,8 +108,7 @@ EXPORT long long mbs_candidates(const roth_loop *r, const double *target, double
     return roth_candidates(r, target, q);
 }
 
-/* pose_solve in CasADi's convention: T and a pose_solver -> q, residual, number, (count, result
- * code). */
+/* pose_solve in CasADi's convention: T and a pose_solver -> q, residual, number, (count, code). */
 EXPORT int mbs_pose(const double **arg, double **res, long long *iw, double *w, int mem) {
     long long count;
     (void)iw;
@@ -157,8 +153,7 @@ EXPORT void mbs_reach_sphere(const arm *a, const double *target, const double *c
     for (i = 0; i < count; i++) arm_reach_sphere(a, target, centre, radius, x + i * a->n);
 }
 
-/* x (count, n) and g (count, 6 - n + c) for h (count, c), see arm_reduced. Returns 1 if all
- * converged. */
+/* x (count, n) and g (count, 6 - n + c) for h (count, c), see arm_reduced; 1 if all converge. */
 EXPORT int mbs_reduced(const arm *a, const double *target, const arm_reduction *r, long long count,
                        const double *h, double *x, double *g) {
     long long i;

@@ -8,17 +8,17 @@
 enum { STALLS = 3, ROWS = 7 + ARM_JOINTS };
 static const double SOLUTION = 1e-26;   /* largest cost of a solution, from rounding */
 static const double FINEST = 1e-31; /* cost below which nothing can be gained */
-static const double WEAK = 1e-8;    /* relative pivot of the normal matrix that counts as rounding
-*/ static const double LEAST = 1e-31;  /* smallest damping, so that no matrix is singular */ static
-const double DEPENDENT = 1e-12; /* damping of singular values that are rounding */ static const
-double ZERO = 2e-6;       /* damping of a self-motion's: accurate to the root of 1e-12 */ static
-const double LONGEST = 0.3;     /* longest step of the linear range [rad or arm lengths] */ static
-const double DEPENDENT_THERE = 1e-10; /* DEPENDENT on a sphere, where motions meet */ static const
-double STRAIGHT = 0.9;    /* cosine of 26 degrees, largest change of direction in a step:
-                                          curves hardly ever cross at smaller angles */
-static const double FINISHED = 1e-14;  /* step [rad or arm lengths] that is rounding of angles of 1
-*/ static const double SETTLED = 1e-12;   /* step [rad or arm lengths] that is slightly above
-rounding */
+static const double WEAK = 1e-8;    /* relative pivot of normal equations that is rounding */
+static const double LEAST = 1e-31;  /* smallest damping, so that no matrix is singular */
+static const double DEPENDENT = 1e-12; /* damping of singular values that are rounding */
+static const double ZERO = 2e-6;       /* damping along self-motions, accurate to the root of
+                                          1e-12 */
+static const double LONGEST = 0.3;     /* longest step of the linear range [rad or arm lengths] */
+static const double DEPENDENT_THERE = 1e-10; /* DEPENDENT on a sphere, where motions meet */
+static const double STRAIGHT = 0.9;    /* cosine of 26 degrees, largest change of direction in a
+                                          step: curves hardly ever cross at smaller angles */
+static const double FINISHED = 1e-14;  /* step [rad or arm lengths] that is rounding */
+static const double SETTLED = 1e-12;   /* step [rad or arm lengths] slightly above rounding */
 
 void configuration_copy(const arm *a, configuration *to, const configuration *from) {
     size_t n = (size_t)a->n;
@@ -81,8 +81,7 @@ static void clear_columns(double A[ARM_JOINTS + 1][ROWS], int n, int rows) {
     for (j = 0; j <= n; j++) memset(A[j], 0, (size_t)rows * sizeof **A);
 }
 
-/* Step of normal_step by reflections of [J gap; sqrt(shift) 0], which do not square the Jacobian.
-*/
+/* Step of normal_step by reflections of [J gap; sqrt(shift) 0], not squaring J. */
 static void orthogonal_step(const arm *a, const configuration *p, double shift, double *dx) {
     double A[ARM_JOINTS + 1][ROWS];
     int j, k, n = a->n, rows = 6 + a->n;
@@ -100,8 +99,7 @@ static void orthogonal_step(const arm *a, const configuration *p, double shift, 
     }
 }
 
-/* Least-squares solution of [J; held] dx = [right; value] by reflections, with rows of `damping`.
-*/
+/* Least-squares solution of [J; held] dx = [right; value] by damped reflections. */
 static void held_step(const arm *a, const configuration *p, const double *right, const double *held,
                       double value, double damping, double *dx) {
     double A[ARM_JOINTS + 1][ROWS];
@@ -245,8 +243,7 @@ static int side(const arm *a, const double *x, const double *along, double *left
     return sign;
 }
 
-/* Direction `left` of equations that the joints do not change at x, from the best of six guesses.
-*/
+/* Direction `left` of equations that the joints do not change at x: best of six guesses. */
 static void left_direction(const arm *a, const double *x, double *left) {
     configuration p, turned;
     double most = 0.0;

@@ -71,8 +71,7 @@ static int newton_step(const matrix H, int n, double shift, const double *g, dou
     return 0;
 }
 
-/* Whether a step is an improvement. Near a minimum costs differ by rounding, and the slope decides.
-*/
+/* Whether a step is an improvement. Near a minimum the slope decides: costs are rounding. */
 static int lower(double cost, double slope, double old_cost, double old_slope) {
     return cost < old_cost * (1.0 - ALIKE) ||
            (cost < old_cost * (1.0 + ALIKE) && slope < 0.5 * old_slope);

@@ -9,11 +9,11 @@
 #include "arm.h"
 
 typedef struct {
-    int corank;           /* number c of remaining unknowns h; n - c equations are solved for others
-    */ const double *centre; /* (n,) singular configuration, x = q / unit */ const double *solved;
-    /* (n - c, 6) directions of the solved equations */ const double *left;   /* (6 - n + c, 6)
-    directions of the remaining equations */ const double *null;   /* (c, n) directions of the
-    remaining unknowns */
+    int corank;           /* number c of remaining unknowns h; n - c equations are solved */
+    const double *centre; /* (n,) singular configuration, x = q / unit */
+    const double *solved; /* (n - c, 6) directions of the solved equations */
+    const double *left;   /* (6 - n + c, 6) directions of the remaining equations */
+    const double *null;   /* (c, n) directions of the remaining unknowns */
 } arm_reduction;
 
 /* Computes x (n,) for h (c,) and the residual g (6 - n + c,) of the remaining equations, by

@@ -21,11 +21,10 @@ void arm_start(const arm *a, const double *target, unsigned long long seed, long
 
 /* Whether two solutions are the same: closer than 1e-9, or closer than 1e-2 if their mean is a
  * solution too, to 1e-14 or as exact as they are, as for copies of a multiple root. Angles are
- * compared modulo * 2 pi, lengths in arm lengths. */
+ * compared modulo 2 pi, lengths in arm lengths. */
 int arm_same(const arm *a, const double *target, const double *q, const double *other);
 
-/* Adds a solution to the list; of two equal solutions, the better one is kept. q must not alias
- * them. */
+/* Adds a solution to the list; of equal solutions the best is kept. q is no row of found. */
 void arm_add(const arm *a, const double *target, const double *q, arm_configurations *found);
 
 /* Solutions from `starts` starts. The list must have room for `starts` configurations. */

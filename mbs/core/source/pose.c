@@ -60,8 +60,7 @@ int pose_round(double *T) {
     return 1;
 }
 
-/* Whether J'J - bound^2 is not positive definite, by Cholesky: a singular value is below the bound.
-*/
+/* Whether J'J - bound^2 is not positive definite, by Cholesky: a singular value is smaller. */
 static int is_near_singular(const arm *a, const configuration *p, double bound) {
     double L[ARM_JOINTS][ARM_JOINTS];
     int i, j, k, n = a->n;
@@ -200,8 +199,7 @@ static void fill_coordinates(const pose_solver *s, long long count, double *q) {
     }
 }
 
-/* Converts T (4, 4) of CasADi from column to row order and rounds it. Returns 0 if T is not rigid.
-*/
+/* Converts T (4, 4) of CasADi from column to row order and rounds it; 0 if not rigid. */
 static int read_pose(const double *columns, double *T) {
     int i, j;
     for (i = 0; i < 4; i++)

@@ -1,8 +1,12 @@
-/* All configurations of a six-joint arm that reach a pose, by elimination.  The loop is Z_1 C_1 ..
- * Z_6 C_6 = 1, with the displacements Z of the joints and constant transforms C, * one of which
- * contains the target pose. It may start at any joint and run in either direction. Python * code
- * selects the best loop of an arm once. Re-entrant: no globals and no allocation. * Source:
- * Raghavan and Roth 1993; Manocha and Canny 1994. */
+/* All configurations of a six-joint arm that reach a pose, by elimination.
+ *
+ * The loop is Z_1 C_1 .. Z_6 C_6 = 1, with the displacements Z of the joints and constant
+ * transforms C, one of which contains the target pose. It may start at any joint and run in either
+ * direction. Python code selects the best loop of an arm once. Re-entrant: no globals and no
+ * allocation.
+ *
+ * Source: Raghavan and Roth 1993; Manocha and Canny 1994.
+ */
 #ifndef MBS_RAGHAVAN_ROTH_H
 #define MBS_RAGHAVAN_ROTH_H
 
@@ -32,8 +36,8 @@ typedef struct roth_loop {
     int rank;                /* rank of the matrix of the monomials of joints 1 and 2 */
     int size;                /* size of the square matrix */
     const double *mix;       /* (size, rows) combinations of the equations; NULL: rows = size */
-    const struct roth_loop *next; /* alternative loop of the arm, for poses at which the matrix of
-                                     this loop is nearly singular at every angle; or NULL */
+    const struct roth_loop *next; /* alternative loop of the arm, for poses at which the matrix
+                                     of this loop is nearly singular at every angle; or NULL */
 } roth_loop;
 
 /* Matrix that is singular at a solution: parts with the weights of the angle u of joint 3, 1, cos
@@ -63,16 +67,15 @@ int roth_roots(const roth_matrix *m, double offset, double *u);
 int roth_middle(const roth_loop *r, const roth_matrix *m, double u, int count, double *x4,
                 double *x5);
 
-/* Positions of all joints of the loop for positions of joints 3, 4, 5. Returns the number of rows.
-*/
+/* Positions of all joints of the loop for positions of joints 3, 4, 5. Returns their count. */
 int roth_rest(const roth_loop *r, const double transforms[6][16], const double *middle,
               double configurations[3][6]);
 
 /* Configurations q (ROTH_CONFIGURATIONS, 6) that may reach the pose. Returns their number. */
 int roth_candidates(const roth_loop *r, const double *T, double *q);
 
-/* Distinct polished configurations that reach the pose. `found` has room for ROTH_CONFIGURATIONS.
-*/
+/* Distinct polished configurations that reach the pose. There must be room for
+ * ROTH_CONFIGURATIONS. */
 void roth_solve(const arm *a, const roth_loop *r, const double *T, arm_configurations *found);
 
 #endif

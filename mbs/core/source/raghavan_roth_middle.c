@@ -21,8 +21,8 @@ static void null_space(double *A, int size, int count, double *V) {
     dense_complement(&f, V, count);
 }
 
-/* Least-squares solution X (count, count), column by column, of low X = high. `low` has the rows of
- * V without the highest power of an unknown, `high` those without the lowest power. */
+/* Least-squares solution X (count, count), column by column, of low X = high. `low` has all rows of
+ * V except the highest power of an unknown, `high` all rows except the lowest power. */
 static void shift(const double *V, int size, int count, int block_size, int step, double *X) {
     double low[ROTH_SIZE * ROTH_SHARED], high[ROTH_SIZE * ROTH_SHARED];
     int i, j, rows = 0;

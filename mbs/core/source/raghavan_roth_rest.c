@@ -8,8 +8,8 @@
 enum { KEPT = 6 };
 static const int REVOLUTE[KEPT] = {1, 2, 5, 8, 11, 14}, PRISMATIC[KEPT] = {3, 4, 6, 7, 8, 11};
 static const double FLAT = 1e-4;     /* ratio of singular values below which two roots are added */
-static const double NONE = 1e-9;     /* ratio of singular values below which no single root exists
-*/ static const double NOTHING = 1e-12; /* singular value, in arm lengths, that is rounding */
+static const double NONE = 1e-9;     /* ratio of singular values below which no single root */
+static const double NOTHING = 1e-12; /* singular value, in arm lengths, that is rounding */
 
 /* Singular values s of A (KEPT, 2), column by column, and right vectors V; the left vectors replace
  * A. Source: Hestenes 1958, which for two columns is one rotation. */
@@ -42,8 +42,7 @@ static void decompose(double A[2][KEPT], double *s, double V[2][2]) {
     }
 }
 
-/* Both roots of x cos q + y sin q = g, or of x r + y r^2 = g; the double root if they are complex.
-*/
+/* Both roots of x cos q + y sin q = g, or of x r + y r^2 = g; the double root if complex. */
 static void crossings(int prismatic, const double *n, double g, double *roots) {
     double size = hypot(n[0], n[1]), middle = atan2(n[1], n[0]), half, larger, root;
     if (!prismatic) {
@@ -75,7 +74,7 @@ static void second_equations(const roth_loop *r, const double transforms[6][16],
     }
 }
 
-/* Positions of joint 2: a single root, and two more if there is only one equation, or nearly so. */
+/* Positions of joint 2: a single root, and two more for equations of (nearly) rank one. */
 static int second_joint(const roth_loop *r, const double transforms[6][16], const double *beyond,
                         const double *goal, double *q2) {
     double A[2][KEPT], V[2][2], b[KEPT], s[2], g[2] = {0.0, 0.0}, f[2];

@@ -10,8 +10,7 @@ enum { OFFSETS = 8 };
 static const double FIRST_OFFSET = 0.2731; /* generic angle [rad] for usual designs */
 static const double WELL = 1e-3;           /* regularity at which no other offset is tried */
 static const double FAR_ROUNDING = 1e-15;  /* relative pivot that is rounding */
-static const double OFF_CIRCLE = 0.5;      /* largest |log |e^(iu)|| of a candidate for a real root
-*/
+static const double OFF_CIRCLE = 0.5;      /* largest |log |e^(iu)|| of a kept root */
 
 /* Matrix A at infinite x = tan((u - offset) / 2). */
 static void far_matrix(const roth_matrix *m, double offset, double *A) {

@@ -288,7 +288,7 @@ def value_text(line: CodeLine, printer: Any, choice: str) -> str:
 
 
 def sections(unit: CodeUnit) -> Iterator[tuple[str, Sequence[CodeLine]]]:
-    """Yield a comment with its lines: lines that depend on parameters only, then the others."""
+    """Yield pairs of comment and lines: lines that depend only on parameters, then all others."""
     if unit.fixed:
         yield "Parameters only: these may be computed once.", unit.fixed
         yield "The model.", unit.changing

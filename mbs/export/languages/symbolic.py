@@ -378,7 +378,7 @@ def printer_of(
     comparisons: Mapping[str, str] | None = None,
     joins: Mapping[str, str] | None = None,
 ) -> Any:
-    """Return a printer object that combines `Readable` with a printer class of sympy.
+    """Return a printer that combines `Readable` with a printer class of sympy.
 
     Args:
         base: printer class of sympy.

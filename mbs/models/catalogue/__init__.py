@@ -1,4 +1,4 @@
-"""Every model by the name that menus, the command line and the documentation call it by."""
+"""Catalogue of all models by the short names of menus, command line and documentation."""
 
 from mbs.errors import ModelError
 from mbs.models.catalogue.dynamic import DYNAMIC
@@ -11,15 +11,15 @@ __all__ = ["Entry", "Option", "entries", "entry"]
 
 
 def entries() -> tuple[Entry, ...]:
-    """The models in the order of the menus."""
+    """Return all models in the order of the menus."""
     return _ENTRIES
 
 
 def entry(key: str) -> Entry:
-    """The model of this short name.
+    """Return the model with a short name.
 
     Raises:
-        ModelError: there is none.
+        ModelError: the name is unknown.
     """
     known = {one.key: one for one in _ENTRIES}
     if key not in known:

@@ -1,4 +1,9 @@
-"""Crossings of laws as events: sides and counts with modes, for simulations and FMUs."""
+"""Discontinuities of force and control laws as events with modes, for simulations and FMUs.
+
+A side is an expression at whose sign change a law jumps or bends, such as the condition of an
+if_else. A count is an expression at whose integer values a law jumps, such as the argument of
+floor. A crossing is a side or a count.
+"""
 
 from __future__ import annotations
 
@@ -20,55 +25,55 @@ from mbs.models.symbols import dense_function
 from mbs.operations.graph import Graph, Node, Port, function_of, graph_of, value_of
 from mbs.recursions.parts import PartsAt
 
-# Crossings that may stay at zero or pass it without end.
+# Crossings that may stay at zero, or pass it infinitely often.
 
 
 CONTACTS = "contacts"
-"""Before the names of crossings of contacts in FMUs."""
+"""Prefix of the names of contact crossings in FMUs."""
 GUARD_MODES = 4
-"""Modes of a guarded crossing: its place, whether it is asleep, a number and a time."""
+"""Number of modes of a guarded crossing: place, whether asleep, events in a row, last event time."""
 _OFTEN = 4
-"""Number of crossings in a row after which a crossing is not watched for a while: a body that
-bounces between two sides of a law, or that comes to rest at a friction, passes it without end."""
+"""Number of events in a row after which a crossing is not watched for a pause: a body that bounces
+between two sides of a law, or comes to rest by friction, has infinitely many events."""
 _CROWDED = 1e-5
-"""Part of the duration that is a tick; crossings within one or two ticks are in a row."""
+"""Length of a tick, as a fraction of the duration. Events within 1 or 2 ticks are in a row."""
 _IN_A_ROW = 2.0
-"""Ticks since the last crossing, whose fraction is not kept."""
+"""Number of ticks since the last event below which events are in a row; the time of the last event
+is rounded down to a tick."""
 _WRAP = 1e9
-"""Ticks after which their number begins again, so that it is an integer of 32 bits."""
+"""Number of ticks after which the tick count restarts, so that it fits in 32 bits."""
 _SHORTEST_PAUSE, _LONGEST_PAUSE = 1e-6, 0.02
-"""Parts of the duration for which a crossing is not watched. The pauses double, so that 16 of them
-come to the longest one, and 50 of these to the duration."""
+"""First and longest pause without watching, as fractions of the duration. Pauses double with every
+event, up to the longest after about 15 events. The duration contains 50 longest pauses."""
 
 
 def ticks_of(t: Any, duration: Any) -> Any:
-    """A time in ticks."""
+    """Convert a time [s] to ticks for a given duration of the motion [s]."""
     return t / (_CROWDED * duration)
 
 
 def guard(t: SX, values: SX, counts: int, modes: SX, fired: SX, duration: Any) -> tuple[SX, SX]:
     """Return the indicators of crossings and their modes after an event, without chattering.
 
-    A crossing may stay at zero, or pass it again and again. After `_OFTEN` events in a row it is
-    asleep for a pause: its events are not located, and error control alone follows the law.
+    A crossing may stay at zero or pass it repeatedly. After `_OFTEN` events in a row it is asleep
+    for a pause: its events are not located, and only error control handles the law.
 
-    The modes are four columns of k elements: places; 1 for crossings that are asleep; the number of
-    events in a row; the time of the last event [ticks, see `ticks_of`]. The place of a value is its
-    sign, 1 or -1; it is 0 from the time at which the value is exactly zero until the value is not.
-    The place of a count is its whole number, rounded down. Events within `_IN_A_ROW` ticks of each
-    other are in a row.
+    The modes are four columns of k elements: places; 1 for each sleeping crossing; the number of
+    events in a row; the time of the last event [ticks, see `ticks_of`]. The place of a side is its
+    sign, 1 or -1, or 0 while the value stays exactly zero. The place of a count is its integer
+    part, rounded down. Events within `_IN_A_ROW` ticks are in a row.
 
     Args:
         t: time [s].
-        values: (k, 1) of the crossings, the counts last.
+        values: (k, 1) values of the crossings, sides first, counts last.
         counts: number of counts.
-        modes: (4 k, 1).
+        modes: (4 k, 1) modes before the event.
         fired: (k + counts, 1) 1 for each indicator that is not positive: of the sides, of counts
             that fall, of counts that rise.
         duration: duration of the motion [s].
 
     Returns:
-        indicators (k + counts, 1) and modes.
+        Indicators (k + counts, 1) and modes (4 k, 1) after the event.
     """
     k = values.numel()
     if not k:
@@ -109,23 +114,24 @@ def guard(t: SX, values: SX, counts: int, modes: SX, fired: SX, duration: Any) -
     return indicators, then
 
 
-# Laws that keep the side of their conditions during a step.
+# Laws whose conditions are constant during a step.
 #
-# The conditions of the laws are found again in the graph of a state equation by their values at
-# random points. There the modes of the crossings take their place: a step that goes beyond an event
-# then follows the law of its begin, smoothly.
+# The conditions of the laws are identified in the graph of a state equation by their values at
+# random points, and are replaced by the modes of the crossings. A step past an event then continues
+# the law of its start smoothly.
 
 
 _POINTS, _KNOWN, _SEED = 24, 12, 20261124
-"""Random points at which conditions are compared, and how many of them must have values: |x| and x
-are equal at half of them. A fixed seed, so that every run has the same."""
+"""Number of random points at which conditions are compared, number of points that must have finite
+values, and seed. Many points are needed: |x| and x are equal at half of them."""
 _SIZES = -2.0, 3.0
-"""Powers of ten of the coordinates of these points: fmin(x, 5) and x are equal below 5."""
+"""Decimal exponents of the coordinates of these points: fmin(x, 5) and x differ only above 5."""
 _EQUAL = 1e-9
-"""Difference of equal conditions: far above rounding, far below that of different ones."""
+"""Largest relative difference of equal conditions: far above rounding, far below the difference of
+unequal conditions."""
 _COMPARISONS = {casadi.OP_LT, casadi.OP_LE}
 _ROUNDED = {casadi.OP_FLOOR: 1.0, casadi.OP_CEIL: -1.0}
-"""Operations with counts, and the sign of their operand in the count."""
+"""Rounding operations, with the sign of their operand in the count."""
 
 
 def hold_sides(
@@ -138,24 +144,24 @@ def hold_sides(
     *,
     loose: int = 0,
 ) -> Function:
-    """A function whose conditions have the places of crossings.
+    """Replace the conditions in a function by the places of crossings, which are modes.
 
     Args:
         function: state equation.
-        at: its inputs as symbols.
-        values: (k, 1) of the crossings at these symbols, the counts last.
-        modes: modes of the crossings, as `guard` has them.
+        at: symbols of the inputs of `function`.
+        values: (k, 1) expressions of the crossings in these symbols, counts last.
+        modes: symbols of the modes of the crossings, as in `guard`.
         counts: number of counts.
         inputs: inputs of the result: symbols that include the symbols of `at` and the modes.
-        loose: number of the first crossings, whose conditions stay as they are.
+        loose: number of the first crossings whose conditions are not replaced.
 
     Returns:
-        the function of these inputs. Conditions that are not found in it stay as they are.
+        Function of `inputs`. Conditions that match no crossing are not replaced.
     """
     k, rest = values.numel(), modes.numel()
     try:
         graph = graph_of(function)
-    except ModelError:  # it calls functions as a whole
+    except ModelError:  # the graph contains calls of other Functions
         graph = None
     watched = {*_COMPARISONS, casadi.OP_SIGN, *_ROUNDED}
     if graph is None or not any(node.op in watched for node in graph.nodes):
@@ -187,7 +193,7 @@ def hold_sides(
 def _found_again(
     graph: Graph, sizes: Sequence[int], crossings: Function, counts: int, loose: int
 ) -> dict[int, tuple[int, float]]:
-    """Crossing and sign of each condition in a graph that is one of the crossings."""
+    """Match the conditions in a graph with crossings: node -> (index of the crossing, sign)."""
     nodes, numbers, of_counts = list(graph.nodes), list[int](), list[bool]()
     places = list[int]()
     for number, node in enumerate(graph.nodes):
@@ -206,7 +212,7 @@ def _found_again(
     )
     random = np.random.default_rng(_SEED)
     points = [[_anywhere(random, size) for size in sizes] for _ in range(_POINTS)]
-    for point in points[:_KNOWN]:  # roots of parameters, such as masses, have values
+    for point in points[:_KNOWN]:  # positive parameters, whose roots are real
         point[-1] = np.abs(point[-1])
     seen, wanted = (
         np.array([np.array(f(*point)).ravel() for point in points]) for f in (probe, crossings)
@@ -227,15 +233,16 @@ def _found_again(
 
 
 def _anywhere(random: np.random.Generator, size: int) -> NDArray[np.float64]:
-    """Numbers of many sizes and both signs."""
+    """Return random numbers of many orders of magnitude and both signs."""
     return random.choice([-1.0, 1.0], size) * 10 ** random.uniform(*_SIZES, size)
 
 
-# Crossings of the state equations of FMUs.
+# Crossings in the state equations of FMUs.
 
 
 _SPAN = 1.0
-"""Duration by which crossings in a row are known in an FMU [s], which does not know its own."""
+"""Duration of the motion that is assumed in an FMU to detect events in a row [s], because an FMU
+does not know the duration of its simulation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -243,9 +250,9 @@ class WatchedCrossings:
     """Crossings of a state equation.
 
     Attributes:
-        sides: (n, 1) values that pass through zero, those of contacts first.
-        counts: (m, 1) values at whose whole numbers laws jump.
-        approaches: (k, 2) speeds and paces of the k contacts, as `Approach` has them.
+        sides: (n, 1) values at whose zeros laws jump or bend, sides of the k contacts first.
+        counts: (m, 1) values at whose integer values laws jump.
+        approaches: (k, 2) speeds and paces of the k contacts, as in `Approach`.
     """
 
     sides: SX
@@ -254,15 +261,15 @@ class WatchedCrossings:
 
 
 def part_crossings(system: System) -> Function | None:
-    """`f(q, v, z, u, p) -> sides, counts, approaches` at which the laws of components change.
+    """Return `f(q, v, z, u, p) -> sides, counts, approaches` at which component laws jump.
 
-    Bends and curves are left to error control.
+    Bends of laws are left to error control.
 
     Args:
-        system: open or closed.
+        system: open or closed system.
 
     Returns:
-        the Function, whose outputs are those of `WatchedCrossings`; None if no law jumps.
+        Function with the outputs of `WatchedCrossings`, or None if no law jumps.
     """
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     parts = PartsAt(system, q, v)
@@ -281,15 +288,15 @@ def part_crossings(system: System) -> Function | None:
 
 
 def drive_crossings(system: System, drive: DriveInputs, extra: int) -> Function | None:
-    """`f(t, q, v, w, p) -> sides, counts` at which the laws of a drive jump.
+    """Return `f(t, q, v, w, p) -> sides, counts` at which the control laws of a drive jump.
 
     Args:
-        system: open or closed.
-        drive: a drive, with or without laws.
+        system: open or closed system.
+        drive: drive, with or without laws.
         extra: number of the inputs w of the laws.
 
     Returns:
-        the Function; None if no law jumps, or if laws are external functions.
+        Function, or None if no law jumps or if laws are external functions.
     """
     laws = [law for law in (drive.effort, drive.device) if law is not None]
     if not laws or not all(law.is_a("SXFunction") for law in laws):
@@ -303,9 +310,9 @@ def drive_crossings(system: System, drive: DriveInputs, extra: int) -> Function 
 
 
 def _jumps(laws: SX, t: SX, q: SX, constants: SX) -> Conditions:
-    """Conditions at which laws jump, and bends of these conditions.
+    """Return the conditions at which laws jump, and the bends of these conditions.
 
-    An importer sees signs alone. It meets the zeros of |x| - a on both sides if it stops at x = 0.
+    Importers detect sign changes only. They find both zeros of |x| - a if they also stop at x = 0.
     """
     found = conditions_of(laws, t, q, constants, jumps_alone=True)
     decisive = casadi.vertcat(*found.crossings, *found.counts, *found.zeros, *found.wholes)
@@ -321,7 +328,7 @@ def _jumps(laws: SX, t: SX, q: SX, constants: SX) -> Conditions:
 def _function(
     point: Sequence[SX], sides: Sequence[SX], counts: Sequence[SX], of: SX
 ) -> Function | None:
-    """The Function of those expressions that depend on some symbols."""
+    """Return the Function of the expressions that depend on the symbols `of`, None if empty."""
     kept = [
         [value for value in distinct(values, []) if casadi.depends_on(value, of)]
         for values in (sides, counts)
@@ -334,13 +341,13 @@ def _function(
 def join_crossings(
     events: MinimalEvents | None, values: WatchedCrossings, point: Sequence[SX], source: str
 ) -> MinimalEvents:
-    """Events with the events of crossings behind them, which change modes alone.
+    """Append the events of crossings, which only change modes.
 
     Args:
-        events: other events; None if there are no others.
-        values: crossings at the point.
-        point: t, x, z, u and p, without modes.
-        source: name of the crossings.
+        events: other events, or None.
+        values: expressions of the crossings in the symbols `point`.
+        point: symbols t, x, z, u and p, without modes.
+        source: prefix of the names of the crossings.
     """
     sides, counts, near = values.sides, values.counts, values.approaches
     k, n, m = sides.numel() + counts.numel(), sides.numel(), counts.numel()
@@ -407,14 +414,14 @@ def with_part_crossings(
     *,
     wanted: bool,
 ) -> tuple[MinimalEvents | None, WatchedCrossings]:
-    """Events with the crossings of components behind them, and these crossings.
+    """Append the events of component crossings, and return them with the crossings.
 
     Args:
-        system: open or closed.
-        events: other events; None if there are no others.
+        system: open or closed system.
+        events: other events, or None.
         motion: positions and velocities of the tree.
-        point: t, x, z, u and p, without modes.
-        wanted: whether crossings are wanted at all.
+        point: symbols t, x, z, u and p, without modes.
+        wanted: whether crossings are included; if not, `events` is returned.
     """
     found = part_crossings(system) if wanted else None
     if found is None:
@@ -424,12 +431,15 @@ def with_part_crossings(
 
 
 def held_by(function: Function, values: WatchedCrossings, point: Sequence[SX]) -> Function:
-    """A function of (t, x, z, u, p) that takes the modes of crossings at the end of p.
+    """Return a function of (t, x, z, u, p) with the modes of crossings at the end of p.
+
+    The conditions in the function are replaced by these modes.
 
     Args:
         function: state equation; its p may end with other modes.
-        values: crossings at the point; laws of contacts, which do not jump, have no side.
-        point: t, x, z, u and p, without modes.
+        values: expressions of the crossings in the symbols `point`. Conditions of contacts, whose
+            laws do not jump, are not replaced.
+        point: symbols t, x, z, u and p, without modes.
     """
     sides, counts = values.sides, values.counts
     k = sides.numel() + counts.numel()
@@ -444,7 +454,7 @@ def held_by(function: Function, values: WatchedCrossings, point: Sequence[SX]) -
 
 
 def with_more_modes(function: Function, count: int) -> Function:
-    """A function of (t, x, z, u, p) that takes more modes at the end of p."""
+    """Return a function of (t, x, z, u, p) with `count` more, unused modes at the end of p."""
     if not count:
         return function
     symbols = [SX.sym(f"i{k}", function.numel_in(k)) for k in range(function.n_in())]

@@ -1,7 +1,7 @@
-"""Conditions at which the laws of efforts, inputs and loads jump, bend or are short.
+"""Conditions at which the laws of efforts, inputs and loads jump, bend or act only briefly.
 
-Conditions on the time, constants and parameters alone give times at which a step of an integration
-ends. Conditions on states give expressions that pass through zero, which are watched.
+Conditions on time, constants and parameters result in times at which integration steps end.
+Conditions on states result in expressions whose zero crossings are events.
 
 Source: Cellier and Kofman 2006, chapter 9, for events in time and in states.
 """
@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# Conditions in a graph of scalar operations.
+# Detection of conditions in a graph of scalar operations.
 
 
 _TIME, _POSITION, _OTHER = 1, 2, 4
-"""What an expression depends on, as a sum; zero for constants and parameters."""
+"""Bits of the dependence of an expression on symbols; 0 for constants and parameters."""
 
 _DIFFERENCE = {casadi.OP_LT, casadi.OP_LE, casadi.OP_FMIN, casadi.OP_FMAX}
 _SELF = {casadi.OP_SIGN, casadi.OP_FABS}
@@ -43,15 +43,14 @@ class Conditions:
     """Conditions in the expressions of laws.
 
     Attributes:
-        zeros: expressions of the time at whose zeros a law jumps or bends.
-        wholes: expressions of the time at whose whole numbers a law jumps.
-        terms: expressions of the time alone, whose sums and products with states make up the laws.
-        hints: expressions of the time near whose zeros a smooth law is short.
-        phases: arguments of waves and of periodic laws, expressions of the time.
-        crossings: expressions that also depend on states; a law jumps, bends or is short near their
-            zeros.
-        counts: expressions that also depend on states; a law jumps at their whole numbers.
-        short: those of `crossings` near whose zeros a smooth law is short.
+        zeros: expressions of time at whose zeros a law jumps or bends.
+        wholes: expressions of time at whose integer values a law jumps.
+        terms: expressions of time only, from which the laws are formed with states.
+        hints: expressions of time near whose zeros a smooth law changes within a short time.
+        phases: arguments of waves and of periodic laws in periods, expressions of time.
+        crossings: expressions of states at whose zeros a law jumps, bends or starts to act briefly.
+        counts: expressions of states at whose integer values a law jumps.
+        short: elements of `crossings` near whose zeros a smooth law acts only briefly.
     """
 
     zeros: list[SX] = field(default_factory=list)
@@ -66,12 +65,12 @@ class Conditions:
 
 @dataclass(slots=True)
 class _Walk:
-    """One walk through the graph of expressions.
+    """Traversal of the graph of expressions, with the dependence of each node.
 
     Attributes:
-        known: dependence of each symbol, by its hash; symbols that are not in it are states.
-        depends: dependence of each node, by its hash, in the order of the walk.
-        nodes: the nodes themselves.
+        known: dependence of each symbol, by hash; other symbols are states.
+        depends: dependence of each visited node, by hash, in the order of traversal.
+        nodes: visited nodes, by hash.
     """
 
     known: Mapping[int, int]
@@ -101,12 +100,12 @@ class _Walk:
                 self.depends[key] = found
 
     def of(self, node: SX) -> int:
-        """Dependence of a node."""
+        """Return the dependence of a visited node."""
         return self.depends[node.element_hash()]
 
 
 def operands_of(node: SX) -> list[SX]:
-    """Operands of a scalar expression; symbols and constants have no operands."""
+    """Return the operands of a scalar expression; symbols and constants have no operands."""
     if node.is_symbolic() or node.is_constant():
         return []
     return [node.dep(k) for k in range(node.n_dep())]
@@ -115,14 +114,14 @@ def operands_of(node: SX) -> list[SX]:
 def conditions_of(
     laws: SX, time: SX, positions: SX, constants: SX, *, jumps_alone: bool = False
 ) -> Conditions:
-    """Conditions in the expressions of laws.
+    """Find the conditions in the expressions of laws.
 
     Args:
         laws: (n, 1) expressions.
         time: symbol of the time; empty for laws without time.
         positions: symbols of positions.
         constants: symbols that are constant during a motion, such as parameters.
-        jumps_alone: whether bends and short smooth laws are left out.
+        jumps_alone: whether bends and brief smooth laws are omitted.
     """
     found = Conditions()
     known = {
@@ -149,7 +148,7 @@ def _elements(symbols: SX) -> Iterator[SX]:
 
 
 def _collect(node: SX, depends: int, found: Conditions, *, jumps_alone: bool) -> None:
-    """Add the condition of a node."""
+    """Add the conditions of a node to `found`."""
     if node.is_call() or node.is_output() or (jumps_alone and node.op() in _BENDS):
         return  # an interpolant is continuous
     alone = depends == _TIME
@@ -173,10 +172,10 @@ def _collect(node: SX, depends: int, found: Conditions, *, jumps_alone: bool) ->
 
 
 def _condition(op: int, operands: Sequence[SX]) -> Iterator[tuple[str, SX]]:
-    """Kind and value of the conditions of an operation.
+    """Yield kind and value of each condition of an operation.
 
-    A law jumps or bends where a side is zero or a count is whole. An exponential is negligible
-    beyond a zero, and a steep function changes near a zero. A phase counts periods.
+    A law jumps or bends at the zeros of a "side" and at integer values of a "count". An exponential
+    is "negligible" below a zero. A "steep" function changes near a zero. A "phase" counts periods.
     """
     first, *others = operands
     if op in _DIFFERENCE:
@@ -185,7 +184,7 @@ def _condition(op: int, operands: Sequence[SX]) -> Iterator[tuple[str, SX]]:
         yield "side", first
     elif op == casadi.OP_COPYSIGN:
         yield "side", others[0]
-    elif op == casadi.OP_ATAN2:  # it jumps at half a turn
+    elif op == casadi.OP_ATAN2:  # atan2 jumps at half a revolution
         yield "side", casadi.if_else(others[0] < 0, first, 1)
     elif op == casadi.OP_EXP:
         yield "negligible", first + _NEGLIGIBLE
@@ -198,13 +197,13 @@ def _condition(op: int, operands: Sequence[SX]) -> Iterator[tuple[str, SX]]:
 
 
 def _whole(op: int, operands: Sequence[SX]) -> Iterator[tuple[str, SX]]:
-    """Conditions of integer parts and remainders."""
+    """Yield the conditions of integer parts and remainders."""
     first, *others = operands
     if op == casadi.OP_FLOOR:
         yield "count", first
     elif op == casadi.OP_CEIL:
         yield "count", -first
-    elif op == casadi.OP_FMOD:  # the ratio is cut towards zero
+    elif op == casadi.OP_FMOD:  # the ratio is truncated towards zero
         yield "side", first
         yield "count", casadi.fabs(first / others[0])
     elif op == casadi.OP_REMAINDER:  # the ratio is rounded
@@ -212,7 +211,7 @@ def _whole(op: int, operands: Sequence[SX]) -> Iterator[tuple[str, SX]]:
 
 
 def _terms(walk: _Walk, roots: Sequence[SX]) -> list[SX]:
-    """Expressions of the time alone that states or outputs use; sums as their summands."""
+    """Return the expressions of time only that states or outputs use; sums as their summands."""
     used = {root.element_hash(): root for root in roots if walk.of(root) == _TIME}
     for key, node in walk.nodes.items():
         if walk.depends[key] & ~_TIME:
@@ -237,15 +236,15 @@ def _terms(walk: _Walk, roots: Sequence[SX]) -> list[SX]:
 
 
 _DEPTH = 50
-"""Levels of operations to which expressions are compared: more than conditions of laws have."""
+"""Depth of operations to which expressions are compared: more than conditions of laws have."""
 
 
 def distinct(values: Sequence[SX], known: Sequence[SX]) -> list[SX]:
-    """Those expressions that are equal to none before them, up to the sign.
+    """Remove expressions that are equal to an earlier expression up to the sign.
 
     Args:
-        values: the expressions.
-        known: expressions that are left out too.
+        values: expressions.
+        known: expressions that are removed from `values` too.
     """
     every, found = list(known), list[SX]()
     for value in values:
@@ -256,53 +255,54 @@ def distinct(values: Sequence[SX], known: Sequence[SX]) -> list[SX]:
     return found
 
 
-# Times at which steps end.
+# Times at which integration steps end.
 
 
 _CELLS = 2048
-"""Cells of an interval in which zeros of a function of time are looked for, at the least: four in
-a pulse of a smooth law whose width is a thousandth of the interval, and some more."""
+"""Minimum number of cells of a time interval in the search for zeros of a function of time: a pulse
+of a smooth law with a width of a thousandth of the interval contains two cells."""
 _PER_PERIOD = 16
-"""Cells in a period of a wave: both zeros of its slope are then apart."""
+"""Number of cells per period of a wave, which separates both zeros of its slope."""
 _MOST_CELLS = 2_000_000
-"""Limit of the cells: more would need gigabytes."""
+"""Maximum number of cells: more cells would require gigabytes of memory."""
 _HALVINGS = 80
-"""Bisections of a zero: more than the digits of a number, so that they end at adjacent numbers."""
+"""Maximum number of bisections of a zero: more than the bits of a double, so that they end at
+adjacent numbers."""
 _SECTIONS = 60
-"""Sections of a search for an extremum: 0.62^60 is 3e-13 of the cell."""
+"""Number of golden sections in the search for an extremum: 0.62^60 is 3e-13 of the cell."""
 _GOLDEN = (math.sqrt(5) - 1) / 2
 _ROUNDS = 6
-"""Searches, each of which knows the jumps that the one before has found: the depth of conditions
-in conditions."""
+"""Maximum number of searches, each with the jumps of the search before: the largest depth of nested
+conditions."""
 _UNEVEN = 0.02
-"""Part of the range of a law by which it may differ from a straight line in a cell."""
+"""Largest deviation of a law from a straight line in a cell, as a fraction of its range."""
 _LEVELS = 40
-"""Halvings of a cell in which a law is uneven."""
+"""Maximum number of bisections of a cell in which a law deviates from a straight line."""
 _MOST_POINTS = 200_000
-"""Points at which a law is sampled, at most."""
+"""Maximum number of samples of a law."""
 _VARIATION = 0.45
-"""Part of the range of a law whose variation ends an interval. It is not the half, so that no end
-is on the axis of a symmetric pulse."""
+"""Variation of a law at which an interval ends, as a fraction of its range. It differs from 1/2, so
+that no end is on the axis of a symmetric pulse."""
 _SHORTER = 4.0
-"""Ratio of two intervals from which error control might step over the shorter one."""
+"""Ratio of two intervals above which error control might step over the shorter interval."""
 _NEAR_ZERO = 1e-3
-"""Part of the interval by which the rounding of times near zero is measured."""
+"""Lower limit of the reference time for rounding, as a fraction of the interval."""
 _SAME = 1e3 * float(np.finfo(float).eps)
-"""Part of the time by which jumps differ that fall together: the integrator's own measure."""
+"""Largest relative difference of simultaneous jumps; the integrator has the same tolerance."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeLaws:
-    """Parts of laws that depend on time alone: functions of (t, p), each with a column of values.
+    """Parts of laws that depend on time only: Functions of (t, p), each with a column of values.
 
     Attributes:
-        lines: (a, 2) constants and slopes of the zeros that are linear in time, a function of p.
-        zeros: a law jumps or bends at their zeros.
-        wholes: a law jumps at their whole numbers.
+        lines: Function of p: (a, 2) constants and slopes of the conditions that are linear in time.
+        zeros: conditions at whose zeros a law jumps or bends.
+        wholes: conditions at whose integer values a law jumps.
         terms: smooth parts of laws.
-        hints: a smooth law is short near their zeros.
-        rates: rates of phases, periods per second.
-        p: number of the parameters; zero where the laws depend on none.
+        hints: expressions near whose zeros a smooth law changes within a short time.
+        rates: rates of phases, in periods per second.
+        p: number of parameters; zero if the laws depend on no parameter.
     """
 
     lines: Function
@@ -314,7 +314,7 @@ class TimeLaws:
     p: int
 
     def stops(self, begin: float, end: float, p: Array) -> tuple[Array, Flags]:
-        """Times in an interval at which steps end.
+        """Return the times in an interval at which integration steps must end.
 
         Args:
             begin: begin of the interval [s].
@@ -322,7 +322,7 @@ class TimeLaws:
             p: values of the parameters.
 
         Returns:
-            (m,) times in increasing order; (m,) whether a law may jump or bend there.
+            Times (m,) in increasing order [s]; (m,) whether a law may jump or bend at each time.
         """
         if not end > begin:
             return np.empty(0), np.empty(0, bool)
@@ -337,7 +337,7 @@ class TimeLaws:
 
 
 def time_laws(found: Conditions, time: SX, p: SX) -> TimeLaws | None:
-    """The parts of laws that depend on time alone; None if there are none.
+    """Return the parts of laws that depend on time only, or None if there are none.
 
     Args:
         found: conditions of all laws.
@@ -375,7 +375,7 @@ def time_laws(found: Conditions, time: SX, p: SX) -> TimeLaws | None:
 
 
 def _is_arithmetic(value: SX) -> bool:
-    """Whether an expression is made of sums, products and quotients."""
+    """Whether an expression consists of sums, products and quotients only."""
     walk = _Walk({})
     walk.visit(value)
     inner = (node for node in walk.nodes.values() if operands_of(node))
@@ -385,7 +385,7 @@ def _is_arithmetic(value: SX) -> bool:
 
 
 def _near(values: Array, others: Array, distance: float) -> Flags:
-    """Whether each value is near one of the others, which are in increasing order."""
+    """Return whether each value is within a distance of any of the sorted `others`."""
     if not len(others):
         return np.zeros(len(values), bool)
     place = np.searchsorted(others, values)
@@ -396,12 +396,12 @@ def _near(values: Array, others: Array, distance: float) -> Flags:
 
 
 Curve = Callable[[Array], Array]
-"""Values (k, m) at (m,) times; or (m,) of one row each."""
+"""Function from times (m,) to values (k, m), or to values (m,) of a separate row each."""
 
 
 @dataclass(slots=True)
 class _Search:
-    """A search for times in an interval."""
+    """Search for the times in an interval [begin, end] at which steps must end."""
 
     laws: TimeLaws
     begin: float
@@ -409,7 +409,7 @@ class _Search:
     p: Array
 
     def _values(self, function: Function, times: Array) -> Array:
-        """(k, m) values at times."""
+        """Return the values (k, m) of a function at m times."""
         if not function.numel_out(0) or not len(times):
             return np.empty((function.numel_out(0), len(times)))
         every = np.repeat(self.p[:, None], len(times), 1)
@@ -417,7 +417,7 @@ class _Search:
         return found.reshape(function.numel_out(0), len(times))
 
     def _grid(self, more: Array) -> Array:
-        """Times of a search: equal cells, and both sides of known jumps."""
+        """Return the sampling times of a search: equal cells, and both sides of known jumps."""
         span = self.end - self.begin
         coarse = np.linspace(self.begin, self.end, _CELLS + 1)
         rates = np.abs(self._values(self.laws.rates, coarse))
@@ -429,7 +429,7 @@ class _Search:
         return times[(times >= self.begin) & (times <= self.end)]
 
     def jumps(self) -> Array:
-        """Times at which laws jump or bend, in increasing order."""
+        """Return the times at which laws jump or bend, in increasing order."""
         found = [self._of_lines()]
         zeros, wholes = self.laws.zeros, self.laws.wholes
         if zeros.numel_out(0) or wholes.numel_out(0):
@@ -451,7 +451,7 @@ class _Search:
         return times[np.isfinite(times)]
 
     def _whole_numbers(self, grid: Array) -> Iterator[Array]:
-        """Times at which values pass whole numbers."""
+        """Yield the times at which values pass integers."""
         values = np.floor(self._values(self.laws.wholes, grid))
         for row in range(len(values)):
             passed = np.flatnonzero(values[row, 1:] != values[row, :-1])
@@ -466,7 +466,7 @@ class _Search:
             yield _bisect(is_past, left, right)
 
     def _roots(self, function: Function, grid: Array) -> Iterator[Array]:
-        """Times at which values become or stop being positive, or negative."""
+        """Yield the times at which values become or cease to be positive, or negative."""
         values = self._values(function, grid)
         for row in range(len(values)):
             for sign in (1.0, -1.0):
@@ -475,7 +475,7 @@ class _Search:
     def _flips(
         self, function: Function, row: int, sign: float, grid: Array, values: Array
     ) -> Iterator[Array]:
-        """Times at which sign * value becomes or stops being positive."""
+        """Yield the times at which sign * value becomes or ceases to be positive."""
 
         def value(times: Array) -> Array:
             found: Array = sign * self._values(function, times)[row]
@@ -486,7 +486,7 @@ class _Search:
         flips = np.flatnonzero(up[1:] != up[:-1])
         left, right = grid[flips], grid[flips + 1]
         yield _flip(value, left, right, up[flips])
-        # peaks that do not reach zero at the points of the grid may do so between them
+        # peaks below zero at the grid points may exceed zero between the points
         inner = (v[1:-1] >= v[:-2]) & (v[1:-1] >= v[2:]) & (v[1:-1] <= 0)
         inner &= (v[1:-1] > v[:-2]) | (v[1:-1] > v[2:])
         peaks = np.flatnonzero(inner) + 1
@@ -500,7 +500,10 @@ class _Search:
             yield _flip(value, top, b, ~off)
 
     def shorter_intervals(self, hard: Array) -> Array:
-        """Times before which error control could step over a short change of a smooth law."""
+        """Return the ends of long smooth intervals before a short change of a smooth law.
+
+        Without these stops, error control could step over the change.
+        """
         terms = self.laws.terms
         if not terms.numel_out(0):
             return np.empty(0)
@@ -515,7 +518,7 @@ class _Search:
         return np.unique(np.concatenate(found))
 
     def _tops(self, grid: Array) -> Iterator[Array]:
-        """Times at which hints are largest: the middle of a short change."""
+        """Yield the times of maxima of hints: the middle of a short change."""
         values = self._values(self.laws.hints, grid)
         for row in range(len(values)):
             v = values[row]
@@ -529,7 +532,7 @@ class _Search:
                 yield _maximum(value, grid[peaks - 1], grid[peaks + 1])
 
     def _sampled(self, row: int, grid: Array) -> tuple[Array, Array]:
-        """Times and values of a term, closer together near bends."""
+        """Return times and values of a term, refined where its curvature is large."""
         terms, times = self.laws.terms, grid
         values = self._values(terms, times)[row]
         active = np.arange(len(times) - 1)
@@ -550,18 +553,18 @@ class _Search:
         return times, values
 
     def _uneven(self, times: Array, values: Array, hard: Array) -> Array:
-        """Ends of intervals that are much longer than the next ones."""
+        """Return the ends of intervals of equal variation that are much longer than the next."""
         span = _span(values)
         if span == 0.0:
             return np.empty(0)
-        # a jump is no variation: its two sides are next to each other
+        # jumps do not count as variation: the samples on both sides are neighbours
         change = np.abs(np.diff(values))
         change[~np.isfinite(change)] = 0.0
         change[_near(times[1:], hard, 2 * _SAME * max(abs(self.begin), abs(self.end)))] = 0.0
         varied = np.concatenate([[0.0], np.cumsum(change)]) / (_VARIATION * span)
         levels = np.arange(1, math.floor(varied[-1]) + 1)
         if len(levels) > _MOST_POINTS:
-            return np.empty(0)  # it varies everywhere, which error control sees
+            return np.empty(0)  # the law varies everywhere, which error control detects
         ends = times[np.searchsorted(varied, levels)]
         borders = np.unique(np.concatenate([[self.begin], ends]))
         lengths = np.diff(borders)
@@ -570,28 +573,28 @@ class _Search:
 
 
 def slope_is_there(lines: Array) -> Flags:
-    """Whether each line, a constant and a slope, has a zero."""
+    """Return whether each line (constant, slope) has a zero."""
     there: Flags = (lines[:, 1] != 0) & np.isfinite(lines).all(axis=1)
     return there
 
 
 def _span(values: Array) -> float:
-    """Range of the values that are finite."""
+    """Return the range of the finite values."""
     finite = values[np.isfinite(values)]
     return float(np.ptp(finite)) if len(finite) else 0.0
 
 
 def _distinct(times: Array, begin: float, end: float) -> Array:
-    """Times inside an interval in increasing order, each once."""
+    """Return the distinct times inside an interval in increasing order."""
     inside: Array = np.sort(times[(times > begin) & (times < end)])
-    # times near zero differ by parts of the interval
+    # near time zero the tolerance is relative to the length of the interval
     apart = np.diff(inside) > _SAME * np.maximum(np.abs(inside[1:]), _NEAR_ZERO * (end - begin))
     found: Array = inside[np.concatenate([np.ones(min(len(inside), 1), bool), apart])]
     return found
 
 
 def _flip(value: Curve, left: Array, right: Array, up: Flags) -> Array:
-    """Times between left and right at which values become positive, or stop being so."""
+    """Return the times between left and right at which values become or cease to be positive."""
 
     def is_past(times: Array) -> Flags:
         past: Flags = (value(times) > 0) != up
@@ -601,7 +604,7 @@ def _flip(value: Curve, left: Array, right: Array, up: Flags) -> Array:
 
 
 def _bisect(is_past: Callable[[Array], Flags], left: Array, right: Array) -> Array:
-    """The first numbers, to rounding, at which something has happened."""
+    """Return by bisection the first times, to rounding, at which `is_past` is True."""
     left, right = left.copy(), right.copy()
     if not len(left):
         return right
@@ -615,7 +618,7 @@ def _bisect(is_past: Callable[[Array], Flags], left: Array, right: Array) -> Arr
 
 
 def _maximum(value: Curve, a: Array, b: Array) -> Array:
-    """Times of the largest values between a and b, by golden sections."""
+    """Return the times of the maxima between a and b, by golden-section search."""
     a, b = a.copy(), b.copy()
     c, d = b - _GOLDEN * (b - a), a + _GOLDEN * (b - a)
     at_c, at_d = value(c), value(d)

@@ -242,8 +242,8 @@ def effort_function(system: System, tau: Effort) -> Function | None:
         system: open or closed system.
         tau: constants by motor name, a list of all constants, a function of (t, q, v), or None. A
             function may return a dict by joint name, also for joints without a motor. For a closed
-            system, the values are either of all joints of the tree or of the independent motors
-            that its models take.
+            system, the values are of all joints of the tree, or of the joints whose efforts its
+            models take (`System.motors`).
 
     Returns:
         Function, or None without efforts.

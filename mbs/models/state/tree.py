@@ -172,7 +172,9 @@ def _switch(acting: SX) -> SX:
 
 
 def _shortest(J: SX, r: SX, off: SX, first: Array, columns: Array, last: SX) -> tuple[SX, SX]:
-    """Return the minimum-norm x with J x = r without nearly dependent rows, and 1 if none is.
+    """Solve J x = r for the minimum-norm x, skipping nearly dependent rows.
+
+    Return x, and 1 if all rows are independent, else 0.
 
     Args:
         J: rows of loops, then rows on one coordinate each, then switched rows of contacts.
@@ -206,7 +208,7 @@ def _unit(row: SX, columns: Array) -> float:
 # Functions for steps in local tangent coordinates: constraint rows, inertia and forces.
 #
 # Dependent rows of the loops are included, because the rows that are independent in the assembled
-# configuration may become dependent elsewhere. The rank is the rank at assembly, not a threshold.
+# configuration may become dependent later. The rank is that of the assembly, not from a threshold.
 
 
 def passage(
@@ -584,7 +586,7 @@ class FullState:
         sides: number of the crossings that may stay at zero or cross it infinitely often, such as
             the velocity in a law of dry friction.
         counts: number of the last crossings, at whose integer values laws jump.
-        short: whether a smooth law may hold for a short time only after a crossing.
+        short: whether a smooth law may act only briefly after a crossing.
         timing: time-dependent parts of efforts, inputs and prescribed motions, or None.
         prepared: cache of the integrator between runs.
     """

@@ -1,5 +1,5 @@
-// The bar of an HTML file: play, a slider of time, what is shown, and where it is seen from.
-// mbs.bar(element, scene, {view, theme, motion}) makes the viewer and the bar; mbs.motion(data) unpacks a motion.
+// Control bar of an HTML file: play button, time slider, visible roles and view directions.
+// mbs.bar(element, scene, {view, theme, motion}) creates viewer and bar; mbs.motion(data) decodes a motion.
 (function () {
   "use strict";
 
@@ -9,7 +9,7 @@
     return element;
   }
 
-  /** Poses packed as 32-bit numbers in base 64, a row a frame. */
+  /** Decode a motion: poses are 32-bit floats in base 64, one row per frame. */
   mbs.motion = ({ times, packed, speed }) => {
     const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
     const every = new Float32Array(bytes.buffer);
@@ -50,7 +50,7 @@
   function toggles(bar, viewer, scene) {
     const roles = new Set(scene.primitives.map((item) => item.role));
     const names = { frame: "frames", "link frame": "link frames", axis: "axes", label: "names" };
-    // where links are drawn as they look, what is below can be seen too
+    // with visual shapes, the bars and joints inside them can be shown too
     const below = { visual: "shapes", skeleton: "bars", joint: "joints" };
     if (roles.has("visual")) Object.assign(names, below);
     for (const [role, text] of Object.entries({ ...names, loop: "loops", force: "forces" })) {

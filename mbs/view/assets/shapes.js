@@ -1,10 +1,10 @@
-// What the primitives of a scene look like: each becomes an object of three.js.
-// Needs three.bundle.js before it; viewer.js uses what it puts into mbs.shapes.
+// Conversion of the primitives of a scene to objects of three.js.
+// Load it after three.bundle.js. It defines mbs.shapes for viewer.js.
 (function () {
   "use strict";
   const T = MBS_THREE;
   const UP = new T.Vector3(0, 1, 0);
-  const ROUND = 28; // sides of round things
+  const ROUND = 28; // number of sides of round shapes
 
   const vector = (p) => new T.Vector3(p[0], p[1], p[2]);
 
@@ -14,7 +14,7 @@
     return made;
   }
 
-  /** Turn and move an object that runs along y so that it runs from a to b. */
+  /** Rotate and move an object whose axis is y so that it extends from a to b. */
   function between(object, a, b) {
     const along = b.clone().sub(a);
     object.position.copy(a).addScaledVector(along, 0.5);
@@ -93,14 +93,14 @@
     map.colorSpace = "srgb";
     const look = { map, depthTest: false, sizeAttenuation: false };
     const sprite = new T.Sprite(new T.SpriteMaterial({ ...look, transparent: true }));
-    const height = 0.027; // a part of the height of the picture
+    const height = 0.027; // height of a label relative to the picture
     sprite.scale.set((height * canvas.width) / canvas.height, height, 1);
     sprite.center.set(-0.05, -0.15 - 0.72 * item.row);
     sprite.renderOrder = 2;
     return sprite;
   }
 
-  // On a link: an object in the frame of the link.
+  // Primitives on a single link: functions that create an object in the frame of the link.
   const FIXED = {
     bar(item, paint) {
       const [a, b] = [vector(item.a), vector(item.b)];
@@ -163,7 +163,7 @@
     },
   };
 
-  // Between points on two links: drawn one unit long, stretched at every configuration.
+  // Primitives between points on two links: objects of length 1, scaled at every configuration.
   const STRETCHED = {
     span: (item, paint) =>
       mesh(new T.CylinderGeometry(item.radius, item.radius, 1, ROUND), paint),

@@ -1,10 +1,10 @@
-// The mechanism in three dimensions: draws a scene made by mbs.view.scene, moves its links.
-// mbs.viewer(element, scene, options) -> viewer; needs three.bundle.js and shapes.js before it.
+// Three-dimensional viewer: draws a scene of mbs.view.scene and moves its links.
+// mbs.viewer(element, scene, options) -> viewer. Load it after three.bundle.js and shapes.js.
 (function () {
   "use strict";
   const T = MBS_THREE;
   const { FIXED, STRETCHED, UP, between, ground, vector } = mbs.shapes;
-  const FIELD = 32; // of view, degrees
+  const FIELD = 32; // vertical field of view [degrees]
 
   class Viewer {
     constructor(element, scene, options = {}) {
@@ -32,7 +32,7 @@
       this.lookFrom(scene.views[options.view || "iso"], vector(scene.bounds.center), scene.bounds.radius);
     }
 
-    /** "light" or "dark" whatever the system prefers, "auto" to follow it. */
+    /** Set the theme: "light", "dark", or "auto" for the preference of the browser. */
     setTheme(theme) {
       this.options.theme = theme;
       this.setScene(this.scene);
@@ -43,7 +43,7 @@
       return wanted === "auto" ? (this.dark.matches ? "dark" : "light") : wanted;
     }
 
-    /** Draw another scene. A motion is of one scene only and ends. The camera stays where it is. */
+    /** Draw another scene. The motion of the previous scene ends. The camera does not move. */
     setScene(scene) {
       if (scene !== this.scene) this.forget();
       this.clear();
@@ -121,7 +121,7 @@
       }
     }
 
-    /** Move the links: 12 numbers (rows of R|p) for the base and each link, in one flat array. */
+    /** Move the links. flat: 12 numbers (rows of [R p]) for the base and each link. */
     setPoses(flat) {
       const wanted = 12 * this.links.length;
       if (flat.length !== wanted || !flat.every(Number.isFinite)) {
@@ -141,7 +141,7 @@
       this.redraw();
     }
 
-    /** Whether a role is shown: as somebody switched it, else as the scene says. */
+    /** Whether a role is visible: by the setting of the user, else by the default of the scene. */
     shows(role) {
       return this.visible[role] ?? !this.scene.hidden.includes(role);
     }
@@ -152,7 +152,7 @@
       this.redraw();
     }
 
-    /** "iso", "front", "top" or "side": look from there; "fit": come near, keep the direction. */
+    /** Move the camera to a view ("iso", "front", "side", "top"); "fit" keeps the direction. */
     setCamera(name) {
       const box = new T.Box3();
       this.world.updateMatrixWorld(true);
@@ -200,13 +200,13 @@
       });
     }
 
-    /** The picture as a data URL (PNG). */
+    /** Return the picture as a data URL (PNG). */
     screenshot() {
       this.draw();
       return this.renderer.domElement.toDataURL("image/png");
     }
 
-    /** Show a motion {times, poses, fps}: a flat array of poses a frame; without one, go on. */
+    /** Play a motion {times, poses, fps}: poses is a flat array per frame. Without one, resume. */
     play(motion) {
       if (motion) {
         const times = motion.times || motion.poses.map((_, k) => k / (motion.fps || 30));
@@ -235,13 +235,13 @@
       this.running = undefined;
     }
 
-    /** End the motion. */
+    /** Stop and remove the motion. */
     forget() {
       this.pause();
       this.motion = undefined;
     }
 
-    /** Show the motion at a time [s]. */
+    /** Show the frame of the motion at a time [s]. */
     seek(time) {
       if (!this.motion) return;
       this.time = time;
@@ -249,7 +249,7 @@
       this.options.onTime?.(time);
     }
 
-    /** Poses of the motion at a time [s], between frames on straight lines. */
+    /** Return the poses of the motion at a time [s], by linear interpolation between frames. */
     posesAt(time) {
       const { times, poses } = this.motion;
       let k = 0;

@@ -27,7 +27,7 @@ _MOST_NAMES = 3
 
 @dataclass(frozen=True, slots=True)
 class ConnectionNode:
-    """Rigid link: its number (0 for the base) and the names of its bodies, one per line."""
+    """Rigid link: number (0 for the base) and names of the bodies, one per line."""
 
     number: int
     lines: tuple[str, ...]
@@ -202,7 +202,11 @@ def _chain(graph: Connections) -> list[int]:
 
 
 def _hang(graph: Connections) -> dict[int, tuple[ConnectionEdge, ...]]:
-    """Return for each link the cut joints below it. A cut joint belongs to its link with fewer."""
+    """Return for each link the cut joints to draw below it.
+
+    A cut joint is drawn below the end link with fewer cut joints, and not below the base if
+    possible.
+    """
     count = Counter(end for edge in graph.cuts for end in edge.ends)
     depth = _depths(graph)
     hung: dict[int, tuple[ConnectionEdge, ...]] = dict.fromkeys(graph.nodes, ())

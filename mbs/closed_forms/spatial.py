@@ -40,8 +40,8 @@ from mbs.spatial import Pose, cross, quaternion_rotation, vector
 # Two revolute joints with intersecting axes, as in a universal joint, that move a point of a link
 # to a known point.
 #
-# The component along the axis of the first joint depends on the angle t of the second joint only: X
-# cos t + Y sin t = Z. The sign is the side of the plane of the two axes to which the second joint
+# The component along the axis of the first joint depends on the angle t of the second joint only:
+# X cos t + Y sin t = Z. The sign is the side of the plane of the two axes to which the second joint
 # is rotated.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 2.
@@ -311,8 +311,9 @@ def free_body(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 # Three unknown revolute joints from orientations alone.
 #
-# R_a X_2 R_b X_3 R_c = X_1': element (3, 3) depends on the middle angle only, X cos t + Y sin t =
-# Z. The sign is the side of the plane of the two outer axes to which the middle joint is rotated.
+# R_a X_2 R_b X_3 R_c = X_1': element (3, 3) depends on the middle angle only:
+# X cos t + Y sin t = Z. The sign is the side of the plane of the two outer axes to which the middle
+# joint is rotated.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 2.
 

@@ -241,7 +241,7 @@ def c_library(
 
     A call returns an `mbs_status`, documented in the header: MBS_OK, or the error, with all outputs
     NaN. Calls in Python have the same checks. An error is an input or result that is not finite,
-    a quaternion that is not unit, a parameter out of its bounds, an open loop (beyond a tolerance
+    a quaternion without unit length, a parameter out of its bounds, an open loop (beyond a tolerance
     relative to the size of the mechanism), or a configuration in which the independent joints do
     not determine the others. A casadi.Function that is no model is only checked for finite inputs
     and outputs. The unused columns of the general inverse geometric model (solutions that do not
@@ -270,8 +270,8 @@ def c_library(
         Path of the folder.
 
     Raises:
-        ExportError: the folder cannot be written, or contains a file of this name that mbs did not
-            write. Nothing is written then. The target or type is unknown.
+        ExportError: the folder cannot be written, or contains a file of the same name that mbs did
+            not write. Nothing is written then. Or the target or type is unknown.
         ModelError: a name is invalid, a function cannot be written as C, or a system has events,
             which steps of a fixed length cannot locate.
     """

@@ -142,7 +142,7 @@ def _rows(
 
 
 def require_no_drift(system: System, what: str, velocities: Iterable[int]) -> None:
-    """Raise if massless nodes move without the given velocities, which a matrix belongs to.
+    """Raise if a matrix of independent velocities contains the velocity of a damped massless node.
 
     Args:
         system: mechanism with or without massless nodes with dampers.

@@ -190,7 +190,7 @@ class Closing:
 
     @property
     def size(self) -> float:
-        """The size of the mechanism [m]."""
+        """Size of the mechanism [m]."""
         return float(self._sizes[0][0, 0])
 
     @property

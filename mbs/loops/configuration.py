@@ -466,10 +466,10 @@ def _fit(v: Vector, target: Vector) -> bool:
 
 
 def _refine(J: Vector, rows: list[int], target: Vector) -> Vector:
-    """Return the smallest v (nv,) with J v = 0 and v[rows] = target, if one exists, bit by bit.
+    """Return the smallest v (nv,) with J v = 0 and v[rows] = target, if one exists.
 
-    The result is the same on all processors. A solution by a basis of the null space of J has noise
-    of 1e-14, which depends on the processor.
+    The result is bit-identical on all processors. A solution by a basis of the null space of J has
+    noise of 1e-14, which depends on the processor.
     """
     K = np.vstack([J, np.eye(J.shape[1])[rows]])
     goal = np.concatenate([np.zeros(len(J)), target])

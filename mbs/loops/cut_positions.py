@@ -59,7 +59,7 @@ def cut_positions_and_slopes(system: System) -> OnArrays:
 
 
 def cut_position(cut: Cut, number: int, pose: Pose) -> SX:
-    """Return the position of one freedom of a cut joint [rad or m].
+    """Return the position of a single freedom of a cut joint [rad or m].
 
     Args:
         cut: cut joint.

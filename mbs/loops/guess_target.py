@@ -83,7 +83,7 @@ class GuessTarget:
 
     @property
     def rows(self) -> tuple[Coordinate, ...]:
-        """The coordinates of all positions."""
+        """Coordinates of all positions."""
         own = self.system.coordinates
         return own if self.cut is None else (*own, *self.system.cut_coordinates)
 

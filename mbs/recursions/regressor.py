@@ -1,7 +1,7 @@
 """Regressor: equations of motion as a matrix times the inertial parameters of the links.
 
-An element is the power of the unit wrench of one parameter of link j along a unit velocity of joint
-j or an ancestor joint. A column of link j that is a linear combination of columns of its antecedent
+An element is the power of the unit wrench of a parameter of link j along a unit velocity of joint j
+or an ancestor joint. A column of link j that is a linear combination of columns of its antecedent
 is formed as that sum.
 
 Source: Khalil & Creusot 1997, section 6.1; Gautier & Khalil 1990 for the sums.
@@ -124,7 +124,7 @@ def column_sums(tree: Tree, poses: list[LinkPose], j: int) -> dict[int, ColumnSu
 
 
 def _sum(motion: Motion, pose: LinkPose, part: tuple[int, ...]) -> ColumnSum:
-    """Express the sum of columns `part` of link j by columns of link i, solved for the last one."""
+    """Express the last column of `part` by columns of link i and by the other column of `part`."""
     ten = zeros(10)
     for k in part:
         ten[k] = 1
@@ -241,7 +241,7 @@ def _unit_twists(tree: Tree, poses: list[LinkPose]) -> list[list[PathTwist]]:
 
 
 def _carry(tree: Tree, poses: list[LinkPose], own: list[list[PathTwist]]) -> list[list[PathTwist]]:
-    """Return for each link the twists of its ancestors and its own twists, in its frame."""
+    """Return for each link the twists of all joints on its path, in the frame of the link."""
     outer: list[list[PathTwist]] = []
     inner: list[list[PathTwist]] = []
     result: list[list[PathTwist]] = []

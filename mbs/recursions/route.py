@@ -388,7 +388,7 @@ def relative_acceleration(
 
 
 def _acceleration(frame: Frame, motions: list[Acceleration]) -> tuple[SX, SX, SX]:
-    """Return origin acceleration, angular velocity and acceleration of a frame, in its axes."""
+    """Origin acceleration, angular velocity and angular acceleration of a frame, in its axes."""
     link, pose = frame
     if link < 0:
         return zeros(), zeros(), zeros()

@@ -25,8 +25,8 @@ from mbs.spatial import cross, formula, is_zero, origin, vector, wrench_through,
 def motion_at_joint(link: Link, v: SX) -> tuple[SX, SX]:
     """Velocity (linear, angular) of link j relative to link i, in axes of constant direction.
 
-    The reference point and the axes are those of frame j or, for a backward motion, of the seat
-    (joint frame on link i).
+    The reference point and the axes belong to frame j or, for a backward motion, to the seat (joint
+    frame on link i).
     """
     match link.motion:
         case Motion.REVOLUTE:
@@ -233,7 +233,7 @@ class Acceleration:
 
 
 def resting_base(gravity: SX) -> Acceleration:
-    """Return the motion of a fixed base, whose acceleration is minus gravity (3, 1)."""
+    """Return the motion of a fixed base; gravity (3, 1) in its frame enters as vd = -gravity."""
     return moving_base(zeros(), zeros(), -gravity)
 
 

@@ -1,7 +1,6 @@
-"""Rigid-body algebra on 3-vectors of CasADi scalars whose constants are exact.
+"""Rigid-body algebra on 3-vectors and 3x3 matrices of CasADi scalars with exact constants.
 
-Nothing here is larger than 3x3: zeros and ones fold into the graph, which is what keeps the
-operation counts of the models low.
+Exact zeros and ones are folded by CasADi, which keeps the operation counts of models low.
 """
 
 from mbs.spatial.inertia import Body, Inertia, PseudoInertia

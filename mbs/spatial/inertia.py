@@ -1,4 +1,4 @@
-"""The ten inertial parameters of a rigid body about the origin of a frame."""
+"""Ten inertial parameters of a rigid body about the origin of a frame."""
 
 from __future__ import annotations
 
@@ -31,18 +31,25 @@ class Inertia:
 
     @staticmethod
     def zero() -> Inertia:
-        """No body at all."""
+        """Return the inertia of no body."""
         return Inertia(zeros(3, 3), zeros(), SX(0))
 
     @staticmethod
     def about_com(mass: SX, com: SX, tensor: SX) -> Inertia:
-        """From the tensor about the centre of mass, in the axes of the frame (Huygens)."""
+        """Return the inertia about the origin, by the Huygens-Steiner theorem.
+
+        Args:
+            mass: mass [kg].
+            com: (3, 1) centre of mass in the frame [m].
+            tensor: (3, 3) inertia tensor about the centre of mass, in the axes of the frame
+                [kg m^2].
+        """
         c = skew(com)
         return Inertia(tensor + mass * casadi.mtimes(c, c.T), mass * com, mass)
 
     @staticmethod
     def from_parameters(ten: SX) -> Inertia:
-        """From XX XY XZ YY YZ ZZ MX MY MZ M."""
+        """Return the inertia of ten parameters XX XY XZ YY YZ ZZ MX MY MZ M, (10, 1)."""
         XX, XY, XZ, YY, YZ, ZZ = (ten[k] for k in range(6))
         J = casadi.vertcat(
             casadi.horzcat(XX, XY, XZ), casadi.horzcat(XY, YY, YZ), casadi.horzcat(XZ, YZ, ZZ)
@@ -51,34 +58,34 @@ class Inertia:
 
     @property
     def parameters(self) -> SX:
-        """(10, 1) XX XY XZ YY YZ ZZ MX MY MZ M."""
+        """(10, 1) inertial parameters XX XY XZ YY YZ ZZ MX MY MZ M."""
         J = self.J
         return casadi.densify(
             casadi.vertcat(J[0, 0], J[0, 1], J[0, 2], J[1, 1], J[1, 2], J[2, 2], self.ms, self.m)
         )
 
     def __add__(self, other: Inertia) -> Inertia:
-        """Two bodies welded together, in one frame."""
+        """Return the inertia of two welded bodies, in the same frame."""
         return Inertia(self.J + other.J, self.ms + other.ms, self.m + other.m)
 
     def momentum(self, linear: SX, angular: SX) -> tuple[SX, SX]:
-        """(3, 1) each, linear and angular momentum about the origin, of a velocity of the body.
+        """Return linear momentum and angular momentum about the origin, (3, 1) each.
 
         Args:
-            linear: (3, 1) of the origin, in the same frame.
-            angular: (3, 1) in the same frame.
+            linear: (3, 1) velocity of the origin, in the same frame.
+            angular: (3, 1) angular velocity, in the same frame.
         """
         return _momentum(self.J, self.ms, self.m, linear, angular)
 
     def seen_from(self, R: Rotation, p: SX) -> Inertia:
-        """The same body about the origin of frame i and in its axes.
+        """Transform the inertia to the origin and the axes of frame i.
 
         Source: Khalil, Bennis & Gautier 1990 (generalised links); Khalil & Creusot 1997,
         eq. 27-30.
 
         Args:
-            R: rotation of the present frame j seen from i.
-            p: (3, 1) origin of j in i [m].
+            R: orientation of the current frame j relative to frame i.
+            p: (3, 1) origin of frame j in frame i [m].
         """
         moved = self.rotate(R)
         for axis in range(3):
@@ -86,13 +93,14 @@ class Inertia:
         return moved
 
     def rotate(self, R: Rotation) -> Inertia:
-        """The same body about the same point in the axes of frame i."""
+        """Transform to the axes of frame i; R is the orientation of the current axes in i."""
         return Inertia(R.apply_to_tensor(self.J), R.apply(self.ms), self.m)
 
     def shift(self, axis: int, t: SX) -> Inertia:
-        """The body displaced by t [m] along a coordinate axis.
+        """Return the inertia of the body displaced by t [m] along a coordinate axis.
 
-        Three products: with h = ms + m t, J changes by t (ms + h) across the axis.
+        The cost is three products: let h = ms + m t along the axis, then the moments of inertia
+        about both normal axes change by t (ms + h).
         """
         if t.is_zero():
             return self
@@ -105,9 +113,9 @@ class Inertia:
         return Inertia(J, ms, self.m)
 
     def along_axis(self) -> tuple[Inertia, Inertia]:
-        """Two bodies that make this one: YY, MZ and M are zero in the first.
+        """Split the body in two: a body with zero YY, MZ and M, and mass on the z axis.
 
-        The second is mass on the z axis: no rotation about it can be felt.
+        A rotation about z does not affect the second body.
         """
         J, on_axis = +self.J, zeros(3, 3)
         on_axis[0, 0] = on_axis[1, 1] = self.J[1, 1]
@@ -117,11 +125,11 @@ class Inertia:
         return Inertia(J, ms, SX(0)), Inertia(on_axis, height, self.m)
 
     def rotational(self) -> tuple[Inertia, Inertia]:
-        """Two bodies that make this one: the first has no J, the second J alone."""
+        """Split the body in two: a body with zero J, and a body with J only."""
         return Inertia(zeros(3, 3), self.ms, self.m), Inertia(self.J, zeros(), SX(0))
 
     def massive(self) -> tuple[Inertia, Inertia]:
-        """Two bodies that make this one: the first has no mass, the second M alone."""
+        """Split the body in two: a body with zero mass, and a point mass at the origin."""
         return Inertia(self.J, self.ms, SX(0)), Inertia(zeros(3, 3), zeros(), self.m)
 
 
@@ -130,10 +138,10 @@ def _momentum(J: SX, ms: SX, m: SX, linear: SX, angular: SX) -> tuple[SX, SX]:
     return m * linear + cross(angular, ms), casadi.mtimes(J, angular) + cross(ms, linear)
 
 
-# The second, first and zeroth moments of a body's mass.
+# Second, first and zeroth moments of mass of a body.
 #
-# They hold the ten inertial parameters in the form in which the moment of a turning body takes
-# the fewest products.
+# In this form of the ten inertial parameters the moment of a rotating body needs the fewest
+# products.
 #
 # Source: Balafoutis, Patel & Misra 1988 (Euler's tensor of a body).
 
@@ -154,7 +162,7 @@ class PseudoInertia:
 
     @staticmethod
     def of(inertia: Inertia) -> PseudoInertia:
-        """From the inertia tensor: S = tr(J) / 2 - J."""
+        """Convert from the inertia tensor: S = tr(J) / 2 - J."""
         J = inertia.J
         S = casadi.densify(-J)
         for k in range(3):
@@ -163,7 +171,7 @@ class PseudoInertia:
         return PseudoInertia(S, inertia.ms, inertia.m)
 
     def inertia(self) -> Inertia:
-        """With the inertia tensor: J = tr(S) - S."""
+        """Convert to the inertia tensor: J = tr(S) - S."""
         S = self.S
         J = casadi.densify(-S)
         for k in range(3):
@@ -172,15 +180,15 @@ class PseudoInertia:
         return Inertia(J, self.ms, self.m)
 
     def __add__(self, other: PseudoInertia) -> PseudoInertia:
-        """Two bodies welded together, in one frame."""
+        """Return the inertia of two welded bodies, in the same frame."""
         return PseudoInertia(self.S + other.S, self.ms + other.ms, self.m + other.m)
 
     def rotate(self, R: Rotation) -> PseudoInertia:
-        """The same body about the same point in the axes of frame i."""
+        """Transform to the axes of frame i; R is the orientation of the current axes in i."""
         return PseudoInertia(R.apply_to_tensor(self.S), R.apply(self.ms), self.m)
 
     def shift(self, axis: int, t: SX) -> PseudoInertia:
-        """The body displaced by t [m] along a coordinate axis."""
+        """Return the inertia of the body displaced by t [m] along a coordinate axis."""
         if t.is_zero():
             return self
         S, ms = +self.S, +self.ms
@@ -192,9 +200,9 @@ class PseudoInertia:
         return PseudoInertia(S, ms, self.m)
 
     def along_axis(self) -> tuple[PseudoInertia, PseudoInertia]:
-        """Two bodies that make this one: the first has no S33, MZ, M.
+        """Split the body in two: a body with zero S33, MZ and M, and mass on the z axis.
 
-        The second is mass on the z axis: no rotation about it can be felt.
+        A rotation about z does not affect the second body.
         """
         S, on_axis, ms, height = +self.S, zeros(3, 3), +self.ms, zeros()
         on_axis[2, 2], S[2, 2] = S[2, 2], 0
@@ -202,13 +210,13 @@ class PseudoInertia:
         return PseudoInertia(S, ms, SX(0)), PseudoInertia(on_axis, height, self.m)
 
     def rotational(self) -> tuple[PseudoInertia, PseudoInertia]:
-        """Two bodies that make this one: the first has no S, the second S alone."""
+        """Split the body in two: a body with zero S, and a body with S only."""
         return PseudoInertia(zeros(3, 3), self.ms, self.m), PseudoInertia(self.S, zeros(), SX(0))
 
     def massive(self) -> tuple[PseudoInertia, PseudoInertia]:
-        """Two bodies that make this one: the first has no mass, the second M alone."""
+        """Split the body in two: a body with zero mass, and a point mass at the origin."""
         return PseudoInertia(self.S, self.ms, SX(0)), PseudoInertia(zeros(3, 3), zeros(), self.m)
 
 
 Body = TypeVar("Body", Inertia, PseudoInertia)
-"""A rigid body in either form of its ten parameters."""
+"""Type of a rigid body in one of the two forms of its ten parameters."""

@@ -1,10 +1,10 @@
-"""Modified Denavit-Hartenberg placement of a frame, with the two parameters of branches.
+"""Modified Denavit-Hartenberg placement of a frame, with two additional parameters for branches.
 
 T_ij = Rz(gamma) Tz(b) Rx(alpha) Tx(d) Rz(theta) Tz(r)
 
-Any pose is one of them, or a few one after the other: `placed` finds them. Two axes that are
-nearly parallel have their common perpendicular far away, and an angle between them that is a
-symbol may be zero or negative; a fixed frame between the two then takes the place of the far one.
+`frames_to` converts a pose to one placement or a product of several placements. The common
+perpendicular of two nearly parallel axes is far away, and a symbolic angle between two axes may be
+zero or negative. In these cases a fixed frame is inserted between the two axes.
 
 Source: Khalil & Kleinfinger 1986.
 """
@@ -25,23 +25,24 @@ from mbs.spatial.vectors import exact_sum, vector
 _QUARTER = math.pi / 2
 
 _FARTHEST = 3.0
-"""How far along its axis a frame may move to a common perpendicular, in sizes of the mechanism:
-links keep their own size in the tables, and no digit of a position is lost."""
+"""Largest distance of a frame along its axis to the common perpendicular, relative to the size of
+the mechanism: lengths in the tables keep the order of the links, and positions keep all digits."""
 
 _LEAST_SINE = 0.5
-"""Where lengths are symbols their numbers are not known: axes that make 30 degrees at least have
-their common perpendicular within twice the offset, whatever the symbols are."""
+"""Least sine of the angle between axes with symbolic offsets: at 30 degrees or more the common
+perpendicular is within twice the offset for all values of the symbols."""
 
 _NOISE = 1e-14
-"""Lengths below this part of the size of the mechanism are the rounding of who computed them."""
+"""Length relative to the size of the mechanism below which it counts as rounding error."""
 
 _TIE = 1e-9
-"""An angle gamma this near to a quarter turn counts as one for the choice of its sense [rad]."""
+"""Tolerance on gamma at a quarter turn for the choice of its sign [rad]: rounding errors must not
+decide it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Khalil:
-    """Placement of frame j with respect to its antecedent i.
+    """Placement of frame j relative to its antecedent i.
 
     Attributes:
         gamma: angle from x_i to the common perpendicular, about z_i [rad].
@@ -61,16 +62,16 @@ class Khalil:
 
     @staticmethod
     def identity() -> Khalil:
-        """Frame j on frame i."""
+        """Return the placement of coincident frames."""
         return Khalil(*(SX(0) for _ in range(6)))
 
     @property
     def parameters(self) -> tuple[SX, SX, SX, SX, SX, SX]:
-        """gamma, b, alpha, d, theta, r."""
+        """The six parameters gamma, b, alpha, d, theta, r."""
         return self.gamma, self.b, self.alpha, self.d, self.theta, self.r
 
     def pose(self) -> Pose:
-        """The frame j seen from frame i."""
+        """Return the pose of frame j relative to frame i."""
         R = Pose.about("z", self.gamma) @ Pose.about("x", self.alpha) @ Pose.about("z", self.theta)
         if not R.chain:
             return Pose(R.R, self.position())
@@ -80,14 +81,14 @@ class Khalil:
 
     @property
     def seat(self) -> tuple[ScrewDisplacement, ...]:
-        """From frame i to the axis of joint j: gamma and b, then alpha and d."""
+        """Displacements from frame i to the axis of joint j: gamma and b, then alpha and d."""
         return ScrewDisplacement.about("z", self.gamma, self.b), ScrewDisplacement.about(
             "x", self.alpha, self.d
         )
 
     @property
     def fixed(self) -> tuple[ScrewDisplacement, ...]:
-        """From frame i to frame j when nothing moves between them."""
+        """Displacements from frame i to frame j without a joint between them."""
         if not self._shifts_across:
             return *self.seat, ScrewDisplacement.about("z", self.theta, self.r)
         turn = ScrewDisplacement.about("z", exact_sum(self.gamma, SX(-_QUARTER)), self.b)
@@ -98,7 +99,11 @@ class Khalil:
         )
 
     def split(self) -> tuple[Khalil, Khalil]:
-        """Its gamma and b, which commute with a motion about and along z_i, and what is left."""
+        """Split off gamma and b, which commute with motions about and along z_i.
+
+        Returns:
+            placement with gamma and b only, and placement with the remaining parameters.
+        """
         zero, gamma = SX(0), self.gamma
         left = zero
         if self._shifts_across:
@@ -107,45 +112,46 @@ class Khalil:
 
     @property
     def _shifts_across(self) -> bool:
-        """Whether it is a shift along y, written by an x axis that is a quarter turn ahead."""
+        """Whether the placement has theta = -90 degrees and alpha = 0: a shift along the y axis."""
         ahead = self.theta.is_constant() and float(self.theta) == -_QUARTER
         return bool(self.alpha.is_zero() and ahead)
 
     def position(self) -> SX:
-        """(3, 1) origin of frame j in frame i [m]; theta has no part in it."""
+        """(3, 1) origin of frame j in frame i [m]; it does not depend on theta."""
         gamma, alpha = axis_rotation("z", self.gamma), axis_rotation("x", self.alpha)
         return gamma.apply(vector([self.d, -self.r * alpha.s, self.b + self.r * alpha.c]))
 
     def rotate(self, angle: SX) -> Khalil:
-        """The frame rotated further about its own z axis."""
+        """Return the placement of frame j rotated by an angle [rad] about its own z axis."""
         return replace(self, theta=self.theta + angle)
 
     def shift(self, distance: SX) -> Khalil:
-        """The frame shifted further along its own z axis."""
+        """Return the placement of frame j shifted by a distance [m] along its own z axis."""
         return replace(self, r=self.r + distance)
 
 
 def frames_to(pose: Pose, size: float) -> tuple[Khalil, ...]:
-    """The frames that lead to a pose, one after the other; the last one stands at it.
+    """Convert a pose to successive placements, whose product is the pose.
 
-    It is one frame where the common perpendicular of the two axes is near. Otherwise fixed frames
-    come before it: one for a shift across both axes, one for every further rotation by a
-    symbol. What holds of numbers is never said of a symbol: its sign, or that its sine is not zero.
+    One placement suffices if the common perpendicular of the two axes is near. Otherwise fixed
+    frames precede it: one for a shift normal to both axes, and one for each further rotation by a
+    symbol. No assumption is made on the sign of a symbol, or that its sine is nonzero.
 
-    Parallel axes leave one distance free: b is then zero and r takes the offset.
+    Parallel axes leave one distance free: then b is zero, and r contains the offset.
 
     Args:
-        pose: of numbers, or made of rotations by symbols about coordinate axes.
-        size: of the mechanism, such as the length of its largest link [m].
+        pose: numeric pose, or product of rotations by symbols about coordinate axes and numeric
+            poses, with its `chain`.
+        size: size of the mechanism, such as the length of its largest link [m].
 
     Raises:
-        ValueError: symbols turn the pose in a way that its chain does not tell.
+        ValueError: the orientation depends on symbols, and the pose has no chain.
     """
     if not pose.chain and not pose.R.is_constant():
         raise ValueError("a pose that symbols rotate has no chain of rotations")
     segments, theta, r = _segments(pose, size)
     frames: list[Khalil] = []
-    slide = SX(0)  # along z, left over by the segment before
+    slide = SX(0)  # remaining translation of the previous segment, along z
     for number, segment in enumerate(segments):
         last = number == len(segments) - 1
         segment.z = exact_sum(segment.z, slide)
@@ -159,7 +165,7 @@ def frames_to(pose: Pose, size: float) -> tuple[Khalil, ...]:
 
 @dataclass(slots=True)
 class _Segment:
-    """Rz(gamma), a shift (x, y, z) in the axes that it makes, Rx(alpha)."""
+    """Displacement Rz(gamma) T(x, y, z) Rx(alpha): the shift is in the axes after gamma."""
 
     gamma: SX
     x: SX
@@ -168,18 +174,18 @@ class _Segment:
     alpha: SX
 
     def shift(self, x: SX, y: SX, z: SX) -> None:
-        """A further shift in the axes before alpha."""
+        """Add a shift in the axes before the rotation alpha."""
         self.x, self.y, self.z = exact_sum(self.x, x), exact_sum(self.y, y), exact_sum(self.z, z)
 
     def shift_behind(self, x: SX, y: SX, z: SX) -> None:
-        """A further shift in the axes behind alpha."""
+        """Add a shift in the axes after the rotation alpha."""
         self.shift(*_rotate("x", self.alpha, x, y, z))
 
 
 def _segments(pose: Pose, size: float) -> tuple[list[_Segment], SX, SX]:
-    """A pose as segments, then theta and r of the last frame."""
+    """Split a pose into segments, followed by theta and r of the last frame."""
     segments: list[_Segment] = []
-    # what follows the last turn about x: a rotation about z, then a shift in the axes that it makes
+    # displacement after the last rotation about x: rotation about z, then shift in rotated axes
     theta, x, y, z = SX(0), SX(0), SX(0), SX(0)
     for axis, angle, p in _elementary(pose):
         if axis == "z":
@@ -205,7 +211,7 @@ def _segments(pose: Pose, size: float) -> tuple[list[_Segment], SX, SX]:
         segments[-1].shift_behind(*_rotate("z", theta, x, y, SX(0)))
         r = z
     elif theta.is_constant() or _direction(pose.p[0], pose.p[1]) is not None:
-        # parallel axes, the shift seen from before the turn
+        # parallel axes: express the shift in the axes before the rotation
         segments, r = [_Segment(SX(0), pose.p[0], pose.p[1], pose.p[2], SX(0))], SX(0)
     else:
         segments, theta, r = [_Segment(theta, x, y, z, SX(0))], SX(0), SX(0)
@@ -215,7 +221,10 @@ def _segments(pose: Pose, size: float) -> tuple[list[_Segment], SX, SX]:
 
 
 def _elementary(pose: Pose) -> Iterator[tuple[str, SX, Sequence[SX]]]:
-    """The pose as turns about z and x by an angle, and shifts ("" for the axis)."""
+    """Yield (axis, angle, shift) of elementary displacements: rotations about z or x, and shifts.
+
+    The axis of a shift is "".
+    """
     nothing = (SX(0), SX(0), SX(0))
     for step in pose.steps:
         if isinstance(step, Pose):
@@ -232,7 +241,7 @@ def _elementary(pose: Pose) -> Iterator[tuple[str, SX, Sequence[SX]]]:
 
 
 def _euler_angles(R: Sequence[Sequence[float]]) -> tuple[float, float, float]:
-    """Angles with R = Rz(gamma) Rx(alpha) Rz(theta), gamma within a quarter turn of zero."""
+    """Angles of R = Rz(gamma) Rx(alpha) Rz(theta) with gamma between -90 and 90 degrees [rad]."""
     if R[0][2] == 0 and R[1][2] == 0:
         if R[2][2] > 0:
             return 0.0, 0.0, _atan2(R[1][0], R[0][0])
@@ -244,7 +253,7 @@ def _euler_angles(R: Sequence[Sequence[float]]) -> tuple[float, float, float]:
     alpha = math.atan2(sine, R[2][2])
     if abs(sine) > _LEAST_SINE:
         return gamma, alpha, _atan2(sign * R[2][0], sign * R[2][1])
-    # of axes that are nearly parallel gamma alone says little: theta follows from it
+    # gamma of nearly parallel axes is ill-conditioned: compute theta from R and this gamma
     s, c = math.sin(gamma), math.cos(gamma)
     along, across = c * R[0][0] + s * R[1][0], c * R[1][0] - s * R[0][0]
     up = math.cos(alpha) * across + math.sin(alpha) * R[2][0]
@@ -256,19 +265,19 @@ def _euler_angles(R: Sequence[Sequence[float]]) -> tuple[float, float, float]:
 
 
 def _atan2(y: float, x: float) -> float:
-    """The angle; half a turn is positive, also where y is a negative zero."""
+    """Return atan2(y, x), with +pi instead of -pi for y = -0.0."""
     return math.atan2(y + 0.0, x)
 
 
 def _frames(segment: _Segment, theta: SX, size: float) -> tuple[list[Khalil], SX]:
-    """The frames of a segment and of the turn about z behind it, and a slide along the last z."""
+    """Placements of a segment followed by Rz(theta), and the remaining shift along the last z."""
     gamma, alpha, x, y, z = segment.gamma, segment.alpha, segment.x, segment.y, segment.z
     sine, cosine = axis_rotation("x", alpha).s, axis_rotation("x", alpha).c
     if sine.is_zero():
         alpha = SX(0.0 if float(cosine) > 0 else math.pi)
         towards = 0.0 if y.is_zero() else _direction(x, y)
         if towards is not None:
-            # parallel axes: x along the shift between them
+            # parallel axes: rotate x into the direction of the shift between them
             length = x if y.is_zero() else _rotate("z", SX(-towards), x, y, SX(0))[0]
             gamma = exact_sum(gamma, SX(towards))
             theta = exact_sum(theta, -cosine * towards)
@@ -286,14 +295,14 @@ def _frames(segment: _Segment, theta: SX, size: float) -> tuple[list[Khalil], SX
 
 
 def _is_near(b: SX, r: SX, sine: float, size: float) -> bool:
-    """Whether the common perpendicular is near both frames."""
+    """Whether the distances b and r from both frames to the common perpendicular are small."""
     if b.is_constant() and r.is_constant():
         return max(abs(float(b)), abs(float(r))) <= _FARTHEST * size
     return sine >= _LEAST_SINE
 
 
 def _rotate(axis: str, angle: SX, x: SX, y: SX, z: SX) -> tuple[SX, SX, SX]:
-    """The shift behind a rotation about "x" or "z", seen from before it; zeros stay zeros."""
+    """Rotate a shift (x, y, z) about the axis "x" or "z"; exact zeros stay zero."""
     turn = axis_rotation(axis, angle)
     if axis == "x":
         y, z = exact_sum(turn.c * y, -turn.s * z), exact_sum(turn.s * y, turn.c * z)
@@ -303,7 +312,7 @@ def _rotate(axis: str, angle: SX, x: SX, y: SX, z: SX) -> tuple[SX, SX, SX]:
 
 
 def _clean(segment: _Segment, size: float) -> None:
-    """Zero in the place of lengths that are rounding, or that vanish whatever the symbols are."""
+    """Set lengths to zero that are rounding errors, or that vanish for all values of symbols."""
     lengths = (segment.x, segment.y, segment.z)
     x, y, z = (SX(0) if _is_noise(length, size) else length for length in lengths)
     if not all(length.is_constant() for length in (x, y, z)):
@@ -324,7 +333,7 @@ def _is_noise(length: SX, size: float) -> bool:
 
 
 def _direction(x: SX, y: SX) -> float | None:
-    """The angle of (x, y), to within half a turn, where it is the same for all symbols [rad]."""
+    """Angle of (x, y) modulo pi [rad]; None if it depends on the values of symbols."""
     if x.is_constant() and y.is_constant():
         return math.atan2(float(y), float(x))
     if y.is_zero():
@@ -342,12 +351,12 @@ def _direction(x: SX, y: SX) -> float | None:
 
 
 def _samples(*lengths: SX) -> list[tuple[float, ...]]:
-    """Values of lengths at a few values of the symbols in them, of both signs."""
+    """Values of lengths at six sets of values of their symbols, of both signs."""
     symbols = casadi.symvar(casadi.vertcat(*lengths))
     at = Function("lengths", [casadi.vertcat(*symbols)], [casadi.densify(casadi.vertcat(*lengths))])
     rows = [
         [
-            # irregular between 0.3 and 1.7 by the golden ratio, each sign pattern another one
+            # irregular values from 0.3 to 1.7 by the golden ratio, with varying signs
             (-1) ** (k * (m + 1) // 2) * (0.3 + 1.4 * ((0.618034 * (5 * k + m + 1)) % 1))
             for m in range(len(symbols))
         ]

@@ -1,4 +1,4 @@
-"""Constant placements: the pose of one frame seen from another."""
+"""Poses of frames, wrenches, and elementary displacements."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _EYE = casadi.densify(SX(DM.eye(3)))
 
 @dataclass(frozen=True, slots=True)
 class SymbolicRotation:
-    """A rotation about the axis "x", "y" or "z" by an angle [rad] that has a symbol in it."""
+    """Rotation about the axis "x", "y" or "z" by a symbolic angle [rad]."""
 
     axis: str
     angle: SX
@@ -33,15 +33,14 @@ class SymbolicRotation:
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Pose of a frame j seen from a frame i.
+    """Pose of a frame j relative to a frame i.
 
     Attributes:
         R: (3, 3) orientation; its columns are the axes of j in frame i.
         p: (3, 1) origin of j in frame i [m].
-        chain: the displacements one after the other that make it, where symbols turn it: rotations
-            by an angle with a symbol, and poses whose orientation is of numbers. From them the
-            angles are read off as they were written; the matrix would leave the sign of a sine
-            open. Empty where R is of numbers, and where symbols in R came from elsewhere.
+        chain: factors of a pose with symbolic orientation: rotations by symbolic angles, and poses
+            with numeric orientation. They preserve the angles, whose signs the matrix does not
+            determine. Empty for a numeric R, and for a symbolic R of unknown factors.
     """
 
     R: SX
@@ -50,32 +49,32 @@ class Pose:
 
     @staticmethod
     def identity() -> Pose:
-        """The frame itself."""
+        """Return the pose of a frame relative to itself."""
         return Pose(+_EYE, zeros())
 
     @staticmethod
     def rotation(R: SX) -> Pose:
-        """A frame with the same origin and the orientation R."""
+        """Return the pose of a frame with the same origin and the orientation R (3, 3)."""
         return Pose(casadi.densify(R), zeros())
 
     @staticmethod
     def about(axis: str, angle: SX) -> Pose:
-        """A frame with the same origin, rotated by an angle [rad] about "x", "y" or "z"."""
+        """Return the pose of a frame rotated by an angle [rad] about "x", "y" or "z"."""
         R = axis_rotation(axis, angle).matrix
         return Pose(R, zeros(), () if R.is_constant() else (SymbolicRotation(axis, angle),))
 
     @staticmethod
     def translation(p: SX) -> Pose:
-        """A frame with the same orientation and the origin p."""
+        """Return the pose of a frame with the same orientation and the origin p (3, 1) [m]."""
         return Pose(Pose.identity().R, casadi.densify(p))
 
     @property
     def steps(self) -> tuple[SymbolicRotation | Pose, ...]:
-        """The displacements that make it: those of its chain, or itself."""
+        """Factors of the pose: its chain, or the pose itself if the chain is empty."""
         return self.chain or (self,)
 
     def __matmul__(self, other: Pose) -> Pose:
-        """T_ik from T_ij and T_jk."""
+        """Return the product T_ik = T_ij T_jk."""
         chain = _join(self, other) if self.chain or other.chain else ()
         for one, rest in ((self, other), (other, self)):
             if one.is_identity():
@@ -87,7 +86,7 @@ class Pose:
         )
 
     def inverse(self) -> Pose:
-        """T_ji from T_ij."""
+        """Return T_ji, the inverse of T_ij."""
         R = self.R.T
         return Pose(
             R,
@@ -101,7 +100,7 @@ class Pose:
         return _homogeneous(self.R, self.p)
 
     def at(self, p: SX) -> Pose:
-        """A frame with the same orientation and its origin at p, (3, 1)."""
+        """Return the pose with the same orientation and the origin p (3, 1) [m]."""
         turns = (
             step if isinstance(step, SymbolicRotation) else Pose.rotation(step.R)
             for step in self.chain
@@ -109,12 +108,12 @@ class Pose:
         return Pose(self.R, p, (Pose.translation(p), *turns) if self.chain else ())
 
     def is_identity(self) -> bool:
-        """Whether it is the constant identity."""
+        """Whether the pose is the constant identity."""
         return self.p.is_zero() and SX.binary(casadi.OP_SUB, self.R, _EYE).is_zero()
 
 
 def _own(value: SX) -> SX:
-    """A dense copy, to be changed."""
+    """Return a dense copy."""
     return +value if value.is_dense() else casadi.densify(value)
 
 
@@ -124,7 +123,7 @@ def _homogeneous(R: SX, p: SX) -> SX:
 
 
 def _join(first: Pose, second: Pose) -> tuple[SymbolicRotation | Pose, ...]:
-    """The displacements of both, constant rotations made one; empty if unknown."""
+    """Join the chains of two poses and multiply adjacent numeric poses; empty if unknown."""
     joined: list[SymbolicRotation | Pose] = []
     for step in (*first.steps, *second.steps):
         if isinstance(step, Pose):
@@ -146,7 +145,7 @@ def _inverse(step: SymbolicRotation | Pose) -> SymbolicRotation | Pose:
 
 
 def _with_lone_ones(R: SX) -> SX:
-    """The rotation, its elements that stand alone in a row or a column exactly 1 or -1."""
+    """Set a constant that is the only nonzero in its row or column of a rotation to 1 or -1."""
     if R.is_constant() and not _has_alone(numbers(R)):
         return R
     entries = elements(R)
@@ -162,12 +161,12 @@ def _with_lone_ones(R: SX) -> SX:
 
 
 def _has_alone(elements: list[float]) -> bool:
-    """Whether an element alone in its row or column, of nine, is not yet 1 or -1."""
+    """Whether one of nine elements is alone in its row or column and is not exactly 1 or -1."""
     lines = (*(elements[k : k + 3] for k in (0, 3, 6)), *(elements[k::3] for k in range(3)))
     return any(line.count(0.0) == 2 and max(map(abs, line)) != 1.0 for line in lines)
 
 
-# A force and a moment about one point.
+# Wrenches: force and moment about a point.
 
 
 Wrench = tuple[SX, SX]
@@ -175,60 +174,60 @@ Wrench = tuple[SX, SX]
 
 
 def add_wrenches(a: Wrench, b: Wrench) -> Wrench:
-    """The sum of two wrenches about one point."""
+    """Return the sum of two wrenches about the same point."""
     return a[0] + b[0], a[1] + b[1]
 
 
 def transform_wrench(pose: Pose, wrench: Wrench) -> Wrench:
-    """A wrench about and in frame j, about and in the frame i in which frame j has this pose."""
+    """Transform a wrench about and in frame j to frame i; `pose` is the pose of j in i."""
     force, moment = (casadi.mtimes(pose.R, part) for part in wrench)
     return force, moment + cross(pose.p, force)
 
 
 # Elementary displacements: a rotation about a coordinate axis with a translation along it.
 #
-# A link frame of Khalil and Kleinfinger is two or three of them from its antecedent. A wrench or
-# an inertia is moved through one for a handful of multiplications, where a pose would cost
-# dozens.
+# A link frame of Khalil and Kleinfinger is a product of two or three displacements from its
+# antecedent. A displacement transforms a wrench or an inertia by a few multiplications, while a
+# general pose needs dozens.
 
 
 class Movable(Protocol):
-    """What is given about and in a frame: an inertia, or what is moved like one."""
+    """Protocol of a quantity about and in a frame that transforms like an inertia."""
 
     def rotate(self, R: Rotation) -> Self:
-        """The same about the same point in the axes of frame i."""
+        """Transform to the axes of frame i; R is the orientation of the current axes in i."""
 
     def shift(self, axis: int, t: SX) -> Self:
-        """The same displaced by t [m] along a coordinate axis."""
+        """Return the quantity displaced by t [m] along a coordinate axis."""
 
 
 Thing = TypeVar("Thing", bound=Movable)
 
 
 class Displacement(Protocol):
-    """Where a frame j stands in a frame i."""
+    """Protocol of a displacement from a frame i to a frame j."""
 
     @property
     def rotation(self) -> Rotation:
-        """The orientation of frame j seen from frame i."""
+        """Orientation of frame j relative to frame i."""
 
     def point(self, r: SX) -> SX:
-        """A point of frame j, (3, 1), in frame i [m]."""
+        """Transform a point (3, 1) from frame j to frame i [m]."""
 
     def wrench(self, f: SX, m: SX) -> Wrench:
-        """Force and moment about the origin of frame j, in frame j, about the origin of i in i."""
+        """Transform a force and moment about and in frame j to a wrench about and in frame i."""
 
     def body(self, thing: Thing) -> Thing:
-        """What is given about and in frame j, such as an inertia, about and in frame i."""
+        """Transform an inertia or a similar quantity from frame j to frame i."""
 
 
 @dataclass(frozen=True, slots=True)
 class ScrewDisplacement:
-    """A rotation about a coordinate axis and a translation along the same axis.
+    """Rotation about a coordinate axis and translation along the same axis.
 
     Attributes:
-        rotation: about the axis.
-        t: distance along the axis [m].
+        rotation: rotation about the axis.
+        t: translation along the axis [m].
     """
 
     rotation: AxisRotation
@@ -236,25 +235,25 @@ class ScrewDisplacement:
 
     @staticmethod
     def about(axis: str, angle: SX, t: SX) -> ScrewDisplacement:
-        """The screw by an angle [rad] and a distance [m] along the axis "x", "y" or "z"."""
+        """Return the screw of an angle [rad] and a distance t [m] on the axis "x", "y" or "z"."""
         return ScrewDisplacement(axis_rotation(axis, angle), SX(t))
 
     @property
     def axis(self) -> int:
-        """0, 1 or 2 for x, y or z."""
+        """Index of the axis: 0, 1 or 2 for x, y or z."""
         return self.rotation.along
 
     def point(self, r: SX) -> SX:
-        """A point of frame j, (3, 1), in frame i [m]."""
+        """Transform a point (3, 1) from frame j to frame i [m]."""
         return _shift_point(self.rotation.apply(r), self.t, self.axis)
 
     def wrench(self, f: SX, m: SX) -> Wrench:
-        """Force and moment about the origin of frame j, in frame j, about the origin of i in i."""
+        """Transform a force and moment about and in frame j to a wrench about and in frame i."""
         f, m = self.rotation.apply(f), self.rotation.apply(m)
         return f, m if self.t.is_zero() else _shift_moment(f, m, self.t, *self.rotation.across)
 
     def body(self, thing: Thing) -> Thing:
-        """What is given about and in frame j, such as an inertia, about and in frame i."""
+        """Transform an inertia or a similar quantity from frame j to frame i."""
         return thing.rotate(self.rotation).shift(self.axis, self.t)
 
 
@@ -267,7 +266,7 @@ def _shift_point(r: SX, t: SX, axis: int) -> SX:
 
 @formula((3, 1), (3, 1), (1, 1))
 def _shift_moment(f: SX, m: SX, t: SX, k: int, h: int) -> SX:
-    """The moment about a point that is t [m] before along the axis that k and h are across."""
+    """Moment about a point shifted by -t [m] along the axis normal to the axes k and h."""
     moved = SX(m)
     moved[k] -= t * f[h]
     moved[h] += t * f[k]
@@ -276,10 +275,10 @@ def _shift_moment(f: SX, m: SX, t: SX, k: int, h: int) -> SX:
 
 @dataclass(frozen=True, slots=True)
 class FreeDisplacement:
-    """Any translation, then any rotation.
+    """General displacement: translation, then rotation.
 
     Attributes:
-        rotation: of frame j seen from frame i.
+        rotation: orientation of frame j relative to frame i.
         p: (3, 1) origin of frame j in frame i [m].
     """
 
@@ -287,16 +286,16 @@ class FreeDisplacement:
     p: SX
 
     def point(self, r: SX) -> SX:
-        """A point of frame j, (3, 1), in frame i [m]."""
+        """Transform a point (3, 1) from frame j to frame i [m]."""
         return self.p + self.rotation.apply(r)
 
     def wrench(self, f: SX, m: SX) -> Wrench:
-        """Force and moment about the origin of frame j, in frame j, about the origin of i in i."""
+        """Transform a force and moment about and in frame j to a wrench about and in frame i."""
         f, m = self.rotation.apply(f), self.rotation.apply(m)
         return f, m if is_zero(self.p) else m + cross(self.p, f)
 
     def body(self, thing: Thing) -> Thing:
-        """What is given about and in frame j, such as an inertia, about and in frame i."""
+        """Transform an inertia or a similar quantity from frame j to frame i."""
         moved = thing.rotate(self.rotation)
         for axis in range(3):
             moved = moved.shift(axis, self.p[axis])
@@ -304,7 +303,7 @@ class FreeDisplacement:
 
 
 def origin(steps: Sequence[Displacement]) -> SX:
-    """(3, 1) where the last frame of successive displacements stands in the first [m]."""
+    """(3, 1) origin of the last frame of successive displacements in the first frame [m]."""
     p = zeros()
     for step in reversed(steps):
         p = step.point(p)
@@ -312,14 +311,14 @@ def origin(steps: Sequence[Displacement]) -> SX:
 
 
 def wrench_through(steps: Sequence[Displacement], f: SX, m: SX) -> Wrench:
-    """Force and moment in the last frame of successive displacements, about and in the first."""
+    """Transform a force f and moment m from the last frame of displacements to the first frame."""
     for step in reversed(steps):
         f, m = step.wrench(f, m)
     return f, m
 
 
 def body_through(steps: Sequence[Displacement], thing: Thing) -> Thing:
-    """What is given about and in the last frame of successive displacements, in the first."""
+    """Transform an inertia or similar from the last frame of displacements to the first frame."""
     for step in reversed(steps):
         thing = step.body(thing)
     return thing

@@ -1,7 +1,7 @@
-"""Rotations as sequences of elementary ones about coordinate axes.
+"""Rotations about coordinate axes, by matrices and by quaternions.
 
-A rotation about an axis costs four multiplications and two additions a vector, and nothing when its
-angle is a multiple of a quarter turn: two rotations are cheaper than the matrix they make.
+A rotation about an axis needs four multiplications and two additions per vector, and none if its
+angle is a multiple of 90 degrees. Two successive rotations need fewer than their product matrix.
 """
 
 from __future__ import annotations
@@ -17,47 +17,55 @@ from casadi import DM, SX
 from mbs.spatial.vectors import formula, product_with_vector, sin_cos, skew
 
 Rows = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
-"""A (3, 3) matrix of numbers, row by row."""
+"""Numeric (3, 3) matrix, row by row."""
 
 _AXES = "xyz"
 
 _NOISE = 1e-14
-"""Elements of a unit vector or rotation below this came from the rounding of whoever computed it:
-a product of a few rotations is off by some 1e-15. Tilts that were meant are far larger."""
+"""Element of a unit vector or rotation below which it counts as rounding error of its source: a
+product of a few rotations has errors of 1e-15, while intended tilts are far larger."""
 
 _ORTHONORMAL = 5e-16
-"""What R'R may differ from the identity: two units of the last digit of one."""
+"""Tolerance on the elements of R'R - I: two units in the last place of 1."""
 
 _ROUNDS = 8
-"""The iteration doubles the digits each time, from 1e-6 on; setting zeros costs another two."""
+"""Maximum number of iterations: convergence is quadratic from errors of 1e-6, and setting zeros
+needs two more."""
 
 _TIE = 1e-6
-"""Elements of a unit vector that differ by less are equal for a choice between axes."""
+"""Difference below which elements of a unit vector count as equal when the major axis is chosen:
+rounding errors must not decide it."""
 
 
 class Rotation(Protocol):
-    """Something that rotates vectors of a frame j into vectors of a frame i."""
+    """Protocol of the rotation from a frame j to a frame i."""
 
     @property
     def matrix(self) -> SX:
-        """(3, 3) orientation of frame j seen from frame i."""
+        """(3, 3) orientation of frame j relative to frame i."""
 
     def apply(self, vector: SX) -> SX:
-        """The vector of frame j, (3, 1), in frame i."""
+        """Transform a vector (3, 1) from frame j to frame i."""
 
     def apply_inverse(self, vector: SX) -> SX:
-        """The vector of frame i, (3, 1), in frame j."""
+        """Transform a vector (3, 1) from frame i to frame j."""
 
     def apply_to_tensor(self, tensor: SX) -> SX:
-        """The symmetric tensor of frame j, (3, 3), in frame i."""
+        """Transform a symmetric tensor (3, 3) from frame j to frame i."""
 
     def apply_to_square(self, square: SX) -> SX:
-        """Any tensor of frame j, (3, 3), in frame i."""
+        """Transform a general tensor (3, 3) from frame j to frame i."""
 
 
 @dataclass(frozen=True, slots=True)
 class AxisRotation:
-    """A rotation about a coordinate axis, by its sine and cosine."""
+    """Rotation about a coordinate axis, by its sine and cosine.
+
+    Attributes:
+        axis: "x", "y" or "z".
+        s: sine of the angle.
+        c: cosine of the angle.
+    """
 
     axis: str
     s: SX
@@ -65,12 +73,12 @@ class AxisRotation:
 
     @property
     def along(self) -> int:
-        """Number of the axis: 0, 1 or 2 for x, y or z."""
+        """Index of the axis: 0, 1 or 2 for x, y or z."""
         return _AXES.index(self.axis)
 
     @property
     def across(self) -> tuple[int, int]:
-        """Numbers of the axes that rotate, the first towards the second."""
+        """Indices of the two axes that rotate, the first axis towards the second axis."""
         return _across(self.axis)
 
     @property
@@ -79,29 +87,29 @@ class AxisRotation:
         return _rotation_matrix(self.s, self.c, self.axis)
 
     def apply(self, vector: SX) -> SX:
-        """The vector of the rotated frame in the fixed one."""
+        """Transform a vector (3, 1) from the rotated frame to the fixed frame."""
         return _rotate_vector(vector, self.s, self.c, self.axis)
 
     def apply_inverse(self, vector: SX) -> SX:
-        """The vector of the fixed frame in the rotated one."""
+        """Transform a vector (3, 1) from the fixed frame to the rotated frame."""
         return _rotate_vector(vector, -self.s, self.c, self.axis)
 
     def apply_to_tensor(self, tensor: SX) -> SX:
-        """The symmetric tensor of the rotated frame in the fixed one; eight multiplications."""
+        """Transform a symmetric tensor from the rotated to the fixed frame; 8 multiplications."""
         return _rotate_square(tensor, self.s, self.c, self.axis, self._block, True)
 
     def apply_to_square(self, square: SX) -> SX:
-        """Any tensor of the rotated frame in the fixed one; twelve multiplications."""
+        """Transform a general tensor from the rotated to the fixed frame; 12 multiplications."""
         return _rotate_square(square, self.s, self.c, self.axis, self._block, False)
 
     @property
     def _block(self) -> str:
-        """How the two axes across it turn: by a quarter, not at all, or by any angle."""
+        """Kind of the angle: "quarter" for +-90 degrees, "still" for 0 or 180 degrees, or "any"."""
         return "quarter" if self.c.is_zero() else "still" if self.s.is_zero() else "any"
 
 
 def _across(axis: str) -> tuple[int, int]:
-    """Numbers of the axes that rotate, the first towards the second."""
+    """Indices of the two axes that rotate, the first axis towards the second axis."""
     along = _AXES.index(axis)
     return (along + 1) % 3, (along + 2) % 3
 
@@ -125,10 +133,10 @@ def _rotate_vector(vector: SX, s: SX, c: SX, axis: str) -> SX:
 
 @formula((3, 3), (1, 1), (1, 1))
 def _rotate_square(square: SX, s: SX, c: SX, axis: str, block: str, symmetric: bool) -> SX:
-    """A tensor turned.
+    """Rotate a tensor.
 
-    With w = c (a - e) - s (b + d) the turned block is [[e + c w, b + s w], [d + s w, a - c w]]
-    for the block [[a, b], [d, e]].
+    With w = c (a - e) - s (b + d), the block [[a, b], [d, e]] of the two rotating axes becomes
+    [[e + c w, b + s w], [d + s w, a - c w]].
     """
     (k, h), m = _across(axis), _AXES.index(axis)
     a, b, d, e = square[k, k], square[k, h], square[h, k], square[h, h]
@@ -150,24 +158,24 @@ def _rotate_square(square: SX, s: SX, c: SX, axis: str, block: str, symmetric: b
 
 @dataclass(frozen=True, slots=True)
 class MatrixRotation:
-    """A rotation by its matrix, where no axis is special (quaternions)."""
+    """General rotation by its matrix (3, 3), such as of a quaternion."""
 
     matrix: SX
 
     def apply(self, vector: SX) -> SX:
-        """The vector of the rotated frame in the fixed one."""
+        """Transform a vector (3, 1) from the rotated frame to the fixed frame."""
         return product_with_vector(self.matrix, vector)
 
     def apply_inverse(self, vector: SX) -> SX:
-        """The vector of the fixed frame in the rotated one."""
+        """Transform a vector (3, 1) from the fixed frame to the rotated frame."""
         return product_with_vector(self.matrix.T, vector)
 
     def apply_to_tensor(self, tensor: SX) -> SX:
-        """The symmetric tensor of the rotated frame in the fixed one."""
+        """Transform a symmetric tensor (3, 3) from the rotated frame to the fixed frame."""
         return self.apply_to_square(tensor)
 
     def apply_to_square(self, square: SX) -> SX:
-        """Any tensor of the rotated frame in the fixed one."""
+        """Transform a general tensor (3, 3) from the rotated frame to the fixed frame."""
         return _turned_by_matrix(square, self.matrix)
 
 
@@ -177,19 +185,19 @@ def _turned_by_matrix(square: SX, R: SX) -> SX:
 
 
 def axis_rotation(axis: str, angle: SX) -> AxisRotation:
-    """The turn by an angle [rad] about the axis "x", "y" or "z"."""
+    """Return the rotation by an angle [rad] about the axis "x", "y" or "z"."""
     s, c = sin_cos(angle)
     return AxisRotation(axis, s, c)
 
 
 def align_z(direction: Sequence[float]) -> SX:
-    """A constant rotation whose z axis is along `direction`, three numbers.
+    """Return a numeric rotation (3, 3) whose z axis is along `direction`, three numbers.
 
-    For a coordinate axis the other two are coordinate axes too, so that no oblique numbers
-    appear: x, y and z of the new frame are (y, z, x) for direction x and (z, x, y) for y.
+    For the direction of a coordinate axis the other two axes are coordinate axes too, so that the
+    elements are 0 or 1: x, y, z of the new frame are (y, z, x) for direction x, (z, x, y) for y.
     """
     z = unit_vector([float(x) for x in direction])
-    # the axis that z is nearest to; of nearly equal ones the first, whatever their last digits
+    # coordinate axis nearest to z; the first axis in a tie, independent of rounding errors
     largest = max(map(abs, z))
     major = next(k for k in range(3) if abs(z[k]) > largest - _TIE)
     helper = [0.0, 0.0, 0.0]
@@ -200,18 +208,18 @@ def align_z(direction: Sequence[float]) -> SX:
 
 
 def unit_vector(vector: Sequence[float]) -> tuple[float, float, float]:
-    """The direction of three numbers, what is only rounding in it zero."""
+    """Return the unit vector along three numbers; elements of rounding size become zero."""
     length = math.hypot(*vector)
     x, y, z = (0.0 if abs(x) <= _NOISE * length else x / length for x in vector)
-    length = math.hypot(x, y, z)  # a second time: the first one leaves a unit of the last digit
+    length = math.hypot(x, y, z)  # normalise again: removes the last rounding error
     return x / length, y / length, z / length
 
 
 def nearest_rotation(matrix: Sequence[Sequence[float]], noise: float = _NOISE) -> Rows:
-    """The rotation next to a (3, 3) matrix whose digits were cut off, its noise taken out.
+    """Return the rotation nearest to a (3, 3) matrix with truncated digits.
 
-    Elements below the noise become zero, an element alone in its row becomes 1 or -1, and the rows
-    are made orthonormal again, all together, so that the result is a rotation to the last digit.
+    Elements below `noise` become zero, an element alone in its row becomes 1 or -1, and the rows
+    are orthonormalised together. The result is a rotation to machine precision.
 
     Source: Higham 1986 for the iteration to the orthogonal polar factor.
     """
@@ -236,10 +244,10 @@ def nearest_rotation(matrix: Sequence[Sequence[float]], noise: float = _NOISE) -
 
 @formula((4, 1))
 def quaternion_rotation(quaternion: SX) -> SX:
-    """(3, 3) orientation of the rotated frame, of a unit quaternion (w, x, y, z).
+    """(3, 3) orientation matrix of a unit quaternion (w, x, y, z).
 
-    The diagonal is w2 + x2 - y2 - z2 and so on, which keeps R' R = |quaternion|^4 I when the norm
-    is not one.
+    The diagonal elements have the form w^2 + x^2 - y^2 - z^2, so that R' R = |quaternion|^4 I for
+    any norm.
 
     Source: Khalil & Dombre 2002, section 3.6.
     """
@@ -253,11 +261,11 @@ def quaternion_rotation(quaternion: SX) -> SX:
 
 
 def quaternion_rate(quaternion: SX, angular_velocity: SX) -> SX:
-    """(4, 1) time derivative of the quaternion of a frame that rotates with the velocity [rad/s].
+    """(4, 1) time derivative of a quaternion [1/s].
 
     Args:
-        quaternion: (4, 1) w, x, y, z.
-        angular_velocity: (3, 1) in the rotated frame.
+        quaternion: (4, 1) quaternion w, x, y, z of a frame.
+        angular_velocity: (3, 1) angular velocity of the frame, in its own axes [rad/s].
     """
     w, e = quaternion[0], quaternion[1:4]
     return 0.5 * casadi.vertcat(

@@ -1,4 +1,4 @@
-"""3-vectors of SX scalars, constants made exact, sines and cosines of quarter turns."""
+"""3-vectors of SX scalars, sums and products with exact zeros, exact sines of quarter turns."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -9,12 +9,12 @@ import casadi
 from casadi import SX, Function
 
 _ROUNDING = 2e-15
-"""Part of its terms that a sum may have left from their rounding: some ten units of their last
-digit, far above what two or three roundings leave and far below any tilt that was meant."""
+"""Size of a sum relative to its terms below which it counts as rounding error: about ten units in
+the last place, far above two or three rounding errors and far below an intended tilt."""
 
 
 _SMALL = 1e-9
-"""What is larger in numbers is no rounding of anything smaller than 1000 km, and needs no look."""
+"""Magnitude above which a number is no rounding error of terms below 1000 km, and is not tested."""
 
 
 Given = ParamSpec("Given")
@@ -24,14 +24,14 @@ Made = TypeVar("Made")
 def formula(
     *shapes: tuple[int, int],
 ) -> Callable[[Callable[Given, Made]], Callable[Given, Made]]:
-    """A formula that is written on symbols once for each of its cases, then evaluated.
+    """Decorator that traces a function of SX arguments once per case and then calls the graph.
 
-    Evaluated on expressions it makes the operations that its text makes, constants folded; ten of
-    them take the time that one takes from Python.
+    The call creates the same operations as the Python code, with constants folded, about ten times
+    faster.
 
     Args:
-        shapes: of its leading arguments, which are SX; what follows them is the case, to which
-            the text may look.
+        shapes: shapes of the leading SX arguments. Further arguments are hashable and select the
+            case; the code may branch on them.
     """
 
     def evaluated(text: Callable[Given, Made]) -> Callable[Given, Made]:
@@ -49,7 +49,7 @@ def formula(
                 title = text.__name__.strip("_")
                 functions[case] = Function(title, symbols, results, names, outs), outs
             function, outs = functions[case]
-            # by name: of a list CasADi looks at more types before it is known to be one of SX
+            # call by name: for a list CasADi tries more types before it finds SX
             made = function.call(dict(zip(names, arguments, strict=False)))
             return made["y0"] if len(outs) == 1 else tuple(made[name] for name in outs)
 
@@ -59,19 +59,19 @@ def formula(
 
 
 def vector(elements: Iterable[SX | float]) -> SX:
-    """The column of these scalars."""
+    """Return the column of these scalars."""
     scalars = (one if isinstance(one, SX) else SX(one) for one in elements)
     return casadi.vertcat(*scalars)
 
 
 def zeros(rows: int = 3, columns: int = 1) -> SX:
-    """A dense matrix of zeros."""
+    """Return a dense SX matrix of zeros."""
     return SX.zeros(rows, columns)
 
 
 @formula((3, 1))
 def skew(a: SX) -> SX:
-    """(3, 3) matrix of the vector product: times b it is a x b."""
+    """(3, 3) matrix S of the cross product with a: S b = a x b."""
     x, y, z = a[0], a[1], a[2]
     return casadi.vertcat(
         casadi.horzcat(0, -z, y), casadi.horzcat(z, 0, -x), casadi.horzcat(-y, x, 0)
@@ -80,38 +80,38 @@ def skew(a: SX) -> SX:
 
 @formula((3, 1), (3, 1))
 def cross(a: SX, b: SX) -> SX:
-    """Vector product of a and b, (3, 1), scalar by scalar so that zeros fold."""
+    """(3, 1) cross product of a and b, by scalars so that zeros are folded."""
     (a_x, a_y, a_z), (b_x, b_y, b_z) = elements(a), elements(b)
     return casadi.vertcat(a_y * b_z - a_z * b_y, a_z * b_x - a_x * b_z, a_x * b_y - a_y * b_x)
 
 
 def is_zero(value: SX) -> bool:
-    """Whether every element is the constant zero (a symbol is not)."""
+    """Whether all elements are the constant zero; a symbol is not."""
     return value.is_zero()
 
 
 def elements(value: SX) -> list[SX]:
-    """The scalars of a matrix, column by column, zeros included."""
+    """Return the scalars of a matrix, column by column, including zeros."""
     dense = value if value.is_dense() else casadi.densify(value)
     return cast("list[SX]", dense.nonzeros())
 
 
 def numbers(value: SX) -> list[float]:
-    """The elements of a matrix of constants, column by column."""
+    """Return the elements of a constant matrix as floats, column by column."""
     return [float(element) for element in elements(value)]
 
 
-# Operators and functions of CasADi look through its types for what they are given, which takes
-# several times as long as the operation. What is known to be SX goes by these where much is made.
+# Python operators of CasADi dispatch on the argument type, which takes several times as long as the
+# operation. These functions skip the dispatch for SX arguments in frequently called code.
 
 
 def plus(a: SX, b: SX) -> SX:
-    """The expression a + b."""
+    """Return the expression a + b."""
     return SX.binary(casadi.OP_ADD, a, b)
 
 
 def times(a: SX, b: SX) -> SX:
-    """The expression a * b, element by element."""
+    """Return the elementwise product a * b."""
     return SX.binary(casadi.OP_MUL, a, b)
 
 
@@ -120,9 +120,9 @@ def _sine_and_cosine(angle: SX) -> tuple[SX, SX]:
 
 
 def exact_sum(a: SX, b: SX) -> SX:
-    """The scalar a + b; zero where two numbers cancel but for the rounding of their last digits.
+    """Return the scalar a + b; zero if two numbers cancel up to rounding errors.
 
-    Constants that ought to cancel fold only so; what is small by itself stays.
+    Exact zeros let CasADi fold constants. A small sum of small numbers is not changed.
     """
     if not (a.is_constant() and b.is_constant()):
         return plus(a, b)
@@ -138,7 +138,7 @@ def _product(A: SX, B: SX) -> SX:
 
 @formula((3, 3), (3, 1))
 def product_with_vector(A: SX, b: SX) -> SX:
-    """A b, (3, 1)."""
+    """Return A b, (3, 1), for A (3, 3) and b (3, 1)."""
     return casadi.mtimes(A, b)
 
 
@@ -148,12 +148,15 @@ def _sum_with_product(A: SX, b: SX, c: SX) -> SX:
 
 
 def exact_product(A: SX, B: SX, C: SX | None = None) -> SX:
-    """A B + C; an element is zero where numbers cancel but for their last digits.
+    """Return A B + C; an element is zero if numbers cancel up to rounding errors.
 
-    A is (3, 3), B is (3, 3) or, as C always, (3, 1).
+    Inverse rotations leave values such as 1e-17, which CasADi cannot fold as zeros. Small numbers
+    that are no rounding errors, such as the sine of a tilt of 1e-12, are not changed.
 
-    Rotations that undo each other leave 1e-17 in the place of a zero, which would never fold. What
-    is small by itself, such as the sine of a tilt of 1e-12, stays.
+    Args:
+        A: (3, 3) rotation; constant elements are at most 1.
+        B: (3, 3), or (3, 1).
+        C: (3, 1) with a (3, 1) B; zero by default.
     """
     if C is not None:
         dense = _sum_with_product(A, B, C)
@@ -167,7 +170,7 @@ def exact_product(A: SX, B: SX, C: SX | None = None) -> SX:
         if not element.is_constant():
             continue
         number = abs(float(element))
-        # elements of A, a rotation, are at most one: most sums are told by the largest number
+        # elements of the rotation A are at most 1: a cheap bound excludes most elements
         if 0 < number <= 2 * _ROUNDING * largest:
             row, column = place % rows, place // rows
             terms = [times(A[row, k], B[k, column]) for k in range(A.shape[1])]
@@ -179,24 +182,24 @@ def exact_product(A: SX, B: SX, C: SX | None = None) -> SX:
 
 
 def _largest_number(value: SX) -> float:
-    """The largest constant element, by its size; zero where there is none."""
+    """Largest magnitude of the constant elements; zero if there are none."""
     return max((abs(float(e)) for e in elements(value) if e.is_constant()), default=0.0)
 
 
-# Sines and cosines whose quarter turns are exact.
+# Sines and cosines with exact values at multiples of 90 degrees.
 
 
 _QUARTER = math.pi / 2
 _SNAP = 1e-14
-"""An angle this near to a quarter turn is one [rad]: sums of a few multiples of pi/2 are off by
-some 4e-16 each. A tilt that a file describes is larger, and stays."""
+"""Distance of an angle from a multiple of pi/2 below which it is set to the multiple [rad]: sums of
+a few multiples have rounding errors of 4e-16 each, and intended tilts in files are larger."""
 
 
 def sin_cos(angle: SX) -> tuple[SX, SX]:
-    """Sine and cosine of an angle [rad], with the quarter turns in it taken out exactly.
+    """Return sine and cosine of an angle [rad], exact for multiples of 90 degrees in it.
 
-    sin(pi/2) is 1 and sin(pi/2 + q) is cos(q), so that constants fold. An angle within rounding
-    of a quarter turn is the quarter turn.
+    sin(pi/2) is 1 and sin(pi/2 + q) is cos(q), so that constants are folded. A constant within
+    rounding errors of a multiple of pi/2 is set to the multiple.
     """
     constant, rest = _split(angle)
     quarters = round(constant / _QUARTER)
@@ -207,7 +210,7 @@ def sin_cos(angle: SX) -> tuple[SX, SX]:
 
 
 def _split(angle: SX) -> tuple[float, SX]:
-    """The angle as a number plus a rest that has no constant term."""
+    """Split an angle into a number and an expression without constant term."""
     if angle.is_constant():
         return float(angle), SX(0)
     if angle.is_op(casadi.OP_ADD) or angle.is_op(casadi.OP_SUB):

@@ -74,7 +74,7 @@ class Stroke:
 
 @dataclass(frozen=True, slots=True)
 class Name:
-    """Text with its lower left corner at a point, in a colour of the palette."""
+    """Text at a point, in a colour of the palette. After `placed`, the point is its lower left."""
 
     colour: str
     text: str
@@ -96,7 +96,7 @@ class Drawing:
     caption: str = ""
 
     def bounds(self) -> tuple[float, float, float, float]:
-        """Return left, lower, right and upper bound of the strokes, a unit square without strokes."""
+        """Return left, lower, right and upper bound of the strokes, or a unit square if none."""
         points = [point for stroke in self.strokes for point in stroke.points]
         if not points:
             return 0.0, 0.0, 1.0, 1.0
@@ -121,11 +121,11 @@ class _Eye:
     scale: float = 1.0
 
     def seen(self, points: Array) -> Array:
-        """Project points (..., 3) of the base frame to right, up, near (..., 3) in drawing units."""
+        """Project points (..., 3) in the base frame to right, up, near (..., 3), drawing units."""
         return np.array(self.scale * (points @ self.axes.T))
 
     def project(self, link: int, points: Sequence[Vector] | Vector | Array) -> Array:
-        """Project points (..., 3) of a link frame to right, up, near (..., 3) in drawing units."""
+        """Project points (..., 3) in a link frame to right, up, near (..., 3), drawing units."""
         R, p = self.poses[link, :, :3], self.poses[link, :, 3]
         return self.seen(np.array(points) @ R.T + p)
 

@@ -170,7 +170,7 @@ def _chunk(kind: bytes, content: bytes) -> bytes:
 
 
 def _paint(image: Array, stroke: Stroke, points: Array, width: float) -> None:
-    """Draw a stroke over the image: first its area, then its line, within its bounding window."""
+    """Draw area and line of a stroke over the image, within the bounding window of the stroke."""
     first = np.clip(np.floor(points.min(axis=0) - width), 0, SIZE).astype(int)
     last = np.clip(np.ceil(points.max(axis=0) + width), 0, SIZE).astype(int)
     window = slice(first[1], last[1]), slice(first[0], last[0])

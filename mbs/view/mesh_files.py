@@ -105,7 +105,7 @@ def _module(name: str, path: str) -> Any:
 
 
 def _join(scene: Any) -> tuple[Array, NDArray[np.int64]]:
-    """Return points (n, 3) and triangles (m, 3) of all meshes of a file in the frame of the file."""
+    """Return points (n, 3) and triangles (m, 3) of all meshes of a file, in its root frame."""
     points, triangles, count = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], 0
     for node in scene.graph.nodes_geometry:
         pose, name = scene.graph[node]

@@ -140,7 +140,7 @@ class Painter:
         return self.figure
 
     def _faces(self, link_poses: Array) -> tuple[Array, Array, Array, Array]:
-        """Return corners in the picture, colours and edge widths, far faces first, and the shadow."""
+        """Return corners in the picture, colours, edge widths, far faces first, and the shadow."""
         every = [
             (self._transformed_corners(faces, link_poses[link]), faces)
             for link, faces in self.solid

@@ -53,7 +53,7 @@ class Picture:
         return page(self.scene, self.look, self.speed, *motion)
 
     def __repr__(self) -> str:
-        """Return a one-line description."""
+        """Return a short description."""
         moving = f", {len(self.times)} pictures" if len(self.times) > 1 else ""
         return f"<Picture of {self.scene.system.name}{moving}>"
 
@@ -118,8 +118,8 @@ def show(
 
     Args:
         system: mechanism, open or closed. Every symbol in its geometry has a value.
-        q: all positions (nq,), or a dict of some positions by name [rad or m]. Other positions are
-            those of the assembled configuration, and `mbs.loops.solve` closes the loops at the
+        q: all positions (nq,), or a dict of some positions by name [rad or m]. Other positions
+            come from the assembled configuration, and `mbs.loops.solve` closes the loops at the
             given positions. By default the assembled configuration.
         path: file to write, see `Picture.save`.
         parameters: values of symbols. Other symbols have their default values.

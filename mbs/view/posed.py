@@ -168,7 +168,7 @@ def _pose_function(system: System) -> Function:
 def position_of(system: System, q: Values) -> list[float]:
     """Return positions (nq,) from a sequence, or from a dict by name.
 
-    Positions without a name in the dict are those of the assembled configuration.
+    Positions without a name in the dict come from the assembled configuration.
 
     Raises:
         ModelError: a name is unknown, or the number of positions is wrong.

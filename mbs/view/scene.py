@@ -161,8 +161,8 @@ def scene(
 ) -> Scene:
     """Return the scene of a mechanism: shapes of links, joints, force elements and frames.
 
-    Links with visual shapes in the mechanism file are drawn with these shapes, and bodies that are
-    defined by their dimensions with these dimensions. Other links are bars between their joints.
+    Links with visual shapes in the mechanism file are drawn with these shapes. Bodies defined by
+    dimensions (Box, Cylinder) are drawn to scale. Other links are bars between their joints.
     Sizes of joints and frames follow from the size of the mechanism. Loops are not closed.
 
     Args:

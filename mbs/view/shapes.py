@@ -55,7 +55,7 @@ def joint_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
 
 
 def _shown(scene: PosedLinks) -> Iterator[SkeletonJoint]:
-    """Yield the joints that are drawn: not free joints, and fixed joints only if they close loops."""
+    """Yield the joints to draw: not free joints, and fixed joints only if they close loops."""
     for joint in scene.parts.joints:
         if joint.kind != "free" and (joint.kind != "fixed" or joint.cut):
             yield joint
@@ -82,7 +82,7 @@ def _look(scene: PosedLinks, joint: SkeletonJoint) -> tuple[str, str]:
 
 
 def _join(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
-    """Yield a bar between joint frames that do not coincide, and spheres of joints without axes."""
+    """Yield a bar if the joint frames are at different points, and spheres if there are no axes."""
     role, colour = _look(scene, joint)
     a, b = (scene.points[k] for k in joint.points)
     ends = scene.local(joint.links[0], a), scene.local(joint.links[1], b)
@@ -187,7 +187,7 @@ def figures(scene: PosedLinks, notes: list[str]) -> Iterator[Visual]:
 
     Args:
         scene: posed links.
-        notes: list that receives a sentence for each mesh that is missing or simplified.
+        notes: list to which a warning is appended for each missing or simplified mesh.
     """
     system = scene.system
     values = list(scene.parameters.values())
@@ -279,7 +279,7 @@ def visual_shapes(scene: PosedLinks, notes: list[str]) -> Iterator[Visual]:
 
     Args:
         scene: posed links.
-        notes: list that receives a sentence for each mesh that is missing or simplified.
+        notes: list to which a warning is appended for each missing or simplified mesh.
     """
     system = scene.system
     if not system.shapes:
@@ -477,6 +477,6 @@ def frame_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[FrameShape]:
         R = scene.directions[list(frame.directions)].T
         pose = scene.local_pose(frame.link, R, scene.points[frame.origin])
         yield FrameShape("frame", frame.link, pose, sizes.frame)
-    # axes shorter than those of named frames
+    # axes shorter than the axes of named frames
     for number in range(1, len(scene.poses)):
         yield FrameShape("link frame", number, identity, 0.75 * sizes.frame)

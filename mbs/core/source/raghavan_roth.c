@@ -41,8 +41,8 @@ static void half_parts(int prismatic, const double *w, double *parts) {
     }
 }
 
-/* Parts of rho(joint 3) w with its weights; for a translation by r = tan(u/2), times cos(u/2) or its
- * square. */
+/* Parts of rho(joint 3) w with its weights; for a translation by r = tan(u/2), times
+ * cos(u/2) or its square. */
 static void third_parts(int prismatic, int count, const double *w, double *parts) {
     int i;
     pair_parts(prismatic, w, parts);

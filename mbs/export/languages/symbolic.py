@@ -95,7 +95,7 @@ class SympyWriter:
         return CodeLine(name, self._operation(node))
 
     def value(self, number: int) -> Expr:
-        """Return the text of a node as an operand: name of the node, or expression without name."""
+        """Return a node as an operand: the symbol of a named node, else the full expression."""
         if number in self.names:
             return symbol(self.names[number])
         return self._operation(self.plan.graph.nodes[number])

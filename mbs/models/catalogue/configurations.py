@@ -34,7 +34,7 @@ def moving_joints(system: System, frame: Frame) -> tuple[str, ...]:
 def surplus_joints(system: System, frame: Frame) -> tuple[str, ...]:
     """Return the joints that are locked by default, so that a pose determines the others.
 
-    They precede the middle of the chain, so that an arm of seven joints keeps its elbow free.
+    The locked joints precede the middle of the chain. The elbow of a seven-joint arm stays free.
     """
     names = moving_joints(system, frame)
     surplus = max(0, len(names) - SIX)

@@ -74,7 +74,7 @@ class Entry:
         key: short name, such as "idm".
         menu: menu of the model.
         title: full name.
-        symbol: formula of the model in the notation of the project.
+        symbol: formula of the model, such as "q = igm(T)".
         options: options of the builder functions.
         function: builder of the casadi.Function, or None for text or configurations only.
         text: writer of the equations, or None if they are printed from `function`.

@@ -33,8 +33,8 @@ class Anatomy:
     """Parts of an arm that distinguish named branches.
 
     Attributes:
-        shoulder: whether axes 1 and 2 are perpendicular, so that the wrist centre is to the right
-            or left of the shoulder.
+        shoulder: whether axes 1 and 2 are perpendicular, so that the wrist centre is on either side
+            of the plane through axis 2 and parallel to axis 1.
         elbow: whether axes 2 and 3 are parallel, so that the elbow is above or below the line from
             the shoulder to the wrist centre.
         wrist: whether axes 4, 5 and 6 intersect in one point.

@@ -85,7 +85,7 @@ def close(
         Configurations in the order of `configurations`. Empty if the loops cannot be closed.
 
     Raises:
-        NoClosedForm: spherical or free joints outside the chain are only partly determined.
+        NoClosedForm: a spherical or free joint outside the chain keeps only some of its freedoms.
     """
     rest = np.array(system.configuration if seed is None else seed, dtype=float)
     given = _given(system, chain)

@@ -31,7 +31,7 @@ from mbs.recursions.parts import PartsAt
 CONTACTS = "contacts"
 """Prefix of the names of contact crossings in FMUs."""
 GUARD_MODES = 4
-"""Number of modes of a guarded crossing: place, whether asleep, events in a row, last event time."""
+"""Number of modes per crossing: place, whether asleep, number of events in a row, time of event."""
 _OFTEN = 4
 """Number of events in a row after which a crossing is not watched for a pause: a body that bounces
 between two sides of a law, or comes to rest by friction, has infinitely many events."""
@@ -43,8 +43,8 @@ is rounded down to a tick."""
 _WRAP = 1e9
 """Number of ticks after which the tick count restarts, so that it fits in 32 bits."""
 _SHORTEST_PAUSE, _LONGEST_PAUSE = 1e-6, 0.02
-"""First and longest pause without watching, as fractions of the duration. Pauses double with every
-event, up to the longest after about 15 events. The duration contains 50 longest pauses."""
+"""Factor and upper limit of the pause without watching, as fractions of the duration. The pause
+doubles with every event in a row and reaches the limit, 1/50 of the duration, after 15 events."""
 
 
 def ticks_of(t: Any, duration: Any) -> Any:

@@ -259,8 +259,8 @@ def distinct(values: Sequence[SX], known: Sequence[SX]) -> list[SX]:
 
 
 _CELLS = 2048
-"""Minimum number of cells of a time interval in the search for zeros of a function of time: a pulse
-of a smooth law with a width of a thousandth of the interval contains two cells."""
+"""Minimum number of cells of a time interval in the search for zeros of a function of time. The
+cells resolve a pulse of a smooth law whose width is a thousandth of the interval."""
 _PER_PERIOD = 16
 """Number of cells per period of a wave, which separates both zeros of its slope."""
 _MOST_CELLS = 2_000_000

@@ -438,8 +438,8 @@ def tree_state(
 ) -> TreeState | None:
     """Return the state equation of the tree with the inputs and outputs of `minimal_state`.
 
-    None without dependent positions and without nonholonomic constraints, with motions as inputs,
-    or if `passage` is None for holonomic loops.
+    The result is None if motions are inputs, if there are neither dependent positions nor
+    nonholonomic constraints, or if `passage` is None for holonomic loops.
 
     Args:
         system: open or closed system.

@@ -62,8 +62,7 @@ static void foretell(const core *c, double *guide) {
         guide[i] += 0.5 * dt * dt * m->slope[size.nq + i];
 }
 
-/* Compute the state of the tree from chart coordinates y, on the branch of a state `guide` near it.
- * */
+/* Compute the state of the tree from chart coordinates y, on the branch of the near state guide. */
 static int near_guide(core *c, const double *y, const double *guide, found *f) {
     memset(f->rate, 0, sizeof f->rate);
     return passage_state(c->passage, c->m.time, y, guide, f->X, f->slope, f->rate,

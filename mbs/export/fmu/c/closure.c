@@ -23,8 +23,7 @@
 #define SMALLEST REAL(0.0009765625)
 #define STEEPEST REAL(1e4) /* largest change of dependents per change of a state, nominal sizes */
 /* Largest step of the continuation from the start values, in nominal sizes of the states that
- * determine the dependents. FIRST: fraction of it that the first step, which finds the slope,
- * takes. */
+ * determine the dependents. FIRST: fraction of it for the first step, which finds the slope. */
 #define STRIDE REAL(0.2)
 #define FIRST REAL(1e-3)
 /* Largest deviation of the dependents from their linear extrapolation, relative to the step. On
@@ -45,8 +44,7 @@ typedef struct {
     real residual, move;
 } progress;
 
-/* Whether the closure holds, or residual and step decrease so fast that it holds after this step.
- * */
+/* Whether the closure holds, or residual and step decrease so fast that this step closes it. */
 static int converged(progress now, progress before, real size) {
     real ratio = now.move / before.move;
     if (now.residual < RESIDUAL * size && now.move < MOVE * size) return 1;
@@ -176,8 +174,7 @@ static int any_guessed(const loops *l) {
 }
 
 /* Difference of two values of dependent coordinate i [rad or m], of angles modulo a revolution.
- * Half a revolution is always positive, so that rounding does not decide its sign for aligned bars.
- * */
+ * Half a revolution is always positive, so that rounding cannot change its sign (aligned bars). */
 static real difference(int i, real z, real other) {
     real d = z - other;
     if (!MODEL_TURNS[i]) return d;
@@ -197,8 +194,7 @@ static real distance_from_guess(const loops *l, const real *z, int all) {
 }
 
 /* Whether z is nearer to the guesses than `other`, in the order of mbs.loops.nearest: distance of
- * the guessed coordinates, then of all, then the larger value of the first coordinate that differs.
- * */
+ * the guessed coordinates, then of all, then the larger value of the first different coordinate. */
 static int is_nearer(const loops *l, const real *z, const real *other) {
     int i, all;
     for (all = 0; all < 2; all++) {

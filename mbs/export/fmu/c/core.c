@@ -57,8 +57,7 @@ core_status core_refuse(core *c, const char *format, ...) {
 }
 
 /* Failed evaluation. An external integrator may try a shorter step. A co-simulation master can only
- * return to a saved state, and some masters repeat a discarded step forever, so it gets an error.
- * */
+ * return to a saved state, and some masters repeat a discarded step forever: it gets an error. */
 core_status core_no_answer(core *c, const char *format, ...) {
     core_status status = c->m.mode & CONTINUOUS ? CORE_DISCARD : CORE_ERROR;
     va_list args;

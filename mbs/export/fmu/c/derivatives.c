@@ -299,8 +299,7 @@ core_status core_adjoint(core *c, const core_reference *unknown, size_t n_unknow
 
 #endif
 
-/* Time derivatives of outputs. Inputs are extrapolated by their given derivatives, else constant.
- * */
+/* Time derivatives of outputs. Inputs follow their given derivatives, else they are constant. */
 core_status core_get_output_slopes(core *c, const core_reference *ref, size_t n, const core_integer *order,
                                    double *values) {
     core_status status;

@@ -6,8 +6,7 @@
 
 static double *slopes(core *c, int order) { return c->m.slopes + (order - 1) * NU; }
 
-/* Derivative of order `first` (0: value) of an input, `after` seconds after the start of the step.
- * */
+/* Derivative of order `first` (0: value) of an input, `after` seconds after the step began. */
 static double extrapolated(core *c, int input, int first, double after) {
     double sum = 0.0;
     int order;

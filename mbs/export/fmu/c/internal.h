@@ -88,8 +88,7 @@ core_status core_settle(core *c, int *changed);
 core_status core_show_indicators(core *c);
 core_status core_arm_indicators(core *c);
 
-/* Make x, z the configuration from which loops are closed. Error if the closure loses rank in it.
- * */
+/* Make x, z the configuration from which loops are closed. Error if the closure is singular. */
 core_status core_accept_configuration(core *c, const double *x, const double *z);
 
 /* Accept the present states, after their dependent coordinates are computed. */

@@ -1,5 +1,4 @@
-/* Number type of code that FMUs and bare C libraries share. A bare library has its own definitions.
- * */
+/* Number type of code that FMUs and bare C libraries share. A bare library redefines it. */
 #ifndef MBS_REAL_H
 #define MBS_REAL_H
 

@@ -1,5 +1,5 @@
 /* Saved states: copies of the memory of an instance. The serialized bytes contain format, model,
- * size and a checksum, because they may have been changed outside.
+ * size and a checksum, to detect changes outside the FMU.
  */
 #include "internal.h"
 

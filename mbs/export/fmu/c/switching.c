@@ -178,8 +178,7 @@ static int rates(void *user, double t, const double *x, double *rise) {
     return CALL(EVENTS_ON_TREE(c), rates);
 }
 
-/* 1 if an external integrator has charts and needs no other events: all indicators stay positive.
- * */
+/* 1 if an external integrator has charts and needs no other events: indicators stay positive. */
 #ifndef MODEL_CHARTS_ALONE
 #define MODEL_CHARTS_ALONE 0
 #endif

@@ -162,8 +162,7 @@ static void set_slot(core *c, core_reference ref, double value) {
     changed(c);
 }
 
-/* Make the joints the states, if they are not, before event mode sets a joint value or a parameter.
- * */
+/* Make the joints the states, if they are not, before event mode sets a joint or a parameter. */
 static core_status joints_set(core *c, core_reference ref) {
 #if MODEL_TREE_OUTSIDE
     int ours = ref < DERIVATIVES || ref >= PARAMETERS;

@@ -234,7 +234,7 @@ def _text_width(text: str) -> float:
 
 
 def pill_width(edge: ConnectionEdge) -> float:
-    """Width of the pill of a joint [px]."""
+    """Return the width of the label of a joint [px]."""
     return _text_width(f"{edge.name}  {edge.kind}")
 
 

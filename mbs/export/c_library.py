@@ -241,11 +241,11 @@ def c_library(
 
     A call returns an `mbs_status`, documented in the header: MBS_OK, or the error, with all outputs
     NaN. Calls in Python have the same checks. An error is an input or result that is not finite,
-    a quaternion without unit length, a parameter out of its bounds, an open loop (beyond a tolerance
-    relative to the size of the mechanism), or a configuration in which the independent joints do
-    not determine the others. A casadi.Function that is no model is only checked for finite inputs
-    and outputs. The unused columns of the general inverse geometric model (solutions that do not
-    exist) are NaN without an error.
+    a quaternion without unit length, a parameter out of its bounds, an open loop (beyond a
+    tolerance relative to the size of the mechanism), or a configuration in which the independent
+    joints do not determine the others. A casadi.Function that is no model is only checked for
+    finite inputs and outputs. The unused columns of the general inverse geometric model (solutions
+    that do not exist) are NaN without an error.
 
     With target="bare" the code is for microcontrollers: C99 in scalar operations, without heap,
     files and global variables. It needs math.h, memset and memcpy. A system in `functions` becomes

@@ -127,7 +127,7 @@ def show(
         theme: light, dark or auto. auto follows the browser, and is light in other files.
         shown: roles that are shown in addition to the default: "label" for the names of joints,
             "link frame" for the frame of every link. Also "joint" and "frame" for a mechanism with
-            visual shapes (from its file).
+            visual shapes (`Mechanism.add_shape`).
         hidden: roles that are hidden. If "visual" is hidden, bars and joints replace the visual
             shapes.
 

@@ -65,8 +65,8 @@ class Scene:
     Attributes:
         system: mechanism.
         primitives: shapes, each with its link (0 for the base) and its role: link, joint, axis,
-            frame, loop, force, base, label, link frame. Shapes of links from the mechanism file
-            have the role visual, and the bars of these links the role skeleton.
+            frame, loop, force, base, label, link frame. Shapes from `Mechanism.add_shape` or a
+            robot file have the role visual, and the bars of their links the role skeleton.
         links: names of the base and the links.
         up: unit vector against gravity, in the base frame.
         size: size of the mechanism [m].
@@ -161,8 +161,8 @@ def scene(
 ) -> Scene:
     """Return the scene of a mechanism: shapes of links, joints, force elements and frames.
 
-    Links with visual shapes in the mechanism file are drawn with these shapes. Bodies defined by
-    dimensions (Box, Cylinder) are drawn to scale. Other links are bars between their joints.
+    Links with shapes from `Mechanism.add_shape` or a robot file are drawn with them. Bodies defined
+    by dimensions (Box, Cylinder) are drawn to scale. Other links are bars between their joints.
     Sizes of joints and frames follow from the size of the mechanism. Loops are not closed.
 
     Args:

@@ -204,7 +204,7 @@ def figures(scene: PosedLinks, notes: list[str]) -> Iterator[Visual]:
 def _drawn(
     shape: Shape, link: int, colour: str, pose: Array, notes: list[str], role: str
 ) -> Iterator[Visual]:
-    """Yield a shape of the mechanism file at a pose (3, 4). A missing mesh adds a note instead."""
+    """Yield a shape of a body at a pose (3, 4). A missing mesh adds a note instead."""
     if shape.colour is not None:
         colour = "#" + "".join(f"{round(255 * part):02x}" for part in shape.colour)
     try:
@@ -271,11 +271,11 @@ def _solid(
 
 
 Visual = BoxShape | CylinderShape | BarShape | BallShape | MeshShape
-"""Primitives that draw the shapes of a mechanism file."""
+"""Primitives that draw the shapes of bodies."""
 
 
 def visual_shapes(scene: PosedLinks, notes: list[str]) -> Iterator[Visual]:
-    """Yield the visual shapes of the links from the mechanism file.
+    """Yield the shapes of the links (`Mechanism.add_shape`, or from a robot file).
 
     Args:
         scene: posed links.

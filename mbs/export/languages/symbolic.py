@@ -388,8 +388,8 @@ def printer_of(
             empty text means that the language does not have the function. "denied" is the negation.
         power: format of a power, such as `{0}^{1}`.
         comparisons: comparison signs that differ from C, by sympy class name.
-        joins: signs of "both" (and) and "either" (or) between parenthesised conditions. By default
-            those of C.
+        joins: signs of "both" (and) and "either" (or) between parenthesised conditions. Defaults:
+            the signs of C.
     """
     values = {
         "forms": {"sqrt": "sqrt({0})", "denied": "!{0}", **forms},

@@ -164,8 +164,8 @@ static core_status show_joints(core *c) {
 }
 
 #ifdef MODEL_TREE
-/* Compute all values at a start in a singular configuration. The accelerations are those of the
- * branch, computed from configurations on both sides. */
+/* Compute all values at a start in a singular configuration. The accelerations belong to the
+ * branch of the start velocities and come from configurations on both sides. */
 static core_status show_start(core *c) {
     double none[NT], *v = c->m.values;
     int i;

@@ -16,7 +16,7 @@ struct core_state {
     core_memory m;
 };
 
-/* CRC-32 of IEEE 802.3, as in zlib. A change of one byte always changes it. */
+/* CRC-32 of IEEE 802.3, as in zlib. Every change of a single byte changes it. */
 static unsigned checksum(const char *bytes) {
     unsigned table[16], sum = 0xffffffffu, i, bit;
     size_t k;

@@ -42,7 +42,7 @@ def test_every_source_in_the_code_is_in_the_bibliography() -> None:
         (
             "components.md",
             "components",
-            {"Component", "Joint", "Mechanism", "Note", "Placed", "Point"},
+            {"Component", "Description", "Joint", "Note", "Placed", "Point"},
         ),
         ("models.md", "models", set()),
         ("export.md", "export", set()),

@@ -10,7 +10,7 @@ from mbs.export import inverse_geometry_fmu
 from mbs.export.fmu.inverse_geometry_fmu import _model
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry.chain import frame_chain
-from mbs.models.inverse_geometry.closed_form import steps_or_all
+from mbs.models.inverse_geometry.functions import steps_or_all
 
 NAMES = [*"xyz", *(f"R{r}{c}" for r in (1, 2, 3) for c in (1, 2, 3))]
 START = np.array([0.3, -0.8, -0.4, 0.2, 0.6, 0.1])

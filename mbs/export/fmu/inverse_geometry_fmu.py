@@ -23,11 +23,8 @@ from mbs.export.fmu.variables import parameters
 from mbs.files import path_of
 from mbs.models.geometry import terminal_frame, transform
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain
-from mbs.models.inverse_geometry.closed_form import (
-    all_branches,
-    size,
-    steps_or_all,
-)
+from mbs.models.inverse_geometry.closed_form import all_branches, size
+from mbs.models.inverse_geometry.functions import steps_or_all
 
 _MEMORY = 0.01
 """Time constant [s] with which the states that select the branch follow the solution: shorter than

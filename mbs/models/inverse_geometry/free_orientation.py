@@ -24,7 +24,6 @@ from mbs.models.inverse_geometry.chain import (
 )
 from mbs.models.inverse_geometry.follow import Followed, Redundancy
 from mbs.models.inverse_geometry.follow import follow as follow_poses
-from mbs.models.inverse_geometry.many import ManySolutions, solve_many
 from mbs.models.inverse_geometry.redundancy import Locked, Redundant
 from mbs.models.inverse_geometry.solutions import (
     Given,
@@ -36,6 +35,7 @@ from mbs.models.inverse_geometry.solutions import (
     leaves_out,
 )
 from mbs.models.inverse_geometry.solve import solve
+from mbs.models.inverse_geometry.solve_many import ManySolutions, solve_many
 from mbs.models.inverse_geometry.whole_robot import close, why_searched
 from mbs.text import did_you_mean, quoted
 

@@ -1,0 +1,274 @@
+"""Solutions of the inverse geometric model for many poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.model_function import require_system
+from mbs.closed_forms.arm import Arm, Array
+from mbs.closed_forms.sequence import StepSequence
+from mbs.errors import NoClosedForm
+from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_poses
+from mbs.models.inverse_geometry.closed_form import (
+    CLOSED_FORMS,
+    require_method,
+    sequence_of,
+)
+from mbs.models.inverse_geometry.gathering import METHODS
+from mbs.models.inverse_geometry.many import (
+    Booleans,
+    BranchSolutions,
+    draft_solutions,
+    general_draft,
+    general_draft_varied,
+    nothing,
+    ready,
+    with_configurations,
+)
+from mbs.models.inverse_geometry.redundancy import Locked, LockedSamples, Redundant, samples_of
+from mbs.models.inverse_geometry.solutions import (
+    WITHIN,
+    CoordinateLimits,
+    Given,
+    Solutions,
+    bounds,
+    leaves_out,
+)
+from mbs.models.inverse_geometry.solve import solve_at, solve_rigid
+
+Repair = Callable[[Arm, Array], Array]
+"""Function (arm, T (4, 4)) -> all configurations (m, n) of the arm with end pose T."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ManySolutions:
+    """Solutions of N poses: one row per pose, one column per branch.
+
+    With S positions of redundant joints, the columns of the first position are followed by the
+    columns of the second position, and so on. Use `q.reshape(N, S, -1, nq)` to separate them.
+
+    Attributes:
+        q: (N, S branches, nq) configurations [rad or m]; arbitrary finite values if not valid.
+        valid: (N, S branches) whether the column contains a solution.
+        residual: (N, S branches) largest absolute difference of an element between the pose of q
+            and the target, in m and 1; infinite in unused columns.
+        labels: names of the columns; empty texts without a closed form.
+        searched: (N,) whether the pose was solved individually at some position of redundant
+            joints. Its configurations are in the columns of the nearest branches.
+        undecided: (N,) whether double precision cannot decide the list of solutions at some
+            position of redundant joints; see `Solutions.undecided`.
+        samples: number S of positions of redundant joints, 1 without redundant joints.
+    """
+
+    q: Array
+    valid: Booleans
+    residual: Array
+    labels: tuple[str, ...]
+    searched: Booleans
+    undecided: Booleans
+    samples: int = 1
+
+    def __len__(self) -> int:
+        """Return the number of poses."""
+        return len(self.q)
+
+    @property
+    def count(self) -> NDArray[np.int64]:
+        """Number of solutions of each pose, (N,)."""
+        count: NDArray[np.int64] = np.sum(self.valid, axis=1, dtype=np.int64)
+        return count
+
+    def of(self, k: int) -> Array:
+        """Return the solutions (m, nq) of pose k, counted from 0 [rad or m]."""
+        configurations: Array = self.q[k, self.valid[k]]
+        return configurations
+
+
+def solve_many(
+    system: System,
+    T: Any,
+    frame: str | int | None = None,
+    method: str = "auto",
+    limits: bool | Given | None = None,
+    locked: Locked | None = None,
+    *,
+    redundant: Redundant | None = None,
+    parameters: Mapping[str, float] | None = None,
+    repair: Repair | None = None,
+) -> ManySolutions:
+    """Compute all configurations for many poses of a frame (inverse kinematics).
+
+    A compiled closed form is used, else the general method. Poses at which solutions coincide or
+    joints are undetermined are solved one by one, and so are all poses if neither method applies.
+    Angles are in [-pi, pi]; limits may shift them by full revolutions.
+
+    Args:
+        system: serial robot or tree. For a robot with loops each pose is solved individually.
+        T: (N, 4, 4) poses of the frame relative to the base [m].
+        frame: name of a body or frame, index of a link, or None for the terminal frame.
+        method: "pieper", "paul", "auto" for the cheaper applicable one of both, "general" or
+            "search".
+        limits: None keeps all solutions. True drops solutions beyond the joint limits of the model.
+            A dict of (lower, upper) by joint name replaces limits and drops solutions beyond them
+            [rad or m].
+        locked: positions of fixed joints by name: one for all poses, or (N,) one per pose [rad or
+            m].
+        redundant: samples of joints beyond the six that a pose determines, by name: number of
+            positions between the limits (or over one revolution), or positions (S,) for all poses
+            or (N, S) per pose [rad or m]. Several joints form all combinations, the last joint
+            varies fastest.
+        parameters: parameter values by name; default values for all others.
+        repair: function that solves single poses of a serial robot; default is `solve`. Its
+            results are not marked as undecided.
+
+    Returns:
+        ManySolutions with the same solutions as `solve` for each pose.
+
+    Raises:
+        NoClosedForm: method is "pieper" or "paul" and does not apply to the robot.
+        ModelError: a matrix is no rigid transform, a name is unknown, positions have a wrong shape
+            or value, or more than six joints are free.
+    """
+    require_system(system)
+    require_method(system, method, METHODS)
+    poses, p = target_poses(system, T), np.array(system.parameter_values(parameters))
+    samples = samples_of(system, locked, redundant, limits, len(poses))
+    if system.is_closed:
+        answers = [
+            solve_rigid(
+                system,
+                pose,
+                frame,
+                method,
+                limits,
+                locked={**samples.locked, **dict(zip(samples.varied, at, strict=True))},
+                parameters=parameters,
+            )
+            for pose, own in zip(poses, samples.r.tolist(), strict=True)
+            for at in own
+        ]
+        return _gather_samples(_stack(system, answers), samples)
+    robot = _robot(frame_chain(system, frame, samples.locked, samples.varied), method, p)
+    count, number, joints = samples.r.shape
+    r = samples.r.reshape(count * number, joints)
+    many = poses if number == 1 else np.repeat(poses, number, axis=0)
+    draft = robot.draft(many, r)
+    undecided = np.zeros(len(many), dtype=bool)
+    for k in np.flatnonzero(draft.searched):
+        chain, pose = robot.chain.locked_at(r[k]), many[k]
+        arm = chain.arm(p)
+        if repair:
+            q = repair(arm, pose)
+        else:
+            q, undecided[k] = robot.solved(pose, r[k])
+        draft = with_configurations(draft, int(k), arm, q, pose)
+    q, valid = robot.whole(draft.q, r), draft.valid
+    if leaves_out(limits):
+        names, indices = list(redundant or {}), list(robot.chain.indices)
+        indices += [k for k, c in enumerate(system.coordinates) if c.name in names]
+        q, within = _unwind(bounds(system, limits, indices), q)
+        valid = valid & within
+    found = ManySolutions(q, valid, draft.residual, draft.labels, draft.searched, undecided)
+    return _gather_samples(found, samples)
+
+
+def _gather_samples(many: ManySolutions, samples: LockedSamples) -> ManySolutions:
+    """Join the rows of all samples of redundant joints of a pose to one row."""
+    count, number, _ = samples.r.shape
+    if number == 1:
+        return many
+    columns = many.valid.shape[1]
+    shape = count, number * columns
+    return ManySolutions(
+        many.q.reshape(*shape, many.q.shape[2]),
+        many.valid.reshape(shape),
+        many.residual.reshape(shape),
+        many.labels * number,
+        np.any(many.searched.reshape(count, number), axis=1),
+        np.any(many.undecided.reshape(count, number), axis=1),
+        number,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Robot:
+    """Chain, parameter values and method of a robot; `sequence` is None without a closed form."""
+
+    chain: FrameChain
+    p: Array
+    method: str
+    sequence: StepSequence | None
+
+    def draft(self, T: Array, r: Array) -> BranchSolutions:
+        """Solve poses T (N, 4, 4) by the closed form, else by the general method."""
+        if self.sequence is not None:
+            return draft_solutions(self.chain, self.sequence, self.p, T, r)
+        if self.method in ("auto", "general"):
+            if self.chain.varied:
+                return general_draft_varied(self.chain, self.p, T, r)
+            general = ready(self.chain, self.p)
+            if general is not None:
+                return general_draft(general, T)
+        return nothing(len(self.chain.names), len(T))
+
+    def solved(self, pose: Array, r: Array) -> tuple[Array, bool]:
+        """Solve one pose with varied joints at r (k,): chain positions (m, n), undecided flag."""
+        found = solve_at(self.chain, r, pose, self.method, self.p)
+        return found.q[:, list(self.chain.indices)], found.undecided
+
+    def whole(self, q: Array, r: Array) -> Array:
+        """Return the positions (N, branches, nq) of all joints; others as assembled or locked."""
+        system = self.chain.system
+        if self.chain.indices == tuple(range(system.nq)):
+            return q
+        every = np.empty((*q.shape[:2], system.nq))
+        every[...] = system.position(self.chain.locked)
+        every[..., list(self.chain.indices)] = q
+        every[..., list(self.chain.varied_indices)] = r[:, None]
+        return every
+
+
+def _robot(chain: FrameChain, method: str, p: Array) -> _Robot:
+    return _Robot(chain, p, method, _sequence(chain, method, p))
+
+
+def _sequence(chain: FrameChain, method: str, p: Array) -> StepSequence | None:
+    """Return the requested closed form, or None if there is none or the method is another."""
+    if method not in (*CLOSED_FORMS, "auto"):
+        return None
+    try:
+        return sequence_of(chain, method, p)
+    except NoClosedForm:
+        if method != "auto":
+            raise
+        return None
+
+
+def _stack(system: System, answers: list[Solutions]) -> ManySolutions:
+    """Combine the solutions of all poses in arrays."""
+    columns = max((len(answer) for answer in answers), default=0)
+    shape = len(answers), columns
+    q, valid = np.zeros((*shape, system.nq)), np.zeros(shape, dtype=bool)
+    residual = np.full(shape, np.inf)
+    for k, answer in enumerate(answers):
+        m = len(answer)
+        q[k, :m], valid[k, :m] = answer.q, True
+        residual[k, :m] = [solution.residual for solution in answer]
+    undecided = np.array([answer.undecided for answer in answers], dtype=bool)
+    searched = np.ones(len(answers), dtype=bool)
+    return ManySolutions(q, valid, residual, ("",) * columns, searched, undecided)
+
+
+def _unwind(allowed: CoordinateLimits, q: Array) -> tuple[Array, Booleans]:
+    """Shift angles of q (N, branches, nq) into the limits; also return whether all are within."""
+    low, high = allowed.low - WITHIN, allowed.high + WITHIN
+    missing = np.where(q < low, low - q, np.where(q > high, high - q, 0.0)) / (2 * np.pi)
+    turns = np.copysign(np.ceil(np.abs(missing)), missing)
+    wound = np.where(allowed.turns & (missing != 0), q + 2 * np.pi * turns, q)
+    return wound, np.all((wound >= low) & (wound <= high), axis=-1)

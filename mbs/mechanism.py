@@ -15,6 +15,9 @@ from mbs.result import Result, State, positions_of
 from mbs.text import quoted
 
 
+__all__ = ["Mechanism"]
+
+
 class Mechanism(Description):
     """Bodies and joints connected in any order. Loops are found during assembly.
 

@@ -142,9 +142,9 @@ class Sum(SignalBlock):
 class Limiter(SignalBlock):
     """y = u between two limits, and the nearer limit beyond them.
 
-    With a width w the corners are rounded: fmax(x, 0) becomes w log(1 + exp(x / w)), which is
-        larger
-    by w log 2 at the corner and by w exp(-10) at a distance of 10 w. y stays between the limits.
+    With a width w the corners are rounded: fmax(x, 0) becomes w log(1 + exp(x / w)). The
+    difference is w log 2 at the corner and w exp(-10) at a distance of 10 w. y stays between the
+    limits.
 
     Attributes:
         low, high: limits, one of which may be left out.

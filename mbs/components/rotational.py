@@ -189,8 +189,7 @@ class PlanetaryGear(custom.Custom):
 
     It is one constraint row on the three shafts, exact in positions and velocities, without
     inertia: every shaft is a joint, has an inertia of its own, or is locked by a FixedFlange. The
-        torques on
-    the shafts have the ratios 1 : ratio : -(1 + ratio).
+    torques on the shafts have the ratios 1 : ratio : -(1 + ratio).
 
     Source: Modelica Association 2023 for the equation.
 

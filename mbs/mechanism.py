@@ -14,7 +14,6 @@ from mbs.loops.assemble import assemble
 from mbs.result import Result, State, positions_of
 from mbs.text import quoted
 
-
 __all__ = ["Mechanism"]
 
 

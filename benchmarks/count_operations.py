@@ -91,21 +91,27 @@ unused lines, lines of constants alone and repeated sub-expressions were removed
 
 _HEAD = """# Operations of the models
 
-Made by `python benchmarks/count_operations.py docs/operations.md`. Multiplications / additions of
-each model as it is built, then after `mbs.operations.simplify`, then the fewest of OpenSYMORO and
-SymPyBotics for the same robot in base parameters.
+The table is made by `python benchmarks/count_operations.py docs/operations.md`. It gives
+multiplications / additions of each model as it is built, then after `mbs.operations.simplify`,
+then the fewest of OpenSYMORO and SymPyBotics for the same robot in base parameters.
 
-The convention is that of Khalil & Kleinfinger 1987: lengths and inertial parameters are symbols,
-what depends on them alone is computed once and not counted, a division counts as a multiplication,
-a square too; signs, sines and cosines are not counted; no friction, no rotors, no external
-wrench. Full and base inertial parameters give the same counts, because the models regroup the
-parameters themselves; the table was made with the full ones. The other tools' figures were counted
-in the same way on the text that they write, with unused lines, lines of constants and repeated
-sub-expressions removed first. For the general 6R robot Khalil & Kleinfinger's formula (92 n - 127,
-81 n - 117) gives 425/369 for the IDM.
+The counting convention is that of Khalil & Kleinfinger 1987:
+
+- Lengths and inertial parameters are symbols. Operations on these symbols alone are done once
+  and not counted.
+- A division counts as a multiplication, and so does a square. Signs, sines and cosines are not
+  counted.
+- The models have no friction, no rotors and no external wrench.
+
+Full and base inertial parameters give the same counts, because the models regroup the
+parameters themselves. The table was made with full parameters. Operations of the other tools
+were counted in the same way on the code that they generate. Unused lines, lines of constants
+and repeated sub-expressions were removed first. For the general 6R robot the formula of Khalil
+& Kleinfinger (92 n - 127, 81 n - 117) gives 425/369 for the IDM.
 
 D, D1 and D2, h are the identification models, with a column for each of the ten inertial
-parameters of every link; the other tools' figures of D are for full parameters too.
+parameters of every link. For D the counts of the other tools are for full parameters too.
+
 """
 
 
@@ -131,7 +137,7 @@ def table() -> str:
         cells = (_cell(name, model, build(system)) for model, build in models.items())
         lines.append(f"| {TITLES[name]} | " + " | ".join(cells) + " |")
     print(f"{time.process_time() - begin:.1f} s", file=sys.stderr)
-    lines += ["", "A cell reads: as built, *simplified*, (others)."]
+    lines += ["", "A cell contains: as built, *simplified*, (others)."]
     return "\n".join(lines) + "\n"
 
 

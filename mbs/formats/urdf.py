@@ -4,7 +4,7 @@ The reader uses the elements that affect the motion (links, inertials, joints, l
 mimics and rotors of transmissions) and the shapes of links for pictures. Incomplete or invalid data
 are read as far as possible, with a note in the mechanism.
 
-The reader does not use MuJoCo; see "URDF without MuJoCo" in docs/decisions.md.
+The reader does not use MuJoCo; see "URDF without MuJoCo" in docs/decisions.
 """
 
 from __future__ import annotations

@@ -139,6 +139,7 @@ def small_motions(system: System, q: Array, tolerances: Tolerances) -> tuple[str
         q: positions of a motion, (n, nq).
         tolerances: tolerances of the motion.
     """
-    moved = np.ptp(q, axis=0) if len(q) else np.zeros(q.shape[1])
+    columns = np.ascontiguousarray(q.T)  # extrema of rows are several times faster
+    moved = columns.max(axis=1) - columns.min(axis=1) if len(q) else np.zeros(q.shape[1])
     found = (moved > 0) & (moved < _SMALL * tolerances.absolute[: q.shape[1]])
     return tuple(c.name for c, small in zip(system.coordinates, found, strict=True) if small)

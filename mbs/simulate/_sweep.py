@@ -30,9 +30,9 @@ from mbs.files import check_archive, path_of, write_text
 from mbs.numbers import numbers_given
 from mbs.progress import progress
 from mbs.result import Result, State, optional_module, state_of
-from mbs.simulate.fmu import fmu
+from mbs.simulate._fmu import fmu
 from mbs.simulate.fmu_variables import numbers_of
-from mbs.simulate.run import run, simulator_of
+from mbs.simulate.simulator import run, simulator_of
 from mbs.text import did_you_mean, error_text, quoted
 
 # Cases of a parameter sweep, and the folder of their results.

@@ -47,14 +47,14 @@ def with_crossings(
     t0, end = span
     duration = end - t0 or 1.0  # 1 s if only one time is requested: no events
     start = np.array(state.crossings(t0, x0, [*p, *modes]))[:, 0]
-    few = state.sides + state.counts
-    plain, sides, counts = np.split(start, [len(start) - few, len(start) - state.counts])
-    places = [*np.where(plain > 0, 1.0, -1.0), *np.sign(sides), *np.floor(counts)]
-    if few:  # initial modes of `guard`: awake, no repeated events, since the start
+    n_guarded = state.sides + state.counts
+    contacts, sides, counts = np.split(start, [len(start) - n_guarded, len(start) - state.counts])
+    first_modes = [*np.where(contacts > 0, 1.0, -1.0), *np.sign(sides), *np.floor(counts)]
+    if n_guarded:  # initial modes of `guard`: awake, no repeated events, since the start
         begin = float(math.floor(ticks_of(t0, duration)))
-        places += [*np.zeros(2 * few), *np.full(few, begin), duration]
+        first_modes += [*np.zeros(2 * n_guarded), *np.full(n_guarded, begin), duration]
     first_step = _FIRST_STEP if state.short else 0.0
-    return Events(indicators, jump, [*modes, *places], first_step, approaches), functions
+    return Events(indicators, jump, [*modes, *first_modes], first_step, approaches), functions
 
 
 def _watch_crossings(
@@ -72,40 +72,49 @@ def _watch_crossings(
         modes: number of modes of the other events.
     """
     assert state.crossings is not None
-    count, n_p, few = state.crossings.numel_out(0), own + modes, state.sides + state.counts
-    plain, more = count - few, GUARD_MODES * few + 1 if few else 0
-    first = 0 if events is None else events.indicators.numel_out(0)
-    ends = [0, first, first + plain, first + count + state.counts]
+    count, n_p, n_guarded = state.crossings.numel_out(0), own + modes, state.sides + state.counts
+    n_contacts, n_guard_modes = count - n_guarded, GUARD_MODES * n_guarded + 1 if n_guarded else 0
+    n_others = 0 if events is None else events.indicators.numel_out(0)
+    ends = [0, n_others, n_others + n_contacts, n_others + count + state.counts]
     t, x, pm, fired = (
         SX.sym(name, size)
-        for name, size in (("t", 1), ("x", n), ("p", n_p + plain + more), ("fired", ends[-1]))
+        for name, size in (
+            ("t", 1),
+            ("x", n),
+            ("p", n_p + n_contacts + n_guard_modes),
+            ("fired", ends[-1]),
+        )
     )
-    parameters, sides, guards = casadi.vertsplit(pm, [0, n_p, n_p + plain, n_p + plain + more])
-    fired_first, fired_plain, fired_few = casadi.vertsplit(fired, ends)
+    parameters, contact_sides, guards = casadi.vertsplit(
+        pm, [0, n_p, n_p + n_contacts, n_p + n_contacts + n_guard_modes]
+    )
+    fired_others, fired_contacts, fired_guarded = casadi.vertsplit(fired, ends)
     at = [t, x, parameters]
 
-    def wide(function: Function) -> Function:
+    def with_all_modes(function: Function) -> Function:
         return Function(function.name(), [t, x, pm], function.call(at))
 
-    values, few_values = casadi.vertsplit(state.crossings.call(at)[0], [0, plain, count])
+    values, guarded_values = casadi.vertsplit(state.crossings.call(at)[0], [0, n_contacts, count])
     *own_modes, duration = (
-        casadi.vertsplit(guards, [0, GUARD_MODES * few, more]) if few else [guards, guards]
+        casadi.vertsplit(guards, [0, GUARD_MODES * n_guarded, n_guard_modes])
+        if n_guarded
+        else [guards, guards]
     )
-    guarded, then = guard(t, few_values, state.counts, own_modes[0], fired_few, duration)
-    indicators = [sides * values, guarded]
+    guarded, then = guard(t, guarded_values, state.counts, own_modes[0], fired_guarded, duration)
+    indicators = [contact_sides * values, guarded]
     state_after, after = x, [SX(0, 1)]
     if events is not None:
         indicators.insert(0, events.indicators.call(at)[0])
-        jumps = casadi.mmax(fired_first)
-        there, *changed = events.jump.call([*at, fired_first])  # modes, if any
-        state_after = casadi.if_else(jumps, there, x)
+        jumps = casadi.mmax(fired_others)
+        after_others, *changed = events.jump.call([*at, fired_others])  # modes, if any
+        state_after = casadi.if_else(jumps, after_others, x)
         after = [casadi.if_else(jumps, now, pm[own:n_p]) for now in changed]
-    after += [casadi.if_else(fired_plain > 0, -sides, sides), then, duration]
+    after += [casadi.if_else(fired_contacts > 0, -contact_sides, contact_sides), then, duration]
     approaches = None
     if state.approaches is not None:
         (known,) = state.approaches.call(at)
-        acting = casadi.horzcat(known, sides > 0)  # a contact whose depth is positive
-        others = [SX.zeros(first, 3), acting, SX.zeros(ends[-1] - first - plain, 3)]
+        acting = casadi.horzcat(known, contact_sides > 0)  # a contact whose depth is positive
+        others = [SX.zeros(n_others, 3), acting, SX.zeros(ends[-1] - n_others - n_contacts, 3)]
         approaches = Function("approaches", [t, x, pm], [casadi.vertcat(*others)])
     watched = (
         Function("indicators", [t, x, pm], [casadi.vertcat(*indicators)]),
@@ -115,17 +124,17 @@ def _watch_crossings(
 
     def held(function: Function) -> Function:
         modes = own_modes[0]
-        return hold_sides(function, at, few_values, modes, state.counts, [t, x, pm])
+        return hold_sides(function, at, guarded_values, modes, state.counts, [t, x, pm])
 
     passage = state.passage
     if passage is not None:
         passage = replace(
             passage,
-            rows=wide(passage.rows),
+            rows=with_all_modes(passage.rows),
             forces=held(passage.forces),
-            regularity=wide(passage.regularity),
+            regularity=with_all_modes(passage.regularity),
         )
-    project = None if state.project is None else wide(state.project)
+    project = None if state.project is None else with_all_modes(state.project)
     return watched, (held(state.rhs), project, passage)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from mbs.loops.configuration import start as configuration
 from mbs.models.state.tree import full_state
-from mbs.simulate.run import with_crossings
+from mbs.simulate.crossings import with_crossings
 from mbs.simulate.tolerances import step_tolerances
 from mbs.solvers.integrate import IntegrationCode, run_problem
 from mbs.solvers.problem import equations, problem
@@ -70,7 +70,7 @@ class Ours:
         self.x0 = np.concatenate(
             [*configuration(system, start(HEIGHT), None, None), system.z_start]
         )
-        self.events, (rhs, project, _) = with_crossings(state, self.x0, 0.0, None, ())
+        self.events, (rhs, project, _) = with_crossings(state, self.x0, (0.0, DURATION), None, ())
         self.functions = equations(rhs, project, method, self.events)
         self.code = IntegrationCode(self.functions, may_compile=True)
         if not self.code.compile():

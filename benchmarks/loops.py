@@ -37,7 +37,7 @@ from mbs.loops.configuration import start
 from mbs.models.state.signals import effort_function
 from mbs.models.state.tree import full_state
 from mbs.robots import n_four_bar
-from mbs.simulate.run import integrate_legs
+from mbs.simulate.segments import integrate_segments
 from mbs.simulate.tolerances import step_tolerances
 
 GROWTH = (10, 20, 40, 80, 160)
@@ -241,7 +241,7 @@ def _calls(case: Case, duration: float, tolerance: float) -> Iterator[Callable[[
     rtol, atol = step_tolerances(tolerance)
     state = full_state(system, effort_function(system, case.tau))
     options: dict[str, Any] = {"method": case.method, "rtol": rtol, "atol": atol}
-    yield lambda: integrate_legs(system, lambda _: state, x0, times, p, **options)
+    yield lambda: integrate_segments(system, lambda _: state, x0, times, p, **options)
     laws: dict[str, Any] = {"tau": case.tau, "method": case.method}
     given: dict[str, Any] = {"tolerance": tolerance, "v0": case.v0}
     yield lambda: mbs.simulate.run(system, duration, quiet=True, **laws, **given)

@@ -21,7 +21,7 @@ from mbs.models.state.signals import effort_function
 from mbs.models.state.tree import FullState, full_state
 from mbs.native import compiler_found
 from mbs.robots import andrews_squeezer, bricard, flyball_governor, n_four_bar, simple_pendulum
-from mbs.simulate.run import integrate_legs
+from mbs.simulate.segments import integrate_segments
 from mbs.simulate.tolerances import step_tolerances
 
 Array = np.ndarray[Any, Any]
@@ -158,12 +158,12 @@ def run(case: Case, of: Made, tolerance: float, times: Array) -> Callable[[], Ar
     options: dict[str, Any] = {"method": case.method, "rtol": rtol, "atol": atol}
 
     def states() -> Array:
-        legs, stop = integrate_legs(
+        segments, stop = integrate_segments(
             of.system, lambda _: of.state, of.x0, times, np.zeros(0), **options
         )
         if stop is not None:
             raise stop
-        return np.concatenate([leg.x for leg in legs])
+        return np.concatenate([segment.x for segment in segments])
 
     return states
 

@@ -8,7 +8,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable
 
 from mbs.errors import SolverError
-from mbs.simulate.fmu import Intermediate, co_simulate
+from mbs.simulate._fmu import Intermediate, co_simulate
 from mbs.simulate.fmu_plan import Plan, recording_of, row_times, tracks_of, with_points
 from mbs.simulate.fmu_variables import columns_of, reader, writer
 

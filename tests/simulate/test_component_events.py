@@ -1,4 +1,4 @@
-"""Events of components beside contacts, discs, and legs of over-constrained loops."""
+"""Events of components beside contacts, discs, and segments of over-constrained loops."""
 
 import sys
 from dataclasses import replace
@@ -84,24 +84,24 @@ def test_beside_a_rolling_disc():
     assert ticks(mbs.simulate.run(system, 0.95, quiet=True)) == 9
 
 
-def test_in_legs_of_over_constrained_loops(monkeypatch):
-    """Rows are chosen again if no passage is possible: each leg has its events."""
+def test_in_segments_of_over_constrained_loops(monkeypatch):
+    """Rows are chosen again if no passage is possible: each segment has its events."""
     m = mbs.load("bricard")
     m.add(Clock("clock"))
     system = m.assemble()
     assert system.closure.varies
     whole = mbs.simulate.run(system, 0.95, tolerance=1e-9, quiet=True)
-    module = sys.modules["mbs.simulate.run"]
+    module = sys.modules["mbs.simulate.simulator"]
     full = module.full_state
 
     def without_passage(*args, **options):
         return replace(full(*args, **options), passage=None)
 
     monkeypatch.setattr(module, "full_state", without_passage)
-    legs = mbs.simulate.run(system, 0.95, tolerance=1e-9, quiet=True)
-    assert ticks(whole) == ticks(legs) == 9
+    segments = mbs.simulate.run(system, 0.95, tolerance=1e-9, quiet=True)
+    assert ticks(whole) == ticks(segments) == 9
     name = system.coordinates[0].name
-    assert legs[f"{name}.q"] == pytest.approx(whole[f"{name}.q"], abs=1e-6)  # tolerance of 1e-9
+    assert segments[f"{name}.q"] == pytest.approx(whole[f"{name}.q"], abs=1e-6)  # tolerance of 1e-9
 
 
 def test_what_does_not_settle_is_named():

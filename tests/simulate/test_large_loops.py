@@ -11,7 +11,7 @@ from mbs.native import compiler_found
 from mbs.robots import n_four_bar
 
 INTEGRATE = sys.modules["mbs.solvers.integrate"]
-TREE = sys.modules["mbs.models.state.tree"]
+SINGULAR = sys.modules["mbs.models.state.singular_configurations"]
 
 
 @pytest.mark.skipif(not compiler_found(), reason="there is no compiler")
@@ -28,7 +28,7 @@ def test_code_in_pieces_gives_the_same_bits(monkeypatch):
 def test_zeros_of_large_matrices_are_not_written_one_by_one(monkeypatch):
     system = n_four_bar(20).assemble()
     few = full_state(system).passage
-    monkeypatch.setattr(TREE, "_LARGE", 10**9)
+    monkeypatch.setattr(SINGULAR, "_DENSE_SIZE", 10**9)
     every = full_state(system).passage
     for made, whole in ((few.rows, every.rows), (few.forces, every.forces)):
         assert made.n_instructions() < 0.65 * whole.n_instructions()

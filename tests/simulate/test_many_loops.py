@@ -11,7 +11,7 @@ from support.runtime import integrate_with, with_constant
 import mbs
 from mbs.components import Revolute, Spherical
 from mbs.errors import SolverError
-from mbs.models.state import tree
+from mbs.models.state import singular_configurations
 from mbs.solvers import problem
 
 INTEGRATE = importlib.import_module("mbs.solvers.integrate")
@@ -52,7 +52,7 @@ def test_sparse_matrices_give_the_bits_of_dense_ones(monkeypatch, count, balls):
     sparse = motion(windows(count, balls=balls), 1.0)
     assert sum(pattern is not None for pattern in patterns) >= 2  # slopes and inertia
     patterns.clear()
-    monkeypatch.setattr(tree, "_LARGE", 10**9)
+    monkeypatch.setattr(singular_configurations, "_DENSE_SIZE", 10**9)
     dense = motion(windows(count, balls=balls), 1.0)
     assert all(pattern is None for pattern in patterns)
     assert np.array_equal(sparse.values, dense.values)

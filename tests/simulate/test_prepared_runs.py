@@ -22,7 +22,8 @@ from mbs.components import (
     custom,
 )
 
-run_module = importlib.import_module("mbs.simulate.run")
+simulator = importlib.import_module("mbs.simulate.simulator")
+segments = importlib.import_module("mbs.simulate.segments")
 
 
 def swing(system, **options):
@@ -50,12 +51,12 @@ def test_a_second_run_is_the_first_to_the_last_bit(name, method):
 
 @pytest.mark.parametrize("limit", [0, 5e4])
 def test_what_is_observed_often_is_compiled_to_the_same_bits(limit, monkeypatch):
-    made, build = [], run_module.compiled
-    monkeypatch.setattr(run_module, "compiled", lambda *a, **k: made.append(a) or build(*a, **k))
+    made, build = [], segments.compiled
+    monkeypatch.setattr(segments, "compiled", lambda *a, **k: made.append(a) or build(*a, **k))
     system = mbs.load("four_bar").assemble()
     first = swing(system)
     assert not made
-    monkeypatch.setattr(run_module, "_INTERPRETED", limit)
+    monkeypatch.setattr(segments, "_INTERPRETED", limit)
     again = [swing(system) for _ in range(4)]
     assert len(made) == 1
     for one in again:
@@ -67,9 +68,9 @@ def test_what_is_observed_often_is_compiled_to_the_same_bits(limit, monkeypatch)
 @pytest.fixture
 def made(monkeypatch):
     """Names of the systems whose state equations were derived."""
-    found, derive = [], run_module.full_state
+    found, derive = [], simulator.full_state
     count = lambda system, *laws: found.append(system.name) or derive(system, *laws)  # noqa: E731
-    monkeypatch.setattr(run_module, "full_state", count)
+    monkeypatch.setattr(simulator, "full_state", count)
     return found
 
 
@@ -115,7 +116,7 @@ def test_another_process_reads_what_this_one_derived(name, made, disk):
     assert np.array_equal(swing(again).values, result.values)
     assert len(made) == 1
     program = (
-        "import sys, mbs; run = __import__('mbs.simulate.run', fromlist=['run'])\n"
+        "import sys, mbs; run = __import__('mbs.simulate.simulator', fromlist=['run'])\n"
         "def derived(*a): raise SystemExit('derived')\n"
         "run.full_state = derived\n"
         f"r = run.run(mbs.load({name!r}).assemble(), 0.5, quiet=True)\n"
@@ -280,8 +281,8 @@ def test_code_of_a_user_is_never_taken_from_an_earlier_process(disk, tmp_path):
 
 
 def test_a_run_keeps_what_it_prepared_for_numbers_not_for_functions(monkeypatch):
-    made, build = [], run_module.Simulator
-    monkeypatch.setattr(run_module, "Simulator", lambda *a, **k: made.append(a) or build(*a, **k))
+    made, build = [], simulator.Simulator
+    monkeypatch.setattr(simulator, "Simulator", lambda *a, **k: made.append(a) or build(*a, **k))
     system = mbs.load("planar_2r").assemble()
     results = [swing(system, tau=tau) for tau in (None, {"q1": 1.0}, {"q1": 1.0}, None)]
     assert len(made) == 2
@@ -300,9 +301,9 @@ def test_a_run_keeps_what_it_prepared_for_numbers_not_for_functions(monkeypatch)
 
 
 def test_motions_that_differ_in_velocities_close_the_loops_once(monkeypatch):
-    closed, close = [], run_module.start_position
+    closed, close = [], simulator.start_position
     count = lambda *a: closed.append(a) or close(*a)  # noqa: E731
-    monkeypatch.setattr(run_module, "start_position", count)
+    monkeypatch.setattr(simulator, "start_position", count)
     system, other = (mbs.load("four_bar").assemble() for _ in range(2))
     name = system.speeds[system.active[0]].name
     starts = [dict(v0={name: 1.0}), dict(v0={name: 2.0}), dict(q0={name: 0.3}, v0={name: 2.0})]

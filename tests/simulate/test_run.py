@@ -8,7 +8,6 @@ import pytest
 from support.dae_mechanisms import rssr
 
 import mbs
-import mbs.simulate.run
 from mbs import Mechanism
 from mbs.components import (
     Body,

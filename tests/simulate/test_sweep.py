@@ -159,7 +159,7 @@ def test_processes_simulate_a_system_and_prepare_it_once():
     grid = {"L": [0.4, 0.6], "q1.tau": [0.0, 1.0, 2.0]}
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
         spread = mbs.simulate.sweep(system, grid, 0.5, executor=executor, **OPTIONS)
-        sent = inspect.getmodule(mbs.simulate.sweep)._Run(system)
+        sent = inspect.getmodule(mbs.simulate.sweep)._SystemSimulation(system)
         assert executor.submit(prepared_state_equations, sent).result() == 1
     alone = mbs.simulate.sweep(system, grid, 0.5, **OPTIONS)
     assert not spread.failures
@@ -257,7 +257,7 @@ def test_a_broken_off_study_begins_no_further_case(system, tmp_path, monkeypatch
 
     home = inspect.getmodule(mbs.simulate.sweep)
     monkeypatch.setattr(mbs.simulate.Simulator, "__call__", simulated)
-    monkeypatch.setattr(home.Folder, "keep", full)
+    monkeypatch.setattr(home.ResultStore, "write", full)
     with ThreadPoolExecutor(1) as executor, pytest.raises(ExportError, match="disk is full"):
         mbs.simulate.sweep(system, {"L": [0.1] * 50}, 0.1, executor=executor, **OPTIONS)
     assert len(begun) < 50

@@ -28,7 +28,7 @@ from mbs.expressions import (
 from mbs.models.state.signals import effort_function, full_name
 from mbs.result import Result
 from mbs.simulate import run
-from mbs.simulate.run import input_function
+from mbs.simulate.device_inputs import input_function
 from mbs.text import did_you_mean, quoted
 
 # Laws that a user writes as text: numbers, and functions of time, positions and velocities.

@@ -409,3 +409,11 @@ def by_name(
             )
         result[names.index(name)] = float(number.ravel()[0])
     return result
+
+
+def with_inputs(system: System, values: Sequence[SX], u: SX) -> list[SX]:
+    """Substitute values u (nu, 1) for the input symbols of components in expressions."""
+    if not system.u.numel():
+        return [SX(value) for value in values]
+    dense = [casadi.densify(SX(value)) for value in values]
+    return [SX(value) for value in casadi.substitute(dense, [system.u], [casadi.densify(u)])]

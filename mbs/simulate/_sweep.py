@@ -30,9 +30,9 @@ from mbs.files import check_archive, path_of, write_text
 from mbs.numbers import numbers_given
 from mbs.progress import progress
 from mbs.result import Result, State, optional_module, state_of
-from mbs.simulate.fmu import fmu
+from mbs.simulate._fmu import fmu
 from mbs.simulate.fmu_variables import numbers_of
-from mbs.simulate.run import run, simulator_of
+from mbs.simulate.simulator import run, simulator_of
 from mbs.text import did_you_mean, error_text, quoted
 
 # Cases of a parameter sweep, and the folder of their results.
@@ -86,7 +86,7 @@ def _number(name: str, value: object) -> float:
 
 
 @dataclass(frozen=True, slots=True, weakref_slot=True)
-class Folder:
+class ResultStore:
     """Folder of the results of a sweep, with one file per case.
 
     Attributes:
@@ -96,7 +96,7 @@ class Folder:
     path: Path
 
     @staticmethod
-    def opened(path: object, study: Mapping[str, object]) -> Folder:
+    def opened(path: object, study: Mapping[str, object]) -> ResultStore:
         """Make the folder of a sweep, or open it if it contains the same sweep.
 
         Args:
@@ -107,7 +107,7 @@ class Folder:
             ModelError: the folder contains another sweep, or results without description.
             ExportError: the folder cannot be written.
         """
-        folder = Folder(_make(path_of(path).absolute()))
+        folder = ResultStore(_make_folder(path_of(path).absolute()))
         index = folder.path / _INDEX
         text = json.dumps(study, indent=1, sort_keys=True) + "\n"
         known = index.read_bytes() if index.exists() else None
@@ -125,36 +125,36 @@ class Folder:
         """Return the path of the result of a case."""
         return self.path / f"case_{number:06d}.npz"
 
-    def part(self, number: int) -> Path:
+    def partial_file(self, number: int) -> Path:
         """Return the path of the partial result of a case that failed."""
         return self.path / f"part_{number:06d}.npz"
 
-    def keep(self, number: int, result: Result | None, complaint: str = "") -> None:
+    def write(self, number: int, result: Result | None, error: str = "") -> None:
         """Write the result of a case, or its error message and partial result.
 
         Args:
             number: index of the case.
             result: complete result, or the rows before the stop; None if there are no rows.
-            complaint: error message; empty if the case succeeded.
+            error: error message; empty if the case succeeded.
 
         Raises:
             ExportError: the folder cannot be written.
         """
-        said, part = self._complaint(number), self.part(number)
+        file, part = self._error_file(number), self.partial_file(number)
         part.unlink(missing_ok=True)
-        if complaint:
-            write_text(complaint, said)
+        if error:
+            write_text(error, file)
         else:
-            said.unlink(missing_ok=True)
+            file.unlink(missing_ok=True)
         if result is not None:
-            result.save(part if complaint else self.file(number))
+            result.save(part if error else self.file(number))
 
-    def complained(self, number: int) -> str:
+    def error_of(self, number: int) -> str:
         """Return the error message of a case without complete result."""
-        said = self._complaint(number)
-        return said.read_text(encoding="utf-8") if said.is_file() else "not simulated yet"
+        file = self._error_file(number)
+        return file.read_text(encoding="utf-8") if file.is_file() else "not simulated yet"
 
-    def known(self) -> tuple[str, tuple[Case, ...]]:
+    def model_and_cases(self) -> tuple[str, tuple[Case, ...]]:
         """Return the name of the model and the cases of the sweep in this folder.
 
         Raises:
@@ -168,7 +168,7 @@ class Folder:
                 f"sweep: {self.path} holds no study; give the folder that a sweep was given"
             ) from error
 
-    def _complaint(self, number: int) -> Path:
+    def _error_file(self, number: int) -> Path:
         return self.path / f"case_{number:06d}.txt"
 
     def missing(self, count: int) -> list[int]:
@@ -176,7 +176,7 @@ class Folder:
         return [number for number in range(count) if not zipfile.is_zipfile(self.file(number))]
 
 
-def _make(folder: Path) -> Path:
+def _make_folder(folder: Path) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -205,7 +205,10 @@ def study_of(
     Raises:
         ModelError: the FMU cannot be read, or `model` is neither a System nor a path.
     """
-    name, content = _system(model, options) if isinstance(model, System) else _fmu(model)
+    identity = (
+        _system_identity(model, options) if isinstance(model, System) else _fmu_identity(model)
+    )
+    name, content = identity
     described = {option: _describe(value) for option, value in sorted(options.items())}
     digest = hashlib.sha256(content).hexdigest()
     return {"model": name, "content": digest, "cases": list(cases), "options": described}
@@ -216,13 +219,13 @@ _LAWS = ("tau", "motion", "u", "method")
 that all cases have the same equations."""
 
 
-def _system(system: System, options: Mapping[str, Any]) -> tuple[str, bytes]:
+def _system_identity(system: System, options: Mapping[str, Any]) -> tuple[str, bytes]:
     """Return the name of the system, and the cache key of system and laws."""
     laws = {name: options[name] for name in _LAWS if name in options}
     return system.name, simulator_of(system, **laws).content()
 
 
-def _fmu(path: object) -> tuple[str, bytes]:
+def _fmu_identity(path: object) -> tuple[str, bytes]:
     if not isinstance(path, (str, os.PathLike)):
         raise ModelError(f"sweep: {quoted(path)} is no model; give a System or the path of an FMU")
     file = Path(os.fspath(path))
@@ -272,7 +275,7 @@ class Sweep:
 
     name: str
     cases: tuple[Case, ...]
-    folder: Folder
+    folder: ResultStore
     failures: Mapping[int, str]
     numbers: tuple[int, ...]
 
@@ -289,14 +292,14 @@ class Sweep:
         Raises:
             ModelError: the folder contains no sweep.
         """
-        place = Folder(path_of(folder).absolute())
-        name, cases = place.known()
-        return cls(name, cases, place, {}, tuple(range(len(cases)))).as_found()
+        store = ResultStore(path_of(folder).absolute())
+        name, cases = store.model_and_cases()
+        return cls(name, cases, store, {}, tuple(range(len(cases)))).as_found()
 
     def as_found(self) -> Sweep:
         """Return a copy with the failures that are now recorded in the folder."""
         missing = self.folder.missing(len(self.cases))
-        return replace(self, failures={k: self.folder.complained(k) for k in missing})
+        return replace(self, failures={k: self.folder.error_of(k) for k in missing})
 
     def __repr__(self) -> str:
         return (
@@ -338,7 +341,7 @@ class Sweep:
             ModelError: the case failed, or the index is out of range.
         """
         if isinstance(number, slice):
-            return self._part(range(len(self.cases))[number])
+            return self._slice(range(len(self.cases))[number])
         place = _index(number, len(self.cases))
         if place in self.failures:
             raise ModelError(f"sweep: case {place} failed: {self.failures[place]}")
@@ -358,12 +361,12 @@ class Sweep:
         place = _index(number, len(self.cases))
         if place not in self.failures:
             return self[place]
-        file = self.folder.part(self.numbers[place])
+        file = self.folder.partial_file(self.numbers[place])
         if not file.is_file():
             raise ModelError(f"sweep: case {place} reached nothing: {self.failures[place]}")
         return Result.load(file)
 
-    def _part(self, chosen: range) -> Sweep:
+    def _slice(self, chosen: range) -> Sweep:
         failures = {new: self.failures[k] for new, k in enumerate(chosen) if k in self.failures}
         cases = tuple(self.cases[k] for k in chosen)
         numbers = tuple(self.numbers[k] for k in chosen)
@@ -474,16 +477,16 @@ _OPTIONS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class CaseResult:
     """Result of a case, which can be pickled.
 
     Attributes:
         result: result of the simulation, or its rows before the stop; None if there are no rows.
-        complaint: error message; empty if the case succeeded.
+        error: error message; empty if the case succeeded.
     """
 
     result: Result | None
-    complaint: str = ""
+    error: str = ""
 
 
 def sweep(
@@ -542,17 +545,20 @@ def sweep(
     # absolute, because a law may change the working directory
     kept = tempfile.mkdtemp(prefix="mbs-sweep-") if folder is None else path_of(folder).absolute()
     study = study_of(model, cases, options)
-    place = Folder.opened(kept, study)
+    store = ResultStore.opened(kept, study)
     if folder is None:
-        weakref.finalize(place, shutil.rmtree, kept, ignore_errors=True)
-    tasks = {k: _Task(simulate, cases[k], options) for k in place.missing(len(cases))}
+        weakref.finalize(store, shutil.rmtree, kept, ignore_errors=True)
+    tasks = {k: _Task(simulate, cases[k], options) for k in store.missing(len(cases))}
     label = f"{len(tasks)} simulations of {study['model']}"
-    whole = Sweep(str(study["model"]), cases, place, {}, tuple(range(len(cases))))
+    whole = Sweep(str(study["model"]), cases, store, {}, tuple(range(len(cases))))
     try:
         with progress(label, 0.0, len(tasks), quiet=quiet) as reached:
-            answers = _in_turn(tasks) if executor is None else _spread(tasks, executor)
-            for done, (number, answer) in enumerate(answers, start=1):
-                place.keep(number, answer.result, answer.complaint)
+            if executor is None:
+                finished = _run_serially(tasks)
+            else:
+                finished = _run_in_executor(tasks, executor)
+            for done, (number, found) in enumerate(finished, start=1):
+                store.write(number, found.result, found.error)
                 reached(float(done))
     except SolverError as error:
         error.result = whole.as_found()
@@ -572,27 +578,27 @@ class _Task:
     case: Case
     options: Mapping[str, Any]
 
-    def __call__(self) -> Answer:
-        """Simulate the case. An error is returned as an Answer, so that other cases continue."""
+    def __call__(self) -> CaseResult:
+        """Simulate the case. An error is returned as a CaseResult, so that other cases continue."""
         try:
-            return Answer(self.simulate(self.case, self.options))
+            return CaseResult(self.simulate(self.case, self.options))
         except SolverError as error:
-            return Answer(error.result, str(error))
+            return CaseResult(error.result, str(error))
         except MbsError as error:
-            return Answer(None, str(error))
+            return CaseResult(None, str(error))
         except Exception as error:
-            return Answer(None, error_text(error))
+            return CaseResult(None, error_text(error))
 
 
 @dataclass(frozen=True, slots=True)
-class _Run:
+class _SystemSimulation:
     """Simulation of a system."""
 
     system: System
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle by content, so that a process prepares the system for its first case only."""
-        return _run_of, self.system.cached("packed", lambda: packed(self.system))
+        return _unpickled_simulation, self.system.cached("packed", lambda: packed(self.system))
 
     def __call__(self, case: Case, options: Mapping[str, Any]) -> Result:
         given = _arguments(self.system, case)
@@ -605,13 +611,13 @@ class _Run:
 
 
 @functools.lru_cache(maxsize=4)  # simulations of up to 4 sweeps that share a cluster
-def _run_of(data: bytes, names: tuple[str, ...], graphs: str) -> _Run:
+def _unpickled_simulation(data: bytes, names: tuple[str, ...], graphs: str) -> _SystemSimulation:
     """Unpickle a simulation, or return it from the cache of this process."""
-    return _Run(unpacked(data, names, graphs))
+    return _SystemSimulation(unpacked(data, names, graphs))
 
 
 @dataclass(frozen=True, slots=True)
-class _Fmu:
+class _FmuSimulation:
     """Simulation of an FMU."""
 
     path: Path
@@ -625,7 +631,7 @@ class _Fmu:
         return fmu(self.path, quiet=True, **_merge(options, given))
 
 
-def _simulation(model: object, cases: Sequence[Case]) -> _Run | _Fmu:
+def _simulation(model: object, cases: Sequence[Case]) -> _SystemSimulation | _FmuSimulation:
     """Return the callable that simulates a case of the model.
 
     Raises:
@@ -633,7 +639,7 @@ def _simulation(model: object, cases: Sequence[Case]) -> _Run | _Fmu:
     """
     if isinstance(model, System):
         _require_names(model.name, cases, _system_names(model))
-        return _Run(model)
+        return _SystemSimulation(model)
     if not isinstance(model, (str, os.PathLike)):
         raise ModelError(f"sweep: {quoted(model)} is no model; give a System or the path of an FMU")
     path = Path(os.fspath(model)).resolve()
@@ -648,7 +654,9 @@ def _simulation(model: object, cases: Sequence[Case]) -> _Run | _Fmu:
         raise ModelError(f"sweep: {path} is not an FMU: {' '.join(str(error).split())}") from error
     known = {name: v.causality for name, v in numbers_of(description).items()}
     _require_names(str(description.modelName), cases, set(known))
-    return _Fmu(path, frozenset(name for name, kind in known.items() if kind == "parameter"))
+    return _FmuSimulation(
+        path, frozenset(name for name, kind in known.items() if kind == "parameter")
+    )
 
 
 def _system_names(system: System) -> set[str]:
@@ -754,23 +762,25 @@ def _merge(options: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, An
     return merged
 
 
-def _in_turn(tasks: Mapping[int, _Task]) -> Iterator[tuple[int, Answer]]:
+def _run_serially(tasks: Mapping[int, _Task]) -> Iterator[tuple[int, CaseResult]]:
     for number, task in tasks.items():
         try:
-            answer = task()
+            found = task()
         except Interrupted as stop:
-            yield number, Answer(stop.result, str(stop))
+            yield number, CaseResult(stop.result, str(stop))
             raise
-        yield number, answer
+        yield number, found
 
 
-def _spread(tasks: Mapping[int, _Task], executor: Executor) -> Iterator[tuple[int, Answer]]:
-    futures: dict[Future[Answer], int] = {}
+def _run_in_executor(
+    tasks: Mapping[int, _Task], executor: Executor
+) -> Iterator[tuple[int, CaseResult]]:
+    futures: dict[Future[CaseResult], int] = {}
     try:
         for number, task in tasks.items():
             futures[executor.submit(task)] = number
         for future in as_completed(futures):
-            yield futures[future], _answer(future)
+            yield futures[future], _result_of(future)
     except BrokenExecutor as error:
         raise SolverError(
             f"sweep: a process of the executor ended ({error}); start the study again with the same"
@@ -781,10 +791,10 @@ def _spread(tasks: Mapping[int, _Task], executor: Executor) -> Iterator[tuple[in
             future.cancel()
 
 
-def _answer(future: Future[Answer]) -> Answer:
+def _result_of(future: Future[CaseResult]) -> CaseResult:
     try:
         return future.result()
     except BrokenExecutor:
         raise
     except Exception as error:  # the task was lost, such as with a worker of a cluster
-        return Answer(None, error_text(error))
+        return CaseResult(None, error_text(error))

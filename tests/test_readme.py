@@ -28,7 +28,7 @@ COMPILER = () if any(map(shutil.which, COMPILERS)) or os.environ.get("CC") else 
 """The extra with a C compiler, which an installation needs on a computer without one."""
 
 
-SLOW = ("closed_forms.md", "co_simulation.md", "export.md")
+SLOW = ("closed_forms.md", "export.md")
 """Pages whose code takes longest; guides and other pages call the same functions."""
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from support.catalogue_systems import catalogue_system
 from support.configurations import same
 from support.parallel_geometry import LEGS, rotation
-from support.sweeps import examples, slow
+from support.sweeps import examples
 
 import mbs
 from mbs import Mechanism
@@ -138,7 +138,6 @@ def test_sr400_has_eight_working_modes_as_a_parallelogram_and_eight_crossed(syst
         assert is_closed(system, mode.q)
 
 
-@pytest.mark.slow
 def test_akr3000_has_eight_arms_with_four_signs_of_cylinders(systems):
     """Trunk, elbow and wrist, two ways each; either cylinder may be turned round."""
     system = systems["akr3000"]
@@ -160,7 +159,7 @@ def test_stewart_platform_has_one_working_mode_nearby(systems):
     assert modes[0].hits == 30
 
 
-@pytest.mark.parametrize("beyond", [0.05, slow(0.5)])
+@pytest.mark.parametrize("beyond", [0.05, 0.5])
 def test_out_of_reach_says_by_how_much(systems, beyond):
     """Above the highest point of the line of symmetry, where both legs are stretched."""
     top = np.sqrt((CRANK + COUPLER) ** 2 - (GROUND / 2) ** 2)

@@ -132,7 +132,6 @@ def test_an_arm_with_a_ball_for_a_wrist(seed):
     assert any(same(system, configuration.q, q, 1e-8) for configuration in found)
 
 
-@pytest.mark.slow
 def test_stewart_platform_has_four_ways_for_every_leg(systems):
     """Each leg forwards or backwards, its universal joint turned round or not; nearest first."""
     system = systems["stewart_platform"]

@@ -8,7 +8,6 @@ from support.arm_completeness import assert_complete, assert_exact, assert_same_
 from support.arm_poses import folded, least_gap, over_shoulder, stretched, with_wrist
 from support.arm_search import distance, merged, plain_arm, searched, some, wrapped
 from support.catalogue_systems import catalogue_system
-from support.sweeps import slow
 
 from mbs.models.inverse_geometry import solve
 
@@ -158,7 +157,7 @@ def test_out_of_reach(name):
     assert arm.reach < gap < 5 * arm.reach
 
 
-@pytest.mark.parametrize("name", ["scara", slow("youbot")])
+@pytest.mark.parametrize("name", ["scara", "youbot"])
 def test_pose_that_fewer_than_six_joints_cannot_take(name):
     system = assembled(name)
     arm = plain_arm(system)

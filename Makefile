@@ -35,8 +35,8 @@ LOWEST := build/lowest/bin/python
 help:
 	@echo "make demo     install mbs into $(VENV) and run examples/01_four_bar.py; files go to build/four_bar"
 	@echo "make check    lint, types, layers and the fast half of the tests"
-	@echo "make test     install the tools and run every check: lint, types, layers, tests; of sweeps a part"
-	@echo "make test-all the same with every case of every sweep, and make guides"
+	@echo "make test     install the tools and run every check: lint, types, layers, tests; of sweeps a part, no slow tests"
+	@echo "make test-all the same with every case of every sweep and slow tests, and make guides"
 	@echo "make guides   every page in the installation that it documents, in build/guides"
 	@echo "make test-lowest  the tests with the lowest versions that pyproject.toml allows, in build/lowest; Python 3.11 or 3.12"
 	@echo "make kernels  the tests of numerical subjects as other processors compute; SETTINGS names some"

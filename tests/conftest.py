@@ -40,15 +40,18 @@ settings.load_profile("repeatable")
 
 def pytest_configure(config):
     """The markers of this project."""
-    config.addinivalue_line(
-        "markers", "sweep: many cases of one rule, of which a part runs unless MBS_TEST_ALL=1"
-    )
+    for marker in (
+        "sweep: many cases of one rule, of which a part runs unless MBS_TEST_ALL=1",
+        "slow: one of the slowest tests, which runs only if MBS_TEST_ALL=1",
+    ):
+        config.addinivalue_line("markers", marker)
 
 
 def pytest_report_header(config):
     """What makes a run repeatable."""
-    part = "all cases" if EVERY_CASE else f"a part, MBS_TEST_SEED={os.environ['MBS_TEST_SEED']}"
-    return f"sweeps: {part}"
+    if EVERY_CASE:
+        return "sweeps: all cases; slow tests too"
+    return f"sweeps: a part, MBS_TEST_SEED={os.environ['MBS_TEST_SEED']}; no slow tests"
 
 
 # Whole programs, of up to a quarter of a minute: begun last, one would run on beside an idle core.
@@ -56,7 +59,7 @@ LONG = {"test_examples.py", "test_readme.py", "test_structure.py"}
 
 
 def pytest_collection_modifyitems(config, items):
-    """Long ones first; of each sweep a tenth, three at least; of a rule with several seeds one."""
+    """Long ones first; of sweeps, of rules with several seeds and of slow tests see `left_out`."""
     items.sort(key=lambda item: item.path.name not in LONG)
     if EVERY_CASE:
         return

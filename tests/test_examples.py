@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.sweeps import slow
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 _NUMBER = r"(-?\d[\d.]*(?:e[-+]\d+)?)"
@@ -108,7 +109,15 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+SLOW = ("04_identification", "05_co_simulation", "07_panda", "10_quadruped_jump", "11_chain")
+"""Examples that take longest; what they show has tests of its own, and the others run always."""
+
+
+@pytest.mark.parametrize(
+    "path",
+    [slow(path) if path.stem in SLOW else path for path in EXAMPLES],
+    ids=lambda path: path.stem,
+)
 def test_example_runs_and_finds(path: Path, tmp_path: Path) -> None:
     folder = tmp_path / "out"
     answer = subprocess.run(

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 from support.page import PROGRAM, absent, blocks, documented_extras
+from support.sweeps import slow
 
 from mbs.core.build import COMPILERS
 
@@ -27,7 +28,15 @@ COMPILER = () if any(map(shutil.which, COMPILERS)) or os.environ.get("CC") else 
 """The extra with a C compiler, which an installation needs on a computer without one."""
 
 
-@pytest.mark.parametrize("page", WITH_CODE, ids=lambda page: page.name)
+SLOW = ("closed_forms.md", "export.md")
+"""Pages whose code takes longest; guides and other pages call the same functions."""
+
+
+@pytest.mark.parametrize(
+    "page",
+    [slow(page) if page.name in SLOW else page for page in WITH_CODE],
+    ids=lambda page: page.name,
+)
 def test_python_blocks_run_in_the_installation_that_is_documented(
     page: Path, tmp_path: Path
 ) -> None:

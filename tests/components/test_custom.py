@@ -796,6 +796,25 @@ class TestRowsInMotion:
         assert np.all(two["flat.push"] == 0)
         assert mbs.models.dae(held, "index1").z.numel() == 1
 
+    @pytest.mark.parametrize("rail_first", [True, False])
+    def test_rows_of_positions_come_before_rows_of_velocities(self, rail_first):
+        """Names, kinds and rows of `system.loops` and residuals of the closure in one order."""
+        m = mbs.Mechanism("sleigh", gravity=(4.0, 0, 0))
+        sleigh = m.add(Body("sleigh", mass=3.0, inertia=(0.1, 0.1, 0.2)))
+        m.connect(m.world, mbs.components.Free("p", actuated=False), sleigh)
+        parts = [Rail("rail", sleigh.at(0.1)), Edge("edge", sleigh)]
+        for part in parts if rail_first else reversed(parts):
+            m.add(part)
+        system = m.assemble()
+        assert [(loop.name, loop.closing, loop.rows) for loop in system.loops] == [
+            ("rail", "rail", ("line",)),
+            ("edge", "edge", ("side",)),
+        ]
+        q = [0.3, 0.2, 0.7, 1, 0, 0, 0]
+        assert float(mbs.loops.closure(system)(q)[0]) == pytest.approx(0.7 - 0.4 / 2, abs=1e-14)
+        report = system.report()
+        assert report.index("Rail rail binds p: 1 of 1") < report.index("Edge edge binds p: 1 of 1")
+
     def test_the_joint_does_not_carry_what_the_edge_does(self):
         m = mbs.Mechanism("sleigh", gravity=(4.0, 0, -9.81))
         sleigh = m.add(Body("sleigh", mass=3.0, com=(0.2, 0, 0), inertia=(0.1, 0.1, 0.2)))

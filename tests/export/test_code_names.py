@@ -145,6 +145,18 @@ def test_words_of_the_language_are_renamed(language, word):
     assert re.search(rf"\b{word}(_|x|1)", body)
 
 
+def test_underscores_become_capitals_in_mathematica():
+    """An underscore marks a pattern there; between digits it becomes x, as in A1_12."""
+    names = ["mass_of_tool", "A1_12", "a_", "k_2x", "plain"]
+    symbols = [SX.sym(name) for name in names]
+    function = Function("sum_of_all", symbols, [casadi.sin(casadi.vertcat(*symbols))], names, ["y"])
+    text = mbs.export.code(function, "mathematica")
+    head = re.search(r"\w+\[.*\] := ", text)[0]
+    assert head == "sumOfAll[massOfTool_, A1x12_, a_, k2x_, plain_] := "
+    for name in ("massOfTool", "A1x12", "a", "k2x", "plain"):
+        assert f"Sin[{name}]" in text
+
+
 def test_fortran_knows_no_case():
     s, S = SX.sym("s"), SX.sym("S")
     text = mbs.export.code(Function("f", [s, S], [s - 2 * S], ["s", "S"], ["y"]), "fortran")

@@ -13,6 +13,7 @@ from fmpy.fmi3 import FMU3Model, FMU3Slave
 from fmpy.validation import validate_fmu
 from fmu_instances import Fmu3 as Fmu
 from fmu_models import pendulum, slider_crank
+from support.sweeps import slow
 
 from mbs.errors import ExportError
 from mbs.export.fmu.pack import FACES, write_fmu
@@ -41,6 +42,7 @@ def test_fmpy_finds_nothing_to_complain_about(fmu):
     assert fmu.description.fmiVersion == "3.0"
 
 
+@pytest.mark.parametrize("fmu", ["slider_crank", slow("pendulum")], indirect=True)
 def test_the_sources_are_clean_c_and_all_listed(fmu):
     build = Path(fmu.folder, "sources", "buildDescription.xml").read_text()
     names = FACES["3.0"].compiled("dopri5")

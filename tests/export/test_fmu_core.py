@@ -14,6 +14,7 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.validation import validate_fmu
 from fmu_instances import Fmu
 from fmu_models import MODELS, crank_reference, pendulum, slider_crank
+from support.sweeps import slow
 
 from mbs.errors import CompilerError, ExportError
 from mbs.export.fmu import fmi2_xml
@@ -85,7 +86,12 @@ def test_dependencies_pass_through_the_loop(crank):
     assert "rod.length" in {v.name for v in initial["force"].dependencies}
 
 
-def test_the_sources_are_clean_c(fmu, tmp_path):
+@pytest.mark.parametrize(
+    "name", ["stopped_crank", *map(slow, ("pendulum", "slider_crank", "clapper"))]
+)
+def test_the_sources_are_clean_c(fmu_of, name):
+    """Those of a loop with events contain most of what the preprocessor selects."""
+    fmu = fmu_of(name)
     strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-I."]
     names = [name for name in SOURCES if name != "model.c"]
     command = [*find_compiler().command, *strict, "-c", *names]

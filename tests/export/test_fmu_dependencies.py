@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 from fmu_models import pendulum, slider_crank
 from fmu_structures import ball, two_cranks
+from support.catalogue_systems import catalogue_system
 
-from mbs.export.fmu.xml import dependencies, linearity
+from mbs.export.fmu.system_fmu import Contents, fmu_model
+from mbs.export.fmu.xml import dependencies, linearity, structure
 
 SEED = 20261122
 
@@ -117,3 +119,21 @@ def test_kinds_with_modes_and_fixed_parameters():
     assert known_of(model, "scaled") == {"h": "discrete", "count": "dependent"}
     assert known_of(model, "weighted") == {"h": "fixed", "v": "constant", "e": "dependent"}
     assert known_of(model, "indicator.floor") == {"h": "constant"}
+
+
+def test_outputs_of_a_loop_depend_on_all_states_of_the_host_or_on_none():
+    """Near singular configurations the states are tangent coordinates, which move all joints."""
+    model = fmu_model(catalogue_system("slider_crank"), Contents(outputs=["energy"]))
+    names = [entry.variable.name for entry in model.entries]
+    running = structure(model).running
+
+    def known(name):
+        return names_of(model, running[names.index(name)])
+
+    states = {"state[1]": "dependent", "state[2]": "dependent"}
+    for name in ("crank.q", "slide.q", "rod.v", "tool.x", "energy.kinetic", "der(crank.q)"):
+        assert known(name) == states
+    for name in ("slide.a", "der(crank.v)", "der(state[1])", "indicator.coordinates"):
+        assert known(name) == states | {"crank.tau": "dependent"}
+    for name in ("tool.y", "energy.potential"):  # it slides along x, without gravity
+        assert known(name) == {}

@@ -1,5 +1,6 @@
 """Systems of connected FMUs: their description, what is refused, and their motion in importers."""
 
+import re
 import zipfile
 from importlib import resources
 from xml.etree import ElementTree
@@ -119,6 +120,37 @@ def test_equal_systems_give_equal_files_and_equal_fmus_are_kept_once(fmus, tmp_p
         root = ElementTree.fromstring(archive.read("SystemStructure.ssd"))
     assert [c.get("name") for c in root.iter(f"{SSD}Component")] == ["left", "right"]
     assert root.find(f"{SSD}DefaultExperiment").get("stopTime") == "2.0"  # that of the robot
+
+
+def without_experiment(path, target):
+    """The same FMU without a default experiment."""
+    with zipfile.ZipFile(path) as read, zipfile.ZipFile(target, "w") as written:
+        for name in read.namelist():
+            content = read.read(name)
+            if name == "modelDescription.xml":
+                content, count = re.subn(rb"<DefaultExperiment[^>]*/>", b"", content)
+                assert count == 1
+            written.writestr(name, content)
+    return target
+
+
+def test_the_stop_time_is_the_latest_of_the_fmus_or_one_second(fmus, tmp_path):
+    robot, control = fmus / "robot2.fmu", fmus / "controller2.fmu"
+    bare = [without_experiment(robot, tmp_path / f"{name}.fmu") for name in ("one", "two")]
+
+    def times(parts, **options):
+        path = mbs.export.ssp(tmp_path / "cell.ssp", parts, **options)
+        with zipfile.ZipFile(path) as archive:
+            root = ElementTree.fromstring(archive.read("SystemStructure.ssd"))
+        return root.find(f"{SSD}DefaultExperiment").attrib
+
+    described = [fmpy.read_model_description(str(path)) for path in (robot, control)]
+    assert [d.defaultExperiment.stopTime for d in described] == ["2.0", "10.0"]
+    for parts in ([robot, control], [control, robot]):
+        assert times(parts) == {"startTime": "0.0", "stopTime": "10.0"}
+    assert times([bare[0], robot]) == {"startTime": "0.0", "stopTime": "2.0"}
+    assert times(bare) == {"startTime": "0.0", "stopTime": "1.0"}
+    assert times([robot, control], stop_time=3) == {"startTime": "0.0", "stopTime": "3.0"}
 
 
 def loop(robot):

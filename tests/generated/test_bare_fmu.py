@@ -15,6 +15,7 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 from fmpy.validation import validate_fmu
 from support.catalogue_systems import catalogue_system
+from support.sweeps import slow
 
 import mbs
 from mbs.components import Body, CoulombFriction, Revolute
@@ -64,7 +65,7 @@ def sources(folder):
 
 @pytest.mark.skipif(not shutil.which("arm-none-eabi-gcc"), reason="no compiler for Cortex-M")
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
-@pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.parametrize("name", ["four_bar", slow("puma560")])
 def test_a_microcontroller_has_all_that_they_need(name, fmi, unpacked, tmp_path):
     files = sources(unpacked(name, fmi, "bare"))
     command = ["arm-none-eabi-gcc", *CORTEX, *STRICT, "-Werror", "-O2", "-c", *map(str, files)]
@@ -111,7 +112,7 @@ def test_the_library_has_its_memory_from_the_importer(fmi, unpacked):
 
 
 @pytest.mark.skipif(not shutil.which("cppcheck"), reason="cppcheck is not installed")
-@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+@pytest.mark.parametrize("fmi", [slow("2.0"), "3.0"])
 def test_a_static_checker_finds_nothing(fmi, unpacked):
     folder = unpacked("four_bar", fmi, "bare") / "sources"
     text = (folder / "model.h").read_text()
@@ -123,7 +124,7 @@ def test_a_static_checker_finds_nothing(fmi, unpacked):
     assert (answer.returncode, answer.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+@pytest.mark.parametrize("fmi", [slow("2.0"), "3.0"])
 def test_zig_takes_them_for_a_processor_without_an_fpu(fmi, unpacked, tmp_path):
     pytest.importorskip("ziglang")
     command = [sys.executable, "-m", "ziglang", "cc", "-target", "arm-linux-musleabi", *STRICT]

@@ -12,11 +12,12 @@ import pytest
 from fmpy.fmi2 import FMU2Slave
 from support.bare_library import EXACT, Motion, called, header_number, loaded
 from support.catalogue_systems import catalogue_system
+from support.sweeps import slow
 
 import mbs
 from mbs.components import Body, Box, CoulombFriction, Free, Prismatic, Revolute
 from mbs.errors import ExportError, ModelError
-from mbs.native import find_compiler
+from mbs.native import c_code, find_compiler
 from mbs.robots import n_four_bar
 
 OK, NOT_FINITE, QUATERNION, PARAMETER, OPEN, UNDETERMINED, NO_RESULT = range(7)
@@ -80,9 +81,8 @@ def floating():
 # ---- what it needs ----
 
 
-@pytest.mark.sweep
 @pytest.mark.parametrize("real", ["double", "float"])
-@pytest.mark.parametrize("name", ["puma560", "four_bar", "five_bar"])
+@pytest.mark.parametrize("name", ["four_bar", slow("puma560"), slow("five_bar")])
 def test_it_needs_functions_of_numbers_alone(name, real, tmp_path):
     folder = written(catalogue_system(name), tmp_path / "lib", real=real)
     calls, memory = compiled(sources(folder), tmp_path)
@@ -102,9 +102,11 @@ def test_quaternions_and_parameters_compile_without_warnings(tmp_path):
         assert compiled(sources(folder), tmp_path)[1] == [(0, 0)] * 2
 
 
-def test_long_models_compile_without_warnings(tmp_path):
-    """Some thousand operations, in several pieces."""
-    system = n_four_bar(12).assemble()
+@pytest.mark.parametrize(("count", "least"), [(4, 0), slow(12, c_code._ONE_PIECE)])
+def test_long_models_compile_without_warnings(monkeypatch, tmp_path, count, least):
+    """Some thousand operations, in several pieces; fewer if shorter code is in pieces too."""
+    monkeypatch.setattr(c_code, "_ONE_PIECE", least)
+    system = n_four_bar(count).assemble()
     folder = mbs.export.c_library(system, tmp_path / "lib", target="bare", real="float")
     assert sum(path.read_text().count("NOINLINE void") for path in sources(folder)) > 5
     assert compiled(sources(folder), tmp_path)[1] == [(0, 0)] * 2
@@ -139,7 +141,7 @@ def test_the_equations_of_an_fmu_are_bare(tmp_path):
 
 
 @pytest.mark.skipif(not shutil.which("cppcheck"), reason="cppcheck is not installed")
-@pytest.mark.parametrize("kind", ["hosted", "double", "float", "fmu"])
+@pytest.mark.parametrize("kind", [slow("hosted"), slow("double"), "float", "fmu"])
 def test_a_static_checker_finds_nothing(kind, tmp_path):
     system, undefined = catalogue_system("four_bar"), []
     if kind == "hosted":

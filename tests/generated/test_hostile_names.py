@@ -208,7 +208,7 @@ def test_fmu(fmi, tmp_path):
     for file, data in contents[0].items():
         if file.endswith((".xml", ".svg")):
             ElementTree.fromstring(data)
-        if file.endswith((".c", ".h")):
+        if file.endswith((".c", ".h")) and data != contents[1][file]:
             left, wanted = (
                 [t for t in c_tokens(c[file].decode("utf-8"), tmp_path / "m.c")] for c in contents
             )

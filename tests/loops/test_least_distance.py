@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.sweeps import examples
 
 import mbs
 from mbs.components import Body, Box, Prismatic, Revolute
@@ -74,7 +75,7 @@ def random_bars(rng):
 def test_four_bars_are_nearest_to_a_guess_of_any_joint(seed):
     rng = np.random.default_rng(seed)
     unreachable = 0
-    while unreachable < 10:
+    while unreachable < examples(10):
         bars, joint, cut = random_bars(rng), *rng.choice(JOINTS, 2)
         least, largest = reach(joint, *bars)
         guess = float(rng.uniform(-np.pi, np.pi))
@@ -105,7 +106,7 @@ def slider_crank(crank, rod, offset, cut=None):
 def test_slider_cranks_are_nearest_to_a_guess(seed):
     """The slide is between both distances at which the bars lie in one line."""
     rng = np.random.default_rng(seed)
-    for _ in range(10):
+    for _ in range(examples(10)):
         crank, rod = (float(x) for x in rng.uniform(0.2, 1.0, 2))
         offset = float(rng.uniform(0.1, 0.9) * abs(crank - rod))
         cut = str(rng.choice(["main", "big", "small", "slide"]))

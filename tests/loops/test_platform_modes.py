@@ -7,6 +7,7 @@ from support.flat_loops import flat_loop
 from support.messages import refused
 from support.platforms import hexapod, planar_linkage, planar_platform
 from support.ring_loops import line_symmetric_loop, ring_loop
+from support.sweeps import slow
 
 import mbs
 import mbs.simulate
@@ -244,7 +245,7 @@ def test_a_structure_shows_its_cut_forces_in_a_simulation(method):
     )
 
 
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
+@pytest.mark.parametrize("version", [slow("2.0"), "3.0"])
 def test_an_fmu_of_a_structure_shows_its_cut_forces(version, tmp_path):
     m = triangle()
     m.add(WrenchSensor("at_a", "a", axes="world"))

@@ -9,6 +9,7 @@ from casadi import SX, Function
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.catalogue_systems import catalogue_system
+from support.sweeps import examples
 
 import mbs
 from mbs.components import Body, Free, Planar, Prismatic, Revolute, RollingDisc
@@ -62,7 +63,7 @@ def rotation(quaternion):
     )
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=examples(15), deadline=None)
 @given(
     lean=st.floats(-0.8, 0.8),
     yaw_rate=st.floats(-3, 3),

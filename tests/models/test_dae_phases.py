@@ -39,6 +39,12 @@ def hopper():
     return contact_phases(hopping_leg(), [ContactPoint("foot", "foot", friction=0.8)])
 
 
+@pytest.fixture(scope="module")
+def closed():
+    """The hopping leg whose foot is pinned by a ball joint."""
+    return hopping_leg(pinned=True)
+
+
 def at_start(d):
     return d.function()(d.x0, d.z0, d.u0, d.p0)
 
@@ -100,9 +106,8 @@ def test_invariants_stay_zero(feet, form):
 
 
 @pytest.mark.parametrize("form", FORMS[1:])
-def test_a_foot_that_stands_is_a_ball_joint(hopper, form):
+def test_a_foot_that_stands_is_a_ball_joint(hopper, closed, form):
     """The rows of a contact are those of a cut joint, with the same forces."""
-    closed = hopping_leg(pinned=True)
     tau, v0 = {"hip": 3.0, "slide": 30.0}, {"base.wy": 0.5, "base.wx": 0.2, "hip": -0.4}
     pinned = dae(closed, form, v0=v0, tau0=tau)
     names = [c.name for c in closed.coordinates]
@@ -124,9 +129,8 @@ def ends(d, duration, name, options):
     return numbers(end["xf"]).ravel(), np.abs(numbers(kept)).ravel()
 
 
-def test_integrations_keep_the_contact_and_agree_with_a_simulated_ball_joint(hopper):
+def test_integrations_keep_the_contact_and_agree_with_a_simulated_ball_joint(hopper, closed):
     tau, v0 = {"hip": 3.0, "slide": 30.0}, {"base.wy": 0.5, "base.wx": 0.2, "hip": -0.4}
-    closed = hopping_leg(pinned=True)
     result = mbs.simulate.run(closed, 0.2, v0=v0, tau=tau, step=0.1, tolerance=1e-10)
     q0 = {c.name: result[f"{c.name}.q"][0] for c in closed.coordinates}
     fine = {"reltol": 1e-10, "abstol": 1e-10}

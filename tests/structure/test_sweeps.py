@@ -1,6 +1,8 @@
 """Which cases of the tests run."""
 
+import ast
 from collections import Counter
+from pathlib import Path
 
 import pytest
 from support.sweeps import left_out
@@ -9,13 +11,13 @@ from support.sweeps import left_out
 class Case:
     """What the choice reads of a collected test."""
 
-    def __init__(self, nodeid, params=None, sweep=False):
-        self.nodeid, self.sweep = nodeid, sweep
+    def __init__(self, nodeid, params=None, sweep=False, slow=False):
+        self.nodeid, self.marks = nodeid, {"sweep": sweep, "slow": slow}
         if params is not None:
             self.callspec = type("Spec", (), {"params": params})
 
     def get_closest_marker(self, name):
-        return self.sweep and name == "sweep"
+        return self.marks[name]
 
 
 KINDS = ("open", "closed", "free")
@@ -23,7 +25,10 @@ KINDS = ("open", "closed", "free")
 
 @pytest.fixture
 def cases():
-    """A sweep of 45, one of 4, a rule with 5 seeds for each of three kinds, and one test."""
+    """A sweep of 45, one of 4, a rule with 5 seeds for each of three kinds, and two tests.
+
+    A case of each is slow, and one of the two tests.
+    """
     return [
         *(Case(f"a.py::long[{k}]", {"k": k}, sweep=True) for k in range(45)),
         *(Case(f"a.py::short[{k}]", {"k": k}, sweep=True) for k in range(4)),
@@ -33,6 +38,9 @@ def cases():
             for kind in KINDS
         ),
         Case("a.py::alone"),
+        Case("a.py::long[slow]", {"k": 45}, sweep=True, slow=True),
+        Case("a.py::rule[open-slow]", {"kind": "open", "seed": 5}, slow=True),
+        Case("a.py::thorough", slow=True),
     ]
 
 
@@ -52,4 +60,36 @@ def test_the_part_is_the_same_each_time_and_another_with_another_seed(cases):
     assert run(cases, "1") == run(cases, "1")
     parts = [set(run(cases, str(seed))) for seed in range(60)]
     assert len({frozenset(part) for part in parts}) > 50
-    assert set.union(*parts) == {case.nodeid for case in cases}
+    assert set.union(*parts) == {case.nodeid for case in cases if not case.marks["slow"]}
+
+
+def is_slow(node):
+    """Whether a whole test, class or module is marked as slow."""
+    marks = getattr(node, "decorator_list", None)
+    if marks is None:
+        assigned = [n for n in node.body if isinstance(n, ast.Assign)]
+        marks = [n.value for n in assigned if ast.unparse(n.targets[0]) == "pytestmark"]
+    texts = [ast.unparse(mark) for mark in marks]
+    return any("mark.slow" in text and "parametrize" not in text for text in texts)
+
+
+def quick_tests(node):
+    """Names of the tests that are not marked as slow."""
+    if is_slow(node):
+        return
+    for part in node.body:
+        if isinstance(part, ast.FunctionDef) and part.name.startswith("test"):
+            if not is_slow(part):
+                yield part.name
+        elif isinstance(part, ast.ClassDef) and part.name.startswith("Test"):
+            yield from quick_tests(part)
+
+
+TESTS = Path(__file__).parents[1]
+MARKED = [file for file in sorted(TESTS.rglob("test_*.py")) if "mark.slow" in file.read_text()]
+
+
+@pytest.mark.parametrize("file", MARKED, ids=lambda file: str(file.relative_to(TESTS)))
+def test_no_file_has_slow_tests_alone(file):
+    """What a file tests is tested by `make test` too."""
+    assert list(quick_tests(ast.parse(file.read_text())))

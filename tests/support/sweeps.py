@@ -1,11 +1,18 @@
-"""Sweeps: many cases of one rule, of which `make test` runs a part and `make test-all` all."""
+"""Tests that `make test` leaves out and `make test-all` runs: cases of sweeps, and slow tests."""
 
 import math
 import os
 import random
 from collections import defaultdict
 
+import pytest
+
 EVERY_CASE = os.environ.get("MBS_TEST_ALL") == "1"
+
+
+def slow(*values):
+    """A case of a test that only `make test-all` runs; its cheaper cases run always."""
+    return pytest.param(*values, marks=pytest.mark.slow)
 
 
 def examples(number: int) -> int:
@@ -16,14 +23,16 @@ def examples(number: int) -> int:
 def left_out(items, seed):
     """The collected tests that do not run.
 
-    Of each sweep a tenth runs, three at least; of a rule tried with several seeds one.
+    Of each sweep a tenth runs, three at least; of a rule tried with several seeds one; of what is
+    marked as slow nothing.
 
     Args:
         items: all of them, in their order.
         seed: which part runs.
     """
     sweeps, seeds = defaultdict(list), defaultdict(list)
-    for item in items:
+    left = {item for item in items if item.get_closest_marker("slow")}
+    for item in (item for item in items if item not in left):
         name = item.nodeid.partition("[")[0]
         given = item.callspec.params if hasattr(item, "callspec") else {}
         if item.get_closest_marker("sweep"):
@@ -32,7 +41,6 @@ def left_out(items, seed):
             # the cases of one rule hold the same objects but for the seed
             others = (id(value) for key, value in sorted(given.items()) if key != "seed")
             seeds[name, *others].append(item)
-    left = set()
     for groups, least, part in ((sweeps, 3, 10), (seeds, 1, math.inf)):
         for cases in groups.values():
             kept = max(least, math.ceil(len(cases) / part))

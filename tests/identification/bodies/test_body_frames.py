@@ -34,6 +34,21 @@ def test_bodies_are_told_in_their_own_frames():
     assert lines[2].split()[:5] == ["first", "2", "0.1", "-0.2", "0.3"]
 
 
+def test_each_column_of_the_table_has_its_element():
+    """Three moments and three products of inertia that all differ, with their signs."""
+    m = mbs.Mechanism("skew")
+    inertia = [[0.3, 0.01, -0.02], [0.01, 0.4, 0.03], [-0.02, 0.03, 0.5]]
+    body = m.add(Body("body", mass=2, com=CENTRE, inertia=inertia))
+    m.connect(m.world, Revolute("j1", axis="x"), body)
+    system = m.assemble()
+    columns = columns_of(system)
+    lines = bodies_table(system, columns, numbers_of(system, columns)).splitlines()
+    heads, (name, *values) = lines[1].split(), lines[2].split()
+    assert heads == ["body", "mass", "x", "y", "z", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz"]
+    assert name == "body"
+    assert values == ["2", "0.1", "-0.2", "0.3", "0.3", "0.4", "0.5", "0.01", "-0.02", "0.03"]
+
+
 def test_an_identification_has_the_table():
     found = identify(arm(), noisy_record(), 8.0, quiet=True)
     table = found.bodies_table()

@@ -8,10 +8,10 @@ from support.configurations import active, same, searched
 from support.flat_loops import flat_loop
 
 from mbs import Mechanism, Parameter
-from mbs.components import Body, Coupling, Revolute
-from mbs.errors import LoopError
+from mbs.components import Body, Coupling, Custom, Prismatic, Revolute, custom
+from mbs.errors import LoopError, NoClosedForm
 from mbs.loops import closure, function, modes, reduction_matrix, solve
-from mbs.loops.plan import plan
+from mbs.loops.plan import plan, plan_from
 
 LENGTHS = {"crank": 0.5, "coupler": 1.0, "rocker": 0.7, "ground": 0.9}
 EQUAL = {"crank": 0.5, "coupler": 1.0, "rocker": 0.5, "ground": 1.0}
@@ -207,3 +207,28 @@ def test_an_open_chain_has_one_mode():
 def test_a_loop_of_slides_has_one_mode():
     (mode,) = modes(flat_loop(8, "RRPP", (0,)).assemble())
     assert mode.branch == ()
+
+
+class Line(Custom):
+    """Two coordinates on a straight line: a row that is linear in both."""
+
+    x = custom.coordinate()
+    y = custom.coordinate()
+
+    def rows(self, at):
+        return {"line": at.x.q + 2 * at.y.q - 0.3}
+
+
+def test_a_linear_row_of_a_component_binds_its_coordinates():
+    m = Mechanism("two")
+    first, second = bar(m, "first"), bar(m, "second")
+    m.connect(m.world, Prismatic("px", axis="x", actuated=True), first)
+    m.connect(first, Prismatic("py", axis="y"), second)
+    m.add(Line("line", "px", "py"))
+    system = m.assemble()
+    assert system.closure.mobility == 1
+    with pytest.raises(NoClosedForm, match=r"loop of line has no .*, the rows of a Line bind it"):
+        plan(system)
+    assert plan_from(system, {0, 1}) == ()
+    q = solve(system, {"px": 0.1})
+    assert q == pytest.approx([0.1, 0.1], abs=1e-12)

@@ -48,7 +48,7 @@ def test_next_to_singular_configurations(name, kind, seed):
     check(name, kind, seed)
 
 
-@pytest.mark.sweep
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "kind", "seed"), MORE)
 def test_next_to_many_singular_configurations(name, kind, seed):
     check(name, kind, seed)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from support.arm_search import distance, plain_arm
 from support.catalogue_systems import catalogue_system
+from support.sweeps import slow
 
 import mbs
 from mbs.errors import ModelError
@@ -30,7 +31,7 @@ def residual(system, T, q):
     return np.abs(plain_arm(system, None).pose(q) - T).max(axis=(-2, -1))
 
 
-@pytest.mark.parametrize(("joint", "count"), [("q7", 16), ("q4", 7), ("q3", 5)])
+@pytest.mark.parametrize(("joint", "count"), [slow("q7", 16), ("q4", 7), ("q3", 5)])
 def test_every_sample_is_as_locked(panda, joint, count):
     """By a closed form (q7, q4), whose equations hold the joint as a symbol, and without (q3)."""
     own, T = poses(panda, 2)

@@ -18,6 +18,7 @@ from support.near_singular import (
     units_away,
 )
 from support.runtime import changed_library
+from support.sweeps import slow
 
 import mbs.closed_forms.arm_core as core
 from mbs.models.inverse_geometry import solve, solve_many, solver
@@ -63,7 +64,7 @@ def test_poses_that_differ_in_the_last_places(name, kind):
     check(name, kind, 0, FEW, (1, 100))
 
 
-@pytest.mark.sweep
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize(("name", "kind"), CASES)
 def test_more_poses_that_differ_in_the_last_places(name, kind, seed):
@@ -138,7 +139,7 @@ def test_residuals_and_singular_values_that_differ_in_the_last_places(
         require_same(name, answer, solve(robot(name), T))
 
 
-@pytest.mark.parametrize("count", [1, 100])
+@pytest.mark.parametrize("count", [slow(1), 100])
 def test_eigenvalues_that_differ_in_the_last_places(count, monkeypatch, tmp_path):
     """The library is compiled with eigenvalues that are off by units in the last place."""
     name, eps = "general_6r", np.finfo(float).eps

@@ -47,7 +47,7 @@ def test_many_poses_are_marked_as_each_alone(name, kind):
     check_solve_many(name, near(name, kind, 0))
 
 
-@pytest.mark.sweep
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize(("name", "kind"), CASES)
 def test_more_poses_are_marked_as_each_alone(name, kind, seed):
@@ -98,7 +98,7 @@ def test_branches_of_a_function_differ_only_if_they_are_not_certain():
     assert call.certain(plain("puma560").pose(np.array([0.3, -0.9, 0.4, 0.7, 0.0, 0.2]))) is False
 
 
-@pytest.mark.sweep
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize(("name", "kind"), CASES[:-1])
 def test_more_branches_differ_only_if_they_are_not_certain(name, kind, seed):

@@ -10,7 +10,7 @@ from casadi import SX, Function
 
 from mbs.assembly.model_function import ModelFunction
 from mbs.assembly.validity import Kind, ValidityRow
-from mbs.native.scalar_source import Real
+from mbs.native.c_code import Real
 
 STATUS_OF: dict[Kind, str] = {
     "quaternion": "MBS_QUATERNION",

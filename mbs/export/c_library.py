@@ -19,9 +19,11 @@ from mbs.errors import ExportError, ModelError
 from mbs.export.c_check import NO_FAST_MATH, STATUS, StatusCheck, check_of
 from mbs.export.c_step import StepTexts, step_texts
 from mbs.files import path_of, write_texts
+from mbs.native.c_code import Real, literal
 from mbs.native.compiled import generated, require_function, require_names, unwritten
+from mbs.native.frames import NOINLINE
 from mbs.native.handwritten import handwritten_text, names_declared
-from mbs.native.scalar_source import NOINLINE, Real, Target, bare_source, literal
+from mbs.native.scalar_source import Target, bare_source
 from mbs.text import in_c_comment, quoted
 
 # Names that are reserved in C, C++ and CMake.

@@ -29,7 +29,9 @@ from mbs.export.fmu.variables import (
 )
 from mbs.loops.closing import distance_units
 from mbs.models.state.independent import MinimalState, consistent_start, minimal_state
-from mbs.native.scalar_source import NOINLINE, Real, bare_source, literal
+from mbs.native.c_code import Real, literal
+from mbs.native.frames import NOINLINE
+from mbs.native.scalar_source import bare_source
 from mbs.text import in_c_comment
 
 _HEADER = """\

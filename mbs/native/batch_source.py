@@ -6,18 +6,18 @@ from dataclasses import dataclass
 from importlib import resources
 from itertools import accumulate
 
-import casadi
 from casadi import Function
 
-from mbs.native.c_code import BlockCode, LaneCode, SinCosGroup, blocks, schedule, slots
-from mbs.native.kernel import BLOCK, EXPORT, HEADERS
+from mbs.native.c_code import BLOCK, LaneCode, SinCosGroup, blocks, schedule, slots
+from mbs.native.frames import EXPORT, HEAD, GraphCode, lane_loop, pointers
+from mbs.native.kernel import HEADERS
 from mbs.native.repeats import with_calls
-from mbs.operations.graph import Graph, graph_of
+from mbs.operations.graph import graph_of
 
 _HEAD = f"""\
+{HEAD}\
 #include "elementary.h"
 #include "rows.h"
-#define NOINLINE __attribute__((noinline))
 {EXPORT}EXPORT int mbs_batch_lanes(void) {{ return MBS_LANES; }}
 """
 _INLINE = 16  # angles up to which the sine and cosine code is inlined; else it is called
@@ -35,18 +35,6 @@ class BatchSource:
 
     files: dict[str, str]
     work: int
-
-
-class _States(LaneCode):
-    """Writer of C functions whose inputs are SIMD vectors, element after element."""
-
-    __slots__ = ()
-
-    def _write(self, graph: Graph, number: int) -> str:
-        node = graph.nodes[number]
-        if node.op == casadi.OP_INPUT:
-            return f"i{node.args[0]}[{node.args[1]}]"
-        return LaneCode._write(self, graph, number)
 
 
 def batch_source(
@@ -72,40 +60,40 @@ def batch_source(
         len(step.angles) for steps in pieces for step in steps if isinstance(step, SinCosGroup)
     )
     sincos = "mbs_sincos_wide" if angles <= _INLINE else "mbs_sincos_wide_call"
-    code: BlockCode = _States(graph, where, sincos, [False] * len(graph.inputs))
+    body = GraphCode("batch", LaneCode(graph, where, sincos, [False] * len(graph.inputs)), pieces)
     taken = [port.sparsity.nnz() for port in graph.inputs]
     given = [port.sparsity.nnz() for port in graph.outputs]
     starts = list(accumulate([*taken, *given], initial=where.count))
-    pointers = [f"w + {start}" for start in starts]
+    places = [f"w + {start}" for start in starts[:-1]]
     count, shown = len(taken), len(given) - valid
+    sources = list(zip(places, taken, strict=False))
     flags = [f"out[{shown + k}][0]" for k in range(valid)]
+    once = [
+        *(
+            f"  if (ports[{k}].row) mbs_take(ports + {k}, c, many, {size}, {place});"
+            for k, (place, size) in enumerate(sources)
+        ),
+        *body.calls(),
+        *(_flag(sources, flags, given[:shown]) if finite else ()),
+        *(
+            f"  mbs_give(ports + {count + k}, c, many, {size}, out[{k}]);"
+            for k, size in enumerate(given[:shown])
+        ),
+    ]
     lines = [
         _HEAD,
-        *code.repeats(),
-        *(code.block(f"part{k}", k, steps) for k, steps in enumerate(pieces)),
+        *body.texts(),
         "EXPORT void mbs_batch(const mbs_port *ports, double *work, long long first,"
         " long long last)",
         "{",
         "  mbs_lanes *const w = (mbs_lanes *)mbs_aligned(work);",
-        f"  const double *const in[] = {{{_pointers('const double', pointers[:count])}}};",
-        f"  mbs_lanes *const out[] = {{{', '.join(pointers[count:-1]) or '0'}}};",
+        pointers("const double", "in", [f"(const double *)({place})" for place in places[:count]]),
+        pointers("mbs_lanes", "out", places[count:]),
         *(
-            f"  if (!ports[{k}].row) mbs_take_same(ports + {k}, {size}, {pointers[k]});"
-            for k, size in enumerate(taken)
+            f"  if (!ports[{k}].row) mbs_take_same(ports + {k}, {size}, {place});"
+            for k, (place, size) in enumerate(sources)
         ),
-        "  for (long long k = first; k < last; k += MBS_LANES) {",
-        "    const int many = last - k < MBS_LANES ? (int)(last - k) : MBS_LANES;",
-        *(
-            f"    if (ports[{k}].row) mbs_take(ports + {k}, k, many, {size}, {pointers[k]});"
-            for k, size in enumerate(taken)
-        ),
-        *(f"    part{k}(in, out, w);" for k in range(len(pieces))),
-        *(_flag([*zip(pointers, taken, strict=False)], flags, given[:shown]) if finite else ()),
-        *(
-            f"    mbs_give(ports + {count + k}, k, many, {size}, out[{k}]);"
-            for k, size in enumerate(given[:shown])
-        ),
-        "  }",
+        *lane_loop("first", "last", once),
         "  mbs_store_end();",
         "}",
     ]
@@ -128,7 +116,3 @@ def _flag(inputs: list[tuple[str, int]], flags: list[str], outputs: list[int]) -
         *(f"      mbs_spoil(out[{k}], {size}, wrong);" for k, size in enumerate(outputs)),
         "    }",
     ]
-
-
-def _pointers(kind: str, pointers: list[str]) -> str:
-    return ", ".join(f"({kind} *)({pointer})" for pointer in pointers) or "0"

@@ -1,4 +1,4 @@
-"""Writes C code for operation graphs: operators, order, work array, functions, SIMD lanes."""
+"""Writes C code for operation graphs, on scalars of type double or float, or on SIMD lanes."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from collections import Counter
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, chain, groupby, pairwise
-from typing import ClassVar, Self, TypeAlias
+from typing import ClassVar, Literal, Self, TypeAlias
 
 import casadi
-from casadi import Function
+import numpy as np
 
 from mbs.errors import ModelError
 from mbs.native.repeats import Calls, CallTable, Repeat, table_of
@@ -133,6 +133,9 @@ def constant(node: Node) -> str:
 
 LANES = 8
 """Angles whose sines and cosines are computed at once, in one batch."""
+
+BLOCK = 500
+"""Maximum assignments in a C function: longer functions compile slower and run no faster."""
 
 _ONE_PIECE = 4000  # operations up to which a single C function compiles fast and runs fastest
 _BATCH_SIZE = 50  # operations that take as long to compile as one sine and cosine batch
@@ -651,18 +654,82 @@ def _runs(indices: Sequence[int]) -> list[tuple[int, int]]:
     return runs
 
 
-# C functions of a graph that compute several columns of a map at once, one in each SIMD lane.
+# C functions of a graph in single precision.
+
+
+Real = Literal["double", "float"]
+"""C type of numbers."""
+
+_CALL = re.compile(r"\b([a-z]\w*)\(")
+_LITERAL = re.compile(r"\b\d+\.\d+\b")
+_LEAST = float(np.finfo(np.float32).tiny)
+
+
+def literal(value: float, real: Real) -> str:
+    """Return C text of a number that a compiler reads as the nearest number of the type.
+
+    In single precision a value other than zero remains different from zero, so that a bound such as
+    1e-308 still separates positive lengths from zero.
+
+    Args:
+        value: any number, also infinity and NaN.
+        real: C type of the number.
+    """
+    if real == "double" or not math.isfinite(value):
+        return constant(Node(-1, (), float(value)))
+    with np.errstate(over="ignore", under="ignore"):
+        nearest = float(np.float32(value))
+    if math.isinf(nearest):
+        return constant(Node(-1, (), nearest))
+    if value and abs(nearest) < _LEAST:
+        nearest = math.copysign(_LEAST, value)
+    text = str(np.float32(nearest)) + "f"
+    return f"({text})" if text.startswith("-") else text
+
+
+@dataclass(frozen=True, slots=True)
+class FloatCode(BlockCode):
+    """Writer of the C functions of one graph in single precision."""
+
+    kind: ClassVar[str] = "float"
+    scalar: ClassVar[str] = "float"
+    zero: ClassVar[str] = "0.0f"
+
+    def stored(self, number: int) -> str:
+        """See BlockCode."""
+        return _float_operand(self.graph, number)
+
+    def number(self, number: int) -> str:
+        """See BlockCode."""
+        return _float_operand(self.graph, number)
+
+    def values(self, step: Step) -> list[str]:
+        """See BlockCode."""
+        assert not isinstance(step, SinCosGroup)
+        form = _LITERAL.sub(r"\g<0>f", _CALL.sub(r"\1f(", form_of(self.graph, step)))
+        text = form.format(*(_float_operand(self.graph, n) for n in self.graph.operands(step)))
+        return [f"  const float t{step} = {text};"]
+
+
+def _float_operand(graph: Graph, number: int) -> str:
+    text = operand(graph, number)
+    return text if text[0] in "it" else literal(graph.nodes[number].value, "float")
+
+
+# C functions of a graph that compute several columns or states at once, one in each SIMD lane.
 
 
 @dataclass(frozen=True, slots=True)
 class LaneCode(BlockCode):
-    """Writer of the C functions of a graph on SIMD vectors: a column of a map per lane.
+    """Writer of the C functions of a graph on SIMD vectors: a column or state per lane.
 
     Attributes:
-        shared: whether an input has the same value for all columns, for each input.
+        shared: whether an input has the same value for all lanes, for each input.
+        stride: C text of the number of vectors from an element of an input to the next one.
     """
 
     shared: Sequence[bool]
+    stride: str = "1"
 
     kind: ClassVar[str] = "mbs_lanes"
 
@@ -717,71 +784,5 @@ class LaneCode(BlockCode):
     def _write(self, graph: Graph, number: int) -> str:
         node = graph.nodes[number]
         if node.op == casadi.OP_INPUT and not self.shared[node.args[0]]:
-            return f"i{node.args[0]}[{node.args[1]} * MBS_ROW]"
+            return f"i{node.args[0]}[{node.args[1]} * {self.stride}]"
         return operand(graph, number)
-
-
-# Memory of the C code of a whole Function: inputs, outputs and work space.
-
-
-@dataclass(frozen=True, slots=True)
-class Memory:
-    """Work space of a Function: work array of its blocks, discarded outputs, buffers of maps.
-
-    Attributes:
-        function: whole Function.
-        graph: scalar operations of the Function. If it contains maps, the graph has additional
-            outputs (arguments of the maps) and additional inputs (results of the maps).
-        slots: length of the work array of the blocks, in doubles.
-    """
-
-    function: Function
-    graph: Graph
-    slots: int
-
-    @property
-    def size(self) -> int:
-        """Return the total length of the work space in doubles."""
-        return self.slots + self._lost + (self._starts[-1] + LANES if self._sizes else 0)
-
-    def buffer(self, number: int) -> int:
-        """Return the index in `out` of the buffer of a graph input that a map computes."""
-        return len(self.graph.outputs) + number - self.function.n_in()
-
-    def pointers(self) -> list[str]:
-        """Return C lines that declare the pointer arrays `in` and `out`.
-
-        An omitted input is replaced by zeros. An omitted output is written to a discarded part of
-        the work space. `out` contains the outputs of the Function, the arguments of the maps and
-        the results of the maps. The results of the maps are also the last elements of `in`.
-        """
-        n_in, n_out = self.function.n_in(), self.function.n_out()
-        most = max((port.sparsity.nnz() for port in self.graph.inputs[:n_in]), default=0)
-        places = [f"base + {start}" for start in self._starts[:-1]]
-        taken = len(self.graph.outputs) - n_out
-        inputs = [f"arg[{k}] ? arg[{k}] : zeros" for k in range(n_in)] + places[taken:]
-        outputs = [f"res[{k}] ? res[{k}] : w + {self.slots}" for k in range(n_out)] + places
-        base = f"  double *const base = mbs_aligned(w + {self.slots + self._lost});"
-        lanes = f"  mbs_lanes *const lanes = (mbs_lanes *)(base + {self._starts[-1]});"
-        return [
-            f"  static const double zeros[{most or 1}];",
-            *([base, lanes] if self._sizes else []),
-            f"  const double *const in[] = {{{', '.join(inputs) or '0'}}};",
-            f"  double *const out[] = {{{', '.join(outputs) or '0'}}};",
-        ]
-
-    @property
-    def _lost(self) -> int:
-        return max((self.function.nnz_out(k) for k in range(self.function.n_out())), default=0)
-
-    @property
-    def _sizes(self) -> list[int]:
-        """Return the lengths of the arguments of the maps, then of their results."""
-        taken = self.graph.outputs[self.function.n_out() :]
-        given = self.graph.inputs[self.function.n_in() :]
-        return [port.sparsity.nnz() for port in (*taken, *given)]
-
-    @property
-    def _starts(self) -> list[int]:
-        rounded = ((size + LANES - 1) // LANES * LANES for size in self._sizes)
-        return list(accumulate(rounded, initial=0))

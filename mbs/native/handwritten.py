@@ -12,7 +12,7 @@ import casadi
 from casadi import Function
 
 from mbs.native.compiler import FLAGS, cached_library
-from mbs.native.kernel import EXPORT, function_table
+from mbs.native.frames import EXPORT, function_table
 
 FUNCTION = "FUNCTION"
 """Placeholder of the function name in handwritten C text."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import math
 import os
 import platform
 import tempfile
@@ -16,15 +15,15 @@ from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
 import casadi
-from casadi import Function, Sparsity
+from casadi import Function
 
 from mbs.errors import ModelError
 from mbs.native.c_code import (
+    BLOCK,
     LANES,
     BlockCode,
     Item,
     LaneCode,
-    Memory,
     SinCosGroup,
     Step,
     blocks,
@@ -40,6 +39,16 @@ from mbs.native.compiler import (
     chosen_flags,
     find_compiler,
     is_whole,
+)
+from mbs.native.frames import (
+    EXPORT,
+    HEAD,
+    GraphCode,
+    Memory,
+    entry,
+    function_table,
+    lane_loop,
+    pointers,
 )
 from mbs.native.repeats import with_calls
 from mbs.native.staged import Mapped, Staged, staged
@@ -126,29 +135,32 @@ def map_source(
     graph = graph_of(mapped.column)
     pieces = blocks(graph, schedule(graph), block)
     where = slots(graph, pieces)
-    code = LaneCode(graph, where, "mbs_sincos_wide", mapped.shared)
+    body = GraphCode(
+        name, LaneCode(graph, where, "mbs_sincos_wide", mapped.shared, "MBS_ROW"), pieces
+    )
     sizes = [len(result) for result in graph.results]
     starts = list(accumulate(sizes, initial=where.count))
-    rows = ", ".join(f"w + {start}" for start in starts[:-1])
+    once = [
+        pointers("const double", "in", _inputs(graph, mapped)),
+        pointers("mbs_lanes", "rows", [f"w + {start}" for start in starts[:-1]]),
+        "  double *to[MBS_LANES];",
+        *body.calls(outputs="rows"),
+    ]
+    for k, size in enumerate(sizes):
+        once += [
+            f"  for (int l = 0; l < many; ++l) to[l] = out[place{k}[c + l].output]"
+            f" + place{k}[c + l].first;",
+            f"  mbs_columns(rows[{k}], {size}, many, to);",
+        ]
     lines = [
-        *(code.block(f"{name}_part{k}", k, steps) for k, steps in enumerate(pieces)),
+        *body.texts(),
         f"static NOINLINE void {name}(double *const *out, mbs_lanes *w)",
         "{",
         *_tables(mapped, columns, list(zip(buffers, sizes, strict=True))),
-        f"  for (int c = 0; c < {mapped.columns}; c += MBS_LANES) {{",
-        f"    const int left = {mapped.columns} - c, many = left < MBS_LANES ? left : MBS_LANES;",
-        f"    const double *const in[] = {{{', '.join(_inputs(graph, mapped)) or '0'}}};",
-        f"    mbs_lanes *const rows[] = {{{rows or '0'}}};",
-        "    double *to[MBS_LANES];",
-        *(f"    {name}_part{k}(in, rows, w);" for k in range(len(pieces))),
+        *lane_loop("0", str(mapped.columns), once),
+        "}",
     ]
-    for k, size in enumerate(sizes):
-        lines += [
-            f"    for (int l = 0; l < many; ++l) to[l] = out[place{k}[c + l].output]"
-            f" + place{k}[c + l].first;",
-            f"    mbs_columns(rows[{k}], {size}, many, to);",
-        ]
-    return MapSource("\n".join([*lines, "  }", "}"]), LANES * starts[-1])
+    return MapSource("\n".join(lines), LANES * starts[-1])
 
 
 def _tables(mapped: Mapped, columns: Columns, buffers: Sequence[tuple[int, int]]) -> list[str]:
@@ -176,66 +188,8 @@ def _inputs(graph: Graph, mapped: Mapped) -> list[str]:
     return result
 
 
-# C functions that describe a compiled function to CasADi: names, shapes, defaults, work space.
-
-
-def function_table(function: Function, work: int | str) -> str:
-    """Return the C functions from which CasADi's `external` reads the signature of a function.
-
-    Args:
-        function: Function to describe. The C file must define EXPORT and casadi_int.
-        work: length of the work space of the code in doubles: a number or C text.
-    """
-    name, n_in, n_out = function.name(), function.n_in(), function.n_out()
-    shape = "const casadi_int *"
-    tables = {
-        "sparsity_in": [function.sparsity_in(k) for k in range(n_in)],
-        "sparsity_out": [function.sparsity_out(k) for k in range(n_out)],
-    }
-    lines = [
-        f"EXPORT casadi_int {name}_n_in(void) {{ return {n_in}; }}",
-        f"EXPORT casadi_int {name}_n_out(void) {{ return {n_out}; }}",
-        _choose("double ", f"{name}_default_in", _defaults(function)),
-        _choose("const char *", f"{name}_name_in", [f'"{s}"' for s in function.name_in()]),
-        _choose("const char *", f"{name}_name_out", [f'"{s}"' for s in function.name_out()]),
-    ]
-    for kind, patterns in tables.items():
-        names = [f"{name}_{kind}_{k}" for k in range(len(patterns))]
-        lines += [_table(*row) for row in zip(names, patterns, strict=True)]
-        lines.append(_choose(shape, f"{name}_{kind}", names))
-    return "\n".join([*lines, _work(name, n_in, n_out, work)])
-
-
-def _defaults(function: Function) -> list[str]:
-    values = [float(function.default_in(k)) for k in range(function.n_in())]
-    return [repr(x) if math.isfinite(x) else "NAN" for x in values]
-
-
-def _choose(kind: str, name: str, answers: Sequence[str]) -> str:
-    """Return a C function that returns `answers[i]` for the argument i, and 0 for other values."""
-    cases = "".join(f" case {k}: return {answer};" for k, answer in enumerate(answers))
-    return f"EXPORT {kind}{name}(casadi_int i) {{ switch (i) {{{cases} default: return 0; }} }}"
-
-
-def _table(name: str, pattern: Sparsity) -> str:
-    dense = pattern.is_dense()
-    numbers = [*pattern.shape, 1] if dense else [int(k) for k in pattern.compress()]
-    values = ", ".join(map(str, numbers))
-    return f"static const casadi_int {name}[{len(numbers)}] = {{{values}}};"
-
-
-def _work(name: str, n_in: int, n_out: int, work: int | str) -> str:
-    sizes = {"arg": n_in, "res": n_out, "iw": 0, "w": work}
-    pointers = ", ".join(f"casadi_int *{kind}" for kind in sizes)
-    sets = " ".join(f"if ({kind}) *{kind} = {size};" for kind, size in sizes.items())
-    return f"EXPORT int {name}_work({pointers}) {{ {sets} return 0; }}"
-
-
 # Fast C code of Functions: straight-line code in blocks, sines and cosines in SIMD lanes.
 
-
-BLOCK = 500
-"""Maximum assignments in a C function: longer functions compile slower and run no faster."""
 
 HEADERS = ("sincos.h", "lanes.h", "elementary.h")
 """Headers that the C text includes."""
@@ -249,23 +203,11 @@ _GCC = """\
 #pragma GCC optimize("schedule-insns", "sched-pressure")
 #endif
 """
-EXPORT = """\
-#define casadi_int long long int
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-"""
-"""Preamble of the functions that CasADi's `external` looks up."""
-
-_HEAD = """\
-#include <math.h>
-#include <string.h>
+_HEAD = f"""\
+{HEAD}\
 #include "elementary.h"
-#define NOINLINE __attribute__((noinline))
 #define ALIGNED __attribute__((aligned(64)))
-"""
+{EXPORT}"""
 
 
 def kernel_source(functions: Iterable[Function], block: int = BLOCK) -> dict[str, str]:
@@ -293,10 +235,11 @@ def _file(function: Function, block: int) -> str:
     stages = staged(function) or Staged(function, ())
     graph = graph_of(stages.scalar)
     scheduling = _GCC if len(graph.nodes) <= _SHORT else ""
-    return "\n".join([scheduling, _HEAD, EXPORT, _function(function, graph, stages.maps, block)])
+    return "\n".join([scheduling, _HEAD, *_function(function, graph, stages.maps, block)])
 
 
-def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: int) -> str:
+def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: int) -> list[str]:
+    """Return the C functions of a Function: of its scalar operations and maps, and its entry."""
     name = function.name()
     late = {port: k + 1 for k, m in enumerate(maps) for port in m.outputs}
     pieces = _pieces(graph, late, len(maps), block)
@@ -305,7 +248,8 @@ def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: i
     columns, elsewhere = direct_columns(graph, maps, function.n_out())
     where = slots(graph, every, {port: begins[k] for port, k in late.items()}, elsewhere)
     batches = sum(isinstance(step, SinCosGroup) for steps in every for step in steps)
-    code = BlockCode(graph, where, "mbs_sincos8" if batches <= _INLINE else "mbs_sincos8_call")
+    sincos = "mbs_sincos8" if batches <= _INLINE else "mbs_sincos8_call"
+    body = GraphCode(name, BlockCode(graph, where, sincos), every)
     memory = Memory(function, graph, where.count)
     sources = []
     for k, m in enumerate(maps):
@@ -314,22 +258,13 @@ def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: i
     calls: list[str] = []
     for k in range(len(pieces)):
         calls += [f"  {name}_map{k - 1}(out, lanes);"] if k else []
-        calls += [f"  {name}_part{j}(in, out, w);" for j in range(begins[k], begins[k + 1])]
-    return "\n".join(
-        [
-            *code.repeats(),
-            *(code.block(f"{name}_part{k}", k, steps) for k, steps in enumerate(every)),
-            *(source.text for source in sources),
-            f"EXPORT int {name}(const double **arg, double **res, casadi_int *iw, double *w,"
-            " int mem)",
-            "{",
-            *memory.pointers(),
-            *calls,
-            "  return 0;",
-            "}",
-            function_table(function, memory.size + max((s.work for s in sources), default=0)),
-        ]
-    )
+        calls += body.calls(range(begins[k], begins[k + 1]))
+    return [
+        *body.texts(),
+        *(source.text for source in sources),
+        *entry(name, [*memory.declarations(), *calls], "EXPORT "),
+        function_table(function, memory.size + max((s.work for s in sources), default=0)),
+    ]
 
 
 def _pieces(graph: Graph, late: dict[int, int], maps: int, block: int) -> list[list[list[Item]]]:

@@ -8,13 +8,7 @@ from collections.abc import Iterable
 
 from casadi import Function, Sparsity
 
-_HEAD = """\
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-"""
+from mbs.native.frames import EXPORT
 
 
 def patterns_source(functions: Iterable[Function]) -> str:
@@ -23,7 +17,7 @@ def patterns_source(functions: Iterable[Function]) -> str:
     Args:
         functions: Functions with different names.
     """
-    return "\n".join([_HEAD, *(_pattern(f.name(), _blocks(f)) for f in functions)])
+    return "\n".join([EXPORT, *(_pattern(f.name(), _blocks(f)) for f in functions)])
 
 
 def pattern_source(jacobian: Function) -> str:
@@ -33,7 +27,7 @@ def pattern_source(jacobian: Function) -> str:
         jacobian: Jacobian with the name `jac_f` that CasADi gives it.
     """
     blocks = [jacobian.sparsity_out(k) for k in range(jacobian.n_out())]
-    return "\n".join([_HEAD, _pattern(jacobian.name().removeprefix("jac_"), blocks)])
+    return "\n".join([EXPORT, _pattern(jacobian.name().removeprefix("jac_"), blocks)])
 
 
 def _blocks(function: Function) -> list[Sparsity]:

@@ -1,82 +1,48 @@
 """C99 code of Functions of scalar operations, in double or single precision.
 
-In double precision the values are bit-identical to the C code that CasADi generates. Long functions
-are split into several C functions: compilers need minutes for fifty thousand statements in a single
+In double precision the values are bit-identical to the interpreted Functions. Long functions are
+split into several C functions: compilers need minutes for fifty thousand statements in a single
 function, and a time proportional to the length if it is split.
 """
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Iterable, Sequence
-from typing import ClassVar, Literal, NamedTuple
+from collections.abc import Iterable
+from typing import Literal
 
-import numpy as np
+import casadi
 from casadi import Function
 
 from mbs.native.c_code import (
+    BLOCK,
+    ELEMENTWISE,
     BlockCode,
-    Memory,
-    SinCosGroup,
-    Step,
+    FloatCode,
+    Real,
     blocks,
-    constant,
-    form_of,
-    operand,
     plain_order,
     slots,
 )
 from mbs.native.compiler import FLAGS
-from mbs.native.kernel import BLOCK, EXPORT, function_table
+from mbs.native.frames import EXPORT, HEAD, GraphCode, Memory, Work, entry, function_table
 from mbs.native.repeats import LEAST, with_calls
-from mbs.operations.graph import Graph, Node, graph_of
-
-Real = Literal["double", "float"]
-"""C type of numbers."""
+from mbs.operations.graph import graph_of
 
 Target = Literal["hosted", "bare"]
 """Platform of C code: with an operating system, or without."""
 
-_CALL = re.compile(r"\b([a-z]\w*)\(")
-_LITERAL = re.compile(r"\b\d+\.\d+\b")
-_LEAST = float(np.finfo(np.float32).tiny)
 _LONG = 100_000  # lines of C text for which gcc -O2 needs about one minute
-
-_NOINLINE = """\
-#undef NOINLINE
-#ifdef __GNUC__
-#define NOINLINE __attribute__((noinline))
-#else
-#define NOINLINE
-#endif
-"""
-NOINLINE = f"""\
-{_NOINLINE}\
-#if defined __cplusplus || (defined _MSC_VER && !defined __clang__)
-#undef restrict
-#define restrict __restrict
-#endif
-"""
-"""Definitions before the text of `bare_source`: parts of a function are not inlined, and `restrict`
-is defined for compilers of C++ and for MSVC."""
-_HEAD = f"""\
-#include <math.h>
-#include <string.h>
-{_NOINLINE}"""
+_WRITTEN = ELEMENTWISE | {casadi.OP_INPUT, casadi.OP_OUTPUT, casadi.OP_CONST}
 
 
-class Work(NamedTuple):
-    """Minimum lengths of the work arrays that a C function needs."""
+def is_scalar(function: Function) -> bool:
+    """Return whether a Function consists of scalar operations that C has, without an expansion.
 
-    arg: int = 0
-    res: int = 0
-    iw: int = 0
-    w: int = 0
-
-    def covering(self, other: Work) -> Work:
-        """Return the elementwise maximum of the lengths."""
-        return Work(*map(max, self, other))
+    The values of its C code are then bit-identical to the interpreted Function. An expansion may
+    simplify operations, which changes the last bits.
+    """
+    operations = range(function.n_instructions()) if function.is_a("SXFunction") else ()
+    return bool(operations) and all(function.instruction_id(k) in _WRITTEN for k in operations)
 
 
 def plain_source(
@@ -102,27 +68,16 @@ def plain_source(
         ModelError: a Function cannot be expanded to scalar operations, or has an operation without
             an equivalent in C.
     """
-    texts, most = [_HEAD], Work()
+    texts, most = [HEAD], Work()
     for function in functions:
-        name, parts = function.name(), _Parts(function, "double", block, least)
-        memory = Memory(function, parts.graph, parts.count)
-        texts += [
-            *parts.texts,
-            f"int {name}(const double **arg, double **res, long long *iw, double *w, int mem) {{",
-            "  (void)iw, (void)mem;",
-            *memory.pointers(),
-            *parts.calls("in", "out"),
-            "  return 0;",
-            "}\n",
-        ]
-        most = most.covering(
-            Work(len(parts.graph.inputs), len(parts.graph.outputs), 0, memory.size)
-        )
+        lines, work = _hosted(function, "", block, least)
+        texts += [*lines, ""]
+        most = most.covering(work)
     return "\n".join(texts), most
 
 
-def external_source(functions: Sequence[Function]) -> str:
-    """Return the text of `plain_source` with the functions that CasADi's `external` needs.
+def external_source(functions: Iterable[Function]) -> str:
+    """Return the functions of `plain_source` with those that CasADi's `external` looks up.
 
     Args:
         functions: Functions of scalar operations with different names.
@@ -130,29 +85,11 @@ def external_source(functions: Sequence[Function]) -> str:
     Raises:
         ModelError: a Function has an operation without an equivalent in C.
     """
-    texts = [plain_source([function]) for function in functions]
-    lines = [EXPORT]
-    for function, (text, work) in zip(functions, texts, strict=True):
-        name = function.name()
-        lines += [
-            f"EXPORT int {name}"
-            "(const double **arg, double **res, casadi_int *iw, double *w, int mem);",
-            text,
-            function_table(function, work.w),
-        ]
-    return "\n".join(lines)
-
-
-def plain_flags(source: str) -> tuple[str, ...]:
-    """Return the compiler flags for C text of `plain_source`.
-
-    Args:
-        source: text of the longest C file.
-
-    Returns:
-        FLAGS, with -O1 for text of more than 100,000 lines. The values are the same.
-    """
-    return ("-O1" if source.count("\n") > _LONG else FLAGS[0], *FLAGS[1:])
+    texts = [HEAD + EXPORT]
+    for function in functions:
+        lines, work = _hosted(function, "EXPORT ", BLOCK, LEAST)
+        texts += [*lines, function_table(function, work.w), ""]
+    return "\n".join(texts)
 
 
 def bare_source(functions: Iterable[Function], real: Real = "double") -> tuple[str, int]:
@@ -176,93 +113,37 @@ def bare_source(functions: Iterable[Function], real: Real = "double") -> tuple[s
     """
     texts, most = [], 1
     for function in functions:
-        name, parts = function.name(), _Parts(function, real, BLOCK, LEAST)
-        texts += [
-            *parts.texts,
-            f"static int {name}(const {real} **arg, {real} **res, long long *iw, {real} *w,"
-            " int mem)",
-            "{",
-            "  (void)arg, (void)res, (void)iw, (void)w, (void)mem;",
-            *parts.calls("arg", "res"),
-            "  return 0;",
-            "}\n",
-        ]
-        most = max(most, parts.count)
+        body = _body(function, real, BLOCK, LEAST)
+        calls = body.calls(inputs="arg", outputs="res")
+        texts += [*body.texts(), *entry(function.name(), calls, "static ", real), ""]
+        most = max(most, body.code.where.count)
     return "\n".join(texts), most
 
 
-def literal(value: float, real: Real) -> str:
-    """Return C text of a number that a compiler reads as the nearest number of the type.
-
-    In single precision a value other than zero remains different from zero, so that a bound such as
-    1e-308 still separates positive lengths from zero.
+def plain_flags(source: str) -> tuple[str, ...]:
+    """Return the compiler flags for C text of `plain_source`.
 
     Args:
-        value: any number, also infinity and NaN.
-        real: C type of the number.
+        source: text of the longest C file.
+
+    Returns:
+        FLAGS, with -O1 for text of more than 100,000 lines. The values are the same.
     """
-    if real == "double" or not math.isfinite(value):
-        return constant(Node(-1, (), float(value)))
-    with np.errstate(over="ignore", under="ignore"):
-        nearest = float(np.float32(value))
-    if math.isinf(nearest):
-        return constant(Node(-1, (), nearest))
-    if value and abs(nearest) < _LEAST:
-        nearest = math.copysign(_LEAST, value)
-    text = str(np.float32(nearest)) + "f"
-    return f"({text})" if text.startswith("-") else text
+    return ("-O1" if source.count("\n") > _LONG else FLAGS[0], *FLAGS[1:])
 
 
-class FloatCode(BlockCode):
-    """Writer of the C functions of one graph in single precision."""
-
-    kind: ClassVar[str] = "float"
-    scalar: ClassVar[str] = "float"
-    zero: ClassVar[str] = "0.0f"
-
-    def stored(self, number: int) -> str:
-        """See BlockCode."""
-        return _float_operand(self.graph, number)
-
-    def number(self, number: int) -> str:
-        """See BlockCode."""
-        return _float_operand(self.graph, number)
-
-    def values(self, step: Step) -> list[str]:
-        """See BlockCode."""
-        assert not isinstance(step, SinCosGroup)
-        form = _LITERAL.sub(r"\g<0>f", _CALL.sub(r"\1f(", form_of(self.graph, step)))
-        text = form.format(*(_float_operand(self.graph, n) for n in self.graph.operands(step)))
-        return [f"  const float t{step} = {text};"]
+def _body(function: Function, real: Real, block: int, least: int) -> GraphCode:
+    """Return the C functions of a Function, in the order of its operations."""
+    graph = graph_of(function)
+    pieces = blocks(graph, with_calls(graph, plain_order(graph), least), block)
+    code = (BlockCode if real == "double" else FloatCode)(graph, slots(graph, pieces), "")
+    return GraphCode(function.name(), code, pieces)
 
 
-def _float_operand(graph: Graph, number: int) -> str:
-    text = operand(graph, number)
-    return text if text[0] in "it" else literal(graph.nodes[number].value, "float")
-
-
-class _Parts:
-    """C functions into which a Function is split.
-
-    Attributes:
-        graph: scalar operations of the Function.
-        texts: texts of the C functions.
-        count: length of the work array.
-    """
-
-    def __init__(self, function: Function, real: Real, block: int, least: int) -> None:
-        self.graph = graph_of(function)
-        pieces = blocks(self.graph, with_calls(self.graph, plain_order(self.graph), least), block)
-        where = slots(self.graph, pieces)
-        code = (BlockCode if real == "double" else FloatCode)(self.graph, where, "")
-        self.count = where.count
-        self._names = [f"{function.name()}_part{k}" for k in range(len(pieces))]
-        parts = zip(self._names, pieces, strict=True)
-        self.texts = [
-            *code.repeats(),
-            *(code.block(name, k, steps) for k, (name, steps) in enumerate(parts)),
-        ]
-
-    def calls(self, inputs: str, outputs: str) -> list[str]:
-        """Return the lines that call the parts with these arrays of pointers."""
-        return [f"  {name}({inputs}, {outputs}, w);" for name in self._names]
+def _hosted(function: Function, linkage: str, block: int, least: int) -> tuple[list[str], Work]:
+    """Return the C functions of a Function whose arguments may be NULL, and the work sizes."""
+    body = _body(function, "double", block, least)
+    memory = Memory(function, body.code.graph, body.code.where.count)
+    lines = [*memory.declarations(), *body.calls()]
+    work = Work(function.n_in(), function.n_out(), 0, memory.size)
+    return [*body.texts(), *entry(function.name(), lines, linkage)], work

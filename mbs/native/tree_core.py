@@ -15,9 +15,10 @@ from itertools import accumulate
 import casadi
 from casadi import DM, MX, SX, Function, Sparsity
 
-from mbs.native.compiled import generated
 from mbs.native.derivatives_on_demand import by_parameters
-from mbs.native.kernel import EXPORT, function_table, processor
+from mbs.native.frames import EXPORT, entry, function_table
+from mbs.native.kernel import processor
+from mbs.native.scalar_source import plain_source
 
 ROWS = {
     **{"C": 0, "T": 9, "mass": 12, "h": 13, "J": 16, "turn": 22, "slide": 23, "inner": 24},
@@ -200,14 +201,19 @@ def tree_files(table: TreeTable, functions: Mapping[str, Function]) -> dict[str,
     files = {name: runtime.joinpath(name).read_text("utf-8") for name in own}
     # the cached core depends on text, compiler and flags; "-march=native" also on the processor
     files["lanes.h"] += f"/* {processor()} */\n"
-    files["mechanism.c"] = _source(table, functions)
+    scratch = 0
     if table.dependent is not None:
-        files["dependent.c"] = generated([table.dependent])
+        files["dependent.c"], sizes = plain_source([table.dependent])
+        scratch = sizes.w
+    files["mechanism.c"] = _source(table, functions, scratch)
     return files
 
 
-def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
-    """Return the C code of the table of a mechanism and of the functions that CasADi calls."""
+def _source(table: TreeTable, functions: Mapping[str, Function], scratch: int) -> str:
+    """Return the C code of the table of a mechanism and of the functions that CasADi calls.
+
+    `scratch` is the length of the work array of the numbers that depend on parameters.
+    """
     dependent = table.dependent
     head = [
         "#include <math.h>",
@@ -234,9 +240,7 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
         ]
     else:
         count = len(table.numbers)
-        values, scratch = len(table.places), int(dependent.sz_w())
-        integers = max(int(dependent.sz_iw()), 1)
-        pointers = int(dependent.sz_arg()), int(dependent.sz_res())
+        values = len(table.places)
         before = count + values + scratch + 16
         name = dependent.name()
         head += [
@@ -245,10 +249,9 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
             "static const mbs_tree *at(const double *p, mbs_tree *own, double **w) {",
             "  double *table = (double *)(((uintptr_t)*w + 63) & ~(uintptr_t)63);",
             f"  double *values = table + {count};",
-            f"  const double *arg[{pointers[0]}] = {{p}};",
-            f"  double *res[{pointers[1]}] = {{values}};",
-            f"  casadi_int iw[{integers}];",
-            f"  {name}(arg, res, iw, values + {values}, 0);",
+            "  const double *arg[] = {p};",
+            "  double *res[] = {values};",
+            f"  {name}(arg, res, 0, values + {values}, 0);",
             "  memcpy(table, numbers, sizeof numbers);",
             f"  for (int k = 0; k < {values}; ++k) table[places[k]] = values[k];",
             "  *own = mechanism;",
@@ -263,17 +266,11 @@ def _source(table: TreeTable, functions: Mapping[str, Function]) -> str:
     lines = list(head)
     for name, function in functions.items():
         body, own = _call(name, table, function)
+        model = f"  const mbs_tree *m = at({_parameter(function)}, &own, &w);"
         if name.startswith("jac_") and dependent is not None:
             lines += _by_parameters(name.removeprefix("jac_"), function.n_in() - 1)
         lines += [
-            f"EXPORT int {name}(const double **arg, double **res, casadi_int *iw, double *w, int"
-            " mem) {",
-            "  mbs_tree own;",
-            "  (void)iw; (void)mem;",
-            f"  const mbs_tree *m = at({_parameter(function)}, &own, &w);",
-            *body,
-            "  return 0;",
-            "}",
+            *entry(name, ["  mbs_tree own;", model, *body], "EXPORT "),
             function_table(function, f"{work} + {before + own}"),
         ]
     return "\n".join([*lines, ""])

@@ -107,7 +107,7 @@ def graph_of(function: Function) -> Graph:
     """
     if not isinstance(function, Function) or function.is_null():
         raise ModelError(f"{quoted(function)} is not a Function; give a casadi.Function")
-    function = _scalar(function)
+    function = expanded(function)
     nodes: list[Node] = []
     work: dict[int, int] = {}
     results = [[-1] * function.nnz_out(k) for k in range(function.n_out())]
@@ -134,8 +134,12 @@ def graph_of(function: Function) -> Graph:
     )
 
 
-def _scalar(function: Function) -> Function:
-    """Expand a Function to scalar operations (SX)."""
+def expanded(function: Function) -> Function:
+    """Return a Function with its operations expanded to scalars (SX); an SX Function is unchanged.
+
+    Raises:
+        ModelError: it contains calls without scalar operations, such as an integrator.
+    """
     try:
         scalar = function if function.is_a("SXFunction") else function.expand()
         calls = any(

@@ -3,7 +3,7 @@
 import ctypes
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,11 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from mbs.core import compiled_evaluation, core_library, interpreted_evaluation
-from mbs.errors import Interrupted, ModelError, SolverError
+from mbs.errors import Interrupted, SolverError
 from mbs.native import cached_library, compiler_found
-from mbs.native.compiled import calls_machine_code, generated, unwritten
+from mbs.native.compiled import calls_machine_code, exact_source, unwritten
 from mbs.native.compiler import flags_for, known_library
-from mbs.native.scalar_source import plain_source
 from mbs.solvers.control_c import control_c
 from mbs.solvers.problem import (
     Equations,
@@ -60,41 +59,17 @@ _REASONS = {
 _CROWDED = (14, 15)
 
 
-_LONG = 10_000
-"""Lines of CasADi's C code beyond which it is split into several functions: compilers need more
-than proportional time for long functions. Splitting short code would cost time in every step."""
-
-
-def _in_pieces(functions: Sequence[casadi.Function]) -> str:
-    """Return C code of functions, split so that compile time is linear; results are bit-identical.
-
-    Returns:
-        C code; empty if a function does not consist of scalar operations.
-    """
-    try:
-        text, work = plain_source(functions)
-    except ModelError:
-        return ""
-    sizes = " ".join(f"*{name} = {size};" for name, size in work._asdict().items())
-    given = ", ".join(f"long long *{name}" for name in work._asdict())
-    lines = (f"int {f.name()}_work({given}) {{ {sizes} return 0; }}" for f in functions)
-    return "\n".join([text, *lines])
-
-
 def _source(equations: Equations) -> str | None:
     """Return the C code of the functions of an integration; None if they must be interpreted."""
     if calls_machine_code(equations.all):
         return None
-    source = generated(equations.all)
-    if unwritten(source):
-        return None
-    pieces = _in_pieces(equations.all) if source.count("\n") > _LONG else ""
-    return pieces or source
+    source = exact_source(equations.all)
+    return None if unwritten(source) else source
 
 
-_WRITING, _COMPILING = (0.01, 5e-6), (0.2, 1e-4)
+_WRITING, _COMPILING = (0.01, 2e-5), (0.2, 1e-4)
 """Times of writing and of compiling C code [s]: constant part, and part per instruction. Measured
-with gcc 12 for 1,000 to 20,000 instructions, accurate to a factor of two."""
+with gcc 12 for 600 to 40,000 instructions, accurate to a factor of two."""
 
 
 @dataclass(slots=True, eq=False)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mbs.errors import Interrupted, ModelError, SolverError
+from mbs.operations.graph import expanded
 from mbs.text import quoted
 
 # Functions for motions through singular configurations, where constraints become dependent.
@@ -260,7 +261,7 @@ def equations(
     jacobian = None
     if method == "rodas":
         f_xt = [casadi.jacobian(slope, v) for v in (x, t)]
-        jacobian = _scalar(_dense("mbs_jacobian", txp, *f_xt))
+        jacobian = _dense("mbs_jacobian", txp, *f_xt)
     g = None if project is None else _projection(project, txp)
     through = None if passage is None else _passage(passage, txp)
     if events is None:
@@ -275,7 +276,7 @@ def _passage(given: Passage, txp: list[casadi.MX]) -> Passage:
     def vectors_dense(name: str, function: casadi.Function) -> casadi.Function:
         values = function.call(txp)
         dense = [value if value.shape[1] > 1 else casadi.densify(value) for value in values]
-        return casadi.Function(name, txp, dense)
+        return _scalar(casadi.Function(name, txp, dense))
 
     return replace(
         given,
@@ -290,18 +291,30 @@ def _first(function: casadi.Function, inputs: list[casadi.MX]) -> casadi.MX:
 
 
 def _dense(name: str, inputs: list[casadi.MX], *outputs: casadi.MX) -> casadi.Function:
-    return casadi.Function(name, inputs, [casadi.densify(value) for value in outputs])
+    return _scalar(casadi.Function(name, inputs, [casadi.densify(value) for value in outputs]))
+
+
+_OPERATIONS = ("SXFunction", "MXFunction")
+_SIDE_EFFECTS = (casadi.OP_ASSERTION, casadi.OP_MONITOR)
 
 
 def _scalar(function: casadi.Function) -> casadi.Function:
-    """Return the function, expanded to scalar operations if that is possible.
+    """Return the function, expanded to scalar operations if these are all that it consists of.
 
-    Machine code in several C functions is written from these operations. Interpreted and compiled
-    functions are bit-identical if both evaluate the same operations.
+    Machine code is written from these operations. Interpreted and compiled functions are
+    bit-identical if both evaluate the same operations. Maps and branches that are not evaluated
+    (Switch) are not expanded, since that would multiply the operations.
     """
+    every = [function, *function.find_functions()]
+    matrices = [f for f in every if f.is_a("MXFunction")]
+    steps = (f.instruction_id(k) for f in matrices for k in range(f.n_instructions()))
+    if any(f.class_name() not in _OPERATIONS for f in every) or any(
+        step in _SIDE_EFFECTS for step in steps
+    ):
+        return function
     try:
-        return function.expand()
-    except RuntimeError:
+        return expanded(function)
+    except ModelError:
         return function
 
 

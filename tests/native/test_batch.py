@@ -210,7 +210,7 @@ def test_long_functions_are_cut_into_blocks():
         y = ca.vertcat(y[1:], 0.5 * ca.sin(y[0]) * y[1] + k / (2000 + y[2] ** 2))
     f = ca.Function("f", [x], [y, ca.jacobian(y, x)])
     b = batch(f)
-    assert batch_source(b.function).files["batch.c"].count("NOINLINE void part") > 2
+    assert batch_source(b.function).files["batch.c"].count("NOINLINE void batch_part") > 2
     states = np.random.default_rng(8).uniform(-1, 1, (13, 6))
     for found, exact in zip(b(states), interpreted(f, states), strict=True):
         np.testing.assert_allclose(found, exact, rtol=0, atol=1e-13 * abs(exact).max())

@@ -9,7 +9,8 @@ import pytest
 import mbs
 import mbs.models
 from mbs.errors import CompilerError, ModelError
-from mbs.native import compiled
+from mbs.native import cached_library, compiled
+from mbs.native.compiled import exact_source
 
 
 def example():
@@ -182,10 +183,30 @@ def test_machine_code_is_not_written_as_c(tmp_path, monkeypatch, write):
     ):
         write(problem, *arguments)
     plain = ca.Function("problem", [x, p], [ca.sumsqr(example()(x, p)[0])])
-    assert "example_incref" not in mbs.native.c_source(plain)
+    assert "int example(" not in mbs.native.c_source(plain)
     # C of an external function that the user made may be linked by the user
     monkeypatch.setitem(compiled.__globals__, "_libraries", {})
-    assert "example_incref" in mbs.native.c_source(problem)
+    assert "int example(" in mbs.native.c_source(problem)
+
+
+def test_scalar_functions_are_written_without_casadi():
+    text = mbs.native.c_source(example(), derivatives=1)
+    assert "casadi_real" not in text
+    assert all(f"EXPORT int {name}(" in text for name in ("example", "jac_example", "fwd1_example"))
+
+
+def test_functions_of_both_writers_share_a_file():
+    f = example()
+    x, A = ca.MX.sym("x", 3), ca.MX.sym("A", 3, 3)
+    solved = ca.Function("solved", [x, A], [ca.solve(A, f(x, 1.3)[0], "lsqr")])
+    text = exact_source([f, solved])
+    assert text.count("casadi_real casadi_sq") == 1
+    library = cached_library({"both.c": text})
+    at, matrix = [0.1, 2.0, -3.0], np.eye(3) + 0.1
+    for made, given in ((f, (at, 1.3)), (solved, (at, matrix))):
+        code = ca.external(made.name(), str(library))
+        for found, wanted in zip(code.call(given), made.call(given), strict=True):
+            assert np.array_equal(found.full(), wanted.full())
 
 
 def test_two_processes_may_build_at_once(tmp_path):

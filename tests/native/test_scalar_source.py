@@ -9,7 +9,7 @@ import pytest
 from mbs.errors import ModelError
 from mbs.native import find_compiler
 from mbs.native.compiler import FLAGS
-from mbs.native.scalar_source import plain_flags, plain_source
+from mbs.native.scalar_source import is_scalar, plain_flags, plain_source
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror")
 
@@ -71,6 +71,13 @@ def test_what_has_no_scalar_operations_is_refused():
     A = ca.MX.sym("A", 3, 3)
     with pytest.raises(ModelError):
         plain_source([ca.Function("f", [A, x], [ca.solve(A, x, "lsqr")])])
+
+
+def test_only_scalar_operations_are_written_without_an_expansion():
+    x, y = ca.SX.sym("x"), ca.MX.sym("y")
+    assert is_scalar(ca.Function("f", [x], [ca.if_else(x > 0, ca.sin(x), x)]))
+    assert not is_scalar(ca.Function("f", [x], [ca.erfinv(x)]))
+    assert not is_scalar(ca.Function("f", [y], [ca.sin(y)]))
 
 
 def test_very_long_text_is_optimized_less():

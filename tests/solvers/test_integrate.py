@@ -202,6 +202,34 @@ def test_functions_that_are_compiled_during_a_run_give_the_same_bits(method, mon
     assert interpreted.tobytes() == both.tobytes() == compiled.tobytes()
 
 
+def wrapped(kind):
+    """Pendulum with an operation that is not a scalar one."""
+    t, x, p = ca.MX.sym("t"), ca.MX.sym("x", 2), ca.MX.sym("p")
+    slope = PENDULUM(t, x, p)
+    if kind == "assertion":
+        slope = slope.attachAssert(x[0] < 10, "x is large")
+    elif kind == "switch":
+        slope = ca.conditional(x[0] > 0, [slope], 2 * slope, True)
+    elif kind == "map":
+        slope = PENDULUM.map(3)(t, ca.repmat(x, 1, 3), p)[:, 1]
+    elif kind == "solver":
+        slope = ca.solve(2 * ca.DM.eye(2) + x @ x.T, slope, "lsqr")
+    return ca.Function("pendulum", [t, x, p], [slope])
+
+
+@pytest.mark.skipif(not compiler_found(), reason="there is no C compiler")
+@pytest.mark.parametrize("kind", ["", "assertion", "switch", "map", "solver"])
+def test_what_is_not_scalar_is_compiled_with_the_same_bits(kind, monkeypatch):
+    monkeypatch.setattr(INTEGRATE, "_WRITING", (0.0, 0.0))
+    monkeypatch.setattr(INTEGRATE, "_COMPILING", (0.0, 0.0))
+    rhs, kept, times = wrapped(kind), {}, np.linspace(0, 5, 101)
+    assert equations(rhs, None, "dopri5", None).rhs.is_a("MXFunction" if kind else "SXFunction")
+    interpreted = integrate(rhs, [1.0, 0.5], times, p=9.81, compiled=False)
+    motion = integrate_events(rhs, [1.0, 0.5], times, None, p=9.81, prepared=kept)
+    assert all(code.library is not None for code in kept.values())
+    assert interpreted.tobytes() == motion.x.tobytes()
+
+
 @pytest.mark.skipif(not compiler_found(), reason="there is no C compiler")
 def test_code_is_written_then_looked_up_then_compiled(monkeypatch, tmp_path):
     monkeypatch.setenv("MBS_CACHE_DIR", str(tmp_path))

@@ -14,7 +14,8 @@ from mbs.loops.examine import LEAST_SINE
 from mbs.models.state.events import MinimalEvents
 from mbs.models.state.tree import TreeState
 from mbs.native.compiled import generated, unwritten
-from mbs.native.scalar_source import Work, plain_source
+from mbs.native.frames import Work
+from mbs.native.scalar_source import plain_source
 from mbs.solvers.block_triangular import Block, block_triangular
 
 # Functions that an FMU evaluates, under the names that its C files call.

@@ -22,8 +22,9 @@ from mbs.models.inverse_geometry.chain import (
     target_pose,
     target_poses,
 )
-from mbs.models.inverse_geometry.follow import Followed, Redundancy
+from mbs.models.inverse_geometry.follow import Followed
 from mbs.models.inverse_geometry.follow import follow as follow_poses
+from mbs.models.inverse_geometry.path_redundancy import Redundancy
 from mbs.models.inverse_geometry.redundancy import Locked, Redundant
 from mbs.models.inverse_geometry.solutions import (
     Given,

@@ -1,0 +1,195 @@
+"""Equations of path tracking: joints that move, pose error, limits and redundancy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.closed_forms.arm import Array
+from mbs.loops.pose import Goal
+from mbs.models.inverse_geometry.chain import FrameChain
+from mbs.models.inverse_geometry.solutions import WITHIN, CoordinateLimits
+from mbs.numbers import NONZERO
+
+Rows = Callable[[Array, Array], tuple[Array, Array]]
+"""(x, T) -> pose error (m,) from the configuration x to the target pose T, and Jacobian (m, n). To
+first order a move dx reduces the error by J dx."""
+SINGULAR = 1e-7
+"""Smallest singular value below which a configuration counts as singular."""
+LARGEST_STEP = 0.35
+"""Longest step of any joint [rad or arm lengths], 20 degrees. A longer step may change the branch
+or add a full revolution."""
+SMALL = 1e-9
+"""Error rows and moves [rad or arm lengths] that count as zero: 1000 times the 1e-12 of a solution,
+because rounding errors grow towards a singular configuration."""
+POSE_ERROR = 1e-9
+"""Largest error row at a reached pose. Solutions have an error of 1e-12, and rounding errors are
+larger near singular configurations."""
+AT_POSE = 1e-3
+"""Distance before a pose, as a fraction of the segment between two poses, at which the pose itself
+may be the singular one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracker:
+    """Equations, limits and redundancy of the predictor-corrector continuation.
+
+    Attributes:
+        rows: pose error and Jacobian of a scaled configuration x. Lengths are divided by a
+            reference length, so that they compare with angles.
+        slack: dimension of the null space of the Jacobian at a regular configuration: idle spins
+            of rods and redundant freedoms.
+        exact: whether every nearby pose can be reached. If so, the error is zero between the given
+            poses too; if not, it is minimised.
+        low, high: (n,) limits of x, infinite for unlimited coordinates.
+        redundant: number of redundant freedoms, included in `slack`.
+        slope: gradient (n,) of a cost that redundant joints decrease, as a function of x, or None.
+    """
+
+    rows: Rows
+    slack: int
+    exact: bool
+    low: Array
+    high: Array
+    redundant: int = 0
+    slope: Callable[[Array], Array] | None = None
+
+    def may(self, x: Array) -> bool:
+        """Whether a configuration is within the limits."""
+        return not np.any(self.beyond(x))
+
+    def beyond(self, x: Array) -> NDArray[np.bool_]:
+        """Return (n,) whether each coordinate of x is beyond its limits."""
+        return np.asarray((x < self.low - WITHIN) | (x > self.high + WITHIN))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PathPoint:
+    """Configuration on a path, with its Jacobian and pose error.
+
+    Attributes:
+        x: (n,) scaled configuration.
+        J: (m, n) Jacobian at x.
+        left: largest absolute error row at x.
+    """
+
+    x: Array
+    J: Array
+    left: float
+
+
+def point_at(tracker: Tracker, x: Array, T: Array) -> PathPoint:
+    """Return the path point of a configuration x (n,), with its error to the pose T (4, 4)."""
+    r, J = tracker.rows(x, T)
+    return PathPoint(x, J, float(np.max(np.abs(r))))
+
+
+def smallest(tracker: Tracker, J: Array) -> float:
+    """Return the smallest singular value of J (m, n) outside its regular null space."""
+    values = np.linalg.svd(J, compute_uv=False)
+    return float(values[J.shape[1] - 1 - tracker.slack])
+
+
+def pseudo_inverse(tracker: Tracker, J: Array, stopped: int = 0) -> tuple[Array, float]:
+    """Return the pseudo-inverse of J, truncated to its regular rank, and its norm.
+
+    J lacks the columns of `stopped` joints, which lowers the dimension of its null space.
+    """
+    U, values, V = np.linalg.svd(J, full_matrices=False)
+    kept = J.shape[1] - max(tracker.slack - stopped, 0)
+    inverse = 1 / np.maximum(values[:kept], NONZERO)
+    back: Array = (V[:kept].T * inverse) @ U[:, :kept].T
+    return back, float(inverse[-1])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Follower:
+    """Joints that track a path, and their equations. Scaled positions are x = q / scale.
+
+    Attributes:
+        target: tracked frame and loop closure of the system.
+        indices: indices in q of the joints that move.
+        scale: (n,) unit of each x: 1 for angles, reference length [m] for prismatic joints.
+        rows: pose error and its Jacobian, as functions of x and the target pose.
+        slack: dimension of the regular null space of the Jacobian, redundant freedoms included.
+        exact: whether every nearby pose can be reached.
+        bounds: limits of the coordinates, or None to ignore limits.
+        chain: open chain of the joints, or None for a robot with loops.
+        redundant: number of freedoms beyond those that the pose determines.
+        slope: gradient (n,) of a cost that redundant joints decrease, or None.
+    """
+
+    target: Goal
+    indices: tuple[int, ...]
+    scale: Array
+    rows: Rows
+    slack: int
+    exact: bool
+    bounds: CoordinateLimits | None
+    chain: FrameChain | None = None
+    redundant: int = 0
+    slope: Callable[[Array], Array] | None = None
+
+    @property
+    def system(self) -> System:
+        """Robot that the joints belong to."""
+        return self.target.closing.system
+
+    @property
+    def tracker(self) -> Tracker:
+        """Equations and scaled limits for the continuation."""
+        low, high = self.limits
+        return Tracker(self.rows, self.slack, self.exact, low, high, self.redundant, self.slope)
+
+    @property
+    def length(self) -> float:
+        """Reference length [m]: the length of the arm, or 1 m for a robot with loops."""
+        return 1.0 if self.chain is None else self.chain.arm(self.target.closing.p).length
+
+    @property
+    def limits(self) -> tuple[Array, Array]:
+        """Lower and upper limits (n,) of the moving joints, scaled."""
+        if self.bounds is None:
+            return np.full(len(self.indices), -np.inf), np.full(len(self.indices), np.inf)
+        return self.scaled(self.bounds.low), self.scaled(self.bounds.high)
+
+    def scaled(self, q: Array) -> Array:
+        """Return the scaled positions (n,) of the moving joints in a configuration q (nq,)."""
+        x: Array = q[list(self.indices)] / self.scale
+        return x
+
+    def whole(self, q: Array, x: Array) -> Array:
+        """Return the configuration q (nq,) with the moving joints at scaled positions x (n,)."""
+        whole = q.copy()
+        whole[list(self.indices)] = x * self.scale
+        return whole
+
+    def pose(self, q: Array) -> Array:
+        """Return the pose (4, 4) of the frame in the base at a configuration q (nq,)."""
+        elements = self.target.pose(q)[0]
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = elements[3:].reshape(3, 3).T, elements[:3]
+        return T
+
+    def residual(self, q: Array, T: Array) -> float:
+        """Return the largest absolute pose error or loop closure error at q (nq,)."""
+        return float(np.max(np.abs(self.target.at(T).residual(q)[0])))
+
+    def passed(self, x: Array, slack: float = 0.0) -> tuple[int, float] | None:
+        """Return (index in q, limit) of the first joint within `slack` of its limit, or None.
+
+        x (n,) are scaled positions. The limit and `slack` are in rad or m.
+        """
+        if self.bounds is None:
+            return None
+        for index, value in zip(self.indices, x * self.scale, strict=True):
+            low, high = float(self.bounds.low[index]), float(self.bounds.high[index])
+            if value > high - slack:
+                return index, high
+            if value < low + slack:
+                return index, low
+        return None

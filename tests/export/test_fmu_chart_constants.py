@@ -158,12 +158,12 @@ def miss(model):
 
 
 BESIDE = [  # start, move, speed, what moves the bound, and where it lies
-    ("REACH", FLAT, -0.05, 0.7, 0.1),
-    ("REACH", FLAT, -0.15, 0.7, 10.0),
-    ("ASTRAY", FLAT, 0.0, 0.7 * 1.05, 0.1),
-    ("ASTRAY", FLAT, 0.0, 0.7 * 1.3, 10.0),
-    ("IDLE", FLAT | {"a0.v": 0.0}, 0.0, 5e-5, 0.1),
-    ("IDLE", FLAT | {"a0.v": 0.0}, 0.0, 5e-4, 10.0),
+    ("GUIDE_DISTANCE", FLAT, -0.05, 0.7, 0.1),
+    ("GUIDE_DISTANCE", FLAT, -0.15, 0.7, 10.0),
+    ("GUIDE_VELOCITY", FLAT, 0.0, 0.7 * 1.05, 0.1),
+    ("GUIDE_VELOCITY", FLAT, 0.0, 0.7 * 1.3, 10.0),
+    ("GUIDE_REST", FLAT | {"a0.v": 0.0}, 0.0, 5e-5, 0.1),
+    ("GUIDE_REST", FLAT | {"a0.v": 0.0}, 0.0, 5e-4, 10.0),
 ]
 
 
@@ -171,7 +171,7 @@ BESIDE = [  # start, move, speed, what moves the bound, and where it lies
 def test_states_beside_the_motion_are_refused(written, constant, start, move, speed, factor):
     near = factor < 1
     assert answers(written("parallelogram"), start, move, speed) == near
-    other = written("parallelogram", "passage.c", constant, factor)
+    other = written("parallelogram", "passage_chart.c", constant, factor)
     assert answers(other, start, move, speed) != near
 
 
@@ -210,8 +210,8 @@ _SHORT = ("charts.c", "DIFFERENCE", 0.01)
 @pytest.mark.parametrize(
     ("constant", "name", "start"),
     [
-        ("CLOSED", "slider-crank", {"slide.q": 1.1 + 1e-12}),
-        ("DEPENDENT", "kite", {"j1.q": 1e-5, "j1.v": 1.1}),
+        ("START_CLOSED", "slider-crank", {"slide.q": 1.1 + 1e-12}),
+        ("DEPENDENT_VELOCITIES", "kite", {"j1.q": 1e-5, "j1.v": 1.1}),
     ],
 )
 def test_starts_beside_singular_configurations_are_refused(written, constant, name, start):
@@ -223,4 +223,4 @@ def test_starts_beside_singular_configurations_are_refused(written, constant, na
         return True
 
     assert not begun(written(name))
-    assert begun(written(name, "passage.c", constant, 10.0))
+    assert begun(written(name, "passage_start.c", constant, 10.0))

@@ -64,7 +64,7 @@ def test_sparse_matrices_give_the_bits_of_dense_ones(monkeypatch, count, balls):
 def test_factors_of_rows_find_the_side_and_the_gap(monkeypatch, tmp_path, longer, end):
     """As if a window were many: it passes flat configurations, and reverses beside them."""
     few = motion(windows(1, longer))
-    library = with_constant(tmp_path, "MANY", lambda value: 0)
+    library = with_constant(tmp_path, "MANY_ROWS", lambda value: 0)
     integrate_with(monkeypatch, library)
     many = motion(windows(1, longer))
     # a reversal beside a singular configuration magnifies rounding by 1e10

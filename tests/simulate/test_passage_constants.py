@@ -33,24 +33,24 @@ RUNS = {
 STOPS = 1e300
 MOVED = [  # constant, factor, run, parts of the tolerance that tell the one from the other
     ("PASSAGE_ON", 10, "antiparallelogram", 0.15),
-    ("AHEAD", 10, "tight", 0.1),
-    ("DODGED", 0.1, "tight", 0.5),
-    ("DODGES", 0.1, "tight", 0.16),
-    ("FLOOR", 10, "miss", STOPS),
-    ("AWAY", 10, "miss", STOPS),
-    ("BESIDE", 0.1, "start", STOPS),
-    ("TURNED", 10, "parallelogram", STOPS),
-    ("NEWTON", 0.1, "start", STOPS),
-    ("LAST_MOVE", 10, "miss", 1.5),
-    ("NOISE", 10, "miss", 3.0),
-    ("BACK", 10, "start", 0.1),
-    ("STRAY", 10, "miss of 3e-6", STOPS),
-    ("STRAY", 0.1, "miss of 3e-7", STOPS),
+    ("STEPS_AHEAD", 10, "tight", 0.1),
+    ("NOISE_REJECTED", 0.1, "tight", 0.5),
+    ("NOISE_REJECTIONS", 0.1, "tight", 0.16),
+    ("SIGMA_FLOOR", 10, "miss", STOPS),
+    ("FLOORS_REGULAR", 10, "miss", STOPS),
+    ("FLOORS_BETWEEN", 0.1, "start", STOPS),
+    ("MIN_ALIGNMENT", 10, "parallelogram", STOPS),
+    ("NEWTON_STEPS", 0.1, "start", STOPS),
+    ("NEWTON_CONVERGED", 10, "miss", 1.5),
+    ("ROUNDING", 10, "miss", 3.0),
+    ("START_DISTANCE", 10, "start", 0.1),
+    ("START_VELOCITY", 10, "miss of 3e-6", STOPS),
+    ("START_VELOCITY", 0.1, "miss of 3e-7", STOPS),
 ]
 
 
 def scale(monkeypatch, folder, constant, factor):
-    """Integrate with another value of a constant of passage.c."""
+    """Integrate with another value of a constant of the steps through singular configurations."""
     library = with_constant(folder, constant, lambda value: value * factor)
     integrate_with(monkeypatch, library)
 
@@ -83,7 +83,7 @@ def test_a_constant_moved_tenfold_changes_a_motion(
 
 
 def test_a_miss_is_named_where_it_is_larger_than_rounding(monkeypatch, tmp_path):
-    """`APART` only chooses the words of a stop."""
+    """`BRANCHES_MEET` only chooses the words of a stop."""
 
     def words():
         with pytest.raises(SolverError) as stop:
@@ -91,7 +91,7 @@ def test_a_miss_is_named_where_it_is_larger_than_rounding(monkeypatch, tmp_path)
         return str(stop.value)
 
     assert "come near each other" in words()
-    scale(monkeypatch, tmp_path, "APART", 10)
+    scale(monkeypatch, tmp_path, "BRANCHES_MEET", 10)
     assert "is not passed" in words()
 
 
@@ -103,7 +103,7 @@ def test_the_rows_of_many_loops_in_their_order_lead_to_the_same_motion(monkeypat
         return mbs.simulate.run(system, 3.0, v0={"a0": -4.0}, tolerance=1e-8, quiet=True)
 
     pivots = motion()
-    scale(monkeypatch, tmp_path, "MANY", 0)
+    scale(monkeypatch, tmp_path, "MANY_ROWS", 0)
     ordered = motion()
     difference = np.abs(ordered.values - pivots.values).max(axis=0)
     assert difference.max() > 0

@@ -1,4 +1,4 @@
-"""How far local tangent coordinates of passage.c reach, on a circle."""
+"""How far local tangent coordinates of passage_chart.c reach, on a circle."""
 
 import ctypes
 import re

@@ -16,8 +16,9 @@ from mbs.native import cached_library
 integrate_module = importlib.import_module("mbs.solvers.integrate")
 
 INTEGRATION = (
-    *("module", "model", "driver", "stepper", "dopri5", "rodas", "events", "dense", "passage"),
-    *("least_squares", "array_call", "projection"),
+    *("module", "model", "driver", "stepper", "dopri5", "rodas", "events", "dense"),
+    *("least_squares", "array_call", "projection", "sparse_pattern", "sparse_qr", "skyline"),
+    *(file.stem for file in sorted(SOURCE.glob("passage*.c"))),
 )
 """C files of the extension without those of arms."""
 

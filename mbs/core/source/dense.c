@@ -105,3 +105,37 @@ void dense_complement(const dense_qr *f, double *V, int count) {
             dense_reflect(f->A + k * m + k, f->weight[k], m - k, V + j * m + k);
     }
 }
+
+int dense_eliminate(double *A, int n, double *b, int count) {
+    int sign = 1, i, j, k;
+    for (k = 0; k < n; k++) {
+        double *column = A + k * n;
+        int pivot = k;
+        for (i = k + 1; i < n; i++)
+            if (fabs(column[i]) > fabs(column[pivot])) pivot = i;
+        if (!(fabs(column[pivot]) > 0.0)) return 0;
+        for (j = k; j < n + count && pivot != k; j++) {
+            double *other = j < n ? A + j * n : b + (j - n) * n, kept = other[k];
+            other[k] = other[pivot];
+            other[pivot] = kept;
+        }
+        if ((column[k] < 0.0) != (pivot != k)) sign = -sign;
+        for (i = k + 1; i < n; i++) column[i] /= column[k];
+        for (j = k + 1; j < n + count; j++) {
+            double *other = j < n ? A + j * n : b + (j - n) * n, part = other[k];
+            for (i = k + 1; i < n && part != 0.0; i++) other[i] -= column[i] * part;
+        }
+    }
+    return sign;
+}
+
+int dense_solve_square(double *A, int n, double *b, int count) {
+    int i, j, k;
+    if (!dense_eliminate(A, n, b, count)) return 1;
+    for (j = 0; j < count; j++)
+        for (k = n - 1; k >= 0; k--) {
+            for (i = k + 1; i < n; i++) b[j * n + k] -= A[i * n + k] * b[j * n + i];
+            b[j * n + k] /= A[k * n + k];
+        }
+    return 0;
+}

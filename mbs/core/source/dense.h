@@ -41,4 +41,11 @@ double dense_regularity(const dense_qr *f);
  * orthogonal complement of the columns of A, if the rank of A is rows - count. */
 void dense_complement(const dense_qr *f, double *V, int count);
 
+/* Factorize A (n, n) = L U with row exchanges, in place, and apply the row operations to b
+ * (n, count). Returns the sign of the determinant, 0 if A is singular. */
+int dense_eliminate(double *A, int n, double *b, int count);
+
+/* Compute b = A^-1 b (n, count) in place. A (n, n) is overwritten. Returns 1 if it is singular. */
+int dense_solve_square(double *A, int n, double *b, int count);
+
 #endif

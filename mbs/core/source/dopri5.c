@@ -75,6 +75,19 @@ void dopri5_interpolate(const double *dense, int n, double a, double *row) {
         row[i] = d[i] + a * (d[n + i] + b * (d[2 * n + i] + a * (d[3 * n + i] + b * d[4 * n + i])));
 }
 
+void dopri5_hermite(int n, const double *x, const double *y, double h, const double *first,
+                    const double *last, double *dense) {
+    int i;
+    for (i = 0; i < n; i++) {
+        double rise = y[i] - x[i], bend = h * first[i] - rise;
+        dense[i] = x[i];
+        dense[n + i] = rise;
+        dense[2 * n + i] = bend;
+        dense[3 * n + i] = rise - h * last[i] - bend;
+        dense[4 * n + i] = 0.0;
+    }
+}
+
 static void interpolate(const stepper *s, double a, double *row) {
     dopri5_interpolate(dense(s, 0), s->n, a, row);
 }

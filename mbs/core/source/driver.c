@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "dopri5.h"
+#include "passage_start.h"
 #include "projection.h"
 #include "rodas.h"
 
@@ -18,7 +19,8 @@ struct driver {
     events events;
     passage *passage;
     driver_model model;
-    double *p, *memory, *work, *projected, *modes, *event_memory, *event_work, *passage_memory;
+    double *p, *memory, *work, *projected, *modes, *event_memory, *event_work, *chart_origin;
+    passage_memory chart_memory;
     int stopped; /* whether an evaluation returned MODEL_STOP, which ends all evaluations */
 };
 
@@ -142,10 +144,10 @@ static int watch(driver *d) {
 static int pass(driver *d) {
     passage_model model = {rows, forces, regularity, 0.0};
     model.typical = d->model.typical;
-    d->passage_memory = array((size_t)PASSAGE_MEMORY(d->model.n));
-    if (!d->passage_memory) return 1;
+    d->chart_origin = array((size_t)d->model.n);
+    if (!d->chart_origin) return 1;
     d->passage = passage_new(&d->solver, &d->model.size, &d->model.patterns, &model,
-                             d->passage_memory);
+                             &d->chart_memory, d->chart_origin);
     return d->passage == NULL;
 }
 
@@ -159,7 +161,7 @@ void driver_free(driver *d) {
     free(d->modes);
     free(d->event_memory);
     free(d->event_work);
-    free(d->passage_memory);
+    free(d->chart_origin);
     free(d);
 }
 

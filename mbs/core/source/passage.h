@@ -13,9 +13,16 @@
  * direction in which the rows lose rank has no effect on u'. A new chart is made at the start of
  * each step. Away from singular configurations the method of the stepper runs unchanged.
  *
- * Source: Hairer, Lubich and Wanner 2006, IV.5.3, for local tangent coordinates; Golub and Van Loan
- * 2013, algorithm 5.4.1, for the orthogonal factors of the rows, truncated at the rank that the
- * assembly of the model found.
+ * Further headers: passage_start.h for starts in singular configurations, passage_external.h for
+ * external integrators. The parts of the method are passage_frame.h (rows, inertia and tangents at
+ * a state), passage_newton.h (projection), passage_chart.h (local coordinates), passage_crossing.h
+ * (values at the singular configuration), passage_origin.h (choice of the chart, restart),
+ * passage_near_miss.h (branches that do not meet) and passage_step.h (the step).
+ *
+ * Source: Hairer, Lubich and Wanner 2006, IV.5.3, for local tangent coordinates; Hairer and Wanner
+ * 1996, VII.2, for local state space forms of equations of index 3; Golub and Van Loan 2013,
+ * algorithm 5.4.1, for the orthogonal factors of the rows, truncated at the rank that the assembly
+ * of the model found.
  */
 #ifndef MBS_PASSAGE_H
 #define MBS_PASSAGE_H
@@ -23,8 +30,9 @@
 #include "stepper.h"
 
 /* Fraction of the largest regularity below which steps are made in the chart. A full step magnifies
- * errors by 1 / regularity and rounding by its square. At a fifth the magnification is small; a
- * tenth of the range of a crank lies below it. */
+ * errors by 1 / regularity and rounding by its square. At a fifth the magnification is small, and a
+ * tenth of the range of a crank lies below it. With ten times more the error of an
+ * antiparallelogram at a tolerance of 1e-10 rises from 0.05 to 6.5 tolerances. */
 #define PASSAGE_ON 0.2
 
 /* Dimensions of the state and of the constraint rows. */
@@ -65,78 +73,39 @@ typedef struct {
     double typical; /* regularity at a common configuration */
 } passage_model;
 
-/* Number of doubles that are kept between steps: scalars, then the last regular state (n,). */
-#define PASSAGE_MEMORY(n) (8 + (n))
+/* Data that are kept between steps, in addition to the origin of the chart. All members are
+ * doubles, flags included, so that a saved state can check them as one array. */
+typedef struct {
+    double sigma_max;        /* largest sigma so far, the distance from the loss of rank; 0: none */
+    double regularity_max;   /* largest regularity so far */
+    double regularity;       /* regularity at the end of the last step */
+    double regularity_rate;  /* its mean rate in the last step [1/s] */
+    double regularity_known; /* 1 if regularity belongs to regularity_time, else 0 */
+    double regularity_time;  /* [s] */
+    double has_origin;       /* 1 if the origin of the chart is set, else 0 */
+    double origin_time;      /* time of the origin of the chart [s] */
+} passage_memory;
 
 typedef struct passage passage;
 
 /* Wrap the method of an initialised stepper. Returns NULL if no memory is left. patterns is NULL if
- * all matrices are dense. memory has PASSAGE_MEMORY(n) elements. */
+ * all matrices are dense. The caller keeps memory and origin (n,), the last regular state, at which
+ * the chart has its origin; a copy of both saves the data between steps. */
 passage *passage_new(stepper *s, const passage_size *size, const passage_patterns *patterns,
-                     const passage_model *model, double *memory);
+                     const passage_model *model, passage_memory *memory, double *origin);
 void passage_free(passage *g);
 
 /* Clear the memory before stepper_start. */
 void passage_start(passage *g);
 
-/* Discard all data outside `memory` after its contents were replaced. */
+/* Discard all data outside memory and origin after their contents were replaced. */
 void passage_forget(passage *g);
+
+/* Whether all members are finite. */
+int passage_memory_finite(const passage_memory *memory);
 
 /* Project positions and velocities in x onto the rows in the chart of the last step. Returns 1 if
  * the last step had no chart; the projection of the full step is then required. */
 int passage_project(passage *g, double t, double *x);
-
-/* Functions for a first state at which the rows may be dependent. */
-
-/* Whether the rows are dependent, or nearly so, at x. */
-int passage_singular(passage *g, double t, const double *x);
-
-/* Project the positions in x onto all rows by changes of the positions with indices loose (count,).
- * Returns 1 if the Newton steps do not converge. */
-int passage_place(passage *g, double t, double *x, const int *loose, int count);
-
-/* Replace the velocities in x by the shortest vector that satisfies all rows and keeps the
- * velocities with indices kept (count,). Returns 1 if no motion has these velocities. */
-int passage_velocities(passage *g, double t, double *x, const int *kept, int count);
-
-/* Compute the slope xdot (n,) at x. In a singular configuration it is the slope of the branch that
- * has the velocities of x. on (n,) or NULL: the state on the branch; x if the rows are independent.
- * Returns a status of the stepper, STEPPER_UNDETERMINED if no branch has these velocities. */
-int passage_slope(passage *g, double t, const double *x, double *xdot, double *on);
-
-/* Return the index of the velocity that the rows constrain least at x, or -1 on failure.
- * unit (nv,): factor that scales each velocity. */
-int passage_loosest(passage *g, double t, const double *x, const double *unit);
-
-/* Functions for an external integrator. A chart is valid from one call of passage_chart to the
- * next. All functions return a status of the stepper. */
-
-/* Make a chart at the state x. */
-int passage_chart(passage *g, double t, const double *x);
-
-/* Compute the coordinates y = (xi, u, z) of x in the chart. */
-int passage_coordinates(passage *g, double t, const double *x, double *y);
-
-/* Compute the state x on the rows at the coordinates y, and the slopes of x and y. guide (n,):
- * state near x that selects the branch. *alignment: alignment of the tangents with the tangents at
- * the origin of the chart, 1 if parallel and 0 if orthogonal. */
-int passage_state(passage *g, double t, const double *y, const double *guide, double *x,
-                  double *slope_x, double *slope_y, double *alignment);
-
-/* Whether a step from x at t, with slope first, to y at t + h, with slope last, jumps between
- * branches that come near each other and do not meet. Call it right after passage_state computed
- * y (n,) and last (n,). */
-int passage_jumps(passage *g, double t, const double *x, const double *first, double h,
-                  const double *y, const double *last);
-
-/* Compute how well the independent velocities determine the motion. independent: indices of as many
- * velocities as there are degrees of freedom. unit (nv,): factor that scales each velocity.
- * *grip: 1 / largest element (at least 1) of the matrix from the independent velocities to all
- * velocities; 0 if they do not determine the motion. Returns 1 on failure. */
-int passage_grip(passage *g, double t, const double *x, const int *independent, const double *unit,
-                 double *grip);
-
-/* Return the regularity at x, as a fraction of the largest value so far. */
-double passage_regularity(passage *g, double t, const double *x);
 
 #endif

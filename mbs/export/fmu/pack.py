@@ -62,7 +62,26 @@ _CORE_HEADERS = (
     "solver.h",
 )
 _HOSTED = ("charts.c",)
-_RUNTIME = ("stepper", "events", "dense", "passage", "projection")
+_RUNTIME = (
+    "stepper",
+    "events",
+    "dense",
+    "projection",
+    "sparse_pattern",
+    "sparse_qr",
+    "skyline",
+    "passage",
+    "passage_chart",
+    "passage_crossing",
+    "passage_data",
+    "passage_external",
+    "passage_frame",
+    "passage_near_miss",
+    "passage_newton",
+    "passage_origin",
+    "passage_start",
+    "passage_step",
+)
 _TABLEAU = "dopri5"
 """Integrator for steps through singular configurations, independent of the solver."""
 

@@ -130,7 +130,9 @@ typedef struct {
 #endif
 #ifdef MODEL_TREE
     int loose; /* 1 if the tree state must be projected onto its rows before the next step */
-    double tree[NT], passage[PASSAGE_MEMORY(NT)];
+    double tree[NT];
+    passage_memory passage;
+    double origin[NT]; /* origin of the chart of the passage */
     double slope[NT]; /* derivative of `tree`, at the start or for an external integrator */
     double speeds[N_PASSIVE + 1]; /* start velocities of dependent joints: values other than
                                      MODEL_START select the branch of a singular start */

@@ -160,7 +160,7 @@ static int sane(const core_memory *m) {
     if (!sane_watch(&m->watched)) return 0;
 #ifdef MODEL_TREE
     if (!is_flag(m->loose) || !all_finite(m->tree, NT)) return 0;
-    if (!all_finite(m->passage, PASSAGE_MEMORY(NT))) return 0;
+    if (!passage_memory_finite(&m->passage) || !all_finite(m->origin, NT)) return 0;
     if (!is_flag(m->singular) || !all_finite(m->speeds, N_PASSIVE)) return 0;
     if (!all_finite(m->slope, NT)) return 0;
 #endif

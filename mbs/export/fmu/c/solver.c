@@ -100,7 +100,7 @@ static int init_tree(core *c) {
 #endif
     dopri5_init(&c->solver, NT, tree_rhs, c, c->m.solver, c->work);
     c->solver.project = tree_project;
-    c->passage = passage_new(&c->solver, &size, NULL, &model, c->m.passage);
+    c->passage = passage_new(&c->solver, &size, NULL, &model, &c->m.passage, c->m.origin);
     return c->passage == NULL;
 }
 

@@ -8,6 +8,8 @@
 #ifdef MODEL_TREE
 #include "dopri5.h"
 #include "passage.h"
+#include "passage_external.h"
+#include "passage_start.h"
 #endif
 
 #if defined MODEL_RODAS

@@ -28,7 +28,7 @@ from mbs.components.joints import Motion
 from mbs.errors import ModelError
 from mbs.export.robot_files import shapes_left_out, system_of, write_xml
 from mbs.export.urdf import Numbers, angles, inertia_of, inverse, limits_of, text_of
-from mbs.formats.urdf import UNLIMITED
+from mbs.formats.urdf.reader import UNLIMITED
 from mbs.mechanism import Mechanism
 from mbs.spatial.rotation import quaternion_rotation
 

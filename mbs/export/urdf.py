@@ -26,7 +26,7 @@ from mbs.export.robot_files import (
     system_of,
     write_xml,
 )
-from mbs.formats.urdf import UNLIMITED
+from mbs.formats.urdf.reader import UNLIMITED
 from mbs.mechanism import Mechanism
 from mbs.text import listed, quoted
 

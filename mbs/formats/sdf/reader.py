@@ -39,7 +39,7 @@ from mbs.components.locking import FREE_JOINT, Base
 from mbs.errors import DescriptionError
 from mbs.formats.files import component_name
 from mbs.formats.notes import Notes
-from mbs.formats.urdf import Inertial, KeptNames, Reader, Vector, body_of
+from mbs.formats.urdf.reader import Inertial, KeptNames, Reader, Vector, body_of
 from mbs.formats.xml import line_of, parse_xml
 from mbs.mechanism import Mechanism
 from mbs.text import did_you_mean, quoted

@@ -21,8 +21,8 @@ def transform(R: Any, p: Any) -> Array:
 
 def inverse(T: Array) -> Array:
     """Return the inverse of a homogeneous transform (4, 4)."""
-    R = T[:3, :3].T
-    return transform(R, -(R @ T[:3, 3]))
+    R, p = T[:3, :3], T[:3, 3]
+    return np.block([[R.T, -(R.T @ p)[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
 
 
 def matrix_of_angles(roll: float, pitch: float, yaw: float) -> Array:

@@ -57,7 +57,7 @@ def write_sdf(table: LinkTable, path: str | os.PathLike[str], note: str = "") ->
             that closes a loop has limits which the format does not support.
         ExportError: the file cannot be written.
     """
-    write_xml(_Writer(table).file(), path, note)
+    write_xml(_SdfWriter(table).file(), path, note)
 
 
 def refusal(name: str, what: str) -> ModelError:
@@ -66,7 +66,7 @@ def refusal(name: str, what: str) -> ModelError:
 
 
 @dataclass(slots=True)
-class _Writer:
+class _SdfWriter:
     """Writer of the XML elements of an SDF file.
 
     Attributes:
@@ -221,9 +221,7 @@ class _Writer:
                     _inertial(SubElement(model, "link", name=ground), 1.0, np.zeros(3), np.eye(3))
                     _joint(model, self._unused_name(f"{_GROUND}_joint"), "fixed", "world", ground)
                 carrier = ground
-            element = SubElement(
-                model, "frame", name=self._name(frame.name), attached_to=carrier
-            )
+            element = SubElement(model, "frame", name=self._name(frame.name), attached_to=carrier)
             _pose(element, frame.pose, {})
 
 

@@ -32,7 +32,7 @@ from mbs.components import Coupling, FixedTendon
 from mbs.components.joints import Motion
 from mbs.expressions import to_float
 from mbs.formats import read_mjcf
-from mbs.formats.mjcf import MjcfModel
+from mbs.formats.mjcf.reader import MjcfModel
 from mbs.formats.notes import Notes
 from mbs.recursions.route import relative_pose
 

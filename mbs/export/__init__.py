@@ -5,11 +5,8 @@ from mbs.export.code import code
 from mbs.export.fmu.controller import CController
 from mbs.export.fmu.inverse_geometry_fmu import inverse_geometry_fmu
 from mbs.export.fmu.system_fmu import fmu
-from mbs.export.mjcf import mjcf
-from mbs.export.par import par
-from mbs.export.sdf import sdf
+from mbs.export.robot_files import mjcf, par, sdf, urdf
 from mbs.export.ssp import ssp
-from mbs.export.urdf import urdf
 
 __all__ = [
     "CController",

@@ -1,12 +1,11 @@
 """Readers and writers of robot files: tables of frames (TOML, dict, .par), URDF, SDF and MJCF."""
 
-from mbs.formats.mjcf import read_mjcf
-from mbs.formats.par import read_par
-from mbs.formats.par_write import write_par
-from mbs.formats.sdf import read_sdf
+from mbs.formats.mjcf.reader import read_mjcf
+from mbs.formats.par import read_par, write_par
+from mbs.formats.sdf.reader import read_sdf
 from mbs.formats.table import CutRow, FrameRow, InertiaRow, RobotTable, to_mechanism
 from mbs.formats.toml import from_dict, read_toml, to_dict, write_toml
-from mbs.formats.urdf import read_urdf
+from mbs.formats.urdf.reader import read_urdf
 
 __all__ = [
     "CutRow",

@@ -1,4 +1,4 @@
-"""Reader of SYMORO+ and OpenSYMORO robot files (.par) as tables of frames.
+"""Reader and writer of SYMORO+ and OpenSYMORO robot files (.par) as tables of frames.
 
 With NL links, NJ joints and B = NJ - NL loops there are NF = NJ + B frames: loop k is cut between
 the frames NL + k, which moves with the joint, and NJ + k, which is fixed. The joint variable is the
@@ -8,7 +8,7 @@ symbol in theta of a revolute joint and in r of a prismatic joint.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -20,14 +20,25 @@ from mbs.expressions import (
     Number,
     Operation,
     Parameter,
+    Scalar,
     expression,
     number,
     parameters_of,
+    to_float,
     whole_number,
 )
+from mbs.files import write_text
 from mbs.formats.files import read_text
-from mbs.formats.table import DRIVE, GEOMETRY, CutRow, FrameRow, InertiaRow, RobotTable
-from mbs.text import quoted
+from mbs.formats.table import (
+    DRIVE,
+    GEOMETRY,
+    CutRow,
+    FrameRow,
+    InertiaRow,
+    RobotTable,
+    require_table,
+)
+from mbs.text import in_bracket_comment, quoted
 
 # Keys and lines of .par files, without interpretation.
 
@@ -57,6 +68,9 @@ JOINT_EXTRAS = ("QP", "QDP", "GAM")
 BASE_EXTRAS = {"W0": 3, "WP0": 3, "V0": 3, "VP0": 3, "Z": 16}
 """Vectors of the base, stored as texts, and their lengths."""
 
+_GEOMETRY = tuple(key for key in FRAME_KEYS if key in GEOMETRY)
+"""Vectors of the six geometric parameters, in the order of the files."""
+
 _OTHER_KEYS = ("NL", "NJ", "NF", "Type", "G", "is_floating", "is_mobile")
 
 _OLD_SPELLING = {
@@ -82,7 +96,8 @@ _KNOWN = (
     *_OTHER_KEYS,
 )
 _ASSIGNMENT = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*(.*)", re.DOTALL)
-_REMARKS = ("Value", "Guess", "Fs_width", "rest", "grouped")
+_OF_JOINTS = ("Fs_width", "rest")
+_REMARKS = ("Value", "Guess", *_OF_JOINTS, "grouped")
 _REMARKED = re.compile(r"[\w.]+")
 _SHORTEST_MISSPELT, _SIMILAR = 3, 0.75
 """Minimum length of a key that is checked for misspelling, and similarity ratio of difflib: one
@@ -275,6 +290,9 @@ _SHORT = {0: "th", 1: "r"}
 
 _KIND = {0: "revolute", 1: "prismatic"}
 
+_VARIED = {0: "theta", 1: "r"}
+"""Vector that contains the joint variable."""
+
 
 def split_variable(where: str, value: Expression, j: int, sigma: int) -> tuple[str, Expression]:
     """Split an expression into the joint variable of frame j and a constant.
@@ -343,6 +361,9 @@ def _add(rest: Expression | None, sign: int, term: Expression) -> Expression:
     if rest is None:
         return term if sign > 0 else -term
     return rest + term if sign > 0 else rest - term
+
+
+# Reader of complete files.
 
 
 def read_par(path: str | Path, parameters: Mapping[str, float] | None = None) -> RobotTable:
@@ -428,7 +449,7 @@ def _frame(
         for key in GEOMETRY
         if key in texts
     }
-    key = {0: "theta", 1: "r"}.get(sigma)
+    key = _VARIED.get(sigma)
     variable = None
     if key in values:
         where = f"{file.where(key)} of frame {j}"
@@ -457,7 +478,7 @@ def _check_variables(file: ParFile, rows: tuple[FrameRow, ...], taken: Mapping[s
 def _bodies(
     file: ParFile, NL: int, NJ: int, frames: tuple[FrameRow, ...]
 ) -> tuple[InertiaRow, ...]:
-    remarks = {kind: _remarks(file, kind, NJ) for kind in ("Fs_width", "rest")}
+    remarks = {kind: _remarks(file, kind, NJ) for kind in _OF_JOINTS}
     springs, grouped = _springs(file, NJ, frames), _remarks(file, "grouped", NJ)
     rows = []
     for j in range(1, NJ + 1):
@@ -531,3 +552,177 @@ def _extras(file: ParFile, NL: int, NJ: int) -> dict[str, tuple[str, ...]]:
         if texts is not None:
             kept[key] = tuple(str(expression(text, file.where(key))) for text in texts)
     return kept
+
+
+# Writer.
+
+
+def write_par(table: RobotTable, path: str | Path, *, note: str = "") -> None:
+    """Write a table as a .par file.
+
+    The format has no names of joints and bodies and no limits. They are lost, and joint j is named
+    q<j> when the file is read again. Values of symbols, `guess`, `Fs_width`, `rest` and the marks
+    of bodies with grouped inertial parameters are written as comments, which `read_par` reads. The
+    file specifies for every joint whether it is actuated. If the table does not, the choice of the
+    assembly is written.
+
+    Args:
+        table: table of frames.
+        path: path of the .par file.
+        note: text of a comment at the beginning of the file.
+
+    Raises:
+        DescriptionError: `table` is not a table, or a loop, a symbol, a rotor, or the drive of a
+            cut joint cannot be expressed in this format.
+        ExportError: the file cannot be written.
+    """
+    require_table(table)
+    write_text("\n".join(_lines(table, note)) + "\n", path)
+
+
+def _lines(table: RobotTable, note: str) -> Iterator[str]:
+    NF, B = len(table.frames), len(table.loops)
+    NL, NJ = NF - 2 * B, NF - B
+    _check_loops(table, NL, NJ)
+    _check_drives(table, NL)
+    _check_symbols(table)
+    yield f"(* Robotname = '{re.sub(r'[^A-Za-z0-9 _-]', '_', table.name)}' *)"
+    if table.source:
+        yield f"(* Source = '{in_bracket_comment(table.source)}' *)"
+    if note:
+        yield f"(* {in_bracket_comment(note)} *)"
+    yield from _remark_lines(table, NJ)
+    yield f"NL = {NL}\nNJ = {NJ}\nNF = {NF}\nType = {_kind(table)}"
+    yield "\n(* Geometric parameters *)"
+    yield _vector("ant", (row.antecedent for row in table.frames))
+    yield _vector("sigma", (row.sigma for row in table.frames))
+    yield _vector("mu", _motors(table))
+    for key in _GEOMETRY:
+        yield _vector(key, (_cell(key, j, row) for j, row in enumerate(table.frames, 1)))
+    yield "\n(* Dynamic parameters and external forces *)"
+    bodies = {body.frame: body for body in table.bodies}
+    for key, name in BODY_KEYS.items():
+        rows = (bodies.get(j, InertiaRow(j)) for j in range(1, NL + 1))
+        yield _vector(key, (_text(getattr(row, name)) for row in rows))
+    yield from _extra_lines(table, LINK_EXTRAS)
+    yield "\n(* Joint parameters *)"
+    yield from _spring_lines(table, NJ)
+    yield from _extra_lines(table, JOINT_EXTRAS)
+    yield "\n(* Base: motion, gravity, place *)"
+    yield _vector("G", (_text(value) for value in table.gravity))
+    yield from _extra_lines(table, BASE_EXTRAS)
+    yield "\n(* End of definition *)"
+
+
+def _remark_lines(table: RobotTable, NJ: int) -> Iterator[str]:
+    """Yield comments for data that have no key in the format."""
+    numbers = {table.joint_name(j): j for j in range(1, len(table.frames) + 1)}
+    yield from (f"(* Value {name} = {value!r} *)" for name, value in table.parameters.items())
+    yield from (f"(* Guess q{numbers[name]} = {value!r} *)" for name, value in table.guess.items())
+    for row in table.bodies:
+        for kind in _OF_JOINTS:
+            value, usual = expression(getattr(row, kind)), getattr(InertiaRow(row.frame), kind)
+            if row.frame <= NJ and to_float(value) != usual:
+                yield f"(* {kind} {row.frame} = {_text(value)} *)"
+        if row.grouped and not row.is_body:
+            yield f"(* grouped {row.frame} = 1 *)"
+
+
+def _spring_lines(table: RobotTable, NJ: int) -> Iterator[str]:
+    stiffness = ["0"] * NJ
+    for row in table.bodies:
+        if "stiffness" in row.drive:
+            stiffness[row.frame - 1] = _text(row.stiffness)
+    if any(text != "0" for text in stiffness):
+        yield _vector(FLEXIBLE, (int(text != "0") for text in stiffness))
+        yield _vector(STIFFNESS, stiffness)
+
+
+def _motors(table: RobotTable) -> Iterator[int]:
+    """Yield 1 for actuated frames, else 0. By default, joints inside loops are passive."""
+    passive = set(table.cut_frames)
+    for loop in table.loops:
+        moving, fixed = (_path(table, frame) for frame in loop.cut)
+        passive |= moving ^ fixed
+    for j, row in enumerate(table.frames, 1):
+        chosen = j not in passive if row.actuated is None else row.actuated
+        yield int(bool(chosen) and row.sigma != 2)
+
+
+def _path(table: RobotTable, frame: int) -> set[int]:
+    """Return the frames on the path from the base to this frame."""
+    path: set[int] = set()
+    while frame:
+        path.add(frame)
+        frame = table.frames[frame - 1].antecedent
+    return path
+
+
+def _kind(table: RobotTable) -> int:
+    if table.loops:
+        return 2
+    return int(any(row.antecedent != j for j, row in enumerate(table.frames)))
+
+
+def _cell(key: str, j: int, row: FrameRow) -> str:
+    text = _text(getattr(row, key))
+    if key != _VARIED.get(row.sigma):
+        return text
+    variable = f"{_SHORT[row.sigma]}{j}"
+    if text == "0":
+        return variable
+    return f"{variable}{text}" if text.startswith("-") else f"{variable}+{text}"
+
+
+def _text(value: Scalar) -> str:
+    return str(expression(value)).replace("^", "**")
+
+
+def _vector(key: str, values: Iterable[object]) -> str:
+    return f"{key} = {{{','.join(map(str, values))}}}"
+
+
+def _extra_lines(table: RobotTable, keys: Iterable[str]) -> Iterator[str]:
+    for key in keys:
+        if key in table.extras:
+            yield _vector(key, (_text(text) for text in table.extras[key]))
+
+
+def _check_loops(table: RobotTable, NL: int, NJ: int) -> None:
+    for k, loop in enumerate(table.loops, 1):
+        if loop.joint not in ("revolute", "prismatic"):
+            raise DescriptionError(
+                f"{table.name}/loop {k}: a .par file has no {loop.joint} cut joint; write TOML"
+            )
+        if loop.cut != (NL + k, NJ + k):
+            raise DescriptionError(
+                f"{table.name}/loop {k}: a .par file needs the cut [{NL + k}, {NJ + k}], not"
+                f" {list(loop.cut)}; number the frames of loops last"
+            )
+
+
+def _check_drives(table: RobotTable, NL: int) -> None:
+    for row in table.bodies:
+        where = f"{table.name}/body {row.frame}"
+        if row.rotor is not None:
+            raise DescriptionError(f"{where}: a .par file has no rotor; give Ia, or write TOML")
+        given = [name for name in row.drive if name != "stiffness"]
+        if row.frame > NL and given:
+            raise DescriptionError(
+                f"{where}: a .par file has no {given[0]} of a cut joint; cut the loop at another"
+                " joint, or write TOML"
+            )
+
+
+def _check_symbols(table: RobotTable) -> None:
+    variables = {
+        f"{_SHORT[row.sigma]}{j}" for j, row in enumerate(table.frames, 1) if row.sigma != 2
+    }
+    for j, row in enumerate(table.frames, 1):
+        for value in row.geometry.values():
+            for symbol in parameters_of(expression(value)):
+                if symbol.name in variables:
+                    raise DescriptionError(
+                        f"{table.name}/frame {j}: parameter {symbol.name} has the name of a joint"
+                        " variable of .par files; rename it"
+                    )

@@ -1,4 +1,4 @@
-"""XML parser for robot files, with line numbers and the tolerance of common robot tools.
+"""XML of robot files: a parser with the tolerance of common robot tools, and a writer.
 
 Prefixes need no declaration, since tag names are not interpreted. Errors that expat rejects and the
 tools of URDF (TinyXML) accept are repaired, with a note: a declaration that is not at the
@@ -9,13 +9,16 @@ the root element.
 from __future__ import annotations
 
 import codecs
+import os
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Comment, Element, indent, tostring
 from xml.parsers import expat
 
 from mbs.errors import DescriptionError
+from mbs.files import path_of, write_bytes
 from mbs.formats.files import decoded, read_bytes
 from mbs.formats.notes import Notes
 
@@ -198,3 +201,29 @@ def _without_comments(text: str) -> str:
         parts += [text[at:start], "\n" * text.count("\n", start, end)]
         at = end + 3
     return "".join([*parts, text[at:]])
+
+
+# Writer.
+
+
+def text_of(values: Iterable[Any]) -> str:
+    """Format numbers separated by blanks, with all digits of a double."""
+    return " ".join(repr(float(value) + 0.0) for value in values)
+
+
+def write_xml(root: Element, path: str | os.PathLike[str], note: str = "") -> None:
+    """Write an indented XML file as a whole or not at all.
+
+    Args:
+        root: element of the robot.
+        path: path of the file.
+        note: text of a comment at the beginning of the file.
+
+    Raises:
+        ExportError: the file cannot be written.
+    """
+    if note:
+        root.insert(0, Comment(f" {note.replace('--', '- -')} "))
+    indent(root)
+    content = tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+    write_bytes(content, path_of(path))

@@ -27,7 +27,7 @@ from mbs.components import (
 )
 from mbs.components.joints import Motion
 from mbs.errors import ExportError, ModelError
-from mbs.export.robot_files import child_positions
+from mbs.export.robot_tables import child_positions
 from mbs.models import direct_dynamics, energy, inertia_matrix, inverse_dynamics, transform
 
 mujoco = pytest.importorskip("mujoco")

@@ -7,7 +7,7 @@ import mbs
 from mbs.errors import DescriptionError
 from mbs.expressions import to_float
 from mbs.formats import read_mjcf
-from mbs.formats.mjcf import _EFFECTIVE, _ENABLED_WITHOUT_EFFECT, _WITHOUT_EFFECT, Flags
+from mbs.formats.mjcf.reader import _EFFECTIVE, _ENABLED_WITHOUT_EFFECT, _WITHOUT_EFFECT, Flags
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -292,7 +292,7 @@ def test_flags_without_effect_have_none(tmp_path, flag):
 
 
 def test_flags_that_a_later_mujoco_may_have_are_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("mbs.formats.mjcf._WITHOUT_EFFECT", set())
+    monkeypatch.setattr("mbs.formats.mjcf.reader._WITHOUT_EFFECT", set())
     with pytest.raises(DescriptionError, match="its flag 'contact' is set, which this reader does"):
         read(tmp_path, text_of(flags='contact="disable"'))
 

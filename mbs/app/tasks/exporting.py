@@ -20,7 +20,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
 from mbs.export.fmu.description import Solver
-from mbs.export.par import robot_table
+from mbs.export.robot_tables import robot_table
 from mbs.formats import RobotTable, write_toml
 from mbs.text import did_you_mean
 

@@ -15,11 +15,11 @@ from mbs.components import Rotor
 from mbs.components.component import Placement, in_rotated_axes
 from mbs.components.mounting import mount_of
 from mbs.errors import DescriptionError, ExpressionError, MbsError
-from mbs.export.urdf import angles
 from mbs.expressions import Expression, Number, Scalar, expression, parameters_of, to_float
 from mbs.expressions import number as number_of
 from mbs.formats import CutRow, FrameRow, RobotTable
 from mbs.formats.base_pose import POSE, base_placement, base_pose_texts, placement_pose
+from mbs.formats.rotations import angles_of
 from mbs.formats.table import BODY_SCALARS, GEOMETRY, JOINTS, LOOP_JOINTS, InertiaRow
 from mbs.text import did_you_mean, quoted
 
@@ -359,7 +359,7 @@ def _mounted_cells(table: RobotTable) -> tuple[Texts, tuple[tuple[str, Texts], .
     kept = tuple((k, v) for k, v in table.extras.items() if notes or k != POSE)
     if pose is None or not placement.steps:
         return (*map(written, table.gravity), table.source, ""), tuple(table.extras.items())
-    roll, pitch, yaw = angles(pose[:3, :3])
+    roll, pitch, yaw = angles_of(pose[:3, :3])
     turns = [(a, v) for a, v in zip("zyx", (yaw, pitch, roll), strict=True) if v]
     back: Any = [(axis, -value) for axis, value in reversed(turns)]
     gravity = table.gravity

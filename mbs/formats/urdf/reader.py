@@ -39,6 +39,7 @@ from mbs.expressions import plain_numbers
 from mbs.formats.files import component_name, read_bytes
 from mbs.formats.meshes import MeshFiles
 from mbs.formats.notes import Notes
+from mbs.formats.urdf.shared import MOMENTS, REDUCTION, ROTOR, UNLIMITED
 from mbs.formats.xml import line_of, parse_content
 from mbs.mechanism import Mechanism
 from mbs.text import did_you_mean, install_command, quoted
@@ -47,9 +48,6 @@ from mbs.text import did_you_mean, install_command, quoted
 
 
 Vector = tuple[float, ...]
-
-UNLIMITED = 1e30
-"""Magnitude from which a limit counts as infinite, in a format without infinity."""
 
 _LARGEST = 1e30
 """Largest length, mass and other number in SI units: products stay finite in double precision."""
@@ -157,9 +155,6 @@ def origin_of(reader: Reader, element: Element) -> tuple[Vector, list[tuple[str,
     return xyz, turns
 
 
-_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-
-
 def read_inertial(reader: Reader) -> Inertial:
     """Return the inertial of a link, zero if it has none or no mass.
 
@@ -173,10 +168,10 @@ def read_inertial(reader: Reader) -> Inertial:
     if mass is None or mass.get("value") is None:
         reader.note("ignored", "its inertial has no mass and was left out", inertial)
         return Inertial()
-    missing = [key for key in _MOMENTS if inertia is None or inertia.get(key) is None]
+    missing = [key for key in MOMENTS if inertia is None or inertia.get(key) is None]
     if missing:
         reader.note("completed", f"its inertia has no {', '.join(missing)}; taken as 0", inertial)
-    Ixx, Ixy, Ixz, Iyy, Iyz, Izz = (reader.number(inertia, key, 0.0) for key in _MOMENTS)
+    Ixx, Ixy, Ixz, Iyy, Iyz, Izz = (reader.number(inertia, key, 0.0) for key in MOMENTS)
     com, turns = origin_of(reader, inertial)
     tensor = np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]])
     for axis, angle in reversed(turns):
@@ -655,10 +650,6 @@ def _is_zero(text: str) -> bool:
         return False
 
 
-_REDUCTION = ("mechanicalReduction", "mechanical_reduction", "gear_ratio")
-_ROTOR = ("motorInertia", "rotorInertia", "rotor_inertia")
-
-
 def _rotors(root: Element, tree: UrdfTree) -> dict[str, float]:
     """Return the rotor inertias of transmissions, referred to their joints, Ia [kg m^2 or kg].
 
@@ -672,7 +663,7 @@ def _rotors(root: Element, tree: UrdfTree) -> dict[str, float]:
         name = quoted((element.get("name") or "").strip())
         reader = Reader(f"transmission {name}", element, tree.notes)
         joints = [j.get("name", "").strip() for j in element.iter("joint")]
-        n, inertia = _scalar_in(element, _REDUCTION), _scalar_in(element, _ROTOR)
+        n, inertia = _scalar_in(element, REDUCTION), _scalar_in(element, ROTOR)
         if inertia is None:
             if n not in (None, 0.0, 1.0):
                 reader.note("ignored", f"a reduction of {n:g} without the inertia of a rotor")

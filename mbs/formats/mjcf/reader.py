@@ -41,7 +41,9 @@ from mbs.components.locking import FREE_JOINT, Base
 from mbs.errors import DescriptionError
 from mbs.formats.files import component_name
 from mbs.formats.meshes import MeshFiles
+from mbs.formats.mjcf.shared import numbered_name
 from mbs.formats.notes import Notes
+from mbs.formats.rotations import matrix_of_quaternion
 from mbs.formats.xml import parse_xml
 from mbs.mechanism import Mechanism
 from mbs.text import install_command, quoted
@@ -267,23 +269,11 @@ class MjcfModel:
 
 def placed(point: Point, pos: Sequence[float], quat: Sequence[float]) -> Point:
     """Return the frame at a position [m] and quaternion (w, x, y, z) relative to a frame."""
-    R = matrix_of(quat)
+    R = matrix_of_quaternion(quat)
     # larger than rounding errors of a normalised (1, 0, 0, 0), smaller than any rotation in files
     turned = None if np.allclose(R, np.eye(3), rtol=0, atol=1e-15) else R.tolist()
     x, y, z = (float(value) for value in pos)
     return point.at(x, y, z, rotation=turned)
-
-
-def matrix_of(quat: Sequence[float]) -> Any:
-    """Return the rotation matrix (3, 3) of a nonzero quaternion (w, x, y, z)."""
-    w, x, y, z = np.asarray(quat, dtype=float) / math.hypot(*quat)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def _names(names: Iterable[str], kind: str) -> tuple[str, ...]:
@@ -300,9 +290,7 @@ def _apart(name: str, taken: set[str], kind: str) -> str:
     """Return the name, made unique by a suffix, and add it to `taken`."""
     if name in taken:
         name = f"{name}_{kind}"
-    found, number = name, 2
-    while found in taken:
-        found, number = f"{name}{number}", number + 1
+    found = numbered_name(name, taken)
     taken.add(found)
     return found
 
@@ -551,10 +539,7 @@ class Joints:
 def unused_name(mechanism: Mechanism, mjcf: MjcfModel, name: str) -> str:
     """Return the name, with a number if it is used in the mechanism or the file."""
     known = {*mjcf.bodies, *mjcf.joints, *mjcf.sites, *mjcf.equalities, *mjcf.tendons}
-    found, number = name, 2
-    while found in known or found in mechanism.components:
-        found, number = f"{name}{number}", number + 1
-    return found
+    return numbered_name(name, known, mechanism.components)
 
 
 def _free_joints(mjcf: MjcfModel) -> list[int]:
@@ -577,7 +562,7 @@ def _displace(mjcf: MjcfModel, j: int, point: Point, position: float) -> Point:
         x, y, z = (float(value) for value in position * axis)
         return point.at(x, y, z)
     half = position / 2
-    turn = matrix_of([math.cos(half), *(math.sin(half) * axis)])
+    turn = matrix_of_quaternion([math.cos(half), *(math.sin(half) * axis)])
     return point.at(rotation=turn.tolist())
 
 
@@ -1100,7 +1085,7 @@ def _file_frame(mjcf: MjcfModel, g: int, point: Point) -> Point:
     if int(model.geom_type[g]) != int(mjcf.mujoco.mjtGeom.mjGEOM_MESH):
         return point
     mesh = int(model.geom_dataid[g])
-    R = matrix_of(model.mesh_quat[mesh]).T
+    R = matrix_of_quaternion(model.mesh_quat[mesh]).T
     return placed(point, -R @ model.mesh_pos[mesh], model.mesh_quat[mesh] * [1, -1, -1, -1])
 
 
@@ -1393,7 +1378,7 @@ def _body(mjcf: MjcfModel, k: int) -> Body:
     # MuJoCo treats frames that differ by 1e-8 as equal, and computes with equal frames
     same = int(model.body_sameframe[k])
     turned = same not in (int(kinds.mjSAMEFRAME_BODY), int(kinds.mjSAMEFRAME_BODYROT))
-    R = matrix_of(model.body_iquat[k]) if turned else np.eye(3)
+    R = matrix_of_quaternion(model.body_iquat[k]) if turned else np.eye(3)
     tensor = R @ np.diag(model.body_inertia[k]) @ R.T
     at_origin = same == int(kinds.mjSAMEFRAME_BODY)
     com = (0.0, 0.0, 0.0) if at_origin else tuple(float(value) for value in model.body_ipos[k])

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -39,7 +39,9 @@ from mbs.components.locking import FREE_JOINT, Base
 from mbs.errors import DescriptionError
 from mbs.formats.files import component_name
 from mbs.formats.notes import Notes
-from mbs.formats.urdf import Inertial, KeptNames, Reader, Vector, body_of
+from mbs.formats.rotations import inverse, matrix_of_angles, quaternion_of, transform
+from mbs.formats.sdf.shared import MODEL_GRAVITY, ROTOR_INERTIA
+from mbs.formats.urdf.reader import Inertial, KeptNames, Reader, Vector, body_of
 from mbs.formats.xml import line_of, parse_xml
 from mbs.mechanism import Mechanism
 from mbs.text import did_you_mean, quoted
@@ -125,11 +127,11 @@ class SdfReader(Reader):
             angles = numbers[3:] if text else (0.0, 0.0, 0.0)
             if pose.get("degrees", "false").strip().lower() in ("true", "1"):
                 angles = tuple(map(math.radians, angles))
-            R = _of_angles(*angles)
+            R = matrix_of_angles(*angles)
         else:
             R = self._of_quaternion(numbers[3:])
         relative = pose.get("relative_to", pose.get("frame", "")).strip()
-        return relative, _transform(R, numbers[:3])
+        return relative, transform(R, numbers[:3])
 
     def _of_quaternion(self, quaternion: Vector) -> Array:
         x, y, z, w = quaternion
@@ -139,30 +141,6 @@ class SdfReader(Reader):
         v, n = np.array([x, y, z]), x * x + y * y + z * z + w * w
         K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         return np.array(np.eye(3) * (w * w - v @ v) + 2 * np.outer(v, v) + 2 * w * K) / n
-
-
-def _of_angles(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the rotation (3, 3) by roll, pitch and yaw about the fixed axes x, y and z."""
-    (a, b, c), (x, y, z) = map(math.cos, (roll, pitch, yaw)), map(math.sin, (roll, pitch, yaw))
-    return np.array(
-        [
-            [c * b, c * y * x - z * a, c * y * a + z * x],
-            [z * b, z * y * x + c * a, z * y * a - c * x],
-            [-y, b * x, b * a],
-        ]
-    )
-
-
-def _transform(R: Any, p: Any) -> Array:
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = R, p
-    return T
-
-
-def inverse(T: Array) -> Array:
-    """Return the inverse of a transform (4, 4)."""
-    R = T[:3, :3].T
-    return _transform(R, -R @ T[:3, 3])
 
 
 # Frames of a file, each placed relative to another frame.
@@ -283,7 +261,7 @@ _SILENT: Mapping[str, set[str]] = {
     "joint": {
         *("parent", "child", "pose", "axis", "axis2", "physics", "sensor"),
         *("gearbox_ratio", "gearbox_reference_body", "thread_pitch"),
-        *("screw_thread_pitch", "drake:rotor_inertia", "drake:gear_ratio"),
+        *("screw_thread_pitch", ROTOR_INERTIA, "drake:gear_ratio"),
     },
     "frame": {"pose"},
 }
@@ -598,7 +576,7 @@ class _SdfBuilding:
                 name = f"{FREE_JOINT}{number}"
             self.names.taken.add(name)
             mechanism.connect(mechanism.world, Free(name, actuated=False), self.points[top])
-            drawn = [*T[:3, 3], *quaternion(T[:3, :3])]
+            drawn = [*T[:3, 3], *quaternion_of(T[:3, :3])]
             suffixes = ("x", "y", "z", "qw", "qx", "qy", "qz")
             mechanism.guess |= {
                 f"{name}.{k}": float(v) for k, v in zip(suffixes, drawn, strict=True)
@@ -788,7 +766,7 @@ class _SdfBuilding:
             Fs=self._positive(reader, dynamics, "friction"),
             stiffness=self._positive(reader, dynamics, "spring_stiffness"),
             rest=reader.value(dynamics, "spring_reference", 0.0),
-            Ia=n * n * self._positive(reader, joint.element, "drake:rotor_inertia"),
+            Ia=n * n * self._positive(reader, joint.element, ROTOR_INERTIA),
         )
 
     def _positive(self, reader: SdfReader, parent: Element | None, tag: str) -> float:
@@ -900,28 +878,6 @@ def _at(point: Point, T: Array) -> Point:
     return point.at(x, y, z, rotation=turned)
 
 
-def quaternion(R: Array) -> Array:
-    """Return the unit quaternion (w, x, y, z) of a rotation matrix, by its largest element.
-
-    Source: Shepperd 1978.
-
-    Args:
-        R: (3, 3) rotation matrix.
-    """
-    trace = float(np.trace(R))
-    K = np.array(
-        [
-            [trace, R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],
-            [0, 2 * R[0, 0] - trace, R[0, 1] + R[1, 0], R[0, 2] + R[2, 0]],
-            [0, 0, 2 * R[1, 1] - trace, R[1, 2] + R[2, 1]],
-            [0, 0, 0, 2 * R[2, 2] - trace],
-        ]
-    )
-    K = K + np.triu(K, 1).T + np.eye(4)
-    found = K[int(np.argmax(np.diag(K)))]
-    return np.array(found / np.linalg.norm(found))
-
-
 # Reader of complete files.
 
 
@@ -960,7 +916,7 @@ def read_sdf(path: str | Path, *, base: Base | None = None, strict: bool = False
     if not name:
         name = component_name(Path(path).stem) or "robot"
         notes.add("completed", "<model>", f"it has no name; named {quoted(name)}", line_of(model))
-    gravity: Vector = (0.0, 0.0, -9.81)  # [m/s^2] default for a model without a world, as in URDF
+    gravity: Vector = MODEL_GRAVITY
     if world is not None:
         gravity = _read_world(file, world)
     mechanism = Mechanism(name, gravity=gravity, source=f"SDF file {Path(path).name}")

@@ -11,9 +11,10 @@ import functools
 import inspect
 import os
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import Field, dataclass, fields
-from typing import Any, ParamSpec, Protocol, TypeVar, get_type_hints
+from types import UnionType
+from typing import Any, Literal, ParamSpec, Protocol, TypeVar, get_args, get_origin, get_type_hints
 
 _KEY = "mbs.option"
 _WIDTH = 96
@@ -66,6 +67,48 @@ class OptionInfo:
             return self.text
         first, dot, others = self.text.partition(".")
         return f"{first} [{self.unit}]{dot}{others}"
+
+
+ValueKind = Literal["flag", "number", "names", "choice", "text"]
+"""Kind of the values of an option, which determines how a command or a form asks for them."""
+
+
+def value_kinds(options: type) -> dict[str, ValueKind]:
+    """Return the kind of values of each option, by name. Options of other types are left out.
+
+    Args:
+        options: dataclass of the options.
+    """
+    hints, known = get_type_hints(options), option_fields(options)
+    kinds = {name: _kind(hints[name], option) for name, (_, option) in known.items()}
+    return {name: kind for name, kind in kinds.items() if kind is not None}
+
+
+def _kind(hint: Any, option: OptionInfo) -> ValueKind | None:
+    types = get_args(hint) if isinstance(hint, UnionType) else (hint,)
+    if bool in types:
+        return "flag"
+    if float in types:
+        return "number"
+    if any(get_origin(one) is Sequence and get_args(one) == (str,) for one in types):
+        return "names"
+    if option.choices:
+        return "choice"
+    return "text" if hint is str else None
+
+
+def default_text(field: Field[Any]) -> str:
+    """Return the default of a number as its shortest text: 10, 0.01, 1e-8. "" if it is None."""
+    if field.default is None:
+        return ""
+    return f"{field.default:g}".replace("e-0", "e-").replace("e+0", "e+")
+
+
+def title_of(name: str, option: OptionInfo) -> str:
+    """Return the label of an option with a capital letter and its unit."""
+    label = option.label or name.replace("_", " ")
+    unit = f" [{option.unit}]" if option.unit else ""
+    return f"{label[:1].upper()}{label[1:]}{unit}"
 
 
 def described(

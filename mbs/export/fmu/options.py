@@ -69,6 +69,8 @@ class Contents:
             offered=tuple(GROUPS),
             example="M3 or d4, or the name of a body",
             command="--symbolic",
+            command_text='numeric values to convert to parameters: "masses", "inertias", "lengths",'
+            ' "friction", "M3", "d4".',
             in_form=True,
         ),
     )
@@ -107,6 +109,8 @@ class Contents:
             'names of target platforms, such as ["x86_64-linux", "x86_64-windows"], compiled with'
             " ziglang. By default this computer, with its own compiler.",
             command="--platform",
+            command_text='name of a target platform, such as "x86_64-windows", compiled with'
+            " ziglang. By default this computer, with its own compiler.",
         ),
     )
 

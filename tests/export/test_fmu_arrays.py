@@ -14,6 +14,7 @@ from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import ExportError, ModelError
+from mbs.export.fmu.options import FmuOptions
 from mbs.export.fmu.system_fmu import fmu_model
 
 NAMES = ("puma560", "four_bar", "scara")
@@ -182,7 +183,8 @@ def test_elements_are_named_in_the_pages_and_results(tmp_path):
         root = ET.fromstring(archive.read("modelDescription.xml"))
     assert root.get("variableNamingConvention") == "structured"
     assert fmu_model(system).terminals
-    assert not fmu_model(system, arrays=True).terminals  # they name variables of single joints
+    model = fmu_model(system, FmuOptions(arrays=True))
+    assert not model.terminals  # they name variables of single joints
 
 
 def test_fmi_2_has_no_arrays(tmp_path):

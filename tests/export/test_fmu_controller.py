@@ -10,7 +10,8 @@ import mbs
 from mbs.components import Body, DCMotor, Revolute
 from mbs.errors import CompilerError, ExportError, ModelError
 from mbs.export import CController
-from mbs.export.fmu.system_fmu import Contents, fmu_model
+from mbs.export.fmu.options import FmuOptions
+from mbs.export.fmu.system_fmu import fmu_model
 from mbs.solvers import integrate
 
 TENSOR = ((0.02, 0, 0), (0, 0.03, 0), (0, 0, 0.04))
@@ -91,8 +92,8 @@ def test_a_law_in_c_moves_the_arm_as_its_casadi_twin(tmp_path, sources, jacobian
 @pytest.mark.parametrize(("jacobian", "tolerance"), [(None, 1e-8), ("pd_slopes", 1e-13)])
 def test_derivatives_go_through_a_law_in_c(sources, jacobian, tolerance) -> None:
     law = CController("pd", inputs={"q_ref": 2}, jacobian=jacobian)
-    in_c = fmu_model(arm(), Contents(controller=law, sources=sources)).rhs
-    twin = fmu_model(arm(), Contents(controller=pd_function())).rhs
+    in_c = fmu_model(arm(), FmuOptions(controller=law, sources=sources)).rhs
+    twin = fmu_model(arm(), FmuOptions(controller=pd_function())).rhs
     point = 0.3, [0.2, 0.5, 1.0, -2.0], [], [0.7, -0.4], []
     assert np.abs(np.array(in_c(*point)[0] - twin(*point)[0])).max() < 1e-13
     slopes = [[np.array(J) for J in f.jacobian()(*point, *f(*point))] for f in (in_c, twin)]
@@ -109,7 +110,7 @@ def test_what_calls_a_law_in_c_is_integrated_by_the_interpreter(sources) -> None
     x = ca.MX.sym("x", 4)
     runs = []
     for controller in (law, pd_function()):
-        model = fmu_model(arm(), Contents(controller=controller, sources=sources))
+        model = fmu_model(arm(), FmuOptions(controller=controller, sources=sources))
         call = mbs.native.compiled(model.rhs)
         rhs = ca.Function("f", [ca.MX.sym("t"), x], [call(0.0, x, [], [0.7, -0.4], [])[0]])
         runs.append(integrate(rhs, [0.2, 0.5, 1.0, -2.0], [0.0, 0.05], rtol=1e-9))
@@ -124,7 +125,7 @@ def test_an_fmu_gives_the_derivatives_of_its_law(tmp_path, sources) -> None:
     importer = ca.DaeBuilder("m", str(tmp_path / "unzipped"))
     f = importer.create("f", ["x", "u"], ["ode"])
     J = f.jacobian()([0.2, 0.5, 1.0, -2.0], [0.7, -0.4], [0, 0, 0, 0])
-    twin = fmu_model(arm(), Contents(controller=pd_function())).rhs
+    twin = fmu_model(arm(), FmuOptions(controller=pd_function())).rhs
     point = 0.0, [0.2, 0.5, 1.0, -2.0], [], [0.7, -0.4], []
     exact = twin.jacobian()(*point, *twin(*point))
     for one, other in zip(J, (exact[1], exact[3]), strict=True):
@@ -138,7 +139,7 @@ def test_inputs_of_a_function_are_named_and_keep_their_defaults() -> None:
     names = ["t", "q", "v", "r", "gain"]
     options = {"default_in": [0, 0, 0, 0, 5.0]}
     law = ca.Function("p", [t, q, v, r, gain], [gain * (r - q)], names, ["tau"], options)
-    model = fmu_model(arm(), Contents(controller=law))
+    model = fmu_model(arm(), FmuOptions(controller=law))
     assert [(u.name, u.start) for u in model.inputs] == [("r[1]", 0), ("r[2]", 0), ("gain", 5)]
     assert "j1.tau" in [y.name for y in model.outputs]
 
@@ -173,12 +174,12 @@ def _law(sizes, outputs, names=None, inputs=None):
 )
 def test_laws_that_do_not_fit_are_refused(controller, message) -> None:
     with pytest.raises(ExportError, match=rf"arm: .*{message}"):
-        fmu_model(arm(), Contents(controller=controller))
+        fmu_model(arm(), FmuOptions(controller=controller))
 
 
 def test_a_python_law_that_gives_too_little_is_refused() -> None:
     with pytest.raises(ModelError, match="tau has 1 values, the system has 2"):
-        fmu_model(arm(), Contents(controller=lambda t, q, v: [t]))
+        fmu_model(arm(), FmuOptions(controller=lambda t, q, v: [t]))
 
 
 def test_sources_that_are_none_are_refused(tmp_path, sources) -> None:
@@ -190,11 +191,11 @@ def test_sources_that_are_none_are_refused(tmp_path, sources) -> None:
         (7, "sources: 7 is no list of paths"),
     ):
         with pytest.raises(ExportError, match=message):
-            fmu_model(arm(), Contents(controller="pd", sources=given))
+            fmu_model(arm(), FmuOptions(controller="pd", sources=given))
     for name in ("core.c", "mbs_law_pd.c"):
         (tmp_path / name).write_text(LAW)
         with pytest.raises(ExportError, match=rf"{name} .*rename"):
-            fmu_model(arm(), Contents(controller="pd", sources=[tmp_path / name, sources[1]]))
+            fmu_model(arm(), FmuOptions(controller="pd", sources=[tmp_path / name, sources[1]]))
     law = CController("other", inputs={"q_ref": 2})
     with pytest.raises(CompilerError, match="other"):
         mbs.export.fmu(arm(), tmp_path / "x.fmu", controller=law, sources=sources)
@@ -205,11 +206,11 @@ def test_a_function_that_is_called_as_one_of_the_fmu_is_refused(tmp_path, source
     path = tmp_path / "law.c"
     path.write_text(LAW.replace("void pd(", f"void {name}("))
     with pytest.raises(ExportError, match=rf"law\.c defines {name}, which is a function"):
-        fmu_model(arm(), Contents(controller=name, sources=[path, sources[1]]))
+        fmu_model(arm(), FmuOptions(controller=name, sources=[path, sources[1]]))
     path.write_text(
         LAW.replace("void pd(", f"static double {name}(void) {{ return 1; }}\nvoid pd(")
     )
-    fmu_model(arm(), Contents(sources=[path, sources[1]]))
+    fmu_model(arm(), FmuOptions(sources=[path, sources[1]]))
 
 
 @pytest.mark.parametrize("name", ["gather", "evaluate", "differentiate"])
@@ -217,8 +218,8 @@ def test_a_law_in_c_may_have_any_other_name(tmp_path, sources, name) -> None:
     path = tmp_path / "law_pd.c"
     path.write_text(LAW.replace("void pd(", f"void {name}("))
     law = CController(name, inputs={"q_ref": 2}, jacobian="pd_slopes")
-    rhs = fmu_model(arm(), Contents(controller=law, sources=[path, sources[1]])).rhs
-    twin = fmu_model(arm(), Contents(controller=pd_function())).rhs
+    rhs = fmu_model(arm(), FmuOptions(controller=law, sources=[path, sources[1]])).rhs
+    twin = fmu_model(arm(), FmuOptions(controller=pd_function())).rhs
     point = 0.3, [0.2, 0.5, 1.0, -2.0], [], [0.7, -0.4], []
     assert np.abs(np.array(rhs(*point)[0] - twin(*point)[0])).max() < 1e-13
 
@@ -230,7 +231,7 @@ def _values(model, function_output):
 
 
 def test_a_law_drives_the_joints_whose_motion_is_no_input() -> None:
-    model = fmu_model(arm(), Contents(inputs=["j1.a"], controller=pd))
+    model = fmu_model(arm(), FmuOptions(inputs=["j1.a"], controller=pd))
     assert [u.name for u in model.inputs] == ["j1.a"]
     q, v = np.array([0.1, 0.2]), np.array([0.3, 0.4])
     tau = 30 * (np.array([0.7, -0.4]) - q) - 4 * v * (1 + v**2) + [0.5, 0]
@@ -244,7 +245,7 @@ def test_a_law_drives_the_joints_whose_motion_is_no_input() -> None:
 def test_a_law_sees_the_whole_tree_of_a_closed_system() -> None:
     system = catalogue_system("four_bar")
     driven = [speed.name for speed in system.speeds].index("j1")
-    model = fmu_model(system, Contents(controller=lambda t, q, v: [-3 * sum(q.nz) - v[0], 0, 0]))
+    model = fmu_model(system, FmuOptions(controller=lambda t, q, v: [-3 * sum(q.nz) - v[0], 0, 0]))
     plain = fmu_model(system)
     q, v = np.array(system.configuration), 0.4
     z = [q[k] for k in range(3) if k != driven]
@@ -266,7 +267,7 @@ def test_a_law_gives_the_inputs_of_devices() -> None:
     system = m.assemble()
     t, q, v, w = (ca.SX.sym(n) for n in ("t", "q", "v", "goal"))
     law = ca.Function("law", [t, q, v, w], [9 * (w - q) - v], ["t", "q", "v", "goal"], ["u"])
-    model, plain = fmu_model(system, Contents(controller=law)), fmu_model(system)
+    model, plain = fmu_model(system, FmuOptions(controller=law)), fmu_model(system)
     assert [u.name for u in plain.inputs] == ["motor.voltage"]
     assert [u.name for u in model.inputs] == ["goal"]
     x = [0.2, 0.3, 0.1]

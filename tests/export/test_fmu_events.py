@@ -8,7 +8,8 @@ from support.contact_mechanisms import block, pendulum, stick_slip, stopped_rock
 
 import mbs
 from mbs.components import CoulombFriction, RigidStop
-from mbs.export.fmu.system_fmu import Contents, fmu_model
+from mbs.export.fmu.options import FmuOptions
+from mbs.export.fmu.system_fmu import fmu_model
 from mbs.export.fmu.variables import jumps
 from mbs.models.state.independent import minimal_state
 
@@ -102,7 +103,7 @@ def test_a_rocker_comes_to_rest_on_its_stop_and_leaves_no_trace_of_drift(tmp_pat
 
 def test_a_carriage_with_a_prescribed_acceleration_pulls_a_block_that_sticks_and_slips(tmp_path):
     system = stick_slip()
-    model = fmu_model(system, Contents(inputs=("pull.a",)))
+    model = fmu_model(system, FmuOptions(inputs=("pull.a",)))
     assert [variable.name for variable in model.inputs] == ["x.tau", "pull.a"]
     path = mbs.export.fmu(system, tmp_path / "pulled.fmu", inputs=("pull.a",))
     fmu = simulated(path, "CoSimulation", 6.0, {"pull.v": 0.5})

@@ -8,7 +8,8 @@ from fmpy.fmi2 import FMU2Slave
 import mbs
 from mbs.components import Body, Bushing, Force, Free, Revolute, Torque, WrenchSensor
 from mbs.errors import ModelError
-from mbs.export.fmu.system_fmu import Contents, fmu_model
+from mbs.export.fmu.options import FmuOptions
+from mbs.export.fmu.system_fmu import fmu_model
 
 TENSOR = ((0.02, 0.001, 0), (0.001, 0.03, 0.002), (0, 0.002, 0.04))
 FORCE, MOMENT = (3.0, -2.0, 1.0), (0.4, 0.3, -0.6)
@@ -71,9 +72,9 @@ def _bar(*, pushed=False):
 
 def test_wrenches_of_the_joints_of_a_loop_feel_the_wrench_on_its_coupler() -> None:
     shown = ["cut_forces", "sensors", "motion:tip"]
-    model = fmu_model(_bar(), Contents(inputs=["tip.wrench"], outputs=shown))
+    model = fmu_model(_bar(), FmuOptions(inputs=["tip.wrench"], outputs=shown))
     pushed, plain = (
-        fmu_model(system, Contents(outputs=shown)) for system in (_bar(pushed=True), _bar())
+        fmu_model(system, FmuOptions(outputs=shown)) for system in (_bar(pushed=True), _bar())
     )
     q = _bar().configuration
     point = 0, [q[0], 1.2], q[1:]
@@ -102,7 +103,7 @@ def test_an_acceleration_that_is_an_input_needs_the_effort_that_is_shown(tmp_pat
 
 
 def test_a_position_that_is_an_input_leaves_no_state() -> None:
-    model = fmu_model(arm(), Contents(inputs=["j1.q", "tool.wrench"]))
+    model = fmu_model(arm(), FmuOptions(inputs=["j1.q", "tool.wrench"]))
     assert [x.name for x in model.states] == ["j2.q", "j2.v"]
     names = [u.name for u in model.inputs]
     assert names[0] == "j2.tau"
@@ -134,11 +135,11 @@ def test_a_position_that_is_an_input_leaves_no_state() -> None:
 )
 def test_bad_inputs_are_refused(wished, message) -> None:
     with pytest.raises(ModelError, match=rf"arm: .*{message}|arm: {message}"):
-        fmu_model(arm(), Contents(**wished))
+        fmu_model(arm(), FmuOptions(**wished))
 
 
 def test_terminals_hold_the_variables_of_joints_and_flanges() -> None:
-    model = fmu_model(arm(), Contents(flanges=["tip"]))
+    model = fmu_model(arm(), FmuOptions(flanges=["tip"]))
     joint, _, flange = model.terminals
     told = [(member.name, member.variable, member.kind) for member in joint.members]
     assert (joint.name, joint.kind) == ("j1", "mbs.revolute")

@@ -8,7 +8,8 @@ from support.observed_four_bar import four_bar
 import mbs
 from mbs.components import Box, Fixed, Revolute
 from mbs.errors import ModelError
-from mbs.export.fmu.system_fmu import Contents, fmu_model
+from mbs.export.fmu.options import FmuOptions
+from mbs.export.fmu.system_fmu import fmu_model
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +87,7 @@ def test_flange_motion_is_what_a_sensor_reads(run):
 
 def test_single_outputs_and_groups_overlap_without_repetition() -> None:
     names = ["sensor:tip", "wrench:j2", "pose:a", "poses", "motion:tool"]
-    model = fmu_model(four_bar(), Contents(outputs=names))
+    model = fmu_model(four_bar(), FmuOptions(outputs=names))
     told = [variable.name for variable in model.outputs]
     assert len(told) == len(set(told))
     assert {"tip.p.x", "j2.f.x", "a.x", "b.x", "tool.vx"} <= set(told)
@@ -104,12 +105,12 @@ def test_single_outputs_and_groups_overlap_without_repetition() -> None:
 )
 def test_bad_outputs_are_refused(outputs, message) -> None:
     with pytest.raises(ModelError, match=rf"four_bar: .*{message}|four_bar: {message}"):
-        fmu_model(four_bar(), Contents(outputs=outputs))
+        fmu_model(four_bar(), FmuOptions(outputs=outputs))
 
 
 def test_a_system_without_sensors_has_none_to_show() -> None:
     with pytest.raises(ModelError, match="there is no sensor to show; add one"):
-        fmu_model(catalogue_system("four_bar"), Contents(outputs=["sensors"]))
+        fmu_model(catalogue_system("four_bar"), FmuOptions(outputs=["sensors"]))
 
 
 def test_wrenches_of_welds_and_outer_wrenches_on_their_link_are_refused() -> None:
@@ -119,7 +120,7 @@ def test_wrenches_of_welds_and_outer_wrenches_on_their_link_are_refused() -> Non
     m.connect(a.right, Fixed("hold"), b.left)
     system = m.assemble()
     assert "hold.f.x" in [
-        y.name for y in fmu_model(system, Contents(outputs=["cut_forces"])).outputs
+        y.name for y in fmu_model(system, FmuOptions(outputs=["cut_forces"])).outputs
     ]
     with pytest.raises(ModelError, match="welded: what hold transmits cannot be shown"):
-        fmu_model(system, Contents(outputs=["cut_forces"], inputs=["b.wrench"]))
+        fmu_model(system, FmuOptions(outputs=["cut_forces"], inputs=["b.wrench"]))

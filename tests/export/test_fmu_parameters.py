@@ -1,5 +1,7 @@
 """Numbers of a mechanism that are parameters of its FMU, and what its variables tell."""
 
+from importlib import import_module
+
 import fmpy
 import numpy as np
 import pytest
@@ -8,7 +10,8 @@ from fmpy.validation import validate_fmu
 import mbs
 from mbs.components import Body, Box, CoulombFriction, Revolute, RigidStop
 from mbs.errors import ExportError, ModelError, SolverError
-from mbs.export.fmu.system_fmu import Contents, Settings, fmu_model
+from mbs.export.fmu.options import FmuOptions
+from mbs.export.fmu.system_fmu import fmu_model
 from mbs.expressions import MORE_THAN_ZERO
 
 TENSOR = ((0.02, 0.001, 0), (0.001, 0.03, 0.002), (0, 0.002, 0.04))
@@ -40,9 +43,9 @@ def four_bar(length=1.0):
 
 
 def test_other_parameters_give_the_equations_of_another_system() -> None:
-    wished = Contents(parameters=["masses", "lengths", "Fv2"], outputs=["energy", "cut_forces"])
+    wished = FmuOptions(parameters=["masses", "lengths", "Fv2"], outputs=["energy", "cut_forces"])
     model = fmu_model(arm(), wished)
-    plain = fmu_model(arm(0.6, 3.5, 0.9), Contents(outputs=["energy", "cut_forces"]))
+    plain = fmu_model(arm(0.6, 3.5, 0.9), FmuOptions(outputs=["energy", "cut_forces"]))
     other = {"d2": 0.6, "M2": 3.5, "Fv2": 0.9}
     assert [v.name for v in model.parameters] == ["M2", "d2", "Fv2"]
     rng = np.random.default_rng(2)
@@ -75,7 +78,7 @@ def test_the_fmu_of_a_loop_takes_a_longer_coupler(tmp_path) -> None:
 
 
 def test_what_variables_tell() -> None:
-    model = fmu_model(arm(), Contents(parameters=["masses", "inertias", "friction", "lengths"]))
+    model = fmu_model(arm(), FmuOptions(parameters=["masses", "inertias", "friction", "lengths"]))
     by_name = {entry.variable.name: entry.variable for entry in model.entries}
     assert (by_name["M2"].min, by_name["M2"].nominal, by_name["M2"].unit) == (0.0, 2.0, "kg")
     assert (by_name["Fv2"].min, by_name["d2"].min) == (0.0, None)
@@ -93,7 +96,7 @@ def test_bounds_of_contacts() -> None:
     m.connect(m.world, Revolute("j1", axis="z", actuated=True), rod)
     m.add(RigidStop("stop", "j1", lower=-1.0, restitution=e))
     m.add(CoulombFriction("dry", "j1", sliding=mu))
-    model = fmu_model(m.assemble(), Contents(parameters=["masses"]))
+    model = fmu_model(m.assemble(), FmuOptions(parameters=["masses"]))
     by_name = {variable.name: variable for variable in model.parameters}
     assert (by_name["e"].min, by_name["e"].max) == (0.0, 1.0)
     assert (by_name["mu"].min, by_name["mu"].max) == (MORE_THAN_ZERO, None)
@@ -110,7 +113,7 @@ def test_bounds_of_contacts() -> None:
 )
 def test_unknown_numbers_are_refused(parameters, message) -> None:
     with pytest.raises(ModelError, match=f"arm: .*{message}|arm: {message}"):
-        fmu_model(arm(), Contents(parameters=parameters))
+        fmu_model(arm(), FmuOptions(parameters=parameters))
 
 
 def test_a_symbol_without_value_is_refused() -> None:
@@ -133,7 +136,7 @@ def test_a_symbol_without_value_is_refused() -> None:
 )
 def test_settings_that_are_none_are_refused(settings, message) -> None:
     with pytest.raises(ExportError, match=f"FMU arm: {message}"):
-        fmu_model(arm(), settings=Settings(**settings))
+        fmu_model(arm(), FmuOptions(**settings))
 
 
 def test_paths_and_versions_are_refused(tmp_path) -> None:
@@ -146,7 +149,7 @@ def test_paths_and_versions_are_refused(tmp_path) -> None:
 
 
 def test_a_fixed_parameter_keeps_its_value_once_the_motion_has_begun(tmp_path) -> None:
-    model = fmu_model(arm(), Contents(parameters=["M2", "d2"], fixed=["M2"]))
+    model = fmu_model(arm(), FmuOptions(parameters=["M2", "d2"], fixed=["M2"]))
     assert [(v.name, v.fixed) for v in model.parameters] == [("M2", True), ("d2", False)]
     path = mbs.export.fmu(arm(), tmp_path / "arm.fmu", parameters=["M2", "d2"], fixed=["M2"])
     variables = fmpy.read_model_description(path).modelVariables
@@ -164,7 +167,7 @@ def test_a_fixed_parameter_keeps_its_value_once_the_motion_has_begun(tmp_path) -
 )
 def test_what_is_no_parameter_cannot_be_fixed(fixed, message) -> None:
     with pytest.raises(ModelError, match=f"arm: {message}"):
-        fmu_model(arm(), Contents(parameters=["M2"], fixed=fixed))
+        fmu_model(arm(), FmuOptions(parameters=["M2"], fixed=fixed))
 
 
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
@@ -186,3 +189,16 @@ def test_an_fmu_refuses_what_the_description_of_a_mechanism_refuses(fmi, tmp_pat
             mbs.simulate.fmu(path, 0.1, parameters={name: value}, quiet=True)
     with pytest.raises(SolverError, match="singular configuration or a zero mass"):
         mbs.simulate.fmu(path, 0.1, parameters={"m": 0.0}, quiet=True)  # here it moves nothing else
+
+
+def test_mistakes_in_options_are_told_before_the_equations(tmp_path, monkeypatch) -> None:
+    module = import_module("mbs.export.fmu.system_fmu")
+    monkeypatch.setattr(module, "minimal_state", lambda *_, **__: 1 / 0)
+    for options, message in (
+        ({"solver": "euler"}, "FMU arm: solver is 'euler'; use dopri5 or rodas or rk4"),
+        ({"target": "bare"}, "FMU arm: solver is 'dopri5', and target='bare' takes steps"),
+        ({"max_step": 0}, "FMU arm: longest step 0 must be positive"),
+        ({"license": 3}, "FMU arm: license is 3; give a line of printable characters"),
+    ):
+        with pytest.raises(ExportError, match=message):
+            mbs.export.fmu(arm(), tmp_path / "x.fmu", **options)

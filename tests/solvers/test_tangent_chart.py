@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 
 from mbs.core import core_files
+from mbs.core.build import SOURCE
 from mbs.native import cached_library, compiler_found
 
 pytestmark = pytest.mark.skipif(not compiler_found(), reason="no C compiler")
 
 CIRCLE = Path(__file__).parents[1] / "support" / "circle_chart.c"
-FILES = [name + end for name in ("stepper", "dopri5", "dense", "passage") for end in (".c", ".h")]
+NAMES = ("stepper", "dopri5", "dense", "sparse_pattern", "sparse_qr", "skyline")
+PASSAGE = sorted(file.stem for file in SOURCE.glob("passage*.c"))
+FILES = [name + end for name in (*NAMES, *PASSAGE) for end in (".c", ".h")]
 
 
 @pytest.fixture(scope="module")

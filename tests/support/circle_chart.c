@@ -1,4 +1,4 @@
-/* A point of mass 1 on the unit circle, for steps in local tangent coordinates (passage.h).
+/* A point of mass 1 on the unit circle, for steps in local tangent coordinates (passage_external.h).
  *
  * The tangent at the angle a is (-sin a, cos a), so that its alignment with the tangent at angle 0
  * is cos a.
@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "dopri5.h"
-#include "passage.h"
+#include "passage_external.h"
 
 enum { N = 4 }; /* state: position (2,) and velocity (2,) */
 
@@ -61,13 +61,14 @@ static void state_at(double angle, double *x) {
 int circle_state(double angle, double *x, double *alignment) {
     static const passage_size size = {2, 2, 0, 1, 0, 1, 0};
     static const passage_model model = {rows, forces, regularity, 1.0};
-    double memory[STEPPER_MEMORY(N)], work[DOPRI5_WORK(N)], own[PASSAGE_MEMORY(N)];
+    double memory[STEPPER_MEMORY(N)], work[DOPRI5_WORK(N)], chart_origin[N];
+    passage_memory own;
     double origin[N], guide[N], y[2], slope_x[N], slope_y[2];
     passage *chart;
     stepper s;
     int status;
     dopri5_init(&s, N, rhs, NULL, memory, work);
-    chart = passage_new(&s, &size, NULL, &model, own);
+    chart = passage_new(&s, &size, NULL, &model, &own, chart_origin);
     if (!chart) return -1;
     stepper_start(&s, 0.0);
     state_at(0.0, origin);

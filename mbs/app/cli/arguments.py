@@ -68,16 +68,16 @@ Output = Annotated[Path | None, output("File to write; it is replaced as a whole
 
 def examples(*lines: str) -> str:
     """Return the examples at the end of a help page."""
-    commands = (f"[dim]$[/dim] {_without_markup(line)}" for line in lines)
+    commands = (f"[dim]$[/dim] {without_markup(line)}" for line in lines)
     return "\n".join(["[bold]Examples[/bold]", *commands])
 
 
 def help_of(command: Callable[..., None]) -> str:
     """Return the docstring of a command with a single line per paragraph; terminals wrap it."""
-    paragraphs = _without_markup(inspect.getdoc(command) or "").split("\n\n")
+    paragraphs = without_markup(inspect.getdoc(command) or "").split("\n\n")
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
 
 
-def _without_markup(text: str) -> str:
+def without_markup(text: str) -> str:
     """Return the text with its brackets escaped, which rich would interpret as markup."""
     return text.replace("[", r"\[")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from mbs.app.cli import completion
 from mbs.app.cli.arguments import Gravity, Mount, Parameters, Robot, examples, help_of
+from mbs.app.cli.derived import add_derived
 from mbs.app.cli.group import Commands
 from mbs.app.cli.loading import configuration, system
 from mbs.app.cli.places import require_places
@@ -90,73 +91,11 @@ def export_c(
     note(f"wrote {target}")
 
 
-Fmi = Annotated[str, typer.Option(metavar="VERSION", help="2.0 or 3.0.")]
-Input = Annotated[
-    Texts,
-    typer.Option(
-        "--input",
-        metavar="NAME",
-        help="What drives it beside efforts of motors: NAME.q, NAME.a, FRAME.wrench.",
-        show_default=False,
-    ),
-]
-Output = Annotated[
-    Texts,
-    typer.Option(
-        metavar="NAME",
-        help="What it shows beside the motion: energy, closure, poses, sensors, cut_forces.",
-        show_default=False,
-    ),
-]
-Symbolic = Annotated[
-    Texts,
-    typer.Option(
-        metavar="NAME",
-        help="Numbers that become parameters: masses, lengths, friction, or single ones: M3.",
-        show_default=False,
-    ),
-]
-Platform = Annotated[
-    Texts,
-    typer.Option(
-        metavar="NAME",
-        help="Computer that it is for, such as x86_64-windows; this one when left out.",
-        show_default=False,
-    ),
-]
-Solver = Annotated[
-    str, typer.Option(metavar="METHOD", help="Of co-simulation: dopri5, rodas or rk4.")
-]
-Bare = Annotated[
-    bool,
-    typer.Option("--bare", help="For microcontrollers: no heap; co-simulation by rk4 alone."),
-]
-StopTime = Annotated[str, typer.Option(metavar="SECONDS", help="Default end.")]
-StepSize = Annotated[str, typer.Option(metavar="SECONDS", help="Default communication step.")]
-MaxStep = Annotated[
-    str,
-    typer.Option(
-        metavar="SECONDS", help="The longest step of dopri5 and rodas.", show_default=False
-    ),
-]
-Tolerance = Annotated[str, typer.Option(metavar="NUMBER", help="Default relative tolerance.")]
-
-
 def export_fmu(
     robot: Robot,
-    target: Target,
+    path: Target,
     *,
-    fmi: Fmi = "2.0",
-    input_: Input = None,
-    output: Output = None,
-    symbolic: Symbolic = None,
-    platform: Platform = None,
-    solver: Solver = "dopri5",
-    bare: Bare = False,
-    stop_time: StopTime = "10",
-    step_size: StepSize = "0.01",
-    tolerance: Tolerance = "1e-8",
-    max_step: MaxStep = "",
+    options: dict[str, Any],
     parameter: Parameters = None,
     gravity: Gravity = "",
     mount: Mount = None,
@@ -168,21 +107,14 @@ def export_fmu(
     """
     from mbs.app.tasks import exporting
 
-    settings = exporting.FmuSettings(
-        fmi=fmi,
-        inputs=tuple(input_ or ()),
-        outputs=tuple(output or ()),
-        parameters=tuple(symbolic or ()),
-        platforms=tuple(platform or ()),
-        solver=solver,
-        target="bare" if bare else "hosted",
-        stop_time=stop_time,
-        step_size=step_size,
-        tolerance=tolerance,
-        max_step=max_step,
-    )
-    require_places(target)
-    _write(target, exporting.fmu(system(robot, parameter, gravity, mount), settings))
+    require_places(path)
+    _write(path, exporting.fmu(system(robot, parameter, gravity, mount), options))
+
+
+def _fmu_options() -> type:
+    from mbs.export.fmu.options import FmuOptions
+
+    return FmuOptions
 
 
 def export_par(
@@ -244,9 +176,9 @@ def _write(target: Path, content: bytes) -> None:
     note(f"wrote {target}")
 
 
+add_derived(commands, "fmu", export_fmu, _fmu_options, FMU_EXAMPLES)
 for _name, _command, _examples in (
     ("c", export_c, C_EXAMPLES),
-    ("fmu", export_fmu, FMU_EXAMPLES),
     ("par", export_par, PAR_EXAMPLES),
     ("toml", export_toml, TOML_EXAMPLES),
     ("html", export_html, HTML_EXAMPLES),

@@ -7,66 +7,27 @@ import re
 import tempfile
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from casadi import Function
 
 from mbs import export
 from mbs.app.tasks.equations import entry
-from mbs.app.tasks.simulation import number
+from mbs.app.tasks.options import keywords
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
-from mbs.export.fmu.description import Solver
+from mbs.export.fmu.options import FmuOptions
 from mbs.export.robot_tables import robot_table
 from mbs.formats import RobotTable, write_toml
-from mbs.text import did_you_mean
-
-SOLVERS: tuple[str, ...] = get_args(Solver)
-"""Integration methods that an FMU may contain."""
 
 MODELS = ("idm", "ddm")
 """Default keys of the models in a C library."""
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # fixed file time in zip archives: equal models give equal files
 _NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9_-]+")
-
-
-@dataclass(frozen=True, slots=True)
-class FmuSettings:
-    """Settings of an FMU, as arguments of `mbs.export.fmu`.
-
-    Attributes:
-        fmi: "2.0" or "3.0".
-        inputs: inputs in addition to the efforts of motors, such as "j1.q" or "tool.wrench".
-        outputs: outputs in addition to the motion of all joints, such as "energy" or "closure".
-        parameters: numbers that become parameters, such as "masses" or "M3".
-        fixed: names of parameters that cannot be changed during the simulation.
-        stop_time: default stop time [s].
-        step_size: default communication step [s].
-        tolerance: default relative tolerance.
-        solver: integration method of co-simulation, a name in `SOLVERS`.
-        internal_step: step of "rk4" [s].
-        max_step: maximum step of the other solvers [s]; empty for no limit.
-        target: "hosted", or "bare" for microcontrollers.
-        platforms: platforms such as "x86_64-windows"; empty for this computer.
-    """
-
-    fmi: str = "2.0"
-    inputs: tuple[str, ...] = ()
-    outputs: tuple[str, ...] = ()
-    parameters: tuple[str, ...] = ()
-    fixed: tuple[str, ...] = ()
-    stop_time: float | str = 10.0
-    step_size: float | str = 0.01
-    tolerance: float | str = 1e-8
-    solver: str = "dopri5"
-    internal_step: float | str = 0.001
-    max_step: float | str = ""
-    target: str = "hosted"
-    platforms: tuple[str, ...] = ()
 
 
 def c_library(
@@ -111,31 +72,20 @@ def c_functions(
     return functions
 
 
-def fmu(system: System, settings: FmuSettings | None = None) -> bytes:
+def fmu(system: System, texts: Mapping[str, Any] | None = None) -> bytes:
     """Return an FMU of the system for Model Exchange and Co-Simulation.
 
     Args:
         system: open or closed system.
-        settings: settings of the FMU.
+        texts: options of `mbs.export.fmu` by name, see `mbs.app.tasks.options.keywords`.
 
     Raises:
-        ModelError, ExportError, CompilerError: see `mbs.export.fmu`.
+        ModelError, ExportError, ExpressionError, CompilerError: a text is invalid, or see
+            `mbs.export.fmu`.
     """
     require_system(system)
-    settings = settings or FmuSettings()
-    if settings.solver not in SOLVERS:
-        raise ModelError(
-            f"{system.name}: there is no solver {settings.solver!r};"
-            f" {did_you_mean(settings.solver, SOLVERS)}"
-        )
-    given = asdict(settings)
-    for what in ("stop_time", "step_size", "tolerance", "internal_step"):
-        given[what] = number(given[what], f"{system.name}: {what}")
-    limit = given.pop("max_step")
-    if limit != "":
-        given["max_step"] = number(limit, f"{system.name}: max_step")
-    given["platforms"] = list(settings.platforms) or None
-    return _write(lambda path: export.fmu(system, path, **given), f"{file_stem(system)}.fmu")
+    options = keywords(FmuOptions, texts or {}, system.name)
+    return _write(lambda path: export.fmu(system, path, **options), f"{file_stem(system)}.fmu")
 
 
 def par(system: System) -> bytes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import casadi
@@ -15,6 +15,7 @@ from mbs.assembly import System
 from mbs.errors import ExportError, ModelError
 from mbs.models.state.tree import TreeState
 from mbs.native.scalar_source import Target
+from mbs.options import described, faults
 from mbs.text import quoted
 from mbs.units import UNITS
 from mbs.view.drawing import Drawing
@@ -24,8 +25,6 @@ from mbs.view.drawing import Drawing
 
 TIME = "time"
 """Name of the independent variable, in FMI 3.0 and in results."""
-
-SOLVERS = ("dopri5", "rodas", "rk4")
 
 
 def check(model: FmuModel) -> None:
@@ -58,18 +57,14 @@ def _check_names(model: FmuModel) -> None:
 
 def _check_texts(model: FmuModel) -> None:
     """Raise ExportError if a text of the description contains characters that are not printable."""
-    for what, text in {"description": model.description, **asdict(model.origin)}.items():
-        if not isinstance(text, str) or not text.isprintable():
-            raise ExportError(
-                f"FMU {model.name}: {what} is {quoted(text)}; give a line of printable characters"
-            )
+    for sentence in filter(
+        None, (printable("description", model.description), *faults(model.origin))
+    ):
+        raise ExportError(f"FMU {model.name}: {sentence}")
 
 
 def _check_numbers(model: FmuModel) -> None:
-    if model.solver not in SOLVERS:
-        raise ExportError(
-            f"FMU {model.name}: solver is {model.solver!r}; use {' or '.join(SOLVERS)}"
-        )
+    check_options(model, model.name)
     for entry in model.entries:
         v = entry.variable
         place = f"FMU {model.name}: {v.name}"
@@ -83,16 +78,6 @@ def _check_numbers(model: FmuModel) -> None:
         high = math.inf if v.max is None else v.max
         if not low <= v.start <= high and entry.kind == "parameter":
             raise ExportError(f"{place} starts at {v.start}, outside {low} to {high}; move one")
-    for what, value in (
-        ("stop time", model.stop_time),
-        ("tolerance", model.tolerance),
-        ("step size", model.step_size),
-        ("internal step", model.internal_step),
-        ("longest step", 1.0 if model.max_step is None else model.max_step),
-    ):
-        known = isinstance(value, (int, float)) and math.isfinite(value)
-        if not (known and value > 0):
-            raise ExportError(f"FMU {model.name}: {what} {quoted(value)} must be positive")
 
 
 def _check_functions(model: FmuModel) -> None:
@@ -116,18 +101,9 @@ def _check_functions(model: FmuModel) -> None:
 
 
 def _check_target(model: FmuModel) -> None:
-    """Raise ExportError if target="bare" is invalid: it needs fixed steps and no events."""
-    if model.target not in get_args(Target):
-        raise ExportError(
-            f"FMU {model.name}: target is {quoted(model.target)}; use 'hosted' or 'bare'"
-        )
+    """Raise ExportError if the model has contents that target="bare" does not support."""
     if model.target == "hosted":
         return
-    if model.solver != "rk4":
-        raise ExportError(
-            f"FMU {model.name}: solver is {model.solver!r}, and target='bare' takes steps of a"
-            " fixed length alone; use solver='rk4'"
-        )
     if model.jumps is not None:
         raise ExportError(
             f"FMU {model.name}: rigid stops, Coulomb friction and components have events, which"
@@ -189,6 +165,165 @@ class About:
 
     tables: tuple[PageTable, ...] = ()
     drawing: Drawing | None = None
+
+
+# Options of an FMU that its description contains as well: origin, experiment and solver.
+
+
+Solver = Literal["dopri5", "rodas", "rk4"]
+
+_SOLVERS = {"dopri5": "explicit", "rodas": "stiff", "rk4": "fixed step"}
+_TARGETS: dict[str, str] = dict.fromkeys(get_args(Target), "")
+_STEPS = ("dopri5", "rodas")
+"""Solvers that choose their steps."""
+
+
+def printable(label: str, value: object) -> str:
+    """Return the error of a text that is no line of printable characters, "" if it is one."""
+    if isinstance(value, str) and value.isprintable():
+        return ""
+    return f"{label} is {quoted(value)}; give a line of printable characters"
+
+
+def _positive(label: str, value: object) -> str:
+    if isinstance(value, (int, float)) and math.isfinite(value) and value > 0:
+        return ""
+    return f"{label} {quoted(value)} must be positive"
+
+
+def _known_solver(label: str, value: object) -> str:
+    if isinstance(value, str) and value in _SOLVERS:
+        return ""
+    return f"{label} is {value!r}; use {' or '.join(_SOLVERS)}"
+
+
+def _known_target(label: str, value: object) -> str:
+    if isinstance(value, str) and value in _TARGETS:
+        return ""
+    return f"{label} is {quoted(value)}; use {' or '.join(map(repr, _TARGETS))}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Origin:
+    """Author and licence of a model. Empty texts are left out of the FMU."""
+
+    author: str = field(
+        default="",
+        metadata=described("person or organisation, for the model description.", check=printable),
+    )
+    version: str = field(default="", metadata=described("version of the model.", check=printable))
+    copyright: str = field(
+        default="",
+        metadata=described('copyright notice, such as "(c) 2026 Example Ltd.".', check=printable),
+    )
+    license: str = field(
+        default="",
+        metadata=described("name, text or address of the licence.", check=printable),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """Default experiment, solver and target of an FMU, for classes that have slots for them."""
+
+    __slots__ = ()
+
+    stop_time: float = field(
+        default=10.0,
+        metadata=described(
+            "default end of a simulation.",
+            unit="s",
+            label="stop time",
+            check=_positive,
+            command="--stop-time",
+            in_form=True,
+        ),
+    )
+    step_size: float = field(
+        default=0.01,
+        metadata=described(
+            "default communication step.",
+            unit="s",
+            label="step size",
+            check=_positive,
+            command="--step-size",
+            in_form=True,
+        ),
+    )
+    tolerance: float = field(
+        default=1e-8,
+        metadata=described(
+            "default relative tolerance.", check=_positive, command="--tolerance", in_form=True
+        ),
+    )
+    solver: Solver = field(
+        default="dopri5",
+        metadata=described(
+            'solver of Co-Simulation: "dopri5", the explicit pair of Dormand and Prince; "rodas",'
+            ' the linearly implicit RODAS5P for stiff systems; "rk4", with a fixed step, for real'
+            " time.",
+            _SOLVERS,
+            check=_known_solver,
+            command="--solver",
+            in_form=True,
+        ),
+    )
+    internal_step: float = field(
+        default=0.001,
+        metadata=described(
+            'step of "rk4".',
+            unit="s",
+            label="internal step",
+            only_with=("solver", ("rk4",)),
+            check=_positive,
+            in_form=True,
+        ),
+    )
+    max_step: float | None = field(
+        default=None,
+        metadata=described(
+            'longest step of "dopri5" and "rodas". By default only the error and events limit the'
+            " step.",
+            unit="s",
+            label="longest step",
+            only_with=("solver", _STEPS),
+            check=lambda label, value: "" if value is None else _positive(label, value),
+            command="--max-step",
+            in_form=True,
+        ),
+    )
+    target: Target = field(
+        default="hosted",
+        metadata=described(
+            '"hosted", or "bare" for systems without an operating system: Co-Simulation only, with'
+            ' solver="rk4" and no events, in C99 that uses no heap, files or global variables. In'
+            " FMI 2.0 the callbacks of the importer allocate its memory, in FMI 3.0 two functions"
+            ' in memory.c, which may be replaced. Results are bit-identical to target="hosted".',
+            _TARGETS,
+            check=_known_target,
+            command="--bare",
+            command_text="for microcontrollers: no heap, Co-Simulation by rk4 only, no events.",
+        ),
+    )
+
+
+def check_options(options: Experiment, name: str) -> None:
+    """Check every option of an FMU by itself, and that the target has the solver.
+
+    Args:
+        options: options of the FMU.
+        name: name of the model, for error messages.
+
+    Raises:
+        ExportError: an option is invalid, or the target does not support the solver.
+    """
+    for sentence in faults(options):
+        raise ExportError(f"FMU {name}: {sentence}")
+    if options.target == "bare" and options.solver != "rk4":
+        raise ExportError(
+            f"FMU {name}: solver is {options.solver!r}, and target='bare' takes steps of a"
+            " fixed length alone; use solver='rk4'"
+        )
 
 
 # Names: lists of names from the user, and names of the variables of an FMU.
@@ -258,7 +393,6 @@ def _part(text: str) -> str:
     return f"'{stem.translate(_ESCAPED)}'{index}"
 
 
-Solver = Literal["dopri5", "rodas", "rk4"]
 Kind = Literal[
     "state",
     "derivative",
@@ -416,23 +550,6 @@ class Array:
     description: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Origin:
-    """Author and licence of a model. Empty texts are left out of the FMU.
-
-    Attributes:
-        author: person or organisation.
-        version: version of the model.
-        copyright: copyright notice, such as "(c) 2026 Example Ltd.".
-        license: name, text or address of the licence.
-    """
-
-    author: str = ""
-    version: str = ""
-    copyright: str = ""
-    license: str = ""
-
-
 @dataclass(frozen=True, slots=True)
 class FmuEntry:
     """Variable with its kind. Its value reference is its index in `FmuModel.entries`."""
@@ -457,8 +574,10 @@ class Rules:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FmuModel:
+class FmuModel(Experiment):
     """Description of an FMU: variables, equations, events, default experiment and documentation.
+
+    The default experiment, the solver and the target are attributes of `Experiment`.
 
     nx, nu, ny, np and nz are the numbers of states, inputs, outputs, parameters and dependents. If
     the model has events, p in rhs holds the parameters, then the modes. p in closure, slopes and
@@ -492,15 +611,6 @@ class FmuModel:
             model has no such equations, as for open chains.
         jumps: events, None if the motion is smooth.
         rules: conditions on states and parameters, None if their bounds are sufficient.
-        stop_time: default end of a simulation [s].
-        tolerance: default relative tolerance of the integration.
-        step_size: default communication step [s].
-        solver: solver of co-simulation: "dopri5", explicit with error control; "rodas", linearly
-            implicit with error control, for stiff equations; "rk4", with the fixed step
-            `internal_step`.
-        internal_step: step of "rk4" [s].
-        max_step: longest step of the other solvers [s], None for no limit.
-        target: "hosted", or "bare" for co-simulation only, in C without heap and files.
         documentation: text for `documentation/index.html`. A blank line starts a paragraph.
         terminals: groups of variables that are connected together.
         sources: names and texts of further C files, which are compiled with the FMU.
@@ -525,13 +635,6 @@ class FmuModel:
     tree: TreeState | None = None
     jumps: Jumps | None = None
     rules: Rules | None = None
-    stop_time: float = 10.0
-    tolerance: float = 1e-8
-    step_size: float = 0.01
-    solver: Solver = "dopri5"
-    internal_step: float = 0.001
-    max_step: float | None = None
-    target: Target = "hosted"
     documentation: str = ""
     terminals: tuple[Terminal, ...] = ()
     sources: tuple[tuple[str, str], ...] = ()

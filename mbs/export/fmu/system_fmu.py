@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import casadi
@@ -14,10 +12,9 @@ from mbs.assembly import System, symbolic
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tree import quaternion_slices
 from mbs.assembly.validity import field_rows, quaternion_rows
-from mbs.errors import ExportError
 from mbs.export.fmu.arrays import Group, in_arrays
-from mbs.export.fmu.controller import Law, controller_of, read_sources
-from mbs.export.fmu.description import FmuModel, Origin, Rules, Solver
+from mbs.export.fmu.controller import controller_of, read_sources
+from mbs.export.fmu.description import Experiment, FmuModel, Origin, Rules
 from mbs.export.fmu.documentation import about
 from mbs.export.fmu.interface import (
     interface_of,
@@ -26,7 +23,8 @@ from mbs.export.fmu.interface import (
     observed_variables,
     terminals,
 )
-from mbs.export.fmu.pack import require_version, require_writable, write_fmu
+from mbs.export.fmu.options import FmuOptions
+from mbs.export.fmu.pack import require_writable, write_fmu
 from mbs.export.fmu.variables import (
     dependents,
     inputs,
@@ -36,41 +34,15 @@ from mbs.export.fmu.variables import (
     parameters,
     states,
 )
-from mbs.files import PathLike, path_of
+from mbs.files import path_of
 from mbs.loops.examine import configuration_health, row_independence
 from mbs.models.state.independent import MinimalState, consistent_start, minimal_state
 from mbs.models.state.tree import tree_state
-from mbs.native.scalar_source import Target
+from mbs.options import group_values, keywords_of
 
 
-def fmu(
-    system: System,
-    path: str | os.PathLike[str],
-    *,
-    fmi: str = "2.0",
-    inputs: Sequence[str] = (),
-    outputs: Sequence[str] = (),
-    parameters: Sequence[str] = (),
-    fixed: Sequence[str] = (),
-    flanges: Sequence[str] = (),
-    controller: Law = None,
-    sources: Sequence[PathLike] = (),
-    platforms: Sequence[str] | None = None,
-    stop_time: float = 10.0,
-    step_size: float = 0.01,
-    tolerance: float = 1e-8,
-    solver: Solver = "dopri5",
-    internal_step: float = 0.001,
-    max_step: float | None = None,
-    target: Target = "hosted",
-    reference: bool = False,
-    arrays: bool = False,
-    description: str = "",
-    author: str = "",
-    version: str = "",
-    copyright: str = "",
-    license: str = "",
-) -> Path:
+@keywords_of(FmuOptions)
+def fmu(system: System, path: str | os.PathLike[str], *, options: FmuOptions) -> Path:
     """Write a mechanism as an FMU for Model Exchange and Co-Simulation.
 
     Inputs are the efforts `name.tau` of the actuated joints. A joint that a drive line with its own
@@ -86,50 +58,7 @@ def fmu(
     Args:
         system: assembled mechanism, open or closed.
         path: file to write.
-        fmi: version of FMI, "2.0" or "3.0".
-        inputs: names of further inputs. "j1.a": acceleration of a joint. "j1.q": position of a
-            joint, with its derivatives as inputs `j1.v` and `j1.a`. Both replace the effort, which
-            becomes an output. "tool.wrench": force and moment on a frame at its origin, expressed
-            in the base, `tool.fx` .. `tool.mz`.
-        outputs: names of further outputs. "sensors": values of the sensors, such as `tip.p.x`.
-            "energy": `energy.kinetic` and `energy.potential`. "closure": largest closure residual.
-            "poses": frames of all bodies. "cut_forces": wrenches that joints transmit, `j1.f.x` ..
-            `j1.m.z`. Single outputs: "sensor:tip", "pose:arm", "motion:arm", "wrench:j2".
-        parameters: numeric values to convert to parameters, as in `mbs.assembly.symbolic`:
-            "masses", "inertias", "lengths", "friction", "M3", "d4".
-        fixed: names of parameters that are constant after the initialization. All other parameters
-            are tunable.
-        flanges: names of frames at which another part of a mechanism is coupled. Their poses,
-            velocities and accelerations are outputs, and the wrenches on them are inputs. In FMI
-            3.0 each flange is a terminal.
-        controller: control law that computes the efforts, which are then no inputs. Either a
-            function of (t, q, v) as in `mbs.simulate.run`, or a casadi.Function, whose further
-            inputs become inputs of the FMU, or a C function of `sources` by its name or as a
-            `CController`.
-        sources: C files and headers of the controller, which are compiled with the FMU.
-        platforms: names of target platforms, such as ["x86_64-linux", "x86_64-windows"], compiled
-            with ziglang. By default this computer, with its own compiler.
-        stop_time: default end of a simulation [s].
-        step_size: default communication step [s].
-        tolerance: default relative tolerance.
-        solver: solver of Co-Simulation: "dopri5", the explicit pair of Dormand and Prince; "rodas",
-            the linearly implicit RODAS5P for stiff systems; "rk4", with a fixed step, for real
-            time.
-        internal_step: step of "rk4" [s].
-        max_step: longest step of "dopri5" and "rodas" [s]. By default only the error and events
-            limit the step.
-        target: "hosted", or "bare" for systems without an operating system: Co-Simulation only,
-            with solver="rk4" and no events, in C99 that uses no heap, files or global variables. In
-            FMI 2.0 the callbacks of the importer allocate its memory, in FMI 3.0 two functions in
-            memory.c, which may be replaced. Results are bit-identical to target="hosted".
-        reference: whether to include the results of the default experiment.
-        arrays: whether positions, velocities, accelerations and efforts of the joints are the
-            arrays q, v, a and tau of FMI 3.0. Dependent joints are in `q_dependent` and so on.
-        description: one-line description. By default the first line of the report of the system.
-        author: person or organisation, for the model description.
-        version: version of the model.
-        copyright: copyright notice, such as "(c) 2026 Example Ltd.".
-        license: name, text or address of the licence.
+        options: see `FmuOptions`.
 
     Returns:
         Path of the file.
@@ -144,76 +73,37 @@ def fmu(
             unknown.
     """
     require_system(system)
-    require_version(system.name, fmi)
+    options.check(system.name)
     require_writable(path_of(path))
-    wished = Contents(inputs, outputs, parameters, fixed, flanges, controller, sources)
-    settings = Settings(stop_time, step_size, tolerance, solver, internal_step, target, max_step)
-    if arrays and fmi != "3.0":
-        raise ExportError(
-            f"{system.name}: arrays are variables of FMI 3.0, and fmi is {fmi!r}; use fmi='3.0' or"
-            " leave arrays out"
-        )
-    origin = Origin(author=author, version=version, copyright=copyright, license=license)
-    model = fmu_model(system, wished, settings, (description, origin), arrays=arrays)
-    return write_fmu(model, path, fmi=fmi, platforms=platforms, reference=reference)
+    return write_fmu(
+        fmu_model(system, options),
+        path,
+        fmi=options.fmi,
+        platforms=options.platforms,
+        reference=options.reference,
+    )
 
 
-@dataclass(frozen=True, slots=True)
-class Contents:
-    """Contents of an FMU in addition to the defaults. The attributes are arguments of `fmu`."""
-
-    inputs: Sequence[str] = ()
-    outputs: Sequence[str] = ()
-    parameters: Sequence[str] = ()
-    fixed: Sequence[str] = ()
-    flanges: Sequence[str] = ()
-    controller: Law = None
-    sources: Sequence[PathLike] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """Default experiment and solver of an FMU. The attributes are arguments of `fmu`."""
-
-    stop_time: float = 10.0
-    step_size: float = 0.01
-    tolerance: float = 1e-8
-    solver: Solver = "dopri5"
-    internal_step: float = 0.001
-    target: Target = "hosted"
-    max_step: float | None = None
-
-
-def fmu_model(
-    system: System,
-    wished: Contents | None = None,
-    settings: Settings | None = None,
-    words: tuple[str, Origin] = ("", Origin()),
-    *,
-    arrays: bool = False,
-) -> FmuModel:
+def fmu_model(system: System, options: FmuOptions | None = None) -> FmuModel:
     """Return the description of the FMU of a mechanism.
 
     Args:
         system: assembled mechanism, open or closed.
-        wished: contents in addition to the defaults.
-        settings: default experiment and solver.
-        words: one-line description (empty for that of the report), and author of the model.
-        arrays: whether q, v, a and tau are arrays of FMI 3.0.
+        options: options of the FMU.
 
     Raises:
         ExportError, ModelError, CompilerError: as for `fmu`.
     """
-    wished, settings = wished or Contents(), settings or Settings()
-    given = wished.parameters
+    options = options or FmuOptions()
+    given = options.parameters
     if given is not None and (not isinstance(given, list | tuple) or given):
         system = symbolic(system, given)
     system.parameter_values()
-    interface = interface_of(system, wished.inputs, wished.flanges)
-    request = make_request(system, wished.outputs, interface.flanges)
-    controller = controller_of(system, wished.controller, read_sources(wished.sources))
+    interface = interface_of(system, options.inputs, options.flanges)
+    request = make_request(system, options.outputs, interface.flanges)
+    controller = controller_of(system, options.controller, read_sources(options.sources))
     # a solver with fixed steps cannot locate events
-    crossings = settings.solver != "rk4" and settings.target != "bare"
+    crossings = options.solver != "rk4" and options.target != "bare"
     state = minimal_state(
         system,
         lambda seen: observed_values(system, request, seen),
@@ -221,8 +111,8 @@ def fmu_model(
         crossings=crossings,
     )
     tree = None
-    followed = state.events is None or settings.solver != "rk4"
-    if followed and settings.target != "bare":
+    followed = state.events is None or options.solver != "rk4"
+    if followed and options.target != "bare":
         tree = tree_state(
             system,
             lambda seen: observed_values(system, request, seen),
@@ -236,12 +126,12 @@ def fmu_model(
     y_variables = (*shown, *observed_variables(system, request))
     model = FmuModel(
         name=system.name,
-        description=words[0] or system.report().splitlines()[0],
-        origin=words[1],
+        description=options.description or system.report().splitlines()[0],
+        origin=Origin(**group_values(options, Origin)),
         states=x_variables,
         inputs=u_variables,
         outputs=y_variables,
-        parameters=tuple(parameters(system, wished.fixed)),
+        parameters=tuple(parameters(system, options.fixed)),
         dependents=dependents(system, state, z),
         loop_size=loop_size(system),
         rhs=state.rhs,
@@ -252,13 +142,13 @@ def fmu_model(
         tree=tree,
         jumps=jumps(system, state),
         rules=_rules(system, state),
-        **asdict(settings),
+        **group_values(options, Experiment),
         documentation="\n\n".join([system.report(), system.source]),
         terminals=terminals(system, interface, (*x_variables, *u_variables, *y_variables)),
         sources=controller.sources,
         about=about(system),
     )
-    return in_arrays(model, _arrays(state)) if arrays else model
+    return in_arrays(model, _arrays(state)) if options.arrays else model
 
 
 def _rules(system: System, state: MinimalState) -> Rules | None:

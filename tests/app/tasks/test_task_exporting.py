@@ -12,7 +12,7 @@ from support.catalogue_systems import catalogue_system
 from support.messages import refused
 
 import mbs
-from mbs.app.tasks.exporting import FmuSettings, c_library, file_stem, fmu, html, par, toml
+from mbs.app.tasks.exporting import c_library, file_stem, fmu, html, par, toml
 from mbs.errors import ExportError, ExpressionError, ModelError
 
 
@@ -52,7 +52,7 @@ def test_the_general_inverse_model_is_exported_whole():
 
 
 def test_an_fmu_moves_like_the_system(four_bar, tmp_path):
-    settings = FmuSettings(
+    settings = dict(
         fmi="3.0", outputs=("closure",), stop_time="0.4", step_size=0.02, solver="rodas"
     )
     path = tmp_path / "four_bar.fmu"
@@ -107,9 +107,9 @@ def test_mistakes_are_refused_with_a_sentence(four_bar):
     refused(ModelError, "'nope'", by=lambda: c_library(four_bar, ["nope"]))
     refused(ModelError, "igm-paul", "no Function", by=lambda: c_library(four_bar, ["igm-paul"]))
     refused(ModelError, "no model is chosen", by=lambda: c_library(four_bar, []))
-    refused(ModelError, "'euler'", by=lambda: fmu(four_bar, FmuSettings(solver="euler")))
-    refused(ExportError, "'4.0'", by=lambda: fmu(four_bar, FmuSettings(fmi="4.0")))
-    refused(ExpressionError, "stop_time", by=lambda: fmu(four_bar, FmuSettings(stop_time="1/0")))
-    refused(ModelError, "'nope'", by=lambda: fmu(four_bar, FmuSettings(outputs=("nope",))))
+    refused(ModelError, "'euler'", by=lambda: fmu(four_bar, dict(solver="euler")))
+    refused(ExportError, "'4.0'", by=lambda: fmu(four_bar, dict(fmi="4.0")))
+    refused(ExpressionError, "stop_time", by=lambda: fmu(four_bar, dict(stop_time="1/0")))
+    refused(ModelError, "'nope'", by=lambda: fmu(four_bar, dict(outputs=("nope",))))
     bicycle = catalogue_system("whipple_bicycle")
     refused(ModelError, "rear_contact", by=lambda: toml(bicycle))

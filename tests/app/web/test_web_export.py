@@ -8,7 +8,10 @@ import zipfile
 from support.panel_pages import PATIENT, visited
 
 import mbs
-from mbs.app.web.panels.export import FmuAsked, open_export
+from mbs.app.tasks.options import keywords
+from mbs.app.web.panels.export import open_export
+from mbs.app.web.panels.options_form import first_values, form_texts
+from mbs.export.fmu.options import FmuOptions
 
 
 async def _downloaded(user, marker):
@@ -56,6 +59,18 @@ def test_a_wrong_option_is_told(monkeypatch):
 
 
 def test_names_stand_between_commas_or_blanks():
-    settings = FmuAsked(more_inputs=" j1.q,, tool.wrench ", outputs=["energy"]).settings()
-    assert settings.inputs == ("j1.q", "tool.wrench")
-    assert settings.outputs == ("energy",)
+    values = first_values(FmuOptions) | {"more_inputs": " j1.q,, tool.wrench ", "max_step": " "}
+    texts = form_texts(FmuOptions, values | {"outputs": ["energy"]})
+    assert texts["inputs"] == ("j1.q", "tool.wrench")
+    assert texts["outputs"] == ("energy",)
+    assert keywords(FmuOptions, texts, "x") == {
+        "fmi": "2.0",
+        "inputs": ("j1.q", "tool.wrench"),
+        "outputs": ("energy",),
+        "parameters": (),
+        "stop_time": 10.0,
+        "step_size": 0.01,
+        "tolerance": 1e-8,
+        "solver": "dopri5",
+        "internal_step": 0.001,
+    }

@@ -1,0 +1,104 @@
+"""Form of the options of an action, derived from the fields of a dataclass."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from nicegui import ui
+
+from mbs.app.web.panels.plots import FieldLook, choice_field, several_field, text_field
+from mbs.options import OptionInfo, default_text, option_fields, title_of, value_kinds
+
+FormValues = dict[str, Any]
+"""Values of a form by option: a text, a choice or a list of names. The names in a list that the
+form does not offer are a text "more_..."."""
+
+_NUMBER, _CHOICE, _NAMES = "112px", "160px", "150px"
+"""Widths of fields, enough for their labels."""
+
+
+def first_values(options: type) -> FormValues:
+    """Return the values of a form with the defaults.
+
+    Args:
+        options: dataclass of the options.
+    """
+    values: FormValues = {}
+    kinds = value_kinds(options)
+    for name, (field, option) in option_fields(options).items():
+        if option.in_form and kinds[name] == "names":
+            values |= {name: [], f"more_{name}": ""}
+        elif option.in_form:
+            values[name] = default_text(field) if kinds[name] == "number" else field.default
+    return values
+
+
+def form_texts(options: type, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the texts of options for `mbs.app.tasks.options.keywords`.
+
+    Args:
+        options: dataclass of the options.
+        values: values of the form.
+    """
+    texts = {}
+    for name, kind in value_kinds(options).items():
+        if name in values:
+            value = values[name]
+            texts[name] = value.strip() if kind == "number" else value
+            if kind == "names":
+                texts[name] = (*value, *re.findall(r"[^,\s]+", values[f"more_{name}"]))
+    return texts
+
+
+def option_form(
+    options: type, values: FormValues, offered: Mapping[str, Sequence[str]], joint: str
+) -> None:
+    """Create the fields of a form, which write into `values`.
+
+    Args:
+        options: dataclass of the options.
+        values: values of the form, complete. They are updated while the user types.
+        offered: names that are offered for lists, if they are not those of the option.
+        joint: joint in examples.
+    """
+    kinds = value_kinds(options)
+    shown = {name: option for name, (_, option) in option_fields(options).items() if option.in_form}
+    lists = {name: option for name, option in shown.items() if kinds[name] == "names"}
+    with ui.element("div").classes("app-form"):
+        choices: dict[str, ui.select] = {}
+        for name, option in shown.items():
+            if kinds[name] == "choice":
+                choices[name] = _choice(values, name, option)
+        for name, option in shown.items():
+            if kinds[name] == "number":
+                field = _text(values, name, FieldLook(title_of(name, option), _NUMBER, name))
+                if option.only_with is not None:
+                    other, needed = option.only_with
+                    field.bind_visibility_from(choices[other], "value", needed.__contains__)
+    for name, option in lists.items():
+        if option.offered:
+            _several(values, name, option, offered.get(name, option.offered))
+    with ui.element("div").classes("app-form"):
+        for name, option in lists.items():
+            field = _text(values, f"more_{name}", FieldLook(f"More {name}", _NAMES, f"more_{name}"))
+            field.tooltip(f"such as {option.example.format(joint=joint)}; commas between them")
+
+
+def _text(values: FormValues, key: str, look: FieldLook) -> ui.input:
+    return text_field(look, values[key], partial(values.__setitem__, key))
+
+
+def _choice(values: FormValues, name: str, option: OptionInfo) -> ui.select:
+    labels = {one: f"{one}, {word}" if word else one for one, word in option.choices.items()}
+    look = FieldLook(title_of(name, option), _CHOICE, name)
+    return choice_field(look, labels, values[name], partial(values.__setitem__, name))
+
+
+def _several(values: FormValues, name: str, option: OptionInfo, offered: Sequence[str]) -> None:
+    values[name] = [one for one in values[name] if one in offered]
+    labels = {one: one.replace("_", " ") for one in offered}
+    look = FieldLook(title_of(name, option), "100%", name)
+    several_field(look, labels, values[name], partial(values.__setitem__, name))

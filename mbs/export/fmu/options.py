@@ -1,0 +1,166 @@
+"""Options of the export of a mechanism as an FMU."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from mbs.assembly.symbolic import GROUPS
+from mbs.errors import ExportError
+from mbs.export.fmu.controller import Law
+from mbs.export.fmu.description import Experiment, Origin, check_options, printable
+from mbs.export.fmu.interface import KINDS
+from mbs.export.fmu.pack import FACES, require_version
+from mbs.files import PathLike
+from mbs.options import described
+
+_OUTPUTS = tuple(shown.group for shown in KINDS.values() if shown.group)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contents:
+    """Version and variables of an FMU, its controller and its platforms."""
+
+    __slots__ = ()
+
+    fmi: str = field(
+        default="2.0",
+        metadata=described(
+            'version of FMI, "2.0" or "3.0".',
+            dict.fromkeys(FACES, ""),
+            label="FMI",
+            command="--fmi",
+            in_form=True,
+        ),
+    )
+    inputs: Sequence[str] = field(
+        default=(),
+        metadata=described(
+            'names of further inputs. "j1.a": acceleration of a joint. "j1.q": position of a joint,'
+            " with its derivatives as inputs `j1.v` and `j1.a`. Both replace the effort, which"
+            ' becomes an output. "tool.wrench": force and moment on a frame at its origin,'
+            " expressed in the base, `tool.fx` .. `tool.mz`.",
+            example="{joint}.q, {joint}.a or tool.wrench",
+            command="--input",
+            in_form=True,
+        ),
+    )
+    outputs: Sequence[str] = field(
+        default=(),
+        metadata=described(
+            'names of further outputs. "sensors": values of the sensors, such as `tip.p.x`.'
+            ' "energy": `energy.kinetic` and `energy.potential`. "closure": largest closure'
+            ' residual. "poses": frames of all bodies. "cut_forces": wrenches that joints'
+            ' transmit, `j1.f.x` .. `j1.m.z`. Single outputs: "sensor:tip", "pose:arm",'
+            ' "motion:arm", "wrench:j2".',
+            label="outputs in addition to the motion of joints and tool",
+            offered=_OUTPUTS,
+            example="pose:tool or wrench:{joint}",
+            command="--output",
+            in_form=True,
+        ),
+    )
+    parameters: Sequence[str] = field(
+        default=(),
+        metadata=described(
+            "numeric values to convert to parameters, as in `mbs.assembly.symbolic`:"
+            ' "masses", "inertias", "lengths", "friction", "M3", "d4".',
+            label="numeric values to convert to parameters",
+            offered=tuple(GROUPS),
+            example="M3 or d4, or the name of a body",
+            command="--symbolic",
+            command_text='numeric values to convert to parameters: "masses", "inertias", "lengths",'
+            ' "friction", "M3", "d4".',
+            in_form=True,
+        ),
+    )
+    fixed: Sequence[str] = field(
+        default=(),
+        metadata=described(
+            "names of parameters that are constant after the initialization. All other parameters"
+            " are tunable."
+        ),
+    )
+    flanges: Sequence[str] = field(
+        default=(),
+        metadata=described(
+            "names of frames at which another part of a mechanism is coupled. Their poses,"
+            " velocities and accelerations are outputs, and the wrenches on them are inputs. In"
+            " FMI 3.0 each flange is a terminal."
+        ),
+    )
+    controller: Law = field(
+        default=None,
+        metadata=described(
+            "control law that computes the efforts, which are then no inputs. Either a function of"
+            " (t, q, v) as in `mbs.simulate.run`, or a casadi.Function, whose further inputs become"
+            " inputs of the FMU, or a C function of `sources` by its name or as a `CController`."
+        ),
+    )
+    sources: Sequence[PathLike] = field(
+        default=(),
+        metadata=described(
+            "C files and headers of the controller, which are compiled with the FMU."
+        ),
+    )
+    platforms: Sequence[str] | None = field(
+        default=None,
+        metadata=described(
+            'names of target platforms, such as ["x86_64-linux", "x86_64-windows"], compiled with'
+            " ziglang. By default this computer, with its own compiler.",
+            command="--platform",
+            command_text='name of a target platform, such as "x86_64-windows", compiled with'
+            " ziglang. By default this computer, with its own compiler.",
+        ),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Additions:
+    """Reference results, arrays and description of an FMU."""
+
+    __slots__ = ()
+
+    reference: bool = field(
+        default=False,
+        metadata=described("whether to include the results of the default experiment."),
+    )
+    arrays: bool = field(
+        default=False,
+        metadata=described(
+            "whether positions, velocities, accelerations and efforts of the joints are the arrays"
+            " q, v, a and tau of FMI 3.0. Dependent joints are in `q_dependent` and so on."
+        ),
+    )
+    description: str = field(
+        default="",
+        metadata=described(
+            "one-line description. By default the first line of the report of the system.",
+            check=lambda label, value: printable(label, value) if value else "",
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FmuOptions(Origin, Additions, Experiment, Contents):
+    """Options of `mbs.export.fmu`, in the order of its signature.
+
+    A dataclass takes the fields of its last base first.
+    """
+
+    def check(self, name: str) -> None:
+        """Check the options that do not depend on the system.
+
+        Args:
+            name: name of the system, for error messages.
+
+        Raises:
+            ExportError: an option is invalid, or does not fit the others.
+        """
+        require_version(name, self.fmi)
+        if self.arrays and self.fmi != "3.0":
+            raise ExportError(
+                f"{name}: arrays are variables of FMI 3.0, and fmi is {self.fmi!r}; use fmi='3.0'"
+                " or leave arrays out"
+            )
+        check_options(self, name)

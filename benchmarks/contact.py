@@ -21,7 +21,7 @@ from mbs.loops.configuration import start as configuration
 from mbs.models.state.tree import full_state
 from mbs.simulate.crossings import with_crossings
 from mbs.simulate.tolerances import step_tolerances
-from mbs.solvers.integrate import IntegrationCode, run_problem
+from mbs.solvers._integrate import IntegrationCode, run_problem
 from mbs.solvers.problem import equations, problem
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))

@@ -26,7 +26,7 @@ import mbs
 from mbs import MbsError
 from mbs.assembly import System
 from mbs.identification import base_parameters, regressor
-from mbs.loops import modes
+from mbs.loops import assembly_modes
 from mbs.loops.plan import plan
 from mbs.models import inverse_geometry
 from mbs.operations import count
@@ -130,7 +130,7 @@ def _branches(system: System) -> list[str]:
     try:
         if system.is_closed:
             chosen = [f"{s.name}: {s.labels[s.chosen]} of {s.labels}" for s in plan(system)]
-            return [*chosen, *(", ".join(mode.branch) for mode in modes(system))]
+            return [*chosen, *(", ".join(mode.branch) for mode in assembly_modes(system))]
         return [digest(c_text(inverse_geometry.function(system)))]
     except MbsError as error:
         return [type(error).__name__]

@@ -31,7 +31,7 @@ from mbs.closed_forms.arm_certificate import certified_arm, certified_configurat
 from mbs.closed_forms.arm_search import general_of
 from mbs.closed_forms.hexapod import poses
 from mbs.closed_forms.planar_loops import KNOWN, planar_roots
-from mbs.loops import modes
+from mbs.loops import assembly_modes
 
 
 class Row(NamedTuple):
@@ -78,8 +78,8 @@ def system_modes(build, starts):
     def run(seed, search):
         system = build(seed).assemble()
         q_a = active(system)
-        modes(system, q_a)
-        found, spent = timed(modes, system, q_a)
+        assembly_modes(system, q_a)
+        found, spent = timed(assembly_modes, system, q_a)
         others = searched(system, q_a, starts=starts if search else 0, seed=seed)
         missed = sum(not any(same(system, q, mode.q) for mode in found) for q in others)
         lost = not any(same(system, mode.q, system.configuration) for mode in found)

@@ -28,7 +28,7 @@ def generated_by_others(
     import casadi
 
     from mbs.native import cached_library
-    from mbs.native.compiled import generated
+    from mbs.native._compiled import generated
     from mbs.native.kernel import FAST_FLAGS
 
     if model.nq != model.nv or any(list(model.parents)[1:][k] != k for k in range(model.nv)):

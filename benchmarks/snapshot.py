@@ -31,7 +31,7 @@ from support.builders import ALONE, BUILDERS, CLOSED_ALONE, OPEN_ALONE, SYSTEMS,
 import mbs
 from mbs import MbsError
 from mbs.assembly import System
-from mbs.loops import modes
+from mbs.loops import assembly_modes
 from mbs.loops.plan import plan
 from mbs.models import inverse_geometry
 from mbs.operations import count
@@ -90,7 +90,9 @@ def branches(system: System) -> Record:
     try:
         if system.is_closed:
             chosen = [f"{s.name}: {s.labels[s.chosen]} of {s.labels}" for s in plan(system)]
-            return {"names": [*chosen, *(", ".join(mode.branch) for mode in modes(system))]}
+            return {
+                "names": [*chosen, *(", ".join(mode.branch) for mode in assembly_modes(system))]
+            }
         q = np.random.default_rng(11).uniform(0.2, 0.9, system.nq)
         T = np.array(mbs.models.direct_geometry(system)(q))
         found = inverse_geometry.solve(system, T)

@@ -35,7 +35,7 @@ from timing import ALGORITHMS, Array, Contender, InLibrary, Peer, best_times, ha
 
 from mbs.assembly import System
 from mbs.models import direct_dynamics
-from mbs.models.tree_core import core_library
+from mbs.models._tree_core import core_library
 from mbs.native import compiled
 from mbs.native.kernel import kernel_library
 

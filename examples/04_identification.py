@@ -13,13 +13,13 @@ from matplotlib.figure import Figure
 
 import mbs
 from mbs.identification import (
+    FourierSettings,
     Prior,
     Record,
-    Series,
     base_parameters,
     excitation,
     identify,
-    numbers_of,
+    numeric_parameters,
     observe_filtered,
     plot_residuals,
     regressor,
@@ -33,7 +33,7 @@ base = base_parameters(system)
 print(f"{base.count} base parameters of {len(base.columns)}, such as {base.equations[0]}")
 
 # %% Two motions within the limits: one to identify, one to validate
-series = Series(period=10.0, harmonics=5, samples=40)
+series = FourierSettings(period=10.0, harmonics=5, samples=40)
 limits = {"velocity": 2.0, "acceleration": 6.0, "effort": [100, 120, 60, 10, 10, 10]}
 first, second = (
     excitation(system, base, series=series, starts=1, rounds=60, seed=seed, quiet=True, **limits)
@@ -45,7 +45,7 @@ first.table(rate=100).to_csv(folder / "motion.csv")
 # %% A robot with friction, measured for three periods with noise on positions and efforts
 D = regressor(system)
 friction = {"Fv": 2.0, "Fs": 1.5}
-K = np.array(numbers_of(system, D.columns), dtype=float)
+K = np.array(numeric_parameters(system, D.columns), dtype=float)
 K += [friction.get(c.kind, 0.0) / (1 + 4 * (c.link > 3)) for c in D.columns]
 rng, rate = np.random.default_rng(7), 500.0
 deviation = np.array([0.5, 0.5, 0.5, 0.05, 0.05, 0.05])

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import mbs
-from mbs.bridges import Grid, collocation, invariants
+from mbs.bridges import Grid, collocation, constraint_residuals
 from mbs.components import Body, Revolute
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "build/four_bar_motion")
@@ -47,7 +47,7 @@ def least_effort(form):
     way = collocation(opti, dae, Grid(stages=STAGES, duration=1.0))
     names = [name for name, _ in dae.elements["x"]]
     moved = [names.index("j1.q"), names.index("j1.v")]
-    closed = invariants(dae, way.x[:, 0], way.p)
+    closed = constraint_residuals(dae, way.x[:, 0], way.p)
     if closed.numel():
         opti.subject_to(closed == 0)
     opti.subject_to(way.x[moved, 0] == [FROM, 0])

@@ -43,7 +43,7 @@ def test_every_source_in_the_code_is_in_the_bibliography() -> None:
         (
             "components.md",
             "components",
-            {"Component", "Description", "Joint", "Note", "Placed", "Point"},
+            {"Component", "Description", "ImportNote", "Joint", "Point", "SubMechanism"},
         ),
         ("models.md", "models", set()),
         ("export.md", "export", set()),

@@ -424,7 +424,7 @@ def closes(subject: Subject, values: dict[str, Any], start: dict[str, float]) ->
         return "number"
     q = [start[f"{c.name}.q"] for c in subject.system.coordinates]
     p = [values.get(x.name, x.default) for x in subject.system.parameters]
-    assert np.abs(mbs.loops.closure(subject.system)(q, p).full()).max() < 1e-9
+    assert np.abs(mbs.loops.closure_residual(subject.system)(q, p).full()).max() < 1e-9
     return "closes"
 
 

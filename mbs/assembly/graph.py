@@ -41,7 +41,7 @@ class BodyNode:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Edge:
+class JointEdge:
     """A joint between two nodes.
 
     Attributes:
@@ -70,7 +70,7 @@ class BodyGraph:
     """
 
     nodes: tuple[BodyNode, ...]
-    edges: tuple[Edge, ...]
+    edges: tuple[JointEdge, ...]
     size: float
 
 
@@ -244,14 +244,14 @@ def _edge(
     nodes: list[BodyNode],
     home: Mapping[Port, int],
     symbols: Mapping[str, SX],
-) -> Edge:
+) -> JointEdge:
     a, b = home[joint.name, "a"], home[joint.name, "b"]
     if a == b:
         raise AssemblyError(
             f"{mechanism.name}: joint {joint.name!r} connects {nodes[a].name!r} to itself;"
             " connect it to two bodies"
         )
-    return Edge(
+    return JointEdge(
         joint,
         a,
         b,
@@ -261,7 +261,7 @@ def _edge(
     )
 
 
-def _size(nodes: int, edges: Sequence[Edge], at: _Evaluator) -> float:
+def _size(nodes: int, edges: Sequence[JointEdge], at: _Evaluator) -> float:
     """Return the largest distance between two joints of one body; 1 if there is none [m]."""
     points = at(casadi.horzcat(SX(3, 0), *(p for e in edges for p in (e.pose_a.p, e.pose_b.p))))
     on: list[list[Any]] = [[] for _ in range(nodes)]
@@ -303,7 +303,7 @@ class Branch:
         forward: Whether frame_a is on the side of the base.
     """
 
-    edge: Edge
+    edge: JointEdge
     parent: int
     child: int
     forward: bool
@@ -314,7 +314,7 @@ class SpanningTree:
     """Branches in the order of the link numbers, and the joints that close loops."""
 
     branches: tuple[Branch, ...]
-    cuts: tuple[Edge, ...]
+    cuts: tuple[JointEdge, ...]
 
 
 def spanning_tree(
@@ -376,9 +376,9 @@ def _describe_unreached(name: str, graph: BodyGraph, number: int) -> str:
     return f"{where}; connect it, or connect it to the world by a Free joint"
 
 
-def _prim(graph: BodyGraph, need: set[str], keep: set[str], cut: set[str]) -> list[Edge]:
+def _prim(graph: BodyGraph, need: set[str], keep: set[str], cut: set[str]) -> list[JointEdge]:
     depth = {0: 0}
-    chosen: list[Edge] = []
+    chosen: list[JointEdge] = []
     queue: list[tuple[tuple[bool, int, int, int, int], int]] = []
 
     def offer(node: int) -> None:
@@ -404,7 +404,7 @@ def _prim(graph: BodyGraph, need: set[str], keep: set[str], cut: set[str]) -> li
     return chosen
 
 
-def _depth_first(graph: BodyGraph, chosen: list[Edge]) -> list[Branch]:
+def _depth_first(graph: BodyGraph, chosen: list[JointEdge]) -> list[Branch]:
     branches: list[Branch] = []
     rank = {id(edge): number for number, edge in enumerate(graph.edges)}
     ordered = sorted(chosen, key=lambda edge: rank[id(edge)])
@@ -421,7 +421,7 @@ def _depth_first(graph: BodyGraph, chosen: list[Edge]) -> list[Branch]:
     return branches
 
 
-def _branches_from(node: int, edges: list[Edge]) -> list[Branch]:
+def _branches_from(node: int, edges: list[JointEdge]) -> list[Branch]:
     return [
         Branch(edge, node, edge.b if edge.a == node else edge.a, edge.a == node)
         for edge in edges

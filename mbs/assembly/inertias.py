@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from mbs.assembly.tree import Tree
 from mbs.components.bodies import GROUPED, KhalilBody, RigidBody
 from mbs.components.joints import Motion
-from mbs.components.notes import Note
+from mbs.components.notes import ImportNote
 from mbs.errors import DescriptionError
 
 _PARALLEL = 1e-9
 """Largest sine of the angle between parallel axes: rounding gives 1e-15, designs differ by more."""
 
 
-def inertia_notes(tree: Tree, bodies: Iterable[tuple[RigidBody, int]]) -> list[Note]:
+def inertia_notes(tree: Tree, bodies: Iterable[tuple[RigidBody, int]]) -> list[ImportNote]:
     """Return notes on impossible inertias of bodies.
 
     The motion of a body with a single rotation axis depends only on the moment of inertia about it.
@@ -41,7 +41,7 @@ def inertia_notes(tree: Tree, bodies: Iterable[tuple[RigidBody, int]]) -> list[N
                 f" other two, unless the body rotates about one axis only{grouped}"
             )
         text = f"{body.inertia_fault}; it rotates about one axis only"
-        notes.append(Note("doubted", f"body {body.name!r}", text))
+        notes.append(ImportNote("doubted", f"body {body.name!r}", text))
     return notes
 
 

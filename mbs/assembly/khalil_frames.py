@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import casadi
 from casadi import DM, SX
 
-from mbs.assembly.graph import BodyGraph, Branch, Edge, SpanningTree, inertia_of
+from mbs.assembly.graph import BodyGraph, Branch, JointEdge, SpanningTree, inertia_of
 from mbs.assembly.tree import CarriedRotor, Frame, Link, Tree
 from mbs.components import Description
 from mbs.components.joints import Freedom, Motion
@@ -43,7 +43,7 @@ class Cut:
         welded: Whether the joint itself stays in the tree, with its free end welded.
     """
 
-    edge: Edge
+    edge: JointEdge
     link_a: int
     link_b: int
     pose_a: Pose
@@ -57,7 +57,7 @@ class Cut:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Framed:
+class KhalilTree:
     """A tree with its cuts, and the link of every node of the graph.
 
     Attributes:
@@ -98,7 +98,7 @@ class _DescribedLink:
     backward: bool
     pose: Pose
     given: Khalil | None
-    edge: Edge
+    edge: JointEdge
     nodes: dict[int, Pose] = field(default_factory=dict)
 
 
@@ -121,7 +121,7 @@ class _Chosen:
 
 def khalil_frames(
     mechanism: Description, graph: BodyGraph, spanning: SpanningTree, symbols: Mapping[str, SX]
-) -> Framed:
+) -> KhalilTree:
     """Number the links, place their frames and sum their inertias.
 
     Args:
@@ -172,7 +172,7 @@ def khalil_frames(
     gravity = casadi.vertcat(*(to_sx(g, symbols) for g in mechanism.world.gravity))
     rotors = [_rotor(draft.edge, place, symbols) for draft in drafts]
     tree = Tree(_links(drafts, chosen, inertias, rotors, symbols), gravity)
-    return Framed(tree, tuple(draft.joint for draft in drafts), tuple(cuts), homes)
+    return KhalilTree(tree, tuple(draft.joint for draft in drafts), tuple(cuts), homes)
 
 
 def _keep(spanning: SpanningTree) -> list[Branch]:
@@ -259,7 +259,7 @@ def _align(freedom: Freedom, forward: bool) -> Pose:
 
 
 def _rotor(
-    edge: Edge, place: Callable[[int], tuple[int, Pose]], symbols: Mapping[str, SX]
+    edge: JointEdge, place: Callable[[int], tuple[int, Pose]], symbols: Mapping[str, SX]
 ) -> CarriedRotor | None:
     """Return the rotor of a joint, on the link that carries the joint's frame_a."""
     rotor = edge.joint.rotor

@@ -10,10 +10,10 @@ from casadi import SX
 from mbs.assembly.drive_line import drive_line, shaft_rows
 from mbs.assembly.graph import BodyGraph, connection_graph, spanning_tree
 from mbs.assembly.inertias import inertia_notes
-from mbs.assembly.khalil_frames import Cut, Framed, khalil_frames
+from mbs.assembly.khalil_frames import Cut, KhalilTree, khalil_frames
 from mbs.assembly.parameter_bounds import bounded_fields, parameter_bounds
 from mbs.assembly.parts import (
-    AttachedPart,
+    ComponentInstance,
     attached_parts,
     coordinates_needed,
     symbols_in_order,
@@ -160,14 +160,14 @@ def _is_actuated(joint: Joint, in_loops: set[str]) -> bool:
     return joint.actuated
 
 
-def _loop_joints(framed: Framed, cut: Cut) -> list[str]:
+def _loop_joints(framed: KhalilTree, cut: Cut) -> list[str]:
     """Return the names of the joints in the loop of a cut, in the order of the links."""
     a, b = (set(framed.tree.path(link)) for link in (cut.link_a, cut.link_b))
     names = [framed.joints[j] for j in sorted(a ^ b)]
     return list(dict.fromkeys(names))
 
 
-def _looped_joints(framed: Framed) -> set[str]:
+def _looped_joints(framed: KhalilTree) -> set[str]:
     return {name for cut in framed.cuts for name in _loop_joints(framed, cut)}
 
 
@@ -178,7 +178,7 @@ def _driven_joints(mechanism: Description) -> set[str]:
 
 
 def _loop_rows(
-    mechanism: Description, framed: Framed, parts: Sequence[AttachedPart]
+    mechanism: Description, framed: KhalilTree, parts: Sequence[ComponentInstance]
 ) -> tuple[LoopRow, ...]:
     loops = [
         LoopRow(
@@ -198,7 +198,7 @@ def _loop_rows(
     return (*loops, *couplings, *binding)
 
 
-def _bound_joints(framed: Framed, part: AttachedPart) -> tuple[str, ...]:
+def _bound_joints(framed: KhalilTree, part: ComponentInstance) -> tuple[str, ...]:
     """Return the names of the joints that move the ports of a component."""
     links = [k for link, _ in part.frames for k in framed.tree.path(link)]
     names = [framed.joints[k] for k in sorted(set(links))]
@@ -218,7 +218,7 @@ def _cut_coordinates(cuts: Sequence[Cut]) -> tuple[Coordinate, ...]:
     return tuple(rows)
 
 
-def _bodies(mechanism: Description, graph: BodyGraph, framed: Framed) -> tuple[BodyRow, ...]:
+def _bodies(mechanism: Description, graph: BodyGraph, framed: KhalilTree) -> tuple[BodyRow, ...]:
     """Return the moving bodies, in the order of their links."""
     homes = {
         name: framed.homes[number][0]
@@ -244,7 +244,7 @@ def _mass(body: Component, values: Mapping[str, float]) -> float | None:
     return 0.0
 
 
-def _places(graph: BodyGraph, framed: Framed) -> Places:
+def _places(graph: BodyGraph, framed: KhalilTree) -> Places:
     return {
         port: (link, pose @ inside)
         for node, (link, pose) in zip(graph.nodes, framed.homes, strict=True)

@@ -33,7 +33,7 @@ class FlangeTurn:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lever:
+class MomentArm:
     """Moment arm of a component on a coordinate: weight of the coordinate in a port.
 
     Attributes:
@@ -69,7 +69,7 @@ class WireSource:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AttachedPart:
+class ComponentInstance:
     """A component in a system, with the links, coordinates and symbols that it uses.
 
     Attributes:
@@ -85,7 +85,7 @@ class AttachedPart:
 
     element: Custom
     frames: tuple[Frame, ...]
-    coordinates: Mapping[str, tuple[Lever, ...]]
+    coordinates: Mapping[str, tuple[MomentArm, ...]]
     states: Mapping[str, SX]
     inputs: Mapping[str, SX | WireSource]
     symbols: Mapping[str, SX]
@@ -97,7 +97,7 @@ class AttachedPart:
         return self.element.name
 
     @property
-    def levers(self) -> tuple[Lever, ...]:
+    def levers(self) -> tuple[MomentArm, ...]:
         """Moment arms on all its coordinates; empty if it acts on points only."""
         return tuple(lever for levers in self.coordinates.values() for lever in levers)
 
@@ -235,7 +235,7 @@ def attached_parts(
     symbols: Mapping[str, SX],
     turns: Mapping[tuple[str, str], FlangeTurn],
     sensors: Sequence[AttachedSensor],
-) -> tuple[AttachedPart, ...]:
+) -> tuple[ComponentInstance, ...]:
     """Return every equation-based component with the links of its points and its coordinates.
 
     Args:
@@ -265,7 +265,7 @@ def _attached(
     symbols: Mapping[str, SX],
     turns: Mapping[tuple[str, str], FlangeTurn],
     wires: Mapping[tuple[str, str], WireSource],
-) -> AttachedPart:
+) -> ComponentInstance:
     # links and poses of its points
     frames = []
     for point in part.points:
@@ -285,7 +285,7 @@ def _attached(
     names = [point.owner.name for point in part.points]
     names += [lever.name for port in given for lever in coordinates[port]]
     _require_moving(part, frames, coordinates, names)
-    return AttachedPart(
+    return ComponentInstance(
         element=part,
         frames=tuple(frames),
         coordinates=coordinates,
@@ -302,7 +302,7 @@ def _attached(
 def _require_moving(
     part: Custom,
     frames: Sequence[Frame],
-    coordinates: Mapping[str, tuple[Lever, ...]],
+    coordinates: Mapping[str, tuple[MomentArm, ...]],
     names: Sequence[str],
 ) -> None:
     """Raise AssemblyError if loads and rows act on bodies that cannot move."""
@@ -323,7 +323,7 @@ def _where(names: Sequence[str]) -> str:
     return f"between {listed(names)}" if len(names) > 1 else f"on {names[0]}"
 
 
-def _lever(part: Custom, name: str, factor: SX, tables: tuple[_Rows, _Rows, _Rows]) -> Lever:
+def _lever(part: Custom, name: str, factor: SX, tables: tuple[_Rows, _Rows, _Rows]) -> MomentArm:
     """Return the moment arm of a component on a coordinate; raise if the coordinate is unknown."""
     coordinates, speeds, cut = tables
     q, v = ([row.name for row in table] for table in (coordinates, speeds))
@@ -340,7 +340,7 @@ def _lever(part: Custom, name: str, factor: SX, tables: tuple[_Rows, _Rows, _Row
             f" {type(part).__name__} can act on; {did_you_mean(name, known)}"
         )
     position = q.index(name) if name in q else None
-    return Lever(position, v.index(name), factor, name, speeds[v.index(name)].unit)
+    return MomentArm(position, v.index(name), factor, name, speeds[v.index(name)].unit)
 
 
 # Wires: sources of the inputs of components.

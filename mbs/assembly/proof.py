@@ -18,7 +18,7 @@ from casadi import DM, SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly.graph import Port, is_weld
-from mbs.assembly.khalil_frames import Framed
+from mbs.assembly.khalil_frames import KhalilTree
 from mbs.assembly.tables import Places
 from mbs.assembly.tree import Frame, Tree
 from mbs.components import Description
@@ -32,7 +32,7 @@ from mbs.components.component import (
 from mbs.components.joints import Freedom, Motion
 from mbs.errors import AssemblyError
 from mbs.expressions import Expression, Number, Operation, Parameter
-from mbs.expressions.expression import arithmetic
+from mbs.expressions._expression import arithmetic
 
 Array = NDArray[np.float64]
 """(..., 4, 4) transforms, (samples, 4, 4) if they contain symbols."""
@@ -48,7 +48,7 @@ _FUNCTIONS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt, "ata
 
 def prove(
     mechanism: Description,
-    framed: Framed,
+    framed: KhalilTree,
     places: Places,
     symbols: Mapping[str, SX],
     values: Mapping[str, float],
@@ -111,7 +111,7 @@ def _positions(rng: np.random.Generator, motion: Motion, samples: int) -> Array:
 
 
 def _describe(
-    mechanism: Description, framed: Framed, known: Mapping[str, Array], q: Mapping[str, Array]
+    mechanism: Description, framed: KhalilTree, known: Mapping[str, Array], q: Mapping[str, Array]
 ) -> dict[tuple[str, str], Array]:
     """Return the poses of bodies and joints in the world, and of free ends of kept cut joints."""
     ways: dict[Port, list[tuple[Port, Callable[[], Array]]]] = {}

@@ -10,7 +10,7 @@ from casadi import SX
 from mbs.assembly.drive_line import ShaftRow
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.parameter_bounds import BoundedField, Bounds
-from mbs.assembly.parts import AttachedPart, Quantity
+from mbs.assembly.parts import ComponentInstance, Quantity
 from mbs.assembly.tables import (
     AttachedSensor,
     Balance,
@@ -85,7 +85,7 @@ class SystemData:
     loops: tuple[LoopRow, ...]
     configuration: tuple[float, ...]
     closure: Closure | None = None
-    parts: tuple[AttachedPart, ...] = ()
+    parts: tuple[ComponentInstance, ...] = ()
     joints: tuple[JointRow, ...] = ()
     sensors: tuple[AttachedSensor, ...] = ()
     shafts: tuple[ShaftRow, ...] = ()
@@ -110,7 +110,7 @@ class SystemData:
         return self.tree.nv
 
     @property
-    def devices(self) -> tuple[AttachedPart, ...]:
+    def devices(self) -> tuple[ComponentInstance, ...]:
         """Motors and torques that drive shafts."""
         return tuple(part for part in self.parts if part.element.drives)
 

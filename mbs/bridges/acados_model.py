@@ -9,7 +9,7 @@ from casadi import SX, Function
 
 from mbs.bridges.explicit import require_dae
 from mbs.errors import ModelError
-from mbs.models.dae import Dae
+from mbs.models._dae import Dae
 from mbs.text import quoted
 
 _HIGHER = ("index2", "index3", "ggl")

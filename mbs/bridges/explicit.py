@@ -7,7 +7,7 @@ from typing import Any
 from casadi import MX, SX, Function
 
 from mbs.errors import ModelError
-from mbs.models.dae import Dae
+from mbs.models._dae import Dae
 from mbs.text import quoted
 
 Model = Dae | Function

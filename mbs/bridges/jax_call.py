@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from mbs.errors import ModelError
 from mbs.native import batch
-from mbs.native.batch import Batch
-from mbs.native.compiled import require_function
+from mbs.native._batch import Batch
+from mbs.native._compiled import require_function
 from mbs.text import install_command
 
 _Outputs = Callable[..., tuple[Any, ...]]

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbs.bridges.explicit import Model
 from mbs.errors import ModelError
-from mbs.models.dae import Dae
+from mbs.models._dae import Dae
 from mbs.native import compiled
-from mbs.native.batch import cores
+from mbs.native._batch import cores
 from mbs.text import did_you_mean, quoted
 
 CODES: Mapping[str, Callable[[Function], Function]] = {

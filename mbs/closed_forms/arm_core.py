@@ -326,7 +326,7 @@ def rounded_by(library: ctypes.CDLL, T: Array) -> Array | None:
 
 def settled_by(
     library: ctypes.CDLL,
-    handed: Handed,
+    handed: CArm,
     T: Array,
     every: tuple[Array, ...],
     bounds: tuple[float, float],
@@ -362,7 +362,7 @@ def settled_by(
     return q[:m], residual[:m], number[:m], not doubtful
 
 
-class Handed:
+class CArm:
     """C structure of an arm, and the arrays that it points to."""
 
     def __init__(self, arm: Arm) -> None:
@@ -373,9 +373,9 @@ class Handed:
 
 
 @functools.lru_cache(maxsize=256)
-def handed_of(arm: Arm) -> Handed:
+def handed_of(arm: Arm) -> CArm:
     """Return the C structure of an arm, cached, because an arm is immutable."""
-    return Handed(arm)
+    return CArm(arm)
 
 
 def _wanted(T: Array, *shape: int) -> Array:

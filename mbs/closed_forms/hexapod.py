@@ -55,7 +55,7 @@ def _right(b: Complex) -> Complex:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Legs:
+class PlatformLegs:
     """Six legs, with real or complex values.
 
     Attributes:
@@ -99,13 +99,13 @@ class Homotopy:
     c: Complex
 
     @staticmethod
-    def between(start: Legs, end: Legs) -> Homotopy:
+    def between(start: PlatformLegs, end: PlatformLegs) -> Homotopy:
         """Return the path along a straight line of a, b and c."""
         c = np.append(end.c - start.c, 0)
         first, last = start.forms(), end.forms()
         if np.array_equal(start.a, end.a) and np.array_equal(start.b, end.b):
             return Homotopy(first[None], c)
-        middle = Legs((start.a + end.a) / 2, (start.b + end.b) / 2, (start.c + end.c) / 2)
+        middle = PlatformLegs((start.a + end.a) / 2, (start.b + end.b) / 2, (start.c + end.c) / 2)
         bend = 2 * (first + last) - 4 * middle.forms()
         return Homotopy(np.array([first, last - first - bend, bend]), c)
 
@@ -161,7 +161,7 @@ _FLAT = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ends:
+class PathEnds:
     """Ends of the paths.
 
     Attributes:
@@ -173,7 +173,7 @@ class Ends:
     regular: NDArray[np.bool_]
 
 
-def certify(legs: Legs, x: Complex, t: Real) -> Ends:
+def certify(legs: PlatformLegs, x: Complex, t: Real) -> PathEnds:
     """Return the refined ends of paths that reached t, and which of them are certified.
 
     Source: Blum, Cucker, Shub & Smale 1998, chapter 8; in floating point, with room for rounding.
@@ -200,14 +200,14 @@ def certify(legs: Legs, x: Complex, t: Real) -> Ends:
     same = np.linalg.norm(y[:, None] - along[..., None] * y, axis=2) < _APART
     alone = ~np.any(np.tril(same & certain, -1), axis=1)
     regular[number] = certain & alone & (np.linalg.norm(y[:, :4], axis=1) > _FLAT)
-    return Ends(x, regular)
+    return PathEnds(x, regular)
 
 
 # Stored platform with forty roots, and its computation by monodromy.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Start:
+class StartSystem:
     """Platform with complex legs, and its roots.
 
     Attributes:
@@ -215,28 +215,28 @@ class Start:
         x: (40, 8) roots; fewer for special ends of the legs.
     """
 
-    legs: Legs
+    legs: PlatformLegs
     x: Complex
 
 
 DEGREE = 40
 
 
-def random_legs(rng: np.random.Generator) -> Legs:
+def random_legs(rng: np.random.Generator) -> PlatformLegs:
     """Return random complex legs about the origin, of about unit size."""
 
     def drawn(*shape: int) -> Complex:
         z = rng.normal(size=shape) + 1j * rng.normal(size=shape)
         return np.asarray(z / np.sqrt(2), np.complex128)
 
-    return _centred(Legs(drawn(LEGS, 3), drawn(LEGS, 3), drawn(LEGS)))
+    return _centred(PlatformLegs(drawn(LEGS, 3), drawn(LEGS, 3), drawn(LEGS)))
 
 
-def _centred(legs: Legs) -> Legs:
-    return Legs(legs.a - legs.a.mean(axis=0), legs.b - legs.b.mean(axis=0), legs.c)
+def _centred(legs: PlatformLegs) -> PlatformLegs:
+    return PlatformLegs(legs.a - legs.a.mean(axis=0), legs.b - legs.b.mean(axis=0), legs.c)
 
 
-def monodromy(seed: int, most: int = 200) -> Start:
+def monodromy(seed: int, most: int = 200) -> StartSystem:
     """Return roots of random legs, by tracking known roots along closed paths of other legs.
 
     Args:
@@ -252,7 +252,7 @@ def monodromy(seed: int, most: int = 200) -> Start:
     first = np.concatenate([e, _left(p) @ e])
     # constants for which `first` is a root
     rest = np.einsum("i,kij,j->k", first, legs.forms()[:LEGS], first)
-    legs = Legs(legs.a, legs.b, legs.c - rest / (e @ e))
+    legs = PlatformLegs(legs.a, legs.b, legs.c - rest / (e @ e))
     x = first[None] / np.linalg.norm(first)
     for _ in range(most):
         if len(x) >= DEGREE:
@@ -265,27 +265,27 @@ def monodromy(seed: int, most: int = 200) -> Start:
         every = np.concatenate([x, y[done]])
         ends = certify(legs, every, np.ones(len(every)))
         x = ends.x[ends.regular]
-    return Start(legs, x)
+    return StartSystem(legs, x)
 
 
-def text_of(start: Start) -> str:
+def text_of(start: StartSystem) -> str:
     """Return the values of a start as JSON text for a file."""
     parts = {"a": start.legs.a, "b": start.legs.b, "c": start.legs.c, "x": start.x}
     return json.dumps({name: [z.real.tolist(), z.imag.tolist()] for name, z in parts.items()})
 
 
 @functools.cache
-def kept_start(number: int) -> Start:
+def kept_start(number: int) -> StartSystem:
     """Return one of the two starts that are stored next to this file."""
     file = resources.files("mbs.closed_forms") / "hexapod_starts" / f"{number}.json"
     told = json.loads(file.read_text(encoding="utf-8"))
     parts = {name: np.array(told[name][0]) + 1j * np.array(told[name][1]) for name in "abcx"}
     a, b, c, x = (np.asarray(parts[name], dtype=np.complex128) for name in "abcx")
-    return Start(Legs(a, b, c), x)
+    return StartSystem(PlatformLegs(a, b, c), x)
 
 
 @functools.lru_cache(maxsize=16)
-def own_start(a: bytes, b: bytes) -> Start:
+def own_start(a: bytes, b: bytes) -> StartSystem:
     """Return all roots of a platform with complex leg lengths, the start for any other lengths.
 
     Special ends of the legs have fewer than forty roots: 28 for semi-regular hexagons, 16 for legs
@@ -299,7 +299,7 @@ def own_start(a: bytes, b: bytes) -> Start:
     """
     ends = [np.frombuffer(told).reshape(LEGS, 3).astype(complex) for told in (a, b)]
     rng = np.random.default_rng(_SEED)
-    legs, second, third = (Legs(ends[0], ends[1], _lengths(rng)) for _ in range(3))
+    legs, second, third = (PlatformLegs(ends[0], ends[1], _lengths(rng)) for _ in range(3))
     x, counts = np.zeros((0, _SIZE), dtype=complex), list[int]()
     for number in (0, 1):
         kept = kept_start(number)
@@ -315,8 +315,8 @@ def own_start(a: bytes, b: bytes) -> Start:
             y = y[t >= 1]
         known, x = len(x), _distinct_roots(legs, np.concatenate([x, y]))
         idle = idle + 1 if len(x) == known else 0
-        second, third = (Legs(ends[0], ends[1], _lengths(rng)) for _ in range(2))
-    return Start(legs, x)
+        second, third = (PlatformLegs(ends[0], ends[1], _lengths(rng)) for _ in range(2))
+    return StartSystem(legs, x)
 
 
 _IDLE = 3
@@ -327,7 +327,7 @@ def _lengths(rng: np.random.Generator) -> Complex:
     return rng.normal(size=LEGS) + 1j * rng.normal(size=LEGS)
 
 
-def _distinct_roots(legs: Legs, x: Complex) -> Complex:
+def _distinct_roots(legs: PlatformLegs, x: Complex) -> Complex:
     ends = certify(legs, x.copy(), np.ones(len(x)))
     return ends.x[ends.regular]
 
@@ -401,7 +401,7 @@ def poses(a: Real, b: Real, length: Real) -> Poses:
         )
     square = (length / size) ** 2
     c = np.sum(a0**2, axis=1) + np.sum(b0**2, axis=1) - square
-    legs = Legs(a0.astype(complex), b0.astype(complex), c.astype(complex))
+    legs = PlatformLegs(a0.astype(complex), b0.astype(complex), c.astype(complex))
     start = own_start(a0.tobytes(), b0.tobytes())
     path, expected = Homotopy.between(start.legs, legs), len(start.x)
     for tolerance in (TOLERANCE, TOLERANCE / 10, TOLERANCE / 100):
@@ -462,7 +462,7 @@ class _RealRoots(NamedTuple):
     folds: int
 
 
-def _real(a: Real, b: Real, square: Real, ends: Ends, t: Real) -> _RealRoots:
+def _real(a: Real, b: Real, square: Real, ends: PathEnds, t: Real) -> _RealRoots:
     """Return the real roots among the ends of paths that reached t (r,)."""
     near = t > 1 - _FOLD
     near &= np.linalg.norm(ends.x[:, :4], axis=1) > _FLAT**0.5

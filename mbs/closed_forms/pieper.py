@@ -340,7 +340,7 @@ def _quadratic_root(factors: list[SX], sign: SX, length: SX, unit: SX) -> Root:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reach:
+class PointTarget:
     """Target position of a point that the first three joints move.
 
     Attributes:
@@ -370,7 +370,7 @@ def three_joints(scene: PieperLoop, point: SX, p: SX) -> list[SequenceStep] | No
     f = casadi.mtimes(way.R, moved_point(joint, point))
     f[:, 2] += way.p
     square = _square(f, way.p, point) if joint.is_rotational else _slid_square(f)
-    reach = Reach(scene, scene.after(0).pose, f, square, p)
+    reach = PointTarget(scene, scene.after(0).pose, f, square, p)
     steps = (
         _second_revolute(reach) if scene.ring.joints[1].is_rotational else _second_prismatic(reach)
     )
@@ -389,7 +389,7 @@ def _slid_square(f: SX) -> SX:
     return casadi.vertcat(casadi.sumsqr(u), 2 * casadi.dot(u, v), casadi.sumsqr(v))
 
 
-def _rows(reach: Reach) -> tuple[list[SX], list[SX], list[SX]]:
+def _rows(reach: PointTarget) -> tuple[list[SX], list[SX], list[SX]]:
     """Return two equations a . (J2 f) = h: vectors a, forms h, and the units of h."""
     scene, R, t = reach.scene, reach.way.R, reach.way.p
     if not scene.ring.joints[0].is_rotational:
@@ -401,7 +401,7 @@ def _rows(reach: Reach) -> tuple[list[SX], list[SX], list[SX]]:
     return [turned, R[2, :].T], forms, [scene.length**2, scene.length]
 
 
-def _second_revolute(reach: Reach) -> list[SequenceStep] | None:
+def _second_revolute(reach: PointTarget) -> list[SequenceStep] | None:
     """Return the steps of joints 3 and 2 for a revolute joint 2."""
     scene = reach.scene
     (a, b), (h, k), (unit_h, unit_k) = _rows(reach)
@@ -424,7 +424,7 @@ def _second_revolute(reach: Reach) -> list[SequenceStep] | None:
 
 
 def _parallel(
-    reach: Reach, first: tuple[SX, SX, SX], second: tuple[SX, SX, SX]
+    reach: PointTarget, first: tuple[SX, SX, SX], second: tuple[SX, SX, SX]
 ) -> list[SequenceStep] | None:
     """Return steps of joints 3 and 2 if both equations have proportional terms in joint 2."""
     scene, (a, Z1, unit), (b, Z2, unit_b) = reach.scene, first, second
@@ -448,7 +448,7 @@ def _parallel(
     return None if joint is None else [third, joint]
 
 
-def _second_prismatic(reach: Reach) -> list[SequenceStep] | None:
+def _second_prismatic(reach: PointTarget) -> list[SequenceStep] | None:
     """Return the steps of joints 3 and 2 for a prismatic joint 2."""
     rows, forms, _ = _rows(reach)
     left = [h - casadi.mtimes(reach.f.T, a) for a, h in zip(rows, forms, strict=True)]
@@ -458,7 +458,7 @@ def _second_prismatic(reach: Reach) -> list[SequenceStep] | None:
 
 
 def _two_displacements(
-    reach: Reach, along: tuple[SX, SX], left: tuple[SX, SX]
+    reach: PointTarget, along: tuple[SX, SX], left: tuple[SX, SX]
 ) -> list[SequenceStep] | None:
     """Return the steps of joints 3 and 2 from two equations along[k] x2 = left[k], k = 0, 1."""
     scene, sign = reach.scene, reach.scene.ring.joints[1].sign
@@ -471,7 +471,7 @@ def _two_displacements(
 
 
 def _slide_in_turn(
-    reach: Reach, a: SX, along: SX, left: tuple[SX, SX]
+    reach: PointTarget, a: SX, along: SX, left: tuple[SX, SX]
 ) -> list[SequenceStep] | None:
     """Return the steps of joints 3 and 2 for a revolute joint 1 and a prismatic joint 2.
 
@@ -492,7 +492,7 @@ def _slide_in_turn(
     return [third, linear(scene, 1, along, sign * casadi.dot(left[1], b3))]
 
 
-def _first(reach: Reach) -> SequenceStep:
+def _first(reach: PointTarget) -> SequenceStep:
     """Return the step of joint 1, with the other two joints known."""
     scene = reach.scene
     f = Pose.translation(casadi.mtimes(reach.f, basis(scene, 2)))

@@ -225,7 +225,7 @@ def coupled_position(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Span:
+class RigidLink:
     """Rigid link between two centres, and the loop chain from the end of the link to its start.
 
     Attributes:
@@ -241,7 +241,7 @@ class Span:
     squared: SX
 
 
-def spans(ring: Ring, q: SX, p: SX) -> Iterator[Span]:
+def spans(ring: Ring, q: SX, p: SX) -> Iterator[RigidLink]:
     """Yield each rigid link of a loop between two centres."""
     n = len(ring.joints)
     found = centres(ring, q, p)
@@ -252,11 +252,11 @@ def spans(ring: Ring, q: SX, p: SX) -> Iterator[Span]:
                 yield _span(ring.rotated(one.first), one, other)
 
 
-def _span(begun: Ring, one: Centre, other: Centre) -> Span:
+def _span(begun: Ring, one: Centre, other: Centre) -> RigidLink:
     """Return the span from the centre `one`, at which the loop begins, to the next one, `other`."""
     link = begun.gaps[one.count].pose
     after = one.count + other.count
-    return Span(
+    return RigidLink(
         Chain(begun.joints[after:], (*begun.gaps[after:], begun.gaps[0])),
         other.after,
         one.before,
@@ -275,7 +275,7 @@ def at_distance(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     return None
 
 
-def _ends(span: Span) -> tuple[SX, SX]:
+def _ends(span: RigidLink) -> tuple[SX, SX]:
     """Return the link's end in the frame before the joint, negated, and its start after it."""
     before, after = (gap.pose for gap in span.chain.gaps)
     back = before.inverse()
@@ -535,7 +535,7 @@ class _Sphere:
     k: SX
 
 
-def prismatic_indices(span: Span) -> frozenset[int] | None:
+def prismatic_indices(span: RigidLink) -> frozenset[int] | None:
     """Return indices in q of the two or three prismatic joints of a span; None for other joints."""
     if any(joint.motion is not Motion.PRISMATIC for joint in span.chain.joints):
         return None
@@ -543,7 +543,7 @@ def prismatic_indices(span: Span) -> frozenset[int] | None:
     return indices if len(indices) in (2, 3) else None
 
 
-def independent_links(spans: Mapping[int, Span], q: SX, p: SX) -> list[int] | None:
+def independent_links(spans: Mapping[int, RigidLink], q: SX, p: SX) -> list[int] | None:
     """Return the loops whose links determine the point; None if there are too few of them.
 
     Args:
@@ -569,7 +569,7 @@ def _span_normal(a: Sequence[SX]) -> SX:
     return a[0] if len(a) == 1 else cross(a[0], a[1])
 
 
-def point_on_links(name: str, spans: Sequence[Span]) -> LoopBranches:
+def point_on_links(name: str, spans: Sequence[RigidLink]) -> LoopBranches:
     """Return the two positions of prismatic joints at which rigid links hold a point.
 
     Args:
@@ -590,7 +590,7 @@ def point_on_links(name: str, spans: Sequence[Span]) -> LoopBranches:
     return LoopBranches(branches)
 
 
-def _sphere(span: Span, indices: Sequence[int]) -> _Sphere:
+def _sphere(span: RigidLink, indices: Sequence[int]) -> _Sphere:
     *poses, end = frames_at_zero(span.chain.gaps, Pose.translation(-span.target))
     axes = {
         joint.index: joint.sign * at.R[:, 2]

@@ -41,7 +41,7 @@ from mbs.components.curves import (
     PointOnCurve,
 )
 from mbs.components.custom import Custom, Flange
-from mbs.components.description import Description, Placed
+from mbs.components.description import Description, SubMechanism
 from mbs.components.drives import (
     BLDCMotor,
     DCMotor,
@@ -54,7 +54,6 @@ from mbs.components.drives import (
     TorqueSource,
 )
 from mbs.components.forces import (
-    Attraction,
     Bushing,
     CoulombFriction,
     Damper,
@@ -63,6 +62,7 @@ from mbs.components.forces import (
     ForceElement,
     JointFriction,
     JointStop,
+    PointGravity,
     RigidStop,
     Spring,
     SpringDamperSeries,
@@ -97,7 +97,7 @@ from mbs.components.joints import (
     Universal,
 )
 from mbs.components.motion_joint import MotionJoint
-from mbs.components.notes import Note
+from mbs.components.notes import ImportNote
 from mbs.components.ropes import (
     ElasticRope,
     RopeOverPulleys,
@@ -147,13 +147,20 @@ from mbs.components.translational import (
 from mbs.components.wheels import WheelSet
 from mbs.deprecation import moved
 
-__getattr__ = moved(__name__, {"Mechanism": "mbs.Mechanism"})
+__getattr__ = moved(
+    __name__,
+    {
+        "Mechanism": "mbs.Mechanism",
+        "Placed": "mbs.components.SubMechanism",
+        "Attraction": "mbs.components.PointGravity",
+        "Note": "mbs.components.ImportNote",
+    },
+)
 
 __all__ = [
     "PI",
     "PID",
     "AbsoluteSensor",
-    "Attraction",
     "BLDCMotor",
     "Body",
     "Box",
@@ -202,6 +209,7 @@ __all__ = [
     "HydraulicCylinder",
     "HydraulicValve",
     "IdealGear",
+    "ImportNote",
     "Integrator",
     "Joint",
     "JointEffort",
@@ -214,15 +222,14 @@ __all__ = [
     "LineForceInput",
     "LossyGear",
     "MotionJoint",
-    "Note",
     "OneWayClutch",
     "PairForceInput",
     "PairTorqueInput",
     "PinSlot",
-    "Placed",
     "Planar",
     "PlanetaryGear",
     "Point",
+    "PointGravity",
     "PointMass",
     "PointOnCurve",
     "PointOnLine",
@@ -272,6 +279,7 @@ __all__ = [
     "SpringDamperSeries",
     "SpringFrictionSeries",
     "Step",
+    "SubMechanism",
     "Sum",
     "Table",
     "Torque",

@@ -1,7 +1,7 @@
 """Constraints on a distance, a line, a plane or an orientation between two frames.
 
 They are connected as joints are, but have no coordinates. Joints must determine the pose of both
-frames. The assembly always cuts constraints and adds their rows (`mbs.loops.closure`).
+frames. The assembly always cuts constraints and adds their rows (`mbs.loops.closure_residual`).
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ from mbs.expressions import (
     out_of_bounds,
     to_float,
 )
-from mbs.expressions.expression import finite
+from mbs.expressions._expression import finite
 from mbs.spatial import vector, zeros
 from mbs.text import did_you_mean, quoted
 from mbs.units import UNITS

@@ -24,7 +24,7 @@ from mbs.components.forces import Force
 from mbs.components.joints import Joint
 from mbs.components.motion_joint import MotionJoint
 from mbs.components.mounting import Mounting, mount_of, notes_on_degrees
-from mbs.components.notes import Note
+from mbs.components.notes import ImportNote
 from mbs.components.sensors import Sensor
 from mbs.components.shapes import Shape
 from mbs.errors import AssemblyError, DescriptionError
@@ -35,7 +35,7 @@ from mbs.text import did_you_mean, quoted
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class SubMechanism:
     """Handle to a nested mechanism: `arm["forearm"]` is its component, `arm.base` its ground."""
 
     outer: Description
@@ -76,7 +76,7 @@ OUTER_WORLD = "outer_world"
 _SCOPE = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*", re.ASCII)
 
 
-def place(outer: Description, inner: Description, name: str) -> Placed:
+def place(outer: Description, inner: Description, name: str) -> SubMechanism:
     """Copy the components of a mechanism into another mechanism, with names prefixed by `name`.
 
     Raises:
@@ -120,7 +120,7 @@ def place(outer: Description, inner: Description, name: str) -> Placed:
     for symbol, value in inner.given_values().items():
         if (scoped := f"{scope}.{symbol}") in used:  # drop symbols of its gravity only
             outer.values[scoped] = replace(value, name=scoped)
-    return Placed(outer, scope)
+    return SubMechanism(outer, scope)
 
 
 def _frames_of(inner: Description) -> dict[str, Point]:
@@ -184,7 +184,7 @@ class Description:
         self.keep_order = keep_order
         self.cuts: list[str] = []
         self.guess = values_given(f"{self.name}: guess", guess, '"j1": 0.3', DescriptionError)
-        self.notes: list[Note] = []
+        self.notes: list[ImportNote] = []
         self.numbered: dict[int, str] = {}
         self.world = World(gravity=gravity)
         self.components: dict[str, Component] = {self.world.name: self.world}
@@ -271,9 +271,9 @@ class Description:
     def add(self, component: C) -> C: ...
 
     @overload
-    def add(self, component: Description, name: str | None = None) -> Placed: ...
+    def add(self, component: Description, name: str | None = None) -> SubMechanism: ...
 
-    def add(self, component: C | Description, name: str | None = None) -> C | Placed:
+    def add(self, component: C | Description, name: str | None = None) -> C | SubMechanism:
         """Add a body, a joint, another component or a whole mechanism.
 
         The names of a nested mechanism are prefixed by its own name. It moves in the gravity of the

@@ -316,7 +316,7 @@ class Damper(LineForce):
 
 
 @dataclass(frozen=True, slots=True)
-class Attraction(LineForce):
+class PointGravity(LineForce):
     """Inverse-square attraction between two points: tension mu / L^2.
 
     For the central gravity of a body of mass m: mu = G M m, between the two centres of mass.

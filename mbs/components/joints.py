@@ -2,7 +2,7 @@
 
 A joint is described by its freedoms, a sequence of elementary motions from frame_a to frame_b. The
 constraint rows of a cut joint, which close a loop, follow from the same description
-(`mbs.loops.closure`).
+(`mbs.loops.closure_residual`).
 """
 
 from __future__ import annotations

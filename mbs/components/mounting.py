@@ -8,7 +8,7 @@ from typing import Any
 
 from mbs.components.bodies import three
 from mbs.components.component import ElementaryRotation, Rotation, Step, displacement
-from mbs.components.notes import Note
+from mbs.components.notes import ImportNote
 from mbs.errors import DescriptionError
 from mbs.expressions import to_float
 from mbs.text import quoted
@@ -44,13 +44,13 @@ _REVOLUTION = 2 * math.pi
 """Angle [rad] above which a mount angle is noted as possible degrees: a mount needs no more."""
 
 
-def notes_on_degrees(steps: Iterable[Step]) -> list[Note]:
+def notes_on_degrees(steps: Iterable[Step]) -> list[ImportNote]:
     """Return a note on each angle of a mount that looks like degrees."""
     angles = [
         (step.axis, to_float(step.angle)) for step in steps if isinstance(step, ElementaryRotation)
     ]
     return [
-        Note("doubted", "mount", f"{axis} = {angle:g} rad may be degrees; give radians")
+        ImportNote("doubted", "mount", f"{axis} = {angle:g} rad may be degrees; give radians")
         for axis, angle in angles
         if angle is not None and abs(angle) > _REVOLUTION
     ]

@@ -9,7 +9,7 @@ NoteKind = Literal["renamed", "ignored", "doubted", "completed"]
 
 
 @dataclass(frozen=True, slots=True)
-class Note:
+class ImportNote:
     """A note on one element of a file that was changed, ignored, completed or kept with doubt.
 
     Attributes:

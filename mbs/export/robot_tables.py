@@ -17,7 +17,7 @@ from casadi import DM, SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
-from mbs.assembly.parts import AttachedPart
+from mbs.assembly.parts import ComponentInstance
 from mbs.assembly.tree import Frame, Link, quaternion_slices, zero_position
 from mbs.components import Damper, FixedTendon, Revolute, Rod, Spring
 from mbs.components.description import OUTER_WORLD
@@ -398,7 +398,7 @@ class _Tables:
         of_joint = name in {row.name for row in system.joints}
         return FileFrame(name, number, pose, "joint" if of_joint else "fixed")
 
-    def _force(self, part: AttachedPart) -> FileForce:
+    def _force(self, part: ComponentInstance) -> FileForce:
         element = part.element
         quantities: dict[str, tuple[Any, ...]] = {}
         levers: dict[str, float] = {}

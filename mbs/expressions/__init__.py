@@ -10,15 +10,7 @@ of numbers, symbols, `+ - * / ^`, sin, cos, tan, sqrt, atan2 and pi; they are ne
     atom     := number | symbol | function "(" sum ("," sum)* ")" | "(" sum ")"
 """
 
-from mbs.expressions.evaluate import (
-    parameters_of,
-    renamed,
-    to_float,
-    to_sx,
-    with_values,
-    without_defaults,
-)
-from mbs.expressions.expression import (
+from mbs.expressions._expression import (
     MORE_THAN_ZERO,
     Expression,
     Number,
@@ -28,6 +20,14 @@ from mbs.expressions.expression import (
     expression,
     operation,
     out_of_bounds,
+)
+from mbs.expressions.evaluate import (
+    parameters_of,
+    renamed,
+    to_float,
+    to_sx,
+    with_values,
+    without_defaults,
 )
 from mbs.expressions.numbers import number, plain_numbers, whole_number
 

@@ -10,7 +10,7 @@ from typing import TypeVar
 import casadi
 from casadi import SX
 
-from mbs.expressions.expression import (
+from mbs.expressions._expression import (
     Expression,
     Number,
     Operation,

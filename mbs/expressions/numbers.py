@@ -10,8 +10,8 @@ import math
 import re
 
 from mbs.errors import ExpressionError
+from mbs.expressions._expression import NUMBER, Expression, Scalar, expression
 from mbs.expressions.evaluate import to_float
-from mbs.expressions.expression import NUMBER, Expression, Scalar, expression
 from mbs.text import quoted
 
 _PLAIN = re.compile(rf"[-+]?{NUMBER}", re.ASCII)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mbs.components.component import Placement
 from mbs.components.mounting import mount_of
-from mbs.components.notes import Note
+from mbs.components.notes import ImportNote
 from mbs.errors import DescriptionError
 from mbs.expressions import expression, parameters_of, to_float
 
@@ -36,7 +36,7 @@ def placement_pose(placement: Placement, values: Mapping[str, float]) -> Array |
     return pose if np.isfinite(pose).all() else None
 
 
-def base_placement(extras: Mapping[str, Sequence[str]]) -> tuple[Placement, list[Note]]:
+def base_placement(extras: Mapping[str, Sequence[str]]) -> tuple[Placement, list[ImportNote]]:
     """Return the mount that a table contains, and a note if its vector is no pose in numbers."""
     texts = extras.get(POSE, ())
     values = [to_float(expression(text)) for text in texts]
@@ -50,4 +50,4 @@ def base_placement(extras: Mapping[str, Sequence[str]]) -> tuple[Placement, list
         return Placement(mount_of(mount, POSE)[0]), []
     except (ValueError, TypeError, DescriptionError):
         what = "is no pose of the base in numbers; the base has no mount"
-        return Placement(), [Note("ignored", f"vector {POSE}", what)]
+        return Placement(), [ImportNote("ignored", f"vector {POSE}", what)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from mbs.components.notes import Note, NoteKind
+from mbs.components.notes import ImportNote, NoteKind
 from mbs.errors import DescriptionError
 
 
@@ -22,7 +22,7 @@ class Notes:
     path: str
     strict: bool = False
     lines: bool = True
-    taken: list[Note] = field(default_factory=list)
+    taken: list[ImportNote] = field(default_factory=list)
 
     def add(self, kind: NoteKind, element: str, text: str, line: int | None = None) -> None:
         """Add a note.
@@ -36,7 +36,7 @@ class Notes:
         Raises:
             DescriptionError: `strict` is True.
         """
-        note = Note(kind, element, text, line if self.lines else None)
+        note = ImportNote(kind, element, text, line if self.lines else None)
         if self.strict:
             raise DescriptionError(f"{self.path}: {note}; correct the file or read it not strictly")
         self.taken.append(note)

@@ -1,30 +1,31 @@
 """Base inertial parameters and parameter identification."""
 
-from mbs.identification.base_parameters import BaseParameters, base_parameters
+from mbs.deprecation import moved
+from mbs.identification._base_parameters import BaseParameters, base_parameters
+from mbs.identification._identify import Identification, identify, report
+from mbs.identification._least_squares import (
+    huber,
+    instrumental,
+    iteratively_reweighted,
+    least_squares,
+    simulated_motion,
+    weighted,
+)
 from mbs.identification.bodies import (
     Prior,
-    consistent,
     consistent_links,
     consistent_weighted,
-    recovered,
+    full_parameters,
+    physically_consistent,
 )
 from mbs.identification.estimate import (
     Estimate,
     Residuals,
     cross_validated,
-    held_out,
+    holdout_residuals,
     plot_residuals,
 )
-from mbs.identification.exciting import Series, excitation
-from mbs.identification.identify import Identification, identify, report
-from mbs.identification.least_squares import (
-    instrumental,
-    least_squares,
-    reweighted,
-    robust,
-    simulated_motion,
-    weighted,
-)
+from mbs.identification.exciting import FourierSettings, excitation
 from mbs.identification.methods import Essential, essential
 from mbs.identification.observations import (
     Observations,
@@ -37,7 +38,7 @@ from mbs.identification.observations import (
 from mbs.identification.record import (
     Record,
     Samples,
-    joint_side,
+    motor_to_joint,
     resampled,
     smoothed,
     smoothed_with_velocity,
@@ -49,18 +50,34 @@ from mbs.identification.regressors import (
     energy_regressor,
     filtered_regressor,
     known_efforts,
-    numbers_of,
+    numeric_parameters,
     power_regressor,
     regressor,
-    values_of,
+    symbolic_parameters,
 )
 from mbs.identification.trajectory import Plane, Trajectory
+
+__getattr__ = moved(
+    __name__,
+    {
+        "joint_side": "mbs.identification.motor_to_joint",
+        "held_out": "mbs.identification.holdout_residuals",
+        "recovered": "mbs.identification.full_parameters",
+        "reweighted": "mbs.identification.iteratively_reweighted",
+        "robust": "mbs.identification.huber",
+        "consistent": "mbs.identification.physically_consistent",
+        "values_of": "mbs.identification.symbolic_parameters",
+        "numbers_of": "mbs.identification.numeric_parameters",
+        "Series": "mbs.identification.FourierSettings",
+    },
+)
 
 __all__ = [
     "BaseParameters",
     "Column",
     "Essential",
     "Estimate",
+    "FourierSettings",
     "Identification",
     "Observations",
     "Plane",
@@ -69,11 +86,9 @@ __all__ = [
     "Regressor",
     "Residuals",
     "Samples",
-    "Series",
     "Trajectory",
     "base_parameters",
     "columns_of",
-    "consistent",
     "consistent_links",
     "consistent_weighted",
     "cross_validated",
@@ -82,28 +97,29 @@ __all__ = [
     "excitation",
     "excitation_quality",
     "filtered_regressor",
-    "held_out",
+    "full_parameters",
+    "holdout_residuals",
+    "huber",
     "identify",
     "instrumental",
-    "joint_side",
+    "iteratively_reweighted",
     "known_efforts",
     "least_squares",
-    "numbers_of",
+    "motor_to_joint",
+    "numeric_parameters",
     "observe",
     "observe_energy",
     "observe_filtered",
     "observe_momentum",
+    "physically_consistent",
     "plot_residuals",
     "power_regressor",
-    "recovered",
     "regressor",
     "report",
     "resampled",
-    "reweighted",
-    "robust",
     "simulated_motion",
     "smoothed",
     "smoothed_with_velocity",
-    "values_of",
+    "symbolic_parameters",
     "weighted",
 ]

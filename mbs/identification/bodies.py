@@ -422,7 +422,7 @@ _NO_DEVIATION = 1e-12
 """Smallest standard deviation of an effort [N m or N]; it avoids a division by zero."""
 
 
-def consistent(
+def physically_consistent(
     observations: Observations, prior: Prior | None = None, watch: Watch | None = None
 ) -> Estimate:
     """Estimate a physically consistent full parameter set, with equal error variance of all joints.
@@ -453,7 +453,7 @@ def consistent(
 def consistent_weighted(
     observations: Observations, prior: Prior | None = None, watch: Watch | None = None
 ) -> Estimate:
-    """Estimate as `consistent`, with each effort weighted by its own error deviation.
+    """Estimate as `physically_consistent`, with each effort weighted by its own error deviation.
 
     Args:
         observations: observations in the full parameter set.
@@ -528,7 +528,7 @@ class FullSet(NamedValues):
     misfit: Array
 
 
-def recovered(
+def full_parameters(
     estimate: Estimate,
     columns: Sequence[Column],
     matrix: Array,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from casadi import Function
 
 from mbs.assembly import System
-from mbs.identification.base_parameters import METHODS, base_parameters
+from mbs.identification._base_parameters import METHODS, base_parameters
 from mbs.identification.regressors import energy_regressor, filtered_regressor, regressor
 from mbs.models.catalogue import Entry
 from mbs.models.catalogue.entry import MOVING_BASE, choice

@@ -205,7 +205,9 @@ Estimator = Callable[[Observations], Estimate]
 options set."""
 
 
-def held_out(estimator: Estimator, observations: Observations, part: float = 0.75) -> Residuals:
+def holdout_residuals(
+    estimator: Estimator, observations: Observations, part: float = 0.75
+) -> Residuals:
     """Estimate parameters from the beginning of a record and return residuals on its end.
 
     Args:

@@ -15,7 +15,7 @@ from casadi import DM, MX, SX, Function, Sparsity
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError, SolverError
-from mbs.identification.base_parameters import BaseParameters, base_parameters
+from mbs.identification._base_parameters import BaseParameters, base_parameters
 from mbs.identification.leading import leads_of, positions
 from mbs.identification.regressors import Column, require_columns
 from mbs.identification.trajectory import (
@@ -457,7 +457,7 @@ optimisation ends inside."""
 
 
 @dataclass(frozen=True, slots=True)
-class Series:
+class FourierSettings:
     """Settings of the Fourier series of an excitation and of its sampling.
 
     Attributes:
@@ -493,7 +493,7 @@ def excitation(
     system: System,
     columns: BaseParameters | Sequence[Column] | None = None,
     *,
-    series: Series | None = None,
+    series: FourierSettings | None = None,
     position: Bound = None,
     velocity: Bound = None,
     acceleration: Bound = None,
@@ -645,13 +645,13 @@ def _measure(
     )
 
 
-def _form(series: Series | None) -> Series:
+def _form(series: FourierSettings | None) -> FourierSettings:
     if series is None:
-        return Series()
-    if not isinstance(series, Series):
+        return FourierSettings()
+    if not isinstance(series, FourierSettings):
         raise ModelError(
             f"excitation: the series is {quoted(series)}; give"
-            " mbs.identification.Series(period=, harmonics=, samples=)"
+            " mbs.identification.FourierSettings(period=, harmonics=, samples=)"
         )
     return series
 
@@ -668,7 +668,7 @@ def _columns(
     return chosen
 
 
-def _smooth(system: System, limits: MotionLimits, form: Series) -> System:
+def _smooth(system: System, limits: MotionLimits, form: FourierSettings) -> System:
     """Return a copy of the system with the sign of Coulomb friction smoothed."""
     widths = {}
     rows = zip(system.active, limits.position, limits.velocity, strict=True)

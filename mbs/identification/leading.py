@@ -11,9 +11,9 @@ from casadi import DM, MX, SX, Function
 
 from mbs.assembly import System
 from mbs.errors import ModelError, NoClosedForm
-from mbs.loops.examine import configuration_health
-from mbs.loops.function import follow_active
-from mbs.loops.function import function as closed_form
+from mbs.loops._function import follow_active
+from mbs.loops._function import function as closed_form
+from mbs.loops.examination import configuration_health
 from mbs.loops.velocity import determining_rows
 
 Array = npt.NDArray[np.float64]
@@ -30,7 +30,7 @@ _LARGEST = 8
 
 
 def leads_of(system: System, q: Array) -> Array:
-    """Return `leads` of `mbs.loops.examine` at q (n, nq), negative beyond a singularity.
+    """Return `leads` of `configuration_report` at q (n, nq), negative beyond a singularity.
 
     Its magnitude measures how well the independent joints determine the passive joints: 1 is best,
     0 is singular. Its sign is that of det(J_p) relative to the assembled configuration, where J_p

@@ -10,17 +10,17 @@ import numpy as np
 import numpy.typing as npt
 
 from mbs.errors import ModelError, SolverError
-from mbs.identification.base_parameters import BaseParameters
-from mbs.identification.bodies import Prior, consistent_weighted
-from mbs.identification.estimate import Estimate, Estimator, percent_of, repetition
-from mbs.identification.least_squares import (
+from mbs.identification._base_parameters import BaseParameters
+from mbs.identification._least_squares import (
+    huber,
     instrumental,
+    iteratively_reweighted,
     least_squares,
-    reweighted,
-    robust,
     simulated_motion,
     weighted,
 )
+from mbs.identification.bodies import Prior, consistent_weighted
+from mbs.identification.estimate import Estimate, Estimator, percent_of, repetition
 from mbs.identification.observations import Observations, observe_filtered, stacked
 from mbs.identification.record import Samples
 from mbs.identification.regressors import Regressor
@@ -109,8 +109,8 @@ METHODS: Mapping[str, Callable[[Setting], Estimator]] = MappingProxyType(
     {
         "least_squares": _always(least_squares),
         "weighted": _always(weighted),
-        "reweighted": _always(reweighted),
-        "robust": _always(robust),
+        "reweighted": _always(iteratively_reweighted),
+        "robust": _always(huber),
         "instrumental": _by_instruments,
         "consistent": _by_bodies,
     }

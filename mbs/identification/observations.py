@@ -13,7 +13,7 @@ from casadi import DM
 
 from mbs.assembly import System
 from mbs.errors import ModelError
-from mbs.identification.base_parameters import BaseParameters
+from mbs.identification._base_parameters import BaseParameters
 from mbs.identification.leading import of_motion, positions, regular
 from mbs.identification.record import ORDER, Samples, zero_phase
 from mbs.identification.regressors import (

@@ -514,7 +514,7 @@ class Record:
         return replace(self, time=self.time[keep], q=self.q[keep], tau=self.tau[keep], v=v)
 
 
-def joint_side(N: Any, q_motor: Any, tau_motor: Any) -> tuple[Array, Array]:
+def motor_to_joint(N: Any, q_motor: Any, tau_motor: Any) -> tuple[Array, Array]:
     """Convert motor positions and efforts to joints: q = N^-1 q_m and tau = N' tau_m.
 
     Source: Khalil & Dombre 2002 (transmissions). The gears are assumed lossless.

@@ -179,7 +179,10 @@ def _law_column(system: System, name: str, laws: Sequence[str]) -> Column:
     s, symbol = symbols_of(system, "tree"), symbols[name]
     acting = element_efforts(PartsAt(system, s.q, s.v_tree), s.poses)
     slopes = casadi.jacobian(acting, symbol)
-    elsewhere = [*values_of(system, columns_of(system)).nz, *spring_effort(system.tree, s.q).nz]
+    elsewhere = [
+        *symbolic_parameters(system, columns_of(system)).nz,
+        *spring_effort(system.tree, s.q).nz,
+    ]
     placed = [frame.parameters for link in system.tree.links for frame in link.frames]
     others = casadi.veccat(*elsewhere, *(x for row in placed for x in row), system.tree.gravity)
     if not casadi.depends_on(acting, symbol) or casadi.depends_on(others, symbol):
@@ -304,7 +307,7 @@ def numbers_among(system: System, every: Sequence[Column], columns: Sequence[Col
     return [indices[column.key] for column in columns]
 
 
-def values_of(system: System, columns: Iterable[Column]) -> SX:
+def symbolic_parameters(system: System, columns: Iterable[Column]) -> SX:
     """Return the parameter values (n, 1): numbers, or expressions of the symbols of the system.
 
     Offsets and the parameters of coupled motors are zero, since a system does not contain them.
@@ -324,7 +327,7 @@ def values_of(system: System, columns: Iterable[Column]) -> SX:
     return casadi.densify(casadi.vertcat(SX(0, 1), *values))
 
 
-def numbers_of(
+def numeric_parameters(
     system: System, columns: Iterable[Column], values: Mapping[str, float] | None = None
 ) -> NDArray[np.float64]:
     """Return the parameter values (n,) as numbers.
@@ -337,7 +340,7 @@ def numbers_of(
     Raises:
         ModelError: a symbol has no value, or the system has no symbol of that name.
     """
-    K = Function("K", [system.p], [values_of(system, columns)])
+    K = Function("K", [system.p], [symbolic_parameters(system, columns)])
     return np.asarray(K(DM(system.parameter_values(values))), dtype=float).ravel()
 
 

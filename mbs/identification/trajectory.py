@@ -26,8 +26,8 @@ from mbs.identification.leading import (
 )
 from mbs.identification.record import FARTHEST_TURN
 from mbs.identification.regressors import Column, regressor
+from mbs.models._inverse_dynamics import inverse_dynamics
 from mbs.models.geometry import transform
-from mbs.models.inverse_dynamics import inverse_dynamics
 from mbs.numbers import has_boolean
 from mbs.result import Result
 from mbs.text import did_you_mean, quoted

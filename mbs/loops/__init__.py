@@ -1,28 +1,35 @@
 """Closed loops: closure equations, their independent rows, configurations, reduction."""
 
-from mbs.loops.closure import closure
+from mbs.deprecation import moved
+from mbs.loops._function import function
+from mbs.loops.closure_equations import closure_residual
 from mbs.loops.configuration import solve
-from mbs.loops.examine import ConfigurationState, examine
-from mbs.loops.function import function
-from mbs.loops.modes import Mode, ModeList, WorkingMode, modes, working_modes
+from mbs.loops.examination import ConfigurationReport, configuration_report
+from mbs.loops.mode_search import Mode, ModeList, WorkingMode, assembly_modes, working_modes
 from mbs.loops.pose import solve_pose
 from mbs.loops.reduction import reduction_matrix
 from mbs.loops.velocity import closure_jacobian
 
-assembly_modes = modes
-"""Alias of `modes`, the term in the literature on parallel robots."""
+__getattr__ = moved(
+    __name__,
+    {
+        "examine": "mbs.loops.configuration_report",
+        "ConfigurationState": "mbs.loops.ConfigurationReport",
+        "modes": "mbs.loops.assembly_modes",
+        "closure": "mbs.loops.closure_residual",
+    },
+)
 
 __all__ = [
-    "ConfigurationState",
+    "ConfigurationReport",
     "Mode",
     "ModeList",
     "WorkingMode",
     "assembly_modes",
-    "closure",
     "closure_jacobian",
-    "examine",
+    "closure_residual",
+    "configuration_report",
     "function",
-    "modes",
     "reduction_matrix",
     "solve",
     "solve_pose",

@@ -14,7 +14,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import ConfigurationCheck
 from mbs.errors import SingularPosture
 from mbs.loops.closing import Closing, distance_units
-from mbs.loops.examine import LEAST_SINE, configuration_health, loop_rows, require_determined
+from mbs.loops.examination import LEAST_SINE, configuration_health, loop_rows, require_determined
 from mbs.loops.velocity import scales
 
 Array = NDArray[np.float64]

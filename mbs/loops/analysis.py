@@ -27,7 +27,7 @@ from mbs.loops.closing import (
     mechanism_size,
     unwound,
 )
-from mbs.loops.closure import row_groups
+from mbs.loops.closure_equations import row_groups
 from mbs.loops.cut_positions import cut_positions
 from mbs.loops.guess_target import GuessTarget
 from mbs.loops.nearest import nearest_of

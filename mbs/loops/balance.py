@@ -21,7 +21,7 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.parts import AttachedPart
+from mbs.assembly.parts import ComponentInstance
 from mbs.assembly.tables import Balance, LoopRow
 from mbs.assembly.tree import Link
 from mbs.components import Description
@@ -241,7 +241,7 @@ def obstacles(system: System, velocity: int) -> str:
     return f"; the springs and dampers on {name} do not determine its motion, or it has a motor"
 
 
-def _obstacle(system: System, part: AttachedPart, velocity: int) -> str:
+def _obstacle(system: System, part: ComponentInstance, velocity: int) -> str:
     """Return why a component excludes a force balance on a node; empty text if it does not."""
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     if part.element.has("stops"):

@@ -16,7 +16,7 @@ from mbs.assembly import System
 from mbs.assembly.tables import Coordinate
 from mbs.assembly.tree import norm_rows, quaternion_slices
 from mbs.errors import Unclosable
-from mbs.loops.closure import closure_rows, facing, position_rows, velocity_row_units
+from mbs.loops.closure_equations import closure_rows, facing, position_rows, velocity_row_units
 from mbs.loops.cut_positions import cut_positions
 from mbs.numbers import OnArrays, on_arrays
 from mbs.solvers.least_squares import MANY, NewtonEquations

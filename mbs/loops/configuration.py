@@ -12,6 +12,7 @@ from mbs.assembly.model_function import require_system
 from mbs.assembly.validity import plain_fault
 from mbs.assembly.variable_names import GUESSES, POSITIONS, VELOCITIES
 from mbs.errors import LoopError, ModelError, Unclosable
+from mbs.loops._function import configuration_on, fixed_positions, independent_names
 from mbs.loops.balance import GROUP
 from mbs.loops.closing import (
     OPEN,
@@ -23,9 +24,8 @@ from mbs.loops.closing import (
     follow_configuration,
     unwound,
 )
-from mbs.loops.closure import position_rows
+from mbs.loops.closure_equations import position_rows
 from mbs.loops.cut_positions import cut_positions_and_slopes
-from mbs.loops.function import configuration_on, fixed_positions, independent_names
 from mbs.loops.guess_target import GuessTarget
 from mbs.loops.nearest import nearest_configuration
 from mbs.loops.velocity import closure_jacobian, constraint_drift_at
@@ -72,7 +72,7 @@ def solve(
             are checked.
         guess: approximate positions of other joints, cut joints included, which select the branch.
             The joints keep these values if the loops leave a motion for that.
-        branch: labels from `mbs.loops.modes`, such as "j3:+", as an alternative to a guess. A loop
+        branch: labels from `mbs.loops.assembly_modes`, such as "j3:+", instead of a guess. A loop
             without a label keeps its assembled branch. Only independent joints can be given then.
         parameters: values of symbols by name. Missing symbols have their default values.
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.tree import norm_rows
 from mbs.loops.closing import LARGEST_MOVE, Closing, difference, unwound
-from mbs.loops.closure import closure_rows
+from mbs.loops.closure_equations import closure_rows
 from mbs.loops.cut_positions import cut_positions, cut_positions_and_slopes
 from mbs.loops.guess_target import EQUAL, GuessTarget
 from mbs.numbers import OnArrays, on_arrays

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.tree import quaternion_slices
 from mbs.loops.closing import CLOSED, Closing, candidates, difference, distance_units, unwound
-from mbs.loops.closure import facing, position_rows
+from mbs.loops.closure_equations import facing, position_rows
 from mbs.loops.guess_target import EQUAL, GuessTarget
 from mbs.loops.least_distance import MET, is_movable, least_distance, nearest_in_all
 from mbs.solvers.least_squares import MANY

@@ -17,7 +17,7 @@ import numpy as np
 from casadi import DM, SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.graph import Edge
+from mbs.assembly.graph import JointEdge
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tables import CoordinateCoupling
@@ -32,7 +32,7 @@ from mbs.closed_forms.ring import (
 )
 from mbs.closed_forms.roots import LoopBranches
 from mbs.closed_forms.spatial import (
-    Span,
+    RigidLink,
     coupled_position,
     independent_links,
     point_on_links,
@@ -438,7 +438,7 @@ def _attempt(work: PlanWork, number: int) -> Stage | str | None:
 
 def _point_stage(work: PlanWork, waiting: Sequence[int]) -> Stage | None:
     """Return a stage of prismatic joints that rigid links of several loops determine, or None."""
-    system, groups = work.system, dict[frozenset[int], dict[int, Span]]()
+    system, groups = work.system, dict[frozenset[int], dict[int, RigidLink]]()
     for number in waiting:
         if number < len(system.cuts) and not is_bound(system, number):
             for span in spans(work.ring(number), work.q, system.p):
@@ -725,7 +725,7 @@ def posed_stages(system: System, link: int, known: Collection[int]) -> PosedStag
 
 
 def _weld(link: int, pose: Pose, goal: Pose) -> Cut:
-    joint = Edge(Fixed("pose"), 0, 0, Pose.identity(), Pose.identity(), None)
+    joint = JointEdge(Fixed("pose"), 0, 0, Pose.identity(), Pose.identity(), None)
     return Cut(joint, -1, link, goal, pose, True)
 
 

@@ -12,7 +12,7 @@ from casadi import DM, SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
-from mbs.loops.examine import DETERMINED
+from mbs.loops.examination import DETERMINED
 from mbs.loops.velocity import acceleration_bias, determining_rows
 from mbs.solvers.block_triangular import solve_large
 from mbs.spatial import zeros

@@ -18,7 +18,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.assembly.tree import position_rate
 from mbs.loops.closing import mechanism_size
-from mbs.loops.closure import (
+from mbs.loops.closure_equations import (
     closure_rows,
     drift_rows,
     independent_closure,

@@ -3,17 +3,26 @@
 from typing import NoReturn
 
 from mbs.models import catalogue, inverse_geometry
+from mbs.models._contact_phases import ContactPhases, contact_phases
+from mbs.models._dae import Dae, dae
+from mbs.models._direct_dynamics import direct_dynamics, hybrid_dynamics, inertia_matrix
+from mbs.models._energy import energy
+from mbs.models._inverse_dynamics import bias, gravity_effort, inverse_dynamics
+from mbs.models._joint_wrenches import joint_wrenches
+from mbs.models._lagrange import lagrange
+from mbs.models._limits import Limits, limits
+from mbs.models._linearise import Linearisation, LinearModel, linearise
+from mbs.models._measurements import measurements
+from mbs.models._singularities import singularities
+from mbs.models._tree_core import TreeCore, tree_core
+from mbs.models._validity import validity, validity_rows
 from mbs.models.actuation import actuation_matrix, actuation_null_space
-from mbs.models.contact_phases import ContactPhases, contact_phases
-from mbs.models.dae import Dae, dae
 from mbs.models.dae_phases import ContactPoint
 from mbs.models.derivatives import (
     direct_dynamics_derivatives,
     inverse_dynamics_derivatives,
     with_implicit_jacobian,
 )
-from mbs.models.direct_dynamics import direct_dynamics, hybrid_dynamics, inertia_matrix
-from mbs.models.energy import energy
 from mbs.models.field_names import (
     aba,
     crba,
@@ -28,28 +37,19 @@ from mbs.models.field_names import (
     rnea,
 )
 from mbs.models.geometry import direct_geometry, transform
-from mbs.models.inverse_dynamics import bias, gravity_effort, inverse_dynamics
 from mbs.models.jacobian_inverse import (
     inverse_differential_kinematics,
     inverse_jacobian,
     jacobian_determinant,
 )
-from mbs.models.joint_wrenches import joint_wrenches
 from mbs.models.kinematics import (
     jacobian,
     jacobian_dot_velocity,
     link_accelerations,
     link_velocities,
 )
-from mbs.models.lagrange import lagrange
-from mbs.models.limits import Limits, limits
-from mbs.models.linearise import Linearisation, LinearModel, linearise
 from mbs.models.loop_kinematics import acceleration_closure, velocity_closure
-from mbs.models.measurements import measurements
-from mbs.models.singularities import singularities
 from mbs.models.symbols import devices
-from mbs.models.tree_core import TreeCore, tree_core
-from mbs.models.validity import validity, validity_rows
 from mbs.text import did_you_mean
 
 __all__ = [

@@ -17,8 +17,8 @@ from mbs.loops.velocity import (
     independent_constraint_rows,
     independent_drift,
 )
-from mbs.models.inverse_dynamics import tree_efforts
-from mbs.models.symbols import ModelSymbols, Surroundings
+from mbs.models._inverse_dynamics import tree_efforts
+from mbs.models.symbols import ExternalForces, ModelSymbols
 from mbs.recursions.composite_body import inertia_matrix
 from mbs.solvers.linear import solve_saddle
 
@@ -31,7 +31,7 @@ def constrained_accelerations(
     system: System,
     s: ModelSymbols,
     tau: SX,
-    around: Surroundings,
+    around: ExternalForces,
     prescribed: Sequence[int] | SX = (),
     a_p: SX | None = None,
     acting: SX | None = None,

@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
-from mbs.assembly.parts import AttachedPart
+from mbs.assembly.parts import ComponentInstance
 from mbs.assembly.tables import EFFORT_UNIT
 from mbs.assembly.tree import position_rate, quaternion_slices
 from mbs.components.custom import Friction, OneWay, Stop
 from mbs.errors import ModelError
+from mbs.models._direct_dynamics import are_independent
 from mbs.models.constrained_accelerations import (
     constrained,
     constrained_accelerations,
@@ -31,7 +32,6 @@ from mbs.models.constrained_accelerations import (
     loop_rows,
     unit_rows,
 )
-from mbs.models.direct_dynamics import are_independent
 from mbs.models.symbols import outputs_of, surroundings, symbols_of
 from mbs.recursions.composite_body import inertia_matrix
 from mbs.recursions.parts import PartsAt
@@ -78,7 +78,7 @@ class ContactElement:
         unit: unit of the contact effort.
     """
 
-    part: AttachedPart
+    part: ComponentInstance
     label: str
     law: Friction | Stop | OneWay
     unit: str
@@ -424,7 +424,7 @@ def _contacts(system: System) -> Contacts:
     )
 
 
-def effort_unit(part: AttachedPart, law: Friction | Stop | OneWay) -> str:
+def effort_unit(part: ComponentInstance, law: Friction | Stop | OneWay) -> str:
     """Unit of the contact effort: that of the law, else of the coordinate, else N."""
     if law.unit is not None:
         return law.unit
@@ -521,7 +521,7 @@ def _anchor(system: System, row: _ContactRow, q: SX, v: SX) -> SX | None:
     return sum((row.E[0, k] * q[x.q.start + k - x.v.start] for k, x in moved), SX(0))
 
 
-def _require_unread(system: System, part: AttachedPart) -> None:
+def _require_unread(system: System, part: ComponentInstance) -> None:
     """Raise if a sensor measures joint wrenches while `part` has contacts between points."""
     for attached in system.sensors if part.frames else ():
         if attached.joint is not None:

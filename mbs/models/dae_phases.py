@@ -18,10 +18,10 @@ from mbs.assembly.tree import norm_rows, position_rate
 from mbs.assembly.variable_names import POSITIONS
 from mbs.components.custom import RelativeMotion
 from mbs.errors import ModelError, Unclosable
-from mbs.loops.closure import closure_rows
+from mbs.loops.closure_equations import closure_rows
 from mbs.loops.configuration import Values, smallest_velocity
 from mbs.loops.velocity import acceleration_bias, constraint_drift, constraint_rows, kept_rows
-from mbs.models.dae import (
+from mbs.models._dae import (
     FORMS,
     ConstraintRows,
     Dae,
@@ -37,7 +37,7 @@ from mbs.models.dae import (
     rows_of,
     start_efforts,
 )
-from mbs.models.inverse_dynamics import tree_efforts
+from mbs.models._inverse_dynamics import tree_efforts
 from mbs.models.symbols import ModelSymbols, outputs_of, surroundings, symbols_of
 from mbs.recursions.composite_body import inertia_matrix
 from mbs.recursions.route import relative_acceleration, relative_motion

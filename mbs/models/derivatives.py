@@ -20,8 +20,8 @@ from mbs.assembly.model_function import (
 )
 from mbs.assembly.tree import normalised, position_rate, quaternion_slices
 from mbs.errors import ModelError
-from mbs.models.direct_dynamics import independent_dynamics, require_inertia
-from mbs.models.inverse_dynamics import tree_efforts
+from mbs.models._direct_dynamics import independent_dynamics, require_inertia
+from mbs.models._inverse_dynamics import tree_efforts
 from mbs.models.symbols import (
     ModelSymbols,
     check_coordinates,

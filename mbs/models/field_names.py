@@ -8,9 +8,9 @@ from casadi import Function
 
 from mbs.assembly import System
 from mbs.errors import ModelError
-from mbs.models.direct_dynamics import direct_dynamics, inertia_matrix
+from mbs.models._direct_dynamics import direct_dynamics, inertia_matrix
+from mbs.models._inverse_dynamics import bias, gravity_effort, inverse_dynamics
 from mbs.models.geometry import direct_geometry
-from mbs.models.inverse_dynamics import bias, gravity_effort, inverse_dynamics
 from mbs.models.inverse_geometry import Solutions, solve
 from mbs.models.kinematics import jacobian, jacobian_dot_velocity
 

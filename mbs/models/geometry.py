@@ -11,9 +11,9 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, default_in, model_function, require_system
 from mbs.components.description import OUTER_WORLD
 from mbs.errors import NoClosedForm, Unclosable
+from mbs.loops._function import LoopFunction, follow_active
+from mbs.loops._function import function as closed_form
 from mbs.loops.configuration import solve
-from mbs.loops.function import LoopFunction, follow_active
-from mbs.loops.function import function as closed_form
 from mbs.models.symbols import outputs_of
 from mbs.recursions.route import cheapest_pose
 

@@ -12,7 +12,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import ConfigurationCheck, Named, model_function, require_system
 from mbs.errors import ModelError
 from mbs.loops.balance import require_no_drift
-from mbs.loops.examine import DETERMINED
+from mbs.loops.examination import DETERMINED
 from mbs.loops.reduction import reduction
 from mbs.models.symbols import check_coordinates, is_reduced
 from mbs.recursions.jacobian import VelocityTarget

@@ -15,9 +15,9 @@ from mbs.components import Free, Spherical, Universal
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
 from mbs.loops.balance import require_no_drift
-from mbs.loops.closure import cut_twist
+from mbs.loops.closure_equations import cut_twist
 from mbs.loops.cut_positions import cut_position
-from mbs.loops.examine import DETERMINED
+from mbs.loops.examination import DETERMINED
 from mbs.loops.reduction import reduction, tree_rows
 from mbs.loops.velocity import (
     acceleration_bias,

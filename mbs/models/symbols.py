@@ -12,7 +12,7 @@ from mbs.assembly.model_function import ConfigurationCheck, Named, model_functio
 from mbs.errors import ModelError
 from mbs.loops.accuracy import DIFFERENTIABLE
 from mbs.loops.balance import require_no_balance
-from mbs.loops.examine import DETERMINED
+from mbs.loops.examination import DETERMINED
 from mbs.loops.reduction import Reduction, reduction
 from mbs.recursions.composite_body import velocity_antecedents
 from mbs.recursions.force_elements import element_wrenches, sum_wrenches
@@ -141,7 +141,7 @@ def solution_order(system: System, s: ModelSymbols) -> list[int]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Surroundings:
+class ExternalForces:
     """Base motion and external wrenches of a mechanism.
 
     Attributes:
@@ -156,7 +156,7 @@ class Surroundings:
     inputs: Named
 
 
-def surroundings(system: System, f_ext: bool = False, moves: bool = False) -> Surroundings:
+def surroundings(system: System, f_ext: bool = False, moves: bool = False) -> ExternalForces:
     """Return gravity on a resting base without external wrenches, or model inputs for both.
 
     Args:
@@ -178,11 +178,11 @@ def surroundings(system: System, f_ext: bool = False, moves: bool = False) -> Su
         v_0, a_0, R_0 = SX.sym("v_0", 6), SX.sym("a_0", 6), SX.sym("R_0", 3, 3)
         base = moving_base(v_0[3:6], a_0[3:6], a_0[0:3] - casadi.mtimes(R_0.T, gravity))
         inputs += [("v_0", v_0), ("a_0", a_0), ("R_0", R_0)]
-    return Surroundings(base, external, inputs)
+    return ExternalForces(base, external, inputs)
 
 
 def exerted(
-    system: System, around: Surroundings, poses: list[LinkPose], q: SX, v: SX
+    system: System, around: ExternalForces, poses: list[LinkPose], q: SX, v: SX
 ) -> dict[int, Wrench]:
     """Wrenches that links exert on their environment and on force elements, by link index.
 

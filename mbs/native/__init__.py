@@ -1,7 +1,7 @@
 """Machine code: the C compiler, cached libraries, compiled Functions and the C run-time."""
 
-from mbs.native.batch import Batch, batch
-from mbs.native.compiled import c_source, compiled, link_flags
+from mbs.native._batch import Batch, batch
+from mbs.native._compiled import c_source, compiled, link_flags
 from mbs.native.compiler import (
     Compiler,
     cached_library,

@@ -145,7 +145,7 @@ def lane_loop(first: str, last: str, lines: Sequence[str]) -> list[str]:
 # Work space of a whole Function, and the pointers to its inputs and outputs.
 
 
-class Work(NamedTuple):
+class WorkSize(NamedTuple):
     """Minimum lengths of the work arrays that a C function needs."""
 
     arg: int = 0
@@ -153,9 +153,9 @@ class Work(NamedTuple):
     iw: int = 0
     w: int = 0
 
-    def covering(self, other: Work) -> Work:
+    def covering(self, other: WorkSize) -> WorkSize:
         """Return the elementwise maximum of the lengths."""
-        return Work(*map(max, self, other))
+        return WorkSize(*map(max, self, other))
 
 
 @dataclass(frozen=True, slots=True)

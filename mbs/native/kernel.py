@@ -51,20 +51,20 @@ from mbs.native.frames import (
     pointers,
 )
 from mbs.native.repeats import with_calls
-from mbs.native.staged import Mapped, Staged, staged
+from mbs.native.staged import Mapped, StagedFunction, staged
 from mbs.operations.graph import Graph, graph_of
 
 # C code of a map: a loop over all columns, several columns at a time in SIMD lanes.
 
 
-class Place(NamedTuple):
+class OutputSlot(NamedTuple):
     """Destination of a column: index of the output and index of its first element there."""
 
     output: int
     first: int
 
 
-Columns: TypeAlias = Mapping[tuple[int, int], Place]
+Columns: TypeAlias = Mapping[tuple[int, int], OutputSlot]
 """Destinations of map columns: (graph input that is a map result, column index) to its place in
 an output. Only columns that are copied unchanged to an output are in the table."""
 
@@ -87,8 +87,8 @@ def direct_columns(graph: Graph, maps: Sequence[Mapped], outputs: int) -> tuple[
         if node.op == casadi.OP_INPUT:
             node_of[node.args] = number
     for k, result in enumerate(graph.results[:outputs]):
-        places.update({number: Place(k, element) for element, number in enumerate(result)})
-    found: dict[tuple[int, int], Place] = {}
+        places.update({number: OutputSlot(k, element) for element, number in enumerate(result)})
+    found: dict[tuple[int, int], OutputSlot] = {}
     nodes: set[int] = set()
     for m in maps:
         for k, port in enumerate(m.outputs):
@@ -97,7 +97,7 @@ def direct_columns(graph: Graph, maps: Sequence[Mapped], outputs: int) -> tuple[
                 numbers = [node_of.get((port, column * rows + row), -1) for row in range(rows)]
                 at = places.get(numbers[0]) if numbers else None
                 if at is None or not all(
-                    uses[n] == 1 and places.get(n) == Place(at.output, at.first + row)
+                    uses[n] == 1 and places.get(n) == OutputSlot(at.output, at.first + row)
                     for row, n in enumerate(numbers)
                 ):
                     continue
@@ -170,7 +170,9 @@ def _tables(mapped: Mapped, columns: Columns, buffers: Sequence[tuple[int, int]]
     """
     lines = []
     for k, (port, (buffer, size)) in enumerate(zip(mapped.outputs, buffers, strict=True)):
-        places = [columns.get((port, c), Place(buffer, c * size)) for c in range(mapped.columns)]
+        places = [
+            columns.get((port, c), OutputSlot(buffer, c * size)) for c in range(mapped.columns)
+        ]
         table = ", ".join(f"{{{place.output}, {place.first}}}" for place in places)
         lines.append(f"  static const struct {{ int output, first; }} place{k}[] = {{{table}}};")
     return lines
@@ -232,7 +234,7 @@ def kernel_source(functions: Iterable[Function], block: int = BLOCK) -> dict[str
 
 
 def _file(function: Function, block: int) -> str:
-    stages = staged(function) or Staged(function, ())
+    stages = staged(function) or StagedFunction(function, ())
     graph = graph_of(stages.scalar)
     scheduling = _GCC if len(graph.nodes) <= _SHORT else ""
     return "\n".join([scheduling, _HEAD, *_function(function, graph, stages.maps, block)])

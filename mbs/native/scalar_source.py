@@ -24,7 +24,7 @@ from mbs.native.c_code import (
     slots,
 )
 from mbs.native.compiler import FLAGS
-from mbs.native.frames import EXPORT, HEAD, GraphCode, Memory, Work, entry, function_table
+from mbs.native.frames import EXPORT, HEAD, GraphCode, Memory, WorkSize, entry, function_table
 from mbs.native.repeats import LEAST, with_calls
 from mbs.operations.graph import graph_of
 
@@ -47,7 +47,7 @@ def is_scalar(function: Function) -> bool:
 
 def plain_source(
     functions: Iterable[Function], block: int = BLOCK, least: int = LEAST
-) -> tuple[str, Work]:
+) -> tuple[str, WorkSize]:
     """Return one C file of Functions in CasADi's calling convention.
 
     The file contains for each Function
@@ -68,7 +68,7 @@ def plain_source(
         ModelError: a Function cannot be expanded to scalar operations, or has an operation without
             an equivalent in C.
     """
-    texts, most = [HEAD], Work()
+    texts, most = [HEAD], WorkSize()
     for function in functions:
         lines, work = _hosted(function, "", block, least)
         texts += [*lines, ""]
@@ -140,10 +140,10 @@ def _body(function: Function, real: Real, block: int, least: int) -> GraphCode:
     return GraphCode(function.name(), code, pieces)
 
 
-def _hosted(function: Function, linkage: str, block: int, least: int) -> tuple[list[str], Work]:
+def _hosted(function: Function, linkage: str, block: int, least: int) -> tuple[list[str], WorkSize]:
     """Return the C functions of a Function whose arguments may be NULL, and the work sizes."""
     body = _body(function, "double", block, least)
     memory = Memory(function, body.code.graph, body.code.where.count)
     lines = [*memory.declarations(), *body.calls()]
-    work = Work(function.n_in(), function.n_out(), 0, memory.size)
+    work = WorkSize(function.n_in(), function.n_out(), 0, memory.size)
     return [*body.texts(), *entry(function.name(), lines, linkage)], work

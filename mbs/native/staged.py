@@ -28,10 +28,10 @@ class Mapped:
         column: Function of a single column.
         columns: number of columns.
         shared: whether an input has the same value for all columns, for each input.
-        inputs: index of the output of `Staged.scalar` that contains each input. A shared input is
-            stored by its non-zero elements. Other inputs are stored in groups of LANES columns,
-            row by row; zeros pad the last group.
-        outputs: index of the input of `Staged.scalar` that contains each output, a matrix
+        inputs: index of the output of `StagedFunction.scalar` that contains each input. A shared
+            input is stored by its non-zero elements. Other inputs are stored in groups of LANES
+            columns, row by row; zeros pad the last group.
+        outputs: index of the input of `StagedFunction.scalar` that contains each output, a matrix
             (non-zero elements, columns).
     """
 
@@ -43,7 +43,7 @@ class Mapped:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Staged:
+class StagedFunction:
     """Scalar operations of a Function, and the maps between them.
 
     Attributes:
@@ -58,7 +58,7 @@ class Staged:
     maps: tuple[Mapped, ...]
 
 
-def staged(function: Function) -> Staged | None:
+def staged(function: Function) -> StagedFunction | None:
     """Split a Function into scalar operations and maps.
 
     Returns:
@@ -88,7 +88,7 @@ def staged(function: Function) -> Staged | None:
         )
         for m in trace.maps
     )
-    return Staged(scalar, maps)
+    return StagedFunction(scalar, maps)
 
 
 class _Tiled(NamedTuple):

@@ -26,12 +26,12 @@ from mbs.spatial import (
     PseudoInertia,
     Rotation,
     Wrench,
-    body_through,
     cross,
     formula,
     is_zero,
     skew,
-    wrench_through,
+    transform_inertia_along,
+    transform_wrench_along,
     zeros,
 )
 
@@ -319,7 +319,7 @@ def inertia_pivots(tree: Tree, poses: list[LinkPose]) -> tuple[SX, SX]:
         for number, direction in zip(_numbers(link), _DIRECTIONS[link.motion], strict=True):
             locked[number] = Pivot.of(whole, direction, drive).size
         if link.antecedent >= 0:
-            rigid[link.antecedent] += body_through(poses[j].steps, body)
+            rigid[link.antecedent] += transform_inertia_along(poses[j].steps, body)
     return free, locked
 
 
@@ -342,7 +342,7 @@ def _eliminations(
         outer, body = pose.steps, articulated[j]
         if link.backward:
             inner, outer = pose.motion, pose.seat
-            body = body_through(inner, body)
+            body = transform_inertia_along(inner, body)
         elif j in leaves and link.motion.nv == 1:
             inner, outer = pose.motion, pose.seat
             body = ArticulatedInertia.of(pose.motion[0].body(rigid[j]))
@@ -354,7 +354,7 @@ def _eliminations(
             body = body.without(pivots[-1])
         result.append(JointElimination(inner, outer, tuple(pivots), -1 if link.backward else 1))
         if link.antecedent >= 0:
-            articulated[link.antecedent] += body_through(outer, body)
+            articulated[link.antecedent] += transform_inertia_along(outer, body)
     return result[::-1]
 
 
@@ -393,7 +393,7 @@ def _solution(
 
 
 def _moved_wrench(steps: Sequence[Displacement], wrench: SX) -> SX:
-    return casadi.vertcat(*wrench_through(steps, wrench[:3], wrench[3:]))
+    return casadi.vertcat(*transform_wrench_along(steps, wrench[:3], wrench[3:]))
 
 
 def _moved_twist(steps: Sequence[Displacement], twist: SX) -> SX:

@@ -202,7 +202,7 @@ Q = TypeVar("Q", SX, Array)
 Q_contra = TypeVar("Q_contra", SX, Array, contravariant=True)
 
 
-class Transformable(Protocol[T_co, Q_contra]):
+class JointChain(Protocol[T_co, Q_contra]):
     """Protocol of a symbolic chain (`Chain`) or a numeric chain (`mbs.closed_forms.arm.Arm`)."""
 
     @property
@@ -213,7 +213,7 @@ class Transformable(Protocol[T_co, Q_contra]):
         """Transforms of the joints at positions q."""
 
 
-def transforms(chain: Transformable[T, Q], q: Q) -> list[T]:
+def transforms(chain: JointChain[T, Q], q: Q) -> list[T]:
     """Compute the poses of the frames before every joint and at the end of a chain.
 
     Args:

@@ -16,7 +16,7 @@ from mbs.recursions.newton_euler import momentum_on
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.regrouping import regroup, shift_frames
 from mbs.recursions.velocities import effort, unit_motions
-from mbs.spatial import Wrench, body_through, wrench_through, zeros
+from mbs.spatial import Wrench, transform_inertia_along, transform_wrench_along, zeros
 
 
 def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
@@ -40,7 +40,7 @@ def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
             spin = _at_seat(pose, link.motion, momentum_on(link, j))
             m = m + spin
             A[link.v, link.v.start + column] = effort(link, pose, f, m)
-            f_i, m_i = wrench_through(steps, f, m)
+            f_i, m_i = transform_wrench_along(steps, f, m)
             m_i = m_i + momentum_on(link, link.antecedent)
             _fill_ancestors(A, tree, poses, j, column, (f_i, m_i))
         for k in range(link.v.start, link.v.stop):
@@ -48,7 +48,7 @@ def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
         if link.rotor is not None:
             A[link.v, link.v] += link.rotor.seen_at_joint + effort(link, pose, zeros(), spin)
         if link.antecedent >= 0:
-            composite[link.antecedent] += body_through(steps, body)
+            composite[link.antecedent] += transform_inertia_along(steps, body)
     return A
 
 

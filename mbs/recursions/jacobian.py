@@ -66,7 +66,7 @@ class VelocityTarget:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Outlook:
+class JacobianFrame:
     """Paths through a tree from the frame in whose axes a Jacobian is expressed.
 
     Attributes:
@@ -85,18 +85,18 @@ class Outlook:
         return max(sum(isinstance(s, OtherRotation) for s in branch) for branch in self.branches)
 
 
-def outlook(target: VelocityTarget) -> Outlook:
+def outlook(target: VelocityTarget) -> JacobianFrame:
     """Return the two paths from which the Jacobian of a target is computed."""
     tree, q, frame, axes = target.tree, target.q, target.frame, target.axes
     back, out = path_between(tree, q, axes, frame)
     aside = [step for step in back if not isinstance(step, (JointAt, OriginOf))]
     trunk = reverse_path(path_to(tree, q, (common_link(tree, frame[0], axes[0]), Pose.identity())))
-    return Outlook(
+    return JacobianFrame(
         tree, (join_rotations([*aside, *out], tree), join_rotations([*aside, *trunk], tree))
     )
 
 
-def jacobian(seen: Outlook, reference: int | None = None, matrices: int = 0) -> SX:
+def jacobian(seen: JacobianFrame, reference: int | None = None, matrices: int = 0) -> SX:
     """Return the Jacobian J (6, nv) of a moving frame, with [V; w] = J v, in the axes of `seen`.
 
     Args:
@@ -227,7 +227,7 @@ _ZERO = 1e-10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Survey:
+class JacobianSamples:
     """Jacobian of a moving frame, and the frames on the path to it, at random configurations.
 
     Lengths are divided by the largest length, so that the zero threshold does not depend on the
@@ -250,7 +250,7 @@ class Survey:
     J: Array
     units: Array
 
-    def combine(self, G: Array) -> Survey:
+    def combine(self, G: Array) -> JacobianSamples:
         """Return the survey for m other velocities u with v = G u, where G is (samples, nv, m)."""
         parts = G / self.units[:, None]
         sizes = np.abs(parts).max(axis=(0, 1))
@@ -299,7 +299,7 @@ class Survey:
         return np.asarray(np.einsum("sji,sj->si", self.R[-1], arm))
 
 
-def survey(target: VelocityTarget) -> Survey:
+def survey(target: VelocityTarget) -> JacobianSamples:
     """Evaluate the Jacobian of a target at random configurations and parameters."""
     tree, q, frame, axes = target.tree, target.q, target.frame, target.axes
     path = tree.path(frame[0])
@@ -320,7 +320,9 @@ def survey(target: VelocityTarget) -> Survey:
     units = np.where(slides, length, 1.0)
     J_values[:, :3] /= length
     p = T[:, :, :3, 3] / length
-    return Survey(tuple(frames[:-1]), T[:-1, :, :3, :3], p[:-1], p[-1], J_values * units, units)
+    return JacobianSamples(
+        tuple(frames[:-1]), T[:-1, :, :3, :3], p[:-1], p[-1], J_values * units, units
+    )
 
 
 def random_samples(tree: Tree, parameters: int) -> list[tuple[Array, Array]]:
@@ -372,7 +374,7 @@ _MOST_PLACES = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Renaud:
+class JacobianFactors:
     """The three factors of a Jacobian.
 
     Attributes:
@@ -422,7 +424,7 @@ def cheapest_jacobian(target: VelocityTarget, reference: int | None = None) -> S
 
 def renaud(
     target: VelocityTarget, intermediate: int | None = None, reference: int | None = None
-) -> Renaud:
+) -> JacobianFactors:
     """Return Renaud's three factors of a Jacobian; None selects the fewest operations of J.
 
     Args:
@@ -439,7 +441,7 @@ def renaud(
     ]
     i, r, J = min(candidates, key=lambda found: cost(found[2], target.q, target.p))
     R = relative_pose(target.tree, target.q, target.axes, (i, _HOME)).R
-    return Renaud(i, r, R, arm_from(target.along((i, _HOME)), r), J)
+    return JacobianFactors(i, r, R, arm_from(target.along((i, _HOME)), r), J)
 
 
 def arm_from(target: VelocityTarget, reference: int | None) -> SX:
@@ -455,7 +457,7 @@ def arm_from(target: VelocityTarget, reference: int | None) -> SX:
 
 
 def _rank(
-    found: Survey, intermediate: int | None, reference: int | None
+    found: JacobianSamples, intermediate: int | None, reference: int | None
 ) -> list[tuple[int, int | None]]:
     """Sort pairs of axes and reference by the number of varying, then non-zero entries of J."""
     links = [found.frames[k][0] for k in found.on_path]

@@ -150,7 +150,7 @@ def _free_line(unit: Twist, seen: LineObserver) -> Line:
 
 
 @dataclass(frozen=True, slots=True)
-class Drift:
+class MovingFrame:
     """Change of observer between two points of the links; an observer moves with its point.
 
     Attributes:
@@ -160,7 +160,7 @@ class Drift:
     twice: SX
 
 
-AxesStep = Displacement | Drift
+AxesStep = Displacement | MovingFrame
 """Element of the path from the axes of a joint to the axes or frame of its antecedent."""
 
 
@@ -265,5 +265,5 @@ def _continue(pose: LinkPose, rotation: Rotation, axes: JointAxes, own: Accelera
     return JointAxes(pose.spin, path, True, (line,), w)
 
 
-def _drift(velocity: SX) -> tuple[Drift, ...]:
-    return () if is_zero(velocity) else (Drift(2 * velocity),)
+def _drift(velocity: SX) -> tuple[MovingFrame, ...]:
+    return () if is_zero(velocity) else (MovingFrame(2 * velocity),)

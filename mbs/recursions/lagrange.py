@@ -97,7 +97,7 @@ class VelocityField:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Augmented:
+class SubtreeInertia:
     """Moments of the mass on the distal side of a joint, about the origin and axes of a frame.
 
     Attributes:
@@ -111,28 +111,30 @@ class Augmented:
     spin: SX
 
     @staticmethod
-    def of(body: PseudoInertia, spin: SX) -> Augmented:
+    def of(body: PseudoInertia, spin: SX) -> SubtreeInertia:
         """Return the moments of a body at rest in the frame.
 
         The argument `spin` is half the angular momentum (3, 1) of the rotors on the body.
         """
-        return Augmented(body, PseudoInertia(zeros(3, 3), zeros(), SX(0)), spin)
+        return SubtreeInertia(body, PseudoInertia(zeros(3, 3), zeros(), SX(0)), spin)
 
     @staticmethod
-    def nothing() -> Augmented:
+    def nothing() -> SubtreeInertia:
         """Return the moments of a body without mass."""
-        return Augmented.of(PseudoInertia(zeros(3, 3), zeros(), SX(0)), zeros())
+        return SubtreeInertia.of(PseudoInertia(zeros(3, 3), zeros(), SX(0)), zeros())
 
-    def __add__(self, other: Augmented) -> Augmented:
+    def __add__(self, other: SubtreeInertia) -> SubtreeInertia:
         """Add the moments of a second body, in the same frame."""
-        return Augmented(self.mass + other.mass, self.rate + other.rate, self.spin + other.spin)
+        return SubtreeInertia(
+            self.mass + other.mass, self.rate + other.rate, self.spin + other.spin
+        )
 
-    def through(self, step: Displacement) -> Augmented:
+    def through(self, step: Displacement) -> SubtreeInertia:
         """Transform to the frame before a constant displacement."""
         _, spin = step.wrench(self.rate.ms, self.spin)
-        return Augmented(step.body(self.mass), step.body(self.rate), spin)
+        return SubtreeInertia(step.body(self.mass), step.body(self.rate), spin)
 
-    def moved(self, linear: SX, angular: SX) -> Augmented:
+    def moved(self, linear: SX, angular: SX) -> SubtreeInertia:
         """Change to a reference frame in which the current frame moves.
 
         The arguments are half the linear and half the angular velocity (3, 1) of this motion.
@@ -145,7 +147,7 @@ class Augmented:
             SX(0),
         )
         spin = self.spin + cross(ms, linear) + _inertia_times(S, angular)
-        return Augmented(self.mass, rate, spin)
+        return SubtreeInertia(self.mass, rate, spin)
 
     def column(self, w: SX, linear: SX, angular: SX) -> VelocityField:
         """Return the integrals of the velocity field u = linear + angular x r.
@@ -268,8 +270,8 @@ def lagrange_form(tree: Tree, poses: list[LinkPose], v: SX) -> LagrangeForm:
     w = [motion.w for motion in link_accelerations(tree, poses, v, rest, base)]
     places = _places(tree, poses, v, w)
     spins = spin_momenta(tree, 0.5 * v)
-    framed = [Augmented.of(body, spins.get(j, zeros())) for j, body in enumerate(bodies)]
-    placed = [Augmented.nothing()] * len(bodies)
+    framed = [SubtreeInertia.of(body, spins.get(j, zeros())) for j, body in enumerate(bodies)]
+    placed = [SubtreeInertia.nothing()] * len(bodies)
     form = LagrangeForm(zeros(tree.nv, tree.nv), zeros(tree.nv, tree.nv), zeros(tree.nv))
     work = _FormWork(form, tree, places, w)
     for j in reversed(range(len(tree.links))):
@@ -365,7 +367,7 @@ def _moving_steps(pose: LinkPose, w: SX, linear: SX) -> list[Step]:
     return steps
 
 
-def _fill_columns(work: _FormWork, j: int, body: Augmented) -> None:
+def _fill_columns(work: _FormWork, j: int, body: SubtreeInertia) -> None:
     """Fill the rows and columns of joint j: its diagonal block and the blocks of its ancestors."""
     form, link, place = work.form, work.tree.links[j], work.places[j]
     spin = _at(place.inner, rotor_column(link, j, work.w[j]))

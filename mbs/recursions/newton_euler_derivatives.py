@@ -13,7 +13,7 @@ import casadi
 from casadi import SX
 
 from mbs.assembly.tree import CarriedRotor, Tree
-from mbs.recursions.joint_axes import AxesStep, Drift, JointAxes, Line, Twist, joint_axes
+from mbs.recursions.joint_axes import AxesStep, JointAxes, Line, MovingFrame, Twist, joint_axes
 from mbs.recursions.newton_euler import inertial_wrench, rotor_efforts, rotor_moments, spin_momenta
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.regrouping import regroup, shift_frames
@@ -126,7 +126,7 @@ class SubtreeMotion:
 
     def through(self, step: AxesStep) -> SubtreeMotion:
         """Transform along one step of the path between two joint axes."""
-        if isinstance(step, Drift):
+        if isinstance(step, MovingFrame):
             return self.drifting(step.twice)
         return step.body(self)
 
@@ -181,7 +181,7 @@ def subtree_motions(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Couple:
+class RotorMoment:
     """Derivatives of the moment that a carrier link exerts on a joint-driven rotor, (3, 1) each.
 
     Attributes:
@@ -192,9 +192,9 @@ class Couple:
     dv: SX
     da: SX
 
-    def rotate(self, R: Rotation) -> Couple:
+    def rotate(self, R: Rotation) -> RotorMoment:
         """Transform to the axes of frame i; R is the orientation of the current axes in i."""
-        return Couple(R.apply(self.dv), R.apply(self.da))
+        return RotorMoment(R.apply(self.dv), R.apply(self.da))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -216,7 +216,7 @@ class EffortColumn:
 
     def through(self, step: AxesStep) -> EffortColumn:
         """Transform along one step of the path between two joint axes."""
-        if isinstance(step, Drift):
+        if isinstance(step, MovingFrame):
             return self.drifting(step.twice)
         return EffortColumn(
             step.wrench(*self.dq),
@@ -235,7 +235,7 @@ class EffortColumn:
         spin = self.spin + cross(twice, self.momentum[0])
         return EffortColumn(self.dq, self.dv, self.momentum, spin)
 
-    def with_couple(self, couple: Couple) -> EffortColumn:
+    def with_couple(self, couple: RotorMoment) -> EffortColumn:
         """Add the moments of a rotor that spins with the joint."""
         (f_v, m_v), (f_a, m_a) = self.dv, self.momentum
         return EffortColumn(
@@ -267,10 +267,10 @@ def effort_column(subtree: SubtreeMotion, line: Line) -> EffortColumn:
     )
 
 
-def rotor_couple(rotor: CarriedRotor, axes: JointAxes) -> Couple:
+def rotor_couple(rotor: CarriedRotor, axes: JointAxes) -> RotorMoment:
     """Return the moment derivatives of a rotor, in the joint axes `axes` of its carrier link."""
     momentum = rotor.momentum if axes.rotation is None else axes.rotation.apply(rotor.momentum)
-    return Couple(cross(axes.w, momentum), momentum)
+    return RotorMoment(cross(axes.w, momentum), momentum)
 
 
 # Selection of columns that need fewer operations in base axes than in the axes of all joints.
@@ -309,7 +309,7 @@ def links_by_base(tree: Tree, axes: list[JointAxes]) -> set[int]:
 def _cost(step: AxesStep) -> int:
     """Number of operations to transform a column along a step."""
     match step:
-        case Drift():
+        case MovingFrame():
             return _DRIFT
         case ScrewDisplacement():
             quarter = step.rotation.c.is_zero() or step.rotation.s.is_zero()
@@ -358,7 +358,7 @@ def base_axes(tree: Tree, axes: list[JointAxes]) -> list[BaseAxes]:
 
 
 def _after(step: AxesStep, R: SX, p: SX, twice: SX) -> tuple[SX, SX, SX]:
-    if isinstance(step, Drift):
+    if isinstance(step, MovingFrame):
         return R, p, twice + casadi.mtimes(R, step.twice)
     p = p + casadi.mtimes(R, step.point(zeros()))
     return _rotate(R, step.rotation), p, twice
@@ -463,7 +463,7 @@ def _fill(
 
 def _rotor_couples(
     tree: Tree, axes: list[JointAxes], j: int
-) -> tuple[Couple | None, Couple | None]:
+) -> tuple[RotorMoment | None, RotorMoment | None]:
     """Moment derivatives of the rotor of joint j, if it is on link j, and if on the antecedent.
 
     At least one of the two results is None.
@@ -476,7 +476,7 @@ def _rotor_couples(
 
 
 def _through_axes(
-    tree: Tree, axes: list[JointAxes], j: int, column: EffortColumn, couple: Couple | None
+    tree: Tree, axes: list[JointAxes], j: int, column: EffortColumn, couple: RotorMoment | None
 ) -> Iterator[Passage]:
     """Yield a column of joint j in the axes of each joint on its path to the base.
 
@@ -500,7 +500,7 @@ def _through_axes(
 
 
 def _through_base(
-    tree: Tree, placed: list[BaseAxes], j: int, column: EffortColumn, couple: Couple | None
+    tree: Tree, placed: list[BaseAxes], j: int, column: EffortColumn, couple: RotorMoment | None
 ) -> Iterator[Passage]:
     """Yield a column of joint j in base axes, with each joint on its path; see `_through_axes`."""
     i = tree.links[j].antecedent

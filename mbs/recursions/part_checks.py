@@ -15,7 +15,7 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.parts import AttachedPart, WireSource
+from mbs.assembly.parts import ComponentInstance, WireSource
 from mbs.assembly.tree import position_rate, quaternion_slices
 from mbs.components.custom import (
     Approach,
@@ -85,7 +85,7 @@ _AT_ONCE = ("loads", "energy", "rows", "velocity_rows", "frictions", "stops", "e
 """Methods whose results determine accelerations, or are evaluated before the accelerations."""
 
 
-def _require_state_between(system: System, part: AttachedPart, at: PartsAt) -> None:
+def _require_state_between(system: System, part: ComponentInstance, at: PartsAt) -> None:
     """Raise if an input depends on accelerations or forces and may change them directly.
 
     Raises:
@@ -104,7 +104,7 @@ def _require_state_between(system: System, part: AttachedPart, at: PartsAt) -> N
             )
 
 
-def check_part(system: System, part: AttachedPart, at: PartsAt) -> None:
+def check_part(system: System, part: ComponentInstance, at: PartsAt) -> None:
     """Check one component; see `check_parts`.
 
     Args:
@@ -129,7 +129,7 @@ class _Check:
         q, v: symbols of positions and velocities.
     """
 
-    def __init__(self, system: System, part: AttachedPart, at: PartsAt, q: SX, v: SX) -> None:
+    def __init__(self, system: System, part: ComponentInstance, at: PartsAt, q: SX, v: SX) -> None:
         self.system, self.part, self.at, self.q, self.v = system, part, at, q, v
         self.element = part.element
         # inputs are free symbols, so that the checks are independent of the wires

@@ -15,7 +15,7 @@ import casadi
 from casadi import DM, SX
 
 from mbs.assembly import System
-from mbs.assembly.parts import AttachedPart, WireSource
+from mbs.assembly.parts import ComponentInstance, WireSource
 from mbs.assembly.tables import AttachedSensor
 from mbs.assembly.tree import Frame, position_rate
 from mbs.components.contact import Contact
@@ -114,20 +114,20 @@ class PartsAt:
 
     # Arguments of the methods of components.
 
-    def at(self, part: AttachedPart) -> At:
+    def at(self, part: ComponentInstance) -> At:
         """Return the argument of the methods of a component, with wired inputs."""
         if part.name not in self._found:
             self._found[part.name] = self._seen(part, self._inputs_of(part))
         return self._found[part.name]
 
-    def with_inputs(self, part: AttachedPart, inputs: Mapping[str, SX]) -> At:
+    def with_inputs(self, part: ComponentInstance, inputs: Mapping[str, SX]) -> At:
         """Return the argument of the methods of a component for the given input values."""
         return self._seen(part, {name: partial(_same, value) for name, value in inputs.items()})
 
-    def _inputs_of(self, part: AttachedPart) -> Mapping[str, Callable[[], SX]]:
+    def _inputs_of(self, part: ComponentInstance) -> Mapping[str, Callable[[], SX]]:
         return {name: partial(self._input, part, name) for name in part.inputs}
 
-    def _seen(self, part: AttachedPart, inputs: Mapping[str, Callable[[], Any]]) -> At:
+    def _seen(self, part: ComponentInstance, inputs: Mapping[str, Callable[[], Any]]) -> At:
         element, values = part.element, dict[str, Callable[[], Any]](inputs)
         # ports on points of bodies
         frames = dict(zip(element.frames, part.frames, strict=True))
@@ -162,7 +162,7 @@ class PartsAt:
         V = motion.V + casadi.mtimes(R, t_b[:3]) - t_a[:3] - cross(t_a[3:], motion.p)
         return RelativeMotion(motion.p, R, V, motion.w + casadi.mtimes(R, t_b[3:]) - t_a[3:])
 
-    def _coordinate(self, part: AttachedPart, port: str) -> CoordinateAt | FlangeAt | SX:
+    def _coordinate(self, part: ComponentInstance, port: str) -> CoordinateAt | FlangeAt | SX:
         levers = part.coordinates[port]
         q: SX | None = self._shifts.get(port, SX(0))
         for lever in levers:
@@ -183,7 +183,7 @@ class PartsAt:
 
     # Signals.
 
-    def _input(self, part: AttachedPart, name: str) -> SX:
+    def _input(self, part: ComponentInstance, name: str) -> SX:
         given = part.inputs[name]
         return given if isinstance(given, SX) else self.signal(given)
 
@@ -225,7 +225,9 @@ class PartsAt:
         self._signals[source] = value
         return value
 
-    def _with_placeholders(self, part: AttachedPart) -> tuple[Mapping[str, SX], Mapping[str, SX]]:
+    def _with_placeholders(
+        self, part: ComponentInstance
+    ) -> tuple[Mapping[str, SX], Mapping[str, SX]]:
         """Outputs of a component as expressions of input symbols, and these symbols by name."""
         if part.name not in self._outputs:
             symbols = {name: SX.sym(name) for name in part.inputs}
@@ -262,7 +264,7 @@ class PartsAt:
 
     # Loads, energy, rates, events and outputs.
 
-    def loads(self, part: AttachedPart) -> Mapping[str, Load]:
+    def loads(self, part: ComponentInstance) -> Mapping[str, Load]:
         """Return the loads of a component by port: method `loads`, else minus energy gradient."""
         if part.name not in self._loads:
             element = part.element
@@ -276,7 +278,7 @@ class PartsAt:
 
     def slopes(
         self,
-        part: AttachedPart,
+        part: ComponentInstance,
         value: Callable[[At], SX],
         inputs: Mapping[str, SX] | None = None,
     ) -> Mapping[str, Load]:
@@ -315,7 +317,7 @@ class PartsAt:
         return {**result, **{port: slopes[first + k] for k, port in enumerate(shifts)}}
 
     def loads_of_rows(
-        self, part: AttachedPart, lam: SX, *, velocities: bool = False
+        self, part: ComponentInstance, lam: SX, *, velocities: bool = False
     ) -> list[FrameLoad]:
         """Return the loads of constraint rows on the frames of a component.
 
@@ -362,7 +364,7 @@ class PartsAt:
                 self._add_efforts(total, part, 1)
         return total
 
-    def _add_efforts(self, total: SX, part: AttachedPart, sign: int) -> None:
+    def _add_efforts(self, total: SX, part: ComponentInstance, sign: int) -> None:
         loads = self.loads(part)
         for port, levers in part.coordinates.items():
             if port in loads:
@@ -380,7 +382,7 @@ class PartsAt:
                 total += part.element.energy(self.at(part))
         return total
 
-    def frame_loads(self, part: AttachedPart) -> list[tuple[str, Frame, FrameLoad]]:
+    def frame_loads(self, part: ComponentInstance) -> list[tuple[str, Frame, FrameLoad]]:
         """Return port, frame, and load on the frame in its axes about its origin, for each load."""
         loads, result = self.loads(part), []
         for port, frame in zip(part.element.frames, part.frames, strict=True):

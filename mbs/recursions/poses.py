@@ -23,7 +23,7 @@ from mbs.spatial import (
     axis_rotation,
     origin,
     quaternion_rotation,
-    wrench_through,
+    transform_wrench_along,
     zeros,
 )
 
@@ -94,7 +94,7 @@ class LinkPose:
 
     def wrench(self, f: SX, m: SX) -> Wrench:
         """Transform a wrench about the origin of j, in frame j, to the origin and axes of i."""
-        return wrench_through(self.steps, f, m)
+        return transform_wrench_along(self.steps, f, m)
 
     def after(self, pose: Pose) -> Pose:
         """Return the pose of frame j in the frame in which frame i has the pose `pose`."""

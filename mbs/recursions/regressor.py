@@ -23,11 +23,11 @@ from mbs.recursions.velocities import Acceleration, Velocity, unit_motions
 from mbs.spatial import (
     Inertia,
     ScrewDisplacement,
-    body_through,
     cross,
     elements,
     is_zero,
     origin,
+    transform_inertia_along,
     vector,
     zeros,
 )
@@ -133,7 +133,7 @@ def _sum(motion: Motion, pose: LinkPose, part: tuple[int, ...]) -> ColumnSum:
         body = body.rotate(screw.rotation)
     elif isinstance(screw, ScrewDisplacement):
         body = body.shift(2, screw.t)
-    constants = elements(body_through(pose.seat, body).parameters)
+    constants = elements(transform_inertia_along(pose.seat, body).parameters)
     return ColumnSum(_group(constants), _XX if len(part) > 1 else None)
 
 

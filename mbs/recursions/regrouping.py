@@ -17,7 +17,14 @@ from casadi import SX
 from mbs.assembly.tree import Tree
 from mbs.components.joints import Motion
 from mbs.recursions.poses import LinkPose
-from mbs.spatial import Body, Inertia, ScrewDisplacement, body_through, elements, exact_sum
+from mbs.spatial import (
+    Body,
+    Inertia,
+    ScrewDisplacement,
+    elements,
+    exact_sum,
+    transform_inertia_along,
+)
 
 
 def regroup(tree: Tree, poses: list[LinkPose], bodies: list[Body]) -> list[Body]:
@@ -62,7 +69,7 @@ def _seen_through(body: Body, motion: Motion, pose: LinkPose) -> Body:
     screw = pose.motion[0]
     if isinstance(screw, ScrewDisplacement):
         body = body.shift(2, screw.t)
-    return body_through(pose.seat, body)
+    return transform_inertia_along(pose.seat, body)
 
 
 def _join(body: Body, part: Body) -> Body:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from mbs.assembly.tree import Tree
 from mbs.recursions.jacobian import (
     Array,
-    Survey,
+    JacobianSamples,
     VelocityTarget,
     arm_from,
     cheapest_jacobian,
@@ -158,7 +158,7 @@ def _values(target: VelocityTarget, A: SX) -> Array:
     return np.array([np.array(f(*sample)) for sample in samples])
 
 
-def _places(tree: Tree, found: Survey, columns: Sequence[int]) -> list[int]:
+def _places(tree: Tree, found: JacobianSamples, columns: Sequence[int]) -> list[int]:
     """Indices in the survey of the base, the links of these columns, and the required axes."""
     kept = []
     for place in found.on_path:
@@ -204,7 +204,7 @@ def _always_singular(values: Array) -> bool:
 
 
 def _views(
-    found: Survey, places: Sequence[int], rows: Sequence[int], columns: Sequence[int]
+    found: JacobianSamples, places: Sequence[int], rows: Sequence[int], columns: Sequence[int]
 ) -> Iterator[_View]:
     """Yield the views in which the selected rows do not mix with other rows of [V; w]."""
     V_rows, w_rows = [k for k in rows if k < 3], [k - 3 for k in rows if k >= 3]

@@ -13,7 +13,7 @@ from casadi import SX
 from mbs.assembly.tree import Link, Tree
 from mbs.components.joints import Motion
 from mbs.recursions.poses import LinkPose
-from mbs.spatial import cross, formula, is_zero, origin, vector, wrench_through, zeros
+from mbs.spatial import cross, formula, is_zero, origin, transform_wrench_along, vector, zeros
 
 # Motion subspaces of joints: velocities that a joint adds to its link, and efforts along them.
 #
@@ -83,7 +83,7 @@ def _behind(link: Link, pose: LinkPose, velocity: tuple[SX, SX]) -> tuple[SX, SX
 def effort(link: Link, pose: LinkPose, f: SX, m: SX) -> SX:
     """Project a force f and moment m about the origin of frame j on the joint motion."""
     if link.backward:
-        f, m = wrench_through(pose.motion, f, m)
+        f, m = transform_wrench_along(pose.motion, f, m)
     return effort_at_joint(link, f, m)
 
 

@@ -34,13 +34,13 @@ _URDF, _SDF, _MJCF = (".urdf", ".xacro"), (".sdf", ".world"), ".xml"
 def catalogue() -> Mapping[str, Callable[[], Mechanism]]:
     """Return the functions that build the mechanisms of the catalogue, by name.
 
-    Each module of this package that contains a function of its own name is an entry.
+    The module `_name` of this package contains the function `name`.
     """
-    found = {}
-    for name in sorted(module.name for module in iter_modules([str(Path(__file__).parent)])):
-        if hasattr(module := import_module(f"{__package__}.{name}"), name):
-            found[name] = getattr(module, name)
-    return MappingProxyType(found)
+    modules = (module.name for module in iter_modules([str(Path(__file__).parent)]))
+    names = sorted(module[1:] for module in modules if module.startswith("_"))
+    return MappingProxyType(
+        {name: getattr(import_module(f"{__package__}._{name}"), name) for name in names}
+    )
 
 
 def load(

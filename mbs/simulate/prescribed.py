@@ -14,7 +14,7 @@ from mbs.assembly.variable_names import POSITIONS, VELOCITIES
 from mbs.components.custom import Signal
 from mbs.errors import ModelError
 from mbs.loops.configuration import Start, Values
-from mbs.models.direct_dynamics import hybrid_dynamics
+from mbs.models._direct_dynamics import hybrid_dynamics
 from mbs.models.state.signals import (
     Prescribed,
     untraceable,

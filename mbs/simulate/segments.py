@@ -22,14 +22,14 @@ from mbs.assembly import System
 from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.loops.analysis import rows_at
 from mbs.loops.balance import without_values
-from mbs.loops.closure import least_upright, rolling_discs
-from mbs.loops.examine import row_independence
+from mbs.loops.closure_equations import least_upright, rolling_discs
+from mbs.loops.examination import row_independence
 from mbs.loops.velocity import constraint_jacobian, scales
+from mbs.models._direct_dynamics import require_inertia
 from mbs.models.contacts import (
     KINDS,
     contacts_of,
 )
-from mbs.models.direct_dynamics import require_inertia
 from mbs.models.state.tree import FullState
 from mbs.native import compiled
 from mbs.numbers import OnArrays, on_arrays

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.models.measurements import measurements
+from mbs.models._measurements import measurements
 
 Array = NDArray[np.float64]
 

@@ -25,7 +25,7 @@ from mbs.assembly.pickling import Packed, content_of, packed, unpacked
 from mbs.assembly.variable_names import GUESSES, POSITIONS
 from mbs.errors import Interrupted, ModelError
 from mbs.loops.configuration import Guess, Start, Values, start, start_position, start_velocity
-from mbs.models.inverse_dynamics import bias
+from mbs.models._inverse_dynamics import bias
 from mbs.models.state.signals import (
     Effort,
     by_name,

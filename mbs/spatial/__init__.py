@@ -3,20 +3,21 @@
 Exact zeros and ones are folded by CasADi, which keeps the operation counts of models low.
 """
 
+from mbs.deprecation import moved
 from mbs.spatial.inertia import Body, Inertia, PseudoInertia
 from mbs.spatial.khalil import Khalil, frames_to
 from mbs.spatial.pose import (
     Displacement,
     FreeDisplacement,
-    Movable,
     Pose,
     ScrewDisplacement,
+    Transformable,
     Wrench,
     add_wrenches,
-    body_through,
     origin,
+    transform_inertia_along,
     transform_wrench,
-    wrench_through,
+    transform_wrench_along,
 )
 from mbs.spatial.rotation import (
     AxisRotation,
@@ -42,6 +43,15 @@ from mbs.spatial.vectors import (
     zeros,
 )
 
+__getattr__ = moved(
+    __name__,
+    {
+        "Movable": "mbs.spatial.Transformable",
+        "body_through": "mbs.spatial.transform_inertia_along",
+        "wrench_through": "mbs.spatial.transform_wrench_along",
+    },
+)
+
 __all__ = [
     "AxisRotation",
     "Body",
@@ -50,16 +60,15 @@ __all__ = [
     "Inertia",
     "Khalil",
     "MatrixRotation",
-    "Movable",
     "Pose",
     "PseudoInertia",
     "Rotation",
     "ScrewDisplacement",
+    "Transformable",
     "Wrench",
     "add_wrenches",
     "align_z",
     "axis_rotation",
-    "body_through",
     "cross",
     "elements",
     "exact_product",
@@ -73,9 +82,10 @@ __all__ = [
     "quaternion_rotation",
     "sin_cos",
     "skew",
+    "transform_inertia_along",
     "transform_wrench",
+    "transform_wrench_along",
     "unit_vector",
     "vector",
-    "wrench_through",
     "zeros",
 ]

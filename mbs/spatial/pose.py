@@ -191,7 +191,7 @@ def transform_wrench(pose: Pose, wrench: Wrench) -> Wrench:
 # general pose needs dozens.
 
 
-class Movable(Protocol):
+class Transformable(Protocol):
     """Protocol of a quantity about and in a frame that transforms like an inertia."""
 
     def rotate(self, R: Rotation) -> Self:
@@ -201,7 +201,7 @@ class Movable(Protocol):
         """Return the quantity displaced by t [m] along a coordinate axis."""
 
 
-Thing = TypeVar("Thing", bound=Movable)
+Thing = TypeVar("Thing", bound=Transformable)
 
 
 class Displacement(Protocol):
@@ -310,14 +310,14 @@ def origin(steps: Sequence[Displacement]) -> SX:
     return p
 
 
-def wrench_through(steps: Sequence[Displacement], f: SX, m: SX) -> Wrench:
+def transform_wrench_along(steps: Sequence[Displacement], f: SX, m: SX) -> Wrench:
     """Transform a force f and moment m from the last frame of displacements to the first frame."""
     for step in reversed(steps):
         f, m = step.wrench(f, m)
     return f, m
 
 
-def body_through(steps: Sequence[Displacement], thing: Thing) -> Thing:
+def transform_inertia_along(steps: Sequence[Displacement], thing: Thing) -> Thing:
     """Transform an inertia or similar from the last frame of displacements to the first frame."""
     for step in reversed(steps):
         thing = step.body(thing)

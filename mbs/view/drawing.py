@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mbs.assembly import System
+from mbs.view._scene import scene
 from mbs.view.mesh import BOX_CORNERS, BOX_FACES, rotation_onto
 from mbs.view.posed import Array, PosedLinks, plane_normal, pose_links
 from mbs.view.primitives import (
@@ -30,7 +31,6 @@ from mbs.view.primitives import (
     SpringShape,
     Vector,
 )
-from mbs.view.scene import scene
 
 Point = tuple[float, float]
 

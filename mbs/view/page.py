@@ -14,8 +14,8 @@ import numpy as np
 
 from mbs.errors import ModelError
 from mbs.text import did_you_mean
+from mbs.view._scene import Scene
 from mbs.view.posed import Array
-from mbs.view.scene import Scene
 
 # Files of the viewer in a browser.
 

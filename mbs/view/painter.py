@@ -19,10 +19,10 @@ from mbs.palette import PALETTE, Theme
 from mbs.progress import progress
 from mbs.result import optional_module
 from mbs.text import did_you_mean
+from mbs.view._scene import Scene
 from mbs.view.mesh import Faces, faces_of, stretch
 from mbs.view.posed import Array
 from mbs.view.primitives import LabelShape, SpanShape, SpringShape, rgb
-from mbs.view.scene import Scene
 
 # Camera and perspective projection.
 

@@ -16,10 +16,10 @@ from mbs.loops.configuration import solve
 from mbs.palette import Theme
 from mbs.result import Result
 from mbs.text import quoted
+from mbs.view._scene import Scene, scene
 from mbs.view.page import Look, iframe, look_of, page
 from mbs.view.painter import Painter, painter, save_gif, save_mp4, save_still
 from mbs.view.posed import Array, Values
-from mbs.view.scene import Scene, scene
 
 _ENDINGS = (".html", ".png", ".svg", ".gif", ".mp4")
 _MOST_FRAMES = 5000

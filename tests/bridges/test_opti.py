@@ -8,7 +8,7 @@ from support.rod_mechanisms import acrobot, four_bar
 
 import mbs
 from mbs import Mechanism
-from mbs.bridges import Grid, collocation, invariants, multiple_shooting, step
+from mbs.bridges import Grid, collocation, constraint_residuals, multiple_shooting, step
 from mbs.components import Body, Prismatic
 from mbs.errors import ModelError
 from mbs.models import dae
@@ -118,7 +118,7 @@ def test_four_bar_finds_its_optimum(form, iterations):
     way = collocation(opti, model, Grid(stages=40, duration=1.0, code="interpreted"))
     names = [name for name, _ in model.elements["x"]]
     crank = [names.index("j1.q"), names.index("j1.v")]
-    closed = invariants(model, way.x[:, 0], way.p)
+    closed = constraint_residuals(model, way.x[:, 0], way.p)
     if closed.numel():
         opti.subject_to(closed == 0)
     opti.subject_to(way.x[crank, 0] == [0.3, 0])
@@ -232,7 +232,10 @@ def grid(**changes):
         (lambda o, d: multiple_shooting(o, d, 40), "40 is not a Grid; give Grid"),
         (lambda o, d: multiple_shooting(o, d, grid(), p="m"), "p is 'm'; give numbers"),
         (lambda o, d: multiple_shooting(o, d, grid(), p={"M": 1}), "p has no 'M'; .*m"),
-        (lambda o, d: invariants(3, casadi.MX(2, 1)), "3 is not a Dae; give mbs.models.dae"),
+        (
+            lambda o, d: constraint_residuals(3, casadi.MX(2, 1)),
+            "3 is not a Dae; give mbs.models.dae",
+        ),
         (
             lambda o, d: multiple_shooting(o, d, grid()).integral(casadi.MX(2, 4)),
             r"integral: the values have the shape \(2, 4\); give \(1, 4\)",

@@ -32,7 +32,7 @@ def test_rows_are_closed_or_flagged(name):
     assert 10 < good.sum() < 48  # some get to singular configurations within 0.6 s
     assert np.isnan(x[~good]).all()
     q = mbs.native.batch(dae.function())(x[good], np.zeros(0), u[good], dae.p0)[3]
-    closed = mbs.loops.closure(system)
+    closed = mbs.loops.closure_residual(system)
     assert max(np.abs(closed(row).full()).max() for row in q) < 1e-12
     motors = [system.speeds[k].name for k in system.active]
     for k in np.flatnonzero(good)[:3]:

@@ -20,7 +20,7 @@ from support.messages import refused
 from mbs.closed_forms.hexapod import (
     DEGREE,
     Homotopy,
-    Legs,
+    PlatformLegs,
     certify,
     follow,
     kept_start,
@@ -167,5 +167,5 @@ def test_own_starts_are_kept():
     own_start.cache_clear()
     first = own_start(a.tobytes(), b.tobytes())
     assert own_start(a.tobytes(), b.tobytes()) is first
-    assert isinstance(first.legs, Legs)
+    assert isinstance(first.legs, PlatformLegs)
     assert len(first.x) == 28

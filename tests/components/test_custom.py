@@ -811,7 +811,9 @@ class TestRowsInMotion:
             ("edge", "edge", ("side",)),
         ]
         q = [0.3, 0.2, 0.7, 1, 0, 0, 0]
-        assert float(mbs.loops.closure(system)(q)[0]) == pytest.approx(0.7 - 0.4 / 2, abs=1e-14)
+        assert float(mbs.loops.closure_residual(system)(q)[0]) == pytest.approx(
+            0.7 - 0.4 / 2, abs=1e-14
+        )
         report = system.report()
         assert report.index("Rail rail binds p: 1 of 1") < report.index("Edge edge binds p: 1 of 1")
 

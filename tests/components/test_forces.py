@@ -13,7 +13,6 @@ from support.messages import refused
 import mbs
 import mbs.models
 from mbs.components import (
-    Attraction,
     Body,
     Bushing,
     CoulombFriction,
@@ -23,6 +22,7 @@ from mbs.components import (
     Free,
     JointFriction,
     JointStop,
+    PointGravity,
     PointMass,
     Prismatic,
     Revolute,
@@ -99,7 +99,7 @@ def test_points_on_the_frames_of_a_joint():
 
 def test_attraction_falls_with_the_square_of_the_distance():
     m, b = one_joint()
-    m.add(Attraction("g", m.world, b, strength=8))
+    m.add(PointGravity("g", m.world, b, strength=8))
     assert effort(m, 2.0) == pytest.approx(2.0)
     system = m.assemble()
     assert float(mbs.models.energy(system)(2.0, 0)[1]) == pytest.approx(-4.0)
@@ -209,7 +209,7 @@ def test_friction_of_a_ball_joint_acts_on_one_of_its_velocities():
         (lambda m, b: Spring("s", None, b, stiffness=1), ["s: a is None; give a body"]),
         (lambda m, b: Damper("d", m.world, b, damping=0), ["d: damping is zero", "leave it out"]),
         (lambda m, b: Damper("d", m.world, b, damping=-1), ["d: damping is -1"]),
-        (lambda m, b: Attraction("g", m.world, b, strength=0), ["g: strength is zero"]),
+        (lambda m, b: PointGravity("g", m.world, b, strength=0), ["g: strength is zero"]),
         (lambda m, b: Bushing("u", m.world, b), ["u: stiffness and damping", "does nothing"]),
         (
             lambda m, b: Bushing("u", m.world, b, stiffness=(1, 2)),

@@ -358,7 +358,7 @@ def test_a_lever_of_any_length_holds(lever):
 def test_friction_and_stops_without_a_compiler(monkeypatch):
     system = LOOPS["five"][0](*LOOPS["five"][2])
     compiled = run(system, 0.7, step=0.05)
-    solvers = importlib.import_module("mbs.solvers.integrate")
+    solvers = importlib.import_module("mbs.solvers._integrate")
     monkeypatch.setattr(solvers, "compiler_found", lambda: False)
     interpreted = run(five_bar(-G, *LOOPS["five"][2]), 0.7, step=0.05)
     assert len(interpreted.events) == len(compiled.events) > 2

@@ -20,14 +20,14 @@ from fmu_structures import ball
 
 import mbs
 from mbs.errors import ExportError
-from mbs.export.fmu.description import About, FmuModel, FmuState, FmuVariable
+from mbs.export.fmu.description import Documentation, FmuModel, FmuState, FmuVariable
 from mbs.export.fmu.documentation import MBS
 from mbs.export.fmu.pack import write_fmu
 from mbs.export.fmu.reference import FOLDER, reference_files
 from mbs.solvers import integrate
 from mbs.view.drawing import Drawing, Stroke
 
-DRAWN = About(drawing=Drawing((Stroke("link", "link0", ((0.0, 0.0), (100.0, 0.0))),)))
+DRAWN = Documentation(drawing=Drawing((Stroke("link", "link0", ((0.0, 0.0), (100.0, 0.0))),)))
 
 
 def model():

@@ -16,7 +16,7 @@ from mbs.components import (
     JointStop,
     Prismatic,
 )
-from mbs.identification import known_efforts, regressor, values_of
+from mbs.identification import known_efforts, regressor, symbolic_parameters
 from mbs.models import ContactPoint, contact_phases, dae
 from mbs.models.state.tree import full_state
 
@@ -73,7 +73,7 @@ def functions(system):
     made = {"simulation": -MASS * full_state(system).rhs(0, x, casadi.DM(0, 1))[1]}
     columns = regressor(system)
     known = known_efforts(system, "independent")(q, v)
-    values = values_of(system, columns.columns)
+    values = symbolic_parameters(system, columns.columns)
     made["identification"] = casadi.mtimes(columns(q, v, 0), values) + known
     for form in ("reduced", "index1"):
         d = dae(system, form)
@@ -123,7 +123,7 @@ def test_a_width_of_zero_is_a_step_in_every_place():
         d = dae(system, "index1")
         alg = d.function()(casadi.vertcat(q, v), 0, 0, d.p0)[1]
         estimated = casadi.mtimes(
-            regressor(system)(q, v, 0, *p), values_of(system, regressor(system).columns)
+            regressor(system)(q, v, 0, *p), symbolic_parameters(system, regressor(system).columns)
         )
         for effort in (idm, alg, estimated):
             f = casadi.Function("f", [q, v], [effort, casadi.jacobian(effort, v)])

@@ -310,7 +310,7 @@ def test_a_step_past_a_dead_centre_is_refused(tmp_path):
     stopped = next(k for k, status in enumerate(statuses) if status)
     assert set(statuses[:stopped]) == {OK}
     assert motion.motion([-40.0])[0] == OK  # where it stood before
-    J = mbs.loops.examine(system, motion.motion([-40.0])[1][0])
+    J = mbs.loops.configuration_report(system, motion.motion([-40.0])[1][0])
     assert J.is_closed
 
 

@@ -10,7 +10,7 @@ from support.catalogue_systems import catalogue_system
 import mbs
 import mbs.models
 from mbs.errors import ExportError, ModelError
-from mbs.export.c_library import example_input
+from mbs.export._c_library import example_input
 from mbs.native import compile_library, find_compiler
 
 ROBOTS = ("puma560", "stanford", "two_branch_tree", "sr400", "four_bar", "five_bar")

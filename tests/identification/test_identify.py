@@ -7,17 +7,17 @@ import mbs
 import mbs.identification.bodies as physical_set
 from mbs.errors import ModelError, SolverError
 from mbs.identification import (
+    FourierSettings,
     Record,
     Samples,
-    Series,
     base_parameters,
     excitation,
     identify,
     least_squares,
-    numbers_of,
+    numeric_parameters,
     observe,
     regressor,
-    values_of,
+    symbolic_parameters,
 )
 from mbs.identification.leading import active_indices
 from mbs.identification.methods import METHODS
@@ -51,7 +51,7 @@ def test_an_arm_identified_from_a_noisy_record_predicts_another_motion():
 @pytest.mark.parametrize("method", sorted(METHODS))
 def test_every_method_finds_the_arm(method):
     found = identify(arm(), noisy_record(), 8.0, method, quiet=True)
-    truth = found.base.matrix @ numbers_of(arm(), found.base.columns)
+    truth = found.base.matrix @ numeric_parameters(arm(), found.base.columns)
     errors = (found.estimate.values - truth) / found.estimate.deviations
     assert np.sqrt(np.mean(errors**2)) < 1.6
     assert np.abs(errors).max() < 4.5
@@ -61,7 +61,7 @@ def test_every_method_finds_the_arm(method):
 @pytest.mark.parametrize("equations", ["filtered", "energy"])
 def test_equations_without_accelerations_find_the_arm(equations):
     found = identify(arm(), noisy_record(), 8.0, equations=equations, quiet=True)
-    truth = found.base.matrix @ numbers_of(arm(), found.base.columns)
+    truth = found.base.matrix @ numeric_parameters(arm(), found.base.columns)
     errors = (found.estimate.values - truth) / found.estimate.deviations
     assert np.sqrt(np.mean(errors**2)) < 2
     assert found.estimate["Fv1"] == pytest.approx(0.8, rel=0.15)
@@ -75,7 +75,7 @@ def test_instruments_take_out_the_bias_of_rough_positions():
     plain, free = (
         identify(arm(), record, 12.0, method, quiet=True) for method in ("weighted", "instrumental")
     )
-    truth = free.base.matrix @ numbers_of(arm(), free.base.columns)
+    truth = free.base.matrix @ numeric_parameters(arm(), free.base.columns)
     k = free.estimate.names.index("Ia3")
     assert plain.estimate.values[k] < truth[k] - 0.02
     assert abs(free.estimate.values[k] - truth[k]) < 0.5 * abs(plain.estimate.values[k] - truth[k])
@@ -106,7 +106,7 @@ def test_several_records_are_identified_together(method, equations):
     alone = [identify(arm(), r, 8.0, equations=equations, quiet=True).observations for r in records]
     assert len(found.observations) == sum(len(one) for one in alone)
     assert (np.diff(found.observations.time) > 0).all()
-    truth = found.base.matrix @ numbers_of(arm(), found.base.columns)
+    truth = found.base.matrix @ numeric_parameters(arm(), found.base.columns)
     errors = (found.estimate.values - truth) / found.estimate.deviations
     assert np.sqrt(np.mean(errors**2)) < 2
 
@@ -165,7 +165,7 @@ def test_a_closed_robot_is_identified_from_its_independent_joints(method):
     places = active_indices(system)
     motion = excitation(
         system,
-        series=Series(period=4.0, harmonics=3, samples=24),
+        series=FourierSettings(period=4.0, harmonics=3, samples=24),
         position=[(system.configuration[k] - 0.5, system.configuration[k] + 0.5) for k in places],
         velocity=3.0,
         starts=1,
@@ -179,7 +179,7 @@ def test_a_closed_robot_is_identified_from_its_independent_joints(method):
     record = Record.of(system, t, motion.q(t), tau)
     assert record.names == tuple(system.coordinates[k].name for k in places)
     found = identify(system, record, 10.0, method, quiet=True)
-    truth = found.base.matrix @ numbers_of(system, found.base.columns)
+    truth = found.base.matrix @ numeric_parameters(system, found.base.columns)
     errors = (found.estimate.values - truth) / found.estimate.deviations
     assert np.sqrt(np.mean(errors**2)) < 2
     assert found.validation.rms.max() < 0.01
@@ -195,7 +195,9 @@ def test_base_parameters_of_a_closed_robot_are_found_from_a_simulation():
     base = base_parameters(system, columns=D.columns)
     observations = observe(D, samples_of(system, mbs.simulate.run(system, 3.0, tau=driven)))
     assert observations.efforts == ("q1", "q3")
-    truth = base.matrix @ np.array([float(x) for x in values_of(system, D.columns).elements()])
+    truth = base.matrix @ np.array(
+        [float(x) for x in symbolic_parameters(system, D.columns).elements()]
+    )
     found = least_squares(observations.grouped(base))
     assert found.values == pytest.approx(truth, abs=1e-3)
     assert found.residuals.rms.max() < 1e-4

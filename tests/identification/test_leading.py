@@ -8,7 +8,7 @@ from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import ModelError
-from mbs.identification import Record, Series, excitation, identify
+from mbs.identification import FourierSettings, Record, excitation, identify
 from mbs.identification.leading import (
     REGULAR,
     active_indices,
@@ -50,7 +50,7 @@ def test_leads_change_sign_where_the_parallelogram_is_flat():
     q = positions(system, start + np.outer(turned, np.eye(6)[1]))
     leads = leads_of(system, q)
     for configuration, value in zip(q, leads, strict=True):
-        state = mbs.loops.examine(system, configuration)
+        state = mbs.loops.configuration_report(system, configuration)
         assert abs(value) == pytest.approx(state.leads, rel=1e-9, abs=1e-12)
         assert float(signed_leads(system)(configuration)) == pytest.approx(
             value, rel=1e-9, abs=1e-12
@@ -81,7 +81,7 @@ def test_a_record_next_to_singular_configurations_is_refused():
 def test_an_exciting_motion_stays_on_its_side_of_a_singular_configuration():
     motion = excitation(
         sr400(),
-        series=Series(period=5.0, harmonics=3, samples=30),
+        series=FourierSettings(period=5.0, harmonics=3, samples=30),
         position={f"q{k}": 1.0 for k in (1, 2, 4, 5, 6, 7)},
         velocity=3.0,
         starts=1,

@@ -7,17 +7,17 @@ from support.real_records import panda_record, tx40_record
 from mbs.identification import (
     Prior,
     base_parameters,
-    consistent,
     consistent_links,
     essential,
     excitation_quality,
-    held_out,
+    holdout_residuals,
+    huber,
     identify,
     least_squares,
     observe,
     observe_filtered,
+    physically_consistent,
     regressor,
-    robust,
     smoothed,
     smoothed_with_velocity,
     weighted,
@@ -38,8 +38,8 @@ def test_panda_from_positions_and_torques(panda):
     observations = full.grouped(base)
     assert len(observations.columns) == 64
     assert least_squares(observations).residuals.total_percent <= 1.51
-    assert held_out(least_squares, observations).total_percent <= 1.59
-    bodies = consistent(full, Prior(heaviest=18.0))
+    assert holdout_residuals(least_squares, observations).total_percent <= 1.59
+    bodies = physically_consistent(full, Prior(heaviest=18.0))
     assert bodies.residuals.total_percent <= 1.55
     assert consistent_links(bodies.columns, bodies.values) == list(range(1, 8))
     masses = [bodies[f"M{j}"] for j in range(1, 8)]
@@ -52,7 +52,7 @@ def test_panda_from_measured_velocities_with_no_second_filter(panda):
     observations = full.grouped(base)
     assert excitation_quality(observations).condition == pytest.approx(111, rel=0.05)
     assert least_squares(observations).residuals.total_percent <= 1.51
-    assert held_out(least_squares, observations).total_percent <= 1.59
+    assert holdout_residuals(least_squares, observations).total_percent <= 1.59
 
 
 def test_tx40_at_100_hz():
@@ -66,17 +66,17 @@ def test_tx40_at_100_hz():
     assert estimate.residuals.total_percent <= 8.6
     assert estimate["ZZ1R"] == pytest.approx(1.25, abs=3 * estimate.deviations[0])
     assert estimate["Fv1"] == pytest.approx(8.05, rel=0.15)
-    late = held_out(least_squares, observations, 0.5)
+    late = holdout_residuals(least_squares, observations, 0.5)
     assert late.total_percent <= 16.8
 
 
-@pytest.mark.parametrize("method", [weighted, robust])
+@pytest.mark.parametrize("method", [weighted, huber])
 def test_methods_explain_the_panda_at_5_hz(panda, method):
     record, D, base = panda
     observations = observe_filtered(D, smoothed(record, 5.0)).grouped(base)
     found = method(observations)
     assert found.residuals.total_percent < 0.99
-    assert held_out(method, observations).total_percent < 1.13
+    assert holdout_residuals(method, observations).total_percent < 1.13
     few = essential(found).estimate
     assert 10 < len(few.names) < 64
     assert few.residuals.total_percent < 1.1
@@ -100,7 +100,7 @@ def test_other_equations_on_the_panda(panda, equations, most):
     found = weighted(observations)
     assert len(found.names) == 64
     assert found.residuals.total_percent < most
-    assert held_out(weighted, observations).total_percent < 2.5 * most
+    assert holdout_residuals(weighted, observations).total_percent < 2.5 * most
     dynamic = weighted(observe_filtered(D, samples).grouped(base))
     for name in ("MX4R", "MY4R", "XX2R"):
         k = dynamic.names.index(name)

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from support.measured_arm import equations, noisy_samples
 
-from mbs.identification import consistent, held_out, observe, plot_residuals, report, weighted
+from mbs.identification import (
+    holdout_residuals,
+    observe,
+    physically_consistent,
+    plot_residuals,
+    report,
+    weighted,
+)
 
 
 def full():
@@ -14,7 +21,7 @@ def full():
 def test_the_report_says_values_deviations_errors_and_excitation():
     observations = full().grouped(equations()[1])
     estimate = weighted(observations)
-    text = report(estimate, ("last quarter", held_out(weighted, observations)))
+    text = report(estimate, ("last quarter", holdout_residuals(weighted, observations)))
     lines = text.splitlines()
     head = f"weighted least squares: {len(estimate.names)} parameters from 500 instants of 3 eff"
     assert head in lines[0]
@@ -32,7 +39,7 @@ def test_the_report_says_values_deviations_errors_and_excitation():
 
 
 def test_the_report_of_a_full_set_speaks_of_bodies():
-    text = report(consistent(full()))
+    text = report(physically_consistent(full()))
     assert "Bodies: all 3 pseudo-inertias are positive definite" in text
     assert "cannot be told apart" not in text
 

@@ -77,7 +77,7 @@ def test_guessed_positions_are_met_if_the_others_can_follow():
     system = four_bar(joint).assemble(guess={"j2": 1.0, "free": 0.2})
     at = dict(zip((c.name for c in system.coordinates), system.configuration, strict=True))
     assert (at["j2"], at["free"]) == (1.0, 0.2)
-    assert mbs.loops.examine(system, system.configuration).is_closed
+    assert mbs.loops.configuration_report(system, system.configuration).is_closed
 
 
 def test_the_report_shows_the_configuration_and_the_guess():

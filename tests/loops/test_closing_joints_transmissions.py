@@ -20,7 +20,7 @@ from mbs.components import (
     Screw,
 )
 from mbs.errors import DescriptionError
-from mbs.loops import closure, reduction_matrix, solve
+from mbs.loops import closure_residual, reduction_matrix, solve
 
 J, M, GRAVITY = 0.3, 2.0, 9.81
 
@@ -143,7 +143,7 @@ def test_inside_another_mechanism():
     system = outer.assemble(guess={"left.rocker_axis": 1.8, "right.rocker_axis": 1.8})
     assert system.closure.mobility == 2
     assert [p.name for p in system.parameters] == ["left.rod_length", "right.rod_length"]
-    phi = closure(system)(system.configuration, [0.8, 0.8])
+    phi = closure_residual(system)(system.configuration, [0.8, 0.8])
     assert np.abs(np.array(phi)).max() < 1e-12
 
 
@@ -198,7 +198,7 @@ def test_the_third_coordinate_follows_in_closed_form(given):
     m = planetary()
     system = m.assemble(active=given)
     wanted = dict(zip(given, (0.4, -0.3), strict=True))
-    (mode,) = mbs.loops.modes(system, wanted)
+    (mode,) = mbs.loops.assembly_modes(system, wanted)
     assert mode.branch == ()
     q = solve(system, wanted, branch=())
     np.testing.assert_allclose(q, solve(system, wanted), atol=1e-12)

@@ -15,9 +15,9 @@ from mbs.components import (
     Revolute,
 )
 from mbs.errors import AssemblyError, ModelError, Unclosable
-from mbs.loops import closure, modes, solve
+from mbs.loops import assembly_modes, closure_residual, solve
 from mbs.loops.closing import TOLERANCE, Closing, closure_parameters
-from mbs.loops.closure import facing
+from mbs.loops.closure_equations import facing
 from mbs.loops.configuration import starts
 from mbs.loops.plan import branches_at, plan
 from mbs.solvers.least_squares import gauss_newton
@@ -41,7 +41,7 @@ def test_a_full_turn_stays_on_the_branch(angle):
     system = four_bar()
     q = solve(system, {"j1": angle})
     assert q[0] == angle
-    assert np.abs(np.array(closure(system)(q))).max() < 1e-12
+    assert np.abs(np.array(closure_residual(system)(q))).max() < 1e-12
     assert elbow(q) == elbow(system.configuration)
     assert np.abs(q[1:]).max() < 8
     T = np.array(mbs.models.direct_geometry(system, "b")(angle))
@@ -59,7 +59,7 @@ def test_a_guess_chooses_the_other_branch():
     system = four_bar()
     q = solve(system, {"j1": 0.3}, guess={"j2": -1.7, "j4": -1.8})
     assert elbow(q) == -elbow(system.configuration)
-    assert np.abs(np.array(closure(system)(q))).max() < 1e-12
+    assert np.abs(np.array(closure_residual(system)(q))).max() < 1e-12
 
 
 def test_positions_of_dependent_joints():
@@ -92,7 +92,7 @@ def test_parameters_move_the_configuration():
     system = m.assemble(guess={"j2": 1.0})
     for length in (0.8, 1.1):
         q = solve(system, {"j1": 0.5}, parameters={"L": length})
-        assert np.abs(np.array(closure(system)(q, [2700, length]))).max() < 1e-12
+        assert np.abs(np.array(closure_residual(system)(q, [2700, length]))).max() < 1e-12
         assert elbow(q, c=length) == elbow(system.configuration)
 
 
@@ -207,8 +207,8 @@ def test_all_axes_of_a_prismatic_cut_must_face_one_way():
 
 def test_a_mode_tells_its_largest_row():
     system = mbs.load("four_bar").assemble()
-    rows = closure(system)
-    found = [modes(system, {"j1": x}) for x in (0.3, 1.1, 2.0)]
+    rows = closure_residual(system)
+    found = [assembly_modes(system, {"j1": x}) for x in (0.3, 1.1, 2.0)]
     told = [mode.residual for some in found for mode in some]
     largest = [np.abs(np.array(rows(mode.q))).max() for some in found for mode in some]
     np.testing.assert_allclose(told, largest, rtol=1e-12)

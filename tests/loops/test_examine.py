@@ -10,8 +10,8 @@ from support.messages import refused
 import mbs
 from mbs.components import Body, Revolute
 from mbs.errors import AssemblyError, DescriptionError, ModelError, SingularPosture, Unclosable
-from mbs.loops import examine
-from mbs.loops.examine import require_determined, row_independence
+from mbs.loops import configuration_report
+from mbs.loops.examination import require_determined, row_independence
 from mbs.loops.velocity import constraint_jacobian, scales
 
 GUESS = {"j1": 1.0, "j2": -0.5, "j4": 1.5}
@@ -31,7 +31,7 @@ def four_bar(crank=0.3, **driven):
 
 def test_a_regular_configuration_is_closed_and_led():
     system = four_bar(actuated=True).assemble(GUESS)
-    state = examine(system, system.configuration)
+    state = configuration_report(system, system.configuration)
     assert state.is_closed
     assert state.is_led
     assert not state.is_singular
@@ -42,7 +42,7 @@ def test_an_open_configuration_says_by_how_much():
     system = four_bar(actuated=True).assemble(GUESS)
     q = np.array(system.configuration)
     q[0] += 0.1
-    state = examine(system, q)
+    state = configuration_report(system, q)
     assert not state.is_closed
     assert 1e-3 < state.residual < 0.1
     refused(
@@ -60,7 +60,7 @@ def test_a_dead_point_is_not_led_and_not_singular():
     crank = math.acos(cosine)
     top = reach * np.array([math.cos(crank), math.sin(crank)])
     q = [crank, 0.0, math.atan2(top[1], top[0] - ground)]
-    state = examine(system, q)
+    state = configuration_report(system, q)
     assert state.is_closed
     assert not state.is_singular
     assert not state.is_led
@@ -70,13 +70,13 @@ def test_a_dead_point_is_not_led_and_not_singular():
         'coordinates="tree"',
         by=lambda: require_determined(system, q, np.empty(0)),
     )
-    assert examine(four_bar().assemble(GUESS, active=["j1"]), q).is_led
+    assert configuration_report(four_bar().assemble(GUESS, active=["j1"]), q).is_led
 
 
 @pytest.mark.parametrize("loops", [1, 2, 3])
 def test_a_row_of_four_bars_in_line_gains_a_motion_for_every_loop(loops):
     system = mbs.robots.n_four_bar(loops).assemble(active=["a0"])
-    flat = examine(system, [0.0] * system.nq)
+    flat = configuration_report(system, [0.0] * system.nq)
     assert flat.is_closed
     assert flat.is_singular
     assert (flat.mobility, flat.generic) == (loops + 1, 1)
@@ -85,13 +85,15 @@ def test_a_row_of_four_bars_in_line_gains_a_motion_for_every_loop(loops):
 
 def test_the_parameters_count():
     system = four_bar(mbs.Parameter("L", 0.3)).assemble(GUESS)
-    assert examine(system, system.configuration).is_closed
-    assert not examine(system, system.configuration, parameters={"L": 0.35}).is_closed
+    assert configuration_report(system, system.configuration).is_closed
+    assert not configuration_report(system, system.configuration, parameters={"L": 0.35}).is_closed
 
 
 def test_an_open_chain_has_nothing_to_examine():
     system = catalogue_system("planar_2r")
-    refused(ModelError, "an open chain has no loops", by=lambda: examine(system, [0, 0]))
+    refused(
+        ModelError, "an open chain has no loops", by=lambda: configuration_report(system, [0, 0])
+    )
 
 
 def test_the_user_chooses_the_independent_joints():

@@ -143,7 +143,7 @@ def test_loops_in_sequence_are_each_nearest(seed):
     for q in (again.configuration, mbs.loops.solve(system, {"main": 0.4}, guess=guess)):
         for name, value in zip(names, q, strict=True):
             assert wrapped(value - wanted[name]) == pytest.approx(0, abs=1e-8), name
-    assert mbs.loops.examine(again, again.configuration).is_closed
+    assert mbs.loops.configuration_report(again, again.configuration).is_closed
 
 
 def test_a_loop_of_a_large_mechanism_moves_to_the_end_of_its_range():

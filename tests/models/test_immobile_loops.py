@@ -209,7 +209,7 @@ def test_regressors(name):
     pair = pair_of(name)
     system = pair.bars
     f = identification.regressor(system)
-    X = identification.numbers_of(system, f.columns)
+    X = identification.numeric_parameters(system, f.columns)
     D = numbers(f(pair.q, pair.v, pair.a))
     expected = numbers(mbs.models.inverse_dynamics(pair.rigid)(pair.rigid_q, pair.v, pair.a))
     known = numbers(identification.known_efforts(system)(pair.q, pair.v))

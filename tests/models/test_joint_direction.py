@@ -215,7 +215,7 @@ def test_regressors(pair):
     back, h = pair.back, 1e-6
     D = identification.regressor(back)
     tau = models.inverse_dynamics(back)(pair.q, pair.v, pair.a).full().ravel()
-    X = DM(identification.values_of(back, D.columns)).full().ravel()
+    X = DM(identification.symbolic_parameters(back, D.columns)).full().ravel()
     np.testing.assert_allclose(D(pair.q, pair.v, pair.a).full() @ X, tau, atol=1e-10)
     # the rate of the momenta, by a central difference, and the rest are the dynamic model
     filtered = identification.filtered_regressor(back)

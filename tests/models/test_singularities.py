@@ -7,7 +7,7 @@ import pytest
 
 import mbs
 
-module = importlib.import_module("mbs.models.singularities")
+module = importlib.import_module("mbs.models._singularities")
 
 
 def planar_arm(size):

@@ -309,7 +309,7 @@ def test_narrower_lanes_give_the_same(flags, monkeypatch, compiler_for_lanes):
     system = TREES["driven3"]()
     q, v, a = random_state(system, np.random.default_rng(0))
     wide = tree_core(system)
-    module = sys.modules["mbs.models.tree_core"]  # the function of this name hides it
+    module = sys.modules["mbs.models._tree_core"]  # the function of this name hides it
     monkeypatch.setattr(module, "FAST_FLAGS", (*compiler_for_lanes, *flags))
     narrow = tree_core(TREES["driven3"]())
     close(narrow.idm(q, v, a), wide.idm(q, v, a), 1e-14)

@@ -7,7 +7,7 @@ from casadi import SX, cos, sin
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from mbs.models.singularities import (
+from mbs.models._singularities import (
     NotTrigonometric,
     factored,
     lowered,

@@ -15,7 +15,7 @@ from mbs.native.batch_source import batch_source
 from mbs.native.c_code import BINARY, ELEMENTWISE
 from mbs.native.kernel import FAST_FLAGS
 
-MODULE = sys.modules["mbs.native.batch"]
+MODULE = sys.modules["mbs.native._batch"]
 INF = float("inf")
 VALUES = np.array(
     [

@@ -14,7 +14,7 @@ import mbs.native
 from mbs.errors import ModelError
 from mbs.native import batch
 
-MODULE = sys.modules["mbs.native.batch"]
+MODULE = sys.modules["mbs.native._batch"]
 
 
 def test_what_stands_beside_an_output_is_not_touched():

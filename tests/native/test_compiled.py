@@ -10,7 +10,7 @@ import mbs
 import mbs.models
 from mbs.errors import CompilerError, ModelError
 from mbs.native import cached_library, compiled
-from mbs.native.compiled import exact_source
+from mbs.native._compiled import exact_source
 
 
 def example():

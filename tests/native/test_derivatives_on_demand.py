@@ -163,7 +163,7 @@ def test_a_record_that_is_damaged_is_an_error(flipped, cache, capfd):
 
 
 def test_without_a_disk_everything_is_made_at_once(cache, monkeypatch):
-    module = sys.modules["mbs.native.compiled"]
+    module = sys.modules["mbs.native._compiled"]
     monkeypatch.setattr(module, "write_record", lambda *_: None)
     f = compiled(example(), derivatives=2)
     assert not list(cache.glob("*.function"))

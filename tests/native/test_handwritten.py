@@ -5,7 +5,7 @@ import numpy as np
 from casadi import SX, Function
 
 from mbs.native import c_source, cached_library, compiled
-from mbs.native.compiled import calls_machine_code
+from mbs.native._compiled import calls_machine_code
 from mbs.native.handwritten import handwritten, handwritten_text, names_declared
 
 COMMON = {

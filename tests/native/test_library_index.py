@@ -13,7 +13,7 @@ from mbs.native.compiler import LIBRARY_SUFFIX, is_whole
 
 pytestmark = pytest.mark.skipif(not compiler_found(), reason="there is no compiler")
 
-MAKER = sys.modules["mbs.native.compiled"]
+MAKER = sys.modules["mbs.native._compiled"]
 POINT = np.array([0.3, -0.7])
 
 

@@ -16,7 +16,7 @@ from support.catalogue_systems import catalogue_system
 from support.random_trees import random_tree
 
 import mbs
-from mbs.export.c_library import example_input
+from mbs.export._c_library import example_input
 from mbs.native import batch, compiled, find_compiler, repeats
 from mbs.native.batch_source import batch_source
 from mbs.native.c_code import blocks, plain_order, slots

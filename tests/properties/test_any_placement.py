@@ -15,7 +15,7 @@ from support.random_trees import random_rotation
 from support.sweeps import examples
 
 import mbs.models
-from mbs.loops import closure
+from mbs.loops import closure_residual
 
 COMMON = dict(deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 NAMES = "ABC"
@@ -215,7 +215,7 @@ def test_cut_joints_with_symbols_close_where_those_with_numbers_do(
     given_p = [p[parameter.name] for parameter in symbolic.parameters]
     assert [c.name for c in symbolic.coordinates] == [c.name for c in plain.coordinates]
     q = np.random.default_rng(seed).uniform(-1.5, 1.5, plain.nq)
-    ours = np.array(closure(symbolic)(q, *([given_p] if inside else []))).ravel()
-    theirs = np.array(closure(plain)(q)).ravel()
+    ours = np.array(closure_residual(symbolic)(q, *([given_p] if inside else []))).ravel()
+    theirs = np.array(closure_residual(plain)(q)).ravel()
     # a spherical joint leaves the coincidence of two points, in axes that may differ
     assert np.linalg.norm(ours) == pytest.approx(np.linalg.norm(theirs), abs=1e-12)

@@ -13,7 +13,7 @@ from support.sweeps import examples
 import mbs.models
 import mbs.simulate
 from mbs import MbsError
-from mbs.loops import closure
+from mbs.loops import closure_residual
 
 COMMON = dict(deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 
@@ -86,7 +86,7 @@ def test_closed_mechanism_assembles_and_its_models_agree(drawn):
     mechanism, guess = drawn
     system = mechanism.assemble(guess=guess)
     q = np.array(system.configuration)
-    assert np.abs(np.array(closure(system)(q))).max() < 1e-12
+    assert np.abs(np.array(closure_residual(system)(q))).max() < 1e-12
     rng = np.random.default_rng(0)
     v_a, a_a = rng.uniform(-1, 1, (2, len(system.active)))
     tau = mbs.models.inverse_dynamics(system)(q, v_a, a_a)
@@ -106,7 +106,7 @@ def test_loops_stay_closed_along_a_motion(drawn):
         system, 0.5, q0=list(system.configuration), step=0.05, tolerance=1e-9, quiet=True
     )
     for row in result.values:
-        residual = np.array(closure(system)(row[: system.nq]))
+        residual = np.array(closure_residual(system)(row[: system.nq]))
         assert np.abs(residual).max() < 1e-12
     losses = dissipated(system, result)
     total = result["kinetic_energy"] + result["potential_energy"]

@@ -6,7 +6,6 @@ from support.closed_mechanisms import planar_loop
 
 import mbs
 from mbs.components import (
-    Attraction,
     Body,
     Box,
     Bushing,
@@ -15,6 +14,7 @@ from mbs.components import (
     JointFriction,
     JointStop,
     Planar,
+    PointGravity,
     PointMass,
     Prismatic,
     Revolute,
@@ -76,7 +76,7 @@ def test_orbit_under_central_gravity():
     satellite = m.add(PointMass("satellite", mass=2.0))
     m.connect(m.world, Planar("p", actuated=False), m.add(Body("frame", inertia=(1, 1, 1), mass=0)))
     m.connect(m.components["frame"], satellite)
-    m.add(Attraction("gravity", m.world, satellite, strength=2.0))
+    m.add(PointGravity("gravity", m.world, satellite, strength=2.0))
     speed = np.sqrt(2 / 1.5 - 1)
     result = run(m.assemble(), 2 * np.pi, q0={"p.s_x": 1.5}, v0={"p.s_y": speed}, step=np.pi / 50)
     half = len(result.time) // 2

@@ -10,7 +10,7 @@ from mbs.models.state.tree import full_state
 from mbs.native import compiler_found
 from mbs.robots import n_four_bar
 
-INTEGRATE = sys.modules["mbs.solvers.integrate"]
+INTEGRATE = sys.modules["mbs.solvers._integrate"]
 SINGULAR = sys.modules["mbs.models.state.singular_configurations"]
 
 

@@ -14,7 +14,7 @@ from mbs.errors import SolverError
 from mbs.models.state import singular_configurations
 from mbs.solvers import problem
 
-INTEGRATE = importlib.import_module("mbs.solvers.integrate")
+INTEGRATE = importlib.import_module("mbs.solvers._integrate")
 
 
 def windows(count, longer=0.0, balls=False):

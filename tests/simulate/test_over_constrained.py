@@ -8,7 +8,7 @@ from support.catalogue_systems import catalogue_system
 import mbs
 from mbs.components import Body, Revolute
 from mbs.errors import SolverError
-from mbs.loops import examine, modes
+from mbs.loops import assembly_modes, configuration_report
 
 CASES = [((0.9, 1.7), 1, 3), ((0.3, 1.2), 0, 3), ((1.4, 0.5), 2, 0), ((2.5, 0.8), 0, 3)]
 
@@ -32,7 +32,7 @@ def test_the_motion_does_not_depend_on_which_joint_is_cut():
     motions = []
     for cut in (2, 3):
         system = bennett(1, cut, (0.9, 1.7))
-        start = modes(system, [0.5])[0].q
+        start = assembly_modes(system, [0.5])[0].q
         result = mbs.simulate.run(
             system, 2.0, q0=list(start), v0={"j1": 6.0}, tolerance=1e-10, quiet=True
         )
@@ -48,8 +48,8 @@ def test_models_hold_where_the_kept_rows_are_dependent(twists, driven, cut):
     G, J = mbs.loops.reduction_matrix(system), mbs.loops.closure_jacobian(system)
     weakest = 1.0
     for x in np.linspace(-3.0, 3.0, 61):
-        (mode,) = modes(system, [x])
-        weakest = min(weakest, examine(system, mode.q).leads)
+        (mode,) = assembly_modes(system, [x])
+        weakest = min(weakest, configuration_report(system, mode.q).leads)
         tau = idm(mode.q, [1.5], [0.7])
         assert float(ddm(mode.q, [1.5], tau)) == pytest.approx(0.7, rel=1e-8)
         assert np.abs(np.array(J(mode.q)) @ np.array(G(mode.q))).max() < 1e-9
@@ -63,9 +63,9 @@ def test_energy_is_exchanged_as_the_models_say():
     gravity = mbs.models.gravity_effort(system)
     for x in (-2.0, 0.0, 1.0):
         h = 1e-6
-        low, high = (modes(system, [x + sign * h])[0].q for sign in (-1, 1))
+        low, high = (assembly_modes(system, [x + sign * h])[0].q for sign in (-1, 1))
         slope = (float(energy(high, [0])[1]) - float(energy(low, [0])[1])) / (2 * h)
-        assert float(gravity(modes(system, [x])[0].q)) == pytest.approx(slope, abs=1e-6)
+        assert float(gravity(assembly_modes(system, [x])[0].q)) == pytest.approx(slope, abs=1e-6)
 
 
 def test_planar_loops_keep_their_rows():
@@ -83,7 +83,7 @@ def test_wrenches_stay_of_one_size_all_the_way_round():
     rates = mbs.models.acceleration_closure(system)
     largest = []
     for x in np.linspace(-3.0, 3.0, 41):
-        (mode,) = modes(system, [x])
+        (mode,) = assembly_modes(system, [x])
         v = np.array(G(mode.q)) @ [1.0]
         a = np.array(rates(mode.q, [1.0])[2]).ravel()
         tau = np.zeros(system.nv)
@@ -97,7 +97,7 @@ def test_wrenches_stay_of_one_size_all_the_way_round():
 def test_a_motion_that_is_prescribed_goes_all_the_way_round():
     """The law goes on where one leg ends and the next begins."""
     system = bennett(1, 3, (0.9, 1.7))
-    start = modes(system, [0.5])[0].q[system.active[0]]
+    start = assembly_modes(system, [0.5])[0].q[system.active[0]]
     result = mbs.simulate.run(
         system, 2.5, motion={"j1.q": lambda t: start + 3 * t}, tolerance=1e-9, quiet=True
     )

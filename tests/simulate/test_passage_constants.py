@@ -10,7 +10,7 @@ from support.runtime import integrate_with, with_constant
 import mbs
 from mbs.errors import SolverError
 
-INTEGRATE = importlib.import_module("mbs.solvers.integrate")
+INTEGRATE = importlib.import_module("mbs.solvers._integrate")
 PARALLELOGRAM, MEETS, ANTI = "parallelogram", "a+g=b+c", "antiparallelogram"
 SYSTEMS = {
     PARALLELOGRAM: lambda: mbs.robots.n_four_bar().assemble(active=["a0"]),

@@ -38,7 +38,7 @@ def test_a_loop_of_another_size_moves_alike(size):
     """With gravity in proportion the motion does not depend on the size."""
     assert crank_angles(size) == pytest.approx(crank_angles(1.0), abs=1e-6)
     leads = [
-        mbs.loops.examine(spatial_loop(s), spatial_loop(1.0).configuration).leads
+        mbs.loops.configuration_report(spatial_loop(s), spatial_loop(1.0).configuration).leads
         for s in (1.0, size)
     ]
     assert leads[1] == pytest.approx(leads[0], rel=0.2)  # other rows may have been kept

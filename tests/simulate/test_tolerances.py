@@ -10,7 +10,7 @@ import mbs
 from mbs.components import Body, Prismatic, Revolute, Spring
 from mbs.errors import ModelError
 
-INTEGRATE = importlib.import_module("mbs.solvers.integrate")
+INTEGRATE = importlib.import_module("mbs.solvers._integrate")
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from mbs.native import compiler_found
 from mbs.solvers import integrate, integrate_events
 from mbs.solvers.problem import equations
 
-INTEGRATE = importlib.import_module("mbs.solvers.integrate")
+INTEGRATE = importlib.import_module("mbs.solvers._integrate")
 T, X, P = ca.SX.sym("t"), ca.SX.sym("x", 2), ca.SX.sym("p")
 OSCILLATOR = ca.Function("oscillator", [T, X, P], [ca.vertcat(X[1], -(P**2) * X[0])])
 PENDULUM = ca.Function("pendulum", [T, X, P], [ca.vertcat(X[1], -P * ca.sin(X[0]))])

@@ -11,9 +11,9 @@ from mbs.spatial import (
     MatrixRotation,
     PseudoInertia,
     ScrewDisplacement,
-    body_through,
     origin,
-    wrench_through,
+    transform_inertia_along,
+    transform_wrench_along,
 )
 
 ANGLES = (0.0, 0.7, np.pi / 2, -np.pi / 2, np.pi, -np.pi)
@@ -115,10 +115,10 @@ def test_successive_displacements(rng):
         np.testing.assert_allclose(numeric(origin(steps)), p, atol=1e-15)
         f, m = rng.standard_normal((2, 3))
         X = force_transform(R, p)
-        moved = wrench_through(steps, sx(f), sx(m))
+        moved = transform_wrench_along(steps, sx(f), sx(m))
         expected = X @ np.concatenate([f, m])
         np.testing.assert_allclose(np.concatenate([*map(numeric, moved)]), expected, atol=4e-15)
         J, ms = np.diag([1.0, 1.5, 2.0]), rng.standard_normal(3)
-        body = body_through(steps, Inertia(sx(J), sx(ms), SX(1.2)))
+        body = transform_inertia_along(steps, Inertia(sx(J), sx(ms), SX(1.2)))
         got = spatial_inertia(numeric(body.J), numeric(body.ms), float(body.m))
         np.testing.assert_allclose(got, X @ spatial_inertia(J, ms, 1.2) @ X.T, atol=2e-14)

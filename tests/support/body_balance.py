@@ -99,7 +99,7 @@ def tree_state(system, v_a, a_a):
     q = np.array(system.configuration)
     G = np.array(mbs.loops.reduction_matrix(system)(q))
     psi = np.array(mbs.models.acceleration_closure(system)(q, v_a)[0])
-    count = mbs.loops.closure(system).size1_out(0)
+    count = mbs.loops.closure_residual(system).size1_out(0)
     rows = [*system.closure.rows, *(count + k for k in system.closure.slips)]
     J = np.array(mbs.loops.closure_jacobian(system)(q))[rows]
     passive = list(system.closure.passive)

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 import mbs
-from mbs.identification import Record, Samples, base_parameters, regressor, values_of
+from mbs.identification import Record, Samples, base_parameters, regressor, symbolic_parameters
 from mbs.robots.rows import cuboid, frame, robot
 
 RATE = 400.0
@@ -40,7 +40,7 @@ def equations():
 
 def mbs_values(columns):
     """(k,) the parameters of the arm as floats."""
-    return [float(x) for x in values_of(arm(), columns).elements()]
+    return [float(x) for x in symbolic_parameters(arm(), columns).elements()]
 
 
 def motion(seed=0, rate=RATE):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from support.catalogue_systems import catalogue_system
 
-from mbs.identification import Record, joint_side
+from mbs.identification import Record, motor_to_joint
 from mbs.robots.rows import frame, robot
 
 _ROOT = Path(__file__).parents[2]
@@ -43,7 +43,7 @@ def tx40_record():
     """System and record of a Staubli TX40: 9 s at 5 kHz, motor positions and currents."""
     numbers = _archive("tx40_5khz.npz")
     system = tx40()
-    q, tau = joint_side(_TX40_RATIOS, numbers["motor_position"], numbers["motor_current"])
+    q, tau = motor_to_joint(_TX40_RATIOS, numbers["motor_position"], numbers["motor_current"])
     q = q + np.array([0, -np.pi / 2, np.pi / 2, 0, 0, 0])
     return system, Record.of(system, np.arange(len(q)) / 5000, q, tau)
 

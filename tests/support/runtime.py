@@ -13,7 +13,7 @@ from mbs.core import core_files, evaluations
 from mbs.core.build import SOURCE, build
 from mbs.native import cached_library
 
-integrate_module = importlib.import_module("mbs.solvers.integrate")
+integrate_module = importlib.import_module("mbs.solvers._integrate")
 
 INTEGRATION = (
     *("module", "model", "driver", "stepper", "dopri5", "rodas", "events", "dense"),

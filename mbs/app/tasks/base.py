@@ -14,8 +14,8 @@ import numpy as np
 from casadi import Function
 
 from mbs.assembly import System
-from mbs.identification.base_parameters import METHODS, BaseParameters, base_parameters
-from mbs.identification.regressors import values_of
+from mbs.identification._base_parameters import METHODS, BaseParameters, base_parameters
+from mbs.identification.regressors import symbolic_parameters
 
 __all__ = ["METHODS", "BaseRow", "BaseTable", "base"]
 
@@ -111,7 +111,7 @@ def _values(found: BaseParameters) -> list[float | None]:
     """Return the values of the base parameters with the values of the description."""
     system = found.system
     p = [system.p] if system.parameters else []
-    symbolic = found.function(values_of(system, found.columns), *p)
+    symbolic = found.function(symbolic_parameters(system, found.columns), *p)
     at = Function("values", [system.p], [symbolic])
     numbers = np.array(at(system.p_default), dtype=float).ravel()
     return [float(x) if math.isfinite(x) else None for x in numbers]

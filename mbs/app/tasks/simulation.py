@@ -368,7 +368,7 @@ enough frames of a short motion, and not more than a page can load at once."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Film:
+class Movie:
     """Movie of a simulation: the result, and the configurations at some of its rows.
 
     Attributes:
@@ -383,7 +383,7 @@ class Film:
     configurations: NDArray[np.float64]
 
 
-def film(system: System, settings: SimulationSettings | None = None) -> Film:
+def film(system: System, settings: SimulationSettings | None = None) -> Movie:
     """Simulate a system and select about thirty frames per second for a movie, at most 600.
 
     Args:
@@ -404,7 +404,7 @@ def film(system: System, settings: SimulationSettings | None = None) -> Film:
     return filmed(system, run(system, **arguments, quiet=True))
 
 
-def filmed(system: System, result: Result) -> Film:
+def filmed(system: System, result: Result) -> Movie:
     """Select the frames of a movie from a result.
 
     Args:
@@ -415,4 +415,4 @@ def filmed(system: System, result: Result) -> Film:
     wanted = min(max(span * _PER_SECOND, _FEWEST_FRAMES), _MOST_FRAMES, len(result))
     rows = np.unique(np.linspace(0, len(result) - 1, int(wanted)).round().astype(int))
     q = np.column_stack([result[f"{c.name}.q"] for c in system.coordinates])
-    return Film(result, result.time[rows], q[rows])
+    return Movie(result, result.time[rows], q[rows])

@@ -17,7 +17,7 @@ from mbs.app.tasks.equations import entry
 from mbs.assembly import System
 from mbs.loops.closing import Closing, difference
 from mbs.models import singularities
-from mbs.models.singularities import SingularFactor
+from mbs.models._singularities import SingularFactor
 from mbs.solvers.least_squares import gauss_newton
 
 # Condition under which a factor of a determinant is zero, in words.

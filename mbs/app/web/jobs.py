@@ -37,7 +37,7 @@ _STEP = 0.01
 """Smallest increase of the completed fraction for which a progress message is sent."""
 
 
-class Broken(MbsError):
+class JobError(MbsError):
     """Failure of a computation that the user did not cause."""
 
 
@@ -59,7 +59,7 @@ async def run(
         progress: callable (label, completed fraction from 0 to 1).
 
     Raises:
-        MbsError: error of the task; `Broken` for any other failure, which is logged.
+        MbsError: error of the task; `JobError` for any other failure, which is logged.
     """
     folder = tempfile.mkdtemp(prefix="mbs-app-")
     ours, theirs = multiprocessing.Pipe(duplex=False)
@@ -121,7 +121,7 @@ def _refuse(kind: str, name: str, told: str) -> NoReturn:
         known = getattr(errors, name, MbsError)
         raise known(told)
     _LOG.error("a job broke: %s\n%s", name, told)
-    raise Broken(
+    raise JobError(
         f"this could not be computed ({name}); the log has the details, please report it with the"
         " robot and what you asked for"
     )

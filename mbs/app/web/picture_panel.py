@@ -12,11 +12,11 @@ from nicegui import events, ui
 
 from mbs.app.web.app import App
 from mbs.app.web.document.tables import number
-from mbs.app.web.session import Handle, assembly_modes, handles, mode_of
+from mbs.app.web.session import Handle, handles, listed_modes, mode_of
 from mbs.app.web.style import VIEW
 from mbs.errors import MbsError
 from mbs.loops import Mode
-from mbs.view.scene import COVERED
+from mbs.view._scene import COVERED
 
 # Sliders of the coordinates that can be moved, dependent coordinates, and assembly modes.
 
@@ -124,7 +124,7 @@ class JointSliders:
         self._mode_row.set_visibility(closed)
         if system is None or not closed:
             return
-        found = await self._app.aside(assembly_modes, system, q)
+        found = await self._app.aside(listed_modes, system, q)
         if (system, q) != (self._app.session.system, self._app.q):
             return  # the configuration changed meanwhile; the next refresh is pending
         if isinstance(found, str):

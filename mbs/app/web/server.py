@@ -59,7 +59,7 @@ def serve(
     number = free_port(port)
     serve_assets()
     app.storage.max_tab_storage_age = _DAY
-    app.add_middleware(Guard)
+    app.add_middleware(HostFilter)
     app.on_startup(warm_up)
     address = f"http://{HOST}:{number}/"
     app.on_startup(lambda: print(f"The app is at {address}; Ctrl+C ends it.", flush=True))
@@ -78,7 +78,7 @@ def serve(
     )
 
 
-class Guard:
+class HostFilter:
     """Middleware that rejects requests to other host names or from pages of other sites."""
 
     def __init__(self, app: Any) -> None:

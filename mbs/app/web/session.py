@@ -16,9 +16,9 @@ from mbs.app.web.document.tables import Tables
 from mbs.assembly import System
 from mbs.assembly.tree import quaternion_slices
 from mbs.errors import DescriptionError, LoopError, MbsError, NoClosedForm, Unclosable
-from mbs.loops import Mode, modes
+from mbs.loops import Mode, assembly_modes
+from mbs.loops._function import independent_names
 from mbs.loops.closing import Closing, closure_parameters, follow_configuration
-from mbs.loops.function import independent_names
 
 # Configurations of the picture: coordinates that the user moves, and the dependent coordinates.
 
@@ -159,7 +159,7 @@ def carried(old: System | None, q: Sequence[float], new: System) -> Vector:
     return tuple(float(x) for x in closed.q) if closed.is_closed else new.configuration
 
 
-def assembly_modes(system: System, q: Sequence[float]) -> tuple[Mode, ...] | str:
+def listed_modes(system: System, q: Sequence[float]) -> tuple[Mode, ...] | str:
     """Find all assembly modes of the mechanism with its independent joints as in q.
 
     Returns:
@@ -169,7 +169,7 @@ def assembly_modes(system: System, q: Sequence[float]) -> tuple[Mode, ...] | str
         return ()
     known = {handle.name: q[handle.index] for handle in handles(system)}
     try:
-        found = modes(system, known)
+        found = assembly_modes(system, known)
     except NoClosedForm:
         return "its loops are closed by iteration, so that its assembly modes cannot be listed"
     except LoopError as error:

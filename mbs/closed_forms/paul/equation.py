@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mbs.closed_forms.paul.splits import (
     MOST_VARIABLES,
     SIZE,
-    Knowledge,
+    KnownFrames,
     Members,
     SplitRow,
     Values,
@@ -98,7 +98,7 @@ class Equation:
         return np.zeros(1, dtype=complex) if part is None else part.values
 
 
-def equations(knowledge: Knowledge, most: int = PRODUCTS) -> tuple[Equation, ...]:
+def equations(knowledge: KnownFrames, most: int = PRODUCTS) -> tuple[Equation, ...]:
     """Return the equations of all splits with few unknowns, the two cheapest of equal equations.
 
     Args:
@@ -264,7 +264,7 @@ def ring_matrices(ring: Ring) -> RingMatrices:
     return RingMatrices(on, back, SX(length))
 
 
-def factor(knowledge: Knowledge, matrices: RingMatrices, equation: Equation, key: Key) -> Factor:
+def factor(knowledge: KnownFrames, matrices: RingMatrices, equation: Equation, key: Key) -> Factor:
     """Return the coefficient of a product of the variables (key) of an equation, as expression."""
     total, part = Factor(SX(0), SX(0)), equation.parts.get(key)
     if part is None:
@@ -287,7 +287,9 @@ def _rotate(own: Factor, angle: SX, conjugate: bool) -> Factor:
     return Factor(SX(X), SX(-Y if conjugate else Y))
 
 
-def _own(knowledge: Knowledge, matrices: RingMatrices, equation: Equation, term: Members) -> Factor:
+def _own(
+    knowledge: KnownFrames, matrices: RingMatrices, equation: Equation, term: Members
+) -> Factor:
     """Return X and Y of one product of powers of the joints."""
     joints = knowledge.ring.joints
     prismatic = {k: power for k, power in term if not joints[k].is_rotational}
@@ -321,7 +323,7 @@ def _has_partner(
 
 
 def _mix(
-    knowledge: Knowledge,
+    knowledge: KnownFrames,
     matrices: RingMatrices,
     row: SplitRow,
     term: tuple[Mapping[int, int], list[tuple[int, int]]],
@@ -340,7 +342,7 @@ def _mix(
 
 
 def _coefficient(
-    knowledge: Knowledge, matrices: RingMatrices, row: SplitRow, chosen: Mapping[int, int]
+    knowledge: KnownFrames, matrices: RingMatrices, row: SplitRow, chosen: Mapping[int, int]
 ) -> SX:
     """Return the coefficient of a product of elementary functions of the joints.
 
@@ -368,7 +370,7 @@ def _steps(row: SplitRow, n: int, direction: int) -> Iterator[tuple[str, int]]:
 
 
 def _along(
-    knowledge: Knowledge,
+    knowledge: KnownFrames,
     matrices: RingMatrices,
     path: tuple[SplitRow, list[tuple[str, int]], int],
     chosen: Mapping[int, int],
@@ -388,7 +390,7 @@ def _along(
     return SX(r[0, 0] + r[0, 6 + row.seed])
 
 
-def _joint(knowledge: Knowledge, k: int, number: int, direction: int) -> SX:
+def _joint(knowledge: KnownFrames, k: int, number: int, direction: int) -> SX:
     """Return one basis matrix of an unknown joint, or the matrix of a known joint."""
     joint = knowledge.ring.joints[k]
     sign = direction * joint.sign

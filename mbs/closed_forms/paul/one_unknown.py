@@ -10,7 +10,7 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from mbs.closed_forms.paul.equation import Equation, Factor, Key, RingMatrices, factor
-from mbs.closed_forms.paul.splits import Knowledge, Variable
+from mbs.closed_forms.paul.splits import KnownFrames, Variable
 from mbs.closed_forms.sequence import (
     ZERO,
     Found,
@@ -40,7 +40,7 @@ class PaulStage:
         equations: equations that hold.
     """
 
-    knowledge: Knowledge
+    knowledge: KnownFrames
     matrices: RingMatrices
     equations: tuple[Equation, ...]
 

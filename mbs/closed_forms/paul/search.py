@@ -14,7 +14,7 @@ from mbs.closed_forms.paul.eliminated import eliminated
 from mbs.closed_forms.paul.equation import PRODUCTS, equations, ring_matrices
 from mbs.closed_forms.paul.linear import linear
 from mbs.closed_forms.paul.one_unknown import Candidate, PaulStage, one_unknown
-from mbs.closed_forms.paul.splits import Knowledge, Variable, beginning
+from mbs.closed_forms.paul.splits import KnownFrames, Variable, beginning
 from mbs.closed_forms.paul.two_unknowns import two_unknowns
 from mbs.closed_forms.sequence import ZERO, Found, Problem, SequenceStep, StepSequence, step
 from mbs.components.joints import Motion
@@ -56,7 +56,7 @@ def _alone(stage: PaulStage) -> Iterator[tuple[Variable, SX, str]]:
                 yield _angle(knowledge, k), value, f"{text}, {other}"
 
 
-def _angle(knowledge: Knowledge, k: int) -> Variable:
+def _angle(knowledge: KnownFrames, k: int) -> Variable:
     return Variable(not knowledge.ring.joints[k].is_rotational, ((k, 1),))
 
 

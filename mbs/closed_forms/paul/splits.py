@@ -62,7 +62,7 @@ class LoopSamples:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Knowledge:
+class KnownFrames:
     """Known quantities at one stage of the search.
 
     Attributes:
@@ -104,7 +104,7 @@ class Knowledge:
             return self.ring.joints[variable.members[0][0]].name
         return str(self.problem.x[self.index(variable)])
 
-    def with_joint(self, variable: Variable) -> Knowledge:
+    def with_joint(self, variable: Variable) -> KnownFrames:
         """Return a copy in which one more variable is known."""
         if variable.single:
             return replace(self, known=self.known | {variable.members[0][0]})
@@ -119,7 +119,7 @@ class Knowledge:
         return SX(self.problem.x[self.index(Variable(False, ((k, 1),)))])
 
 
-def _rest(knowledge: Knowledge, variable: Variable, index: int) -> tuple[Variable, SX, Matrix]:
+def _rest(knowledge: KnownFrames, variable: Variable, index: int) -> tuple[Variable, SX, Matrix]:
     """Return a known sum without its known members: variable, expression, values at samples."""
     value = SX(knowledge.problem.x[index])
     members = [member for member in variable.members if member[0] not in knowledge.known]
@@ -134,9 +134,9 @@ def _rest(knowledge: Knowledge, variable: Variable, index: int) -> tuple[Variabl
     return Variable(False, tuple(members)), value, at_samples
 
 
-def beginning(problem: Problem, ring: Ring) -> Knowledge:
+def beginning(problem: Problem, ring: Ring) -> KnownFrames:
     """Return the state at the start of a search, with no known joint."""
-    return Knowledge(problem, ring, _samples(problem, ring))
+    return KnownFrames(problem, ring, _samples(problem, ring))
 
 
 def _samples(problem: Problem, ring: Ring) -> LoopSamples:
@@ -293,7 +293,7 @@ class _Pieces:
     prismatic: frozenset[int]
 
 
-def splits(knowledge: Knowledge) -> Iterator[FrameSplit]:
+def splits(knowledge: KnownFrames) -> Iterator[FrameSplit]:
     """Yield each split of the loop with few unknown joints on each side."""
     whole = _pieces(knowledge, slice(0, SIZE))
     directions = _pieces(knowledge, _DIRECTION)
@@ -393,7 +393,7 @@ def _through(side: Side, k: int, basis: Tensor) -> Side:
     return Side((*side.joints, k), values.reshape(S, d, columns, 3 * K))
 
 
-def _pieces(knowledge: Knowledge, block: slice) -> _Pieces:
+def _pieces(knowledge: KnownFrames, block: slice) -> _Pieces:
     joints = knowledge.unknown
     gaps = [_merge(knowledge, k) for k in joints]
     ways = [represented(T)[:, block, block] for T in gaps]
@@ -404,7 +404,7 @@ def _pieces(knowledge: Knowledge, block: slice) -> _Pieces:
     return _Pieces(joints, ways, back, turns, turns_back, prismatic)
 
 
-def _merge(knowledge: Knowledge, k: int) -> Matrix:
+def _merge(knowledge: KnownFrames, k: int) -> Matrix:
     """Return the transform (samples, 4, 4) from the previous unknown joint to joint k."""
     ring, samples = knowledge.ring, knowledge.samples
     T, n = samples.gaps[:, k], len(ring.joints)
@@ -417,7 +417,7 @@ def _merge(knowledge: Knowledge, k: int) -> Matrix:
     return T
 
 
-def _basis(knowledge: Knowledge, k: int, direction: int) -> Tensor:
+def _basis(knowledge: KnownFrames, k: int, direction: int) -> Tensor:
     """Return factors (3, 15, 15) of e^-iq, 1, e^iq, or of r, 1, r^2."""
     joint = knowledge.ring.joints[k]
     one, first, second = joint_basis(not joint.is_rotational)

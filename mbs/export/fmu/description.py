@@ -154,7 +154,7 @@ class PageTable:
 
 
 @dataclass(frozen=True, slots=True)
-class About:
+class Documentation:
     """Tables and drawing of the documentation.
 
     Attributes:
@@ -601,8 +601,8 @@ class FmuModel(Experiment):
             it is not checked.
         sines: `sines(x, z, p) -> (2, 1)`, squared sines that measure the distance from singular
             configurations: the first for the closure rows of the dependent joints, the second for
-            all closure rows, see `mbs.loops.examine`. Derivatives are an error if the sine is too
-            small. None if it is not checked.
+            all closure rows, see `mbs.loops.configuration_report`. Derivatives are an error if the
+            sine is too small. None if it is not checked.
         passive: index in y of the first velocity of a dependent joint, index of the first
             acceleration, and number of each.
         tree: equations of motion in the coordinates of all joints, for "dopri5" and "rodas", and
@@ -639,7 +639,7 @@ class FmuModel(Experiment):
     terminals: tuple[Terminal, ...] = ()
     sources: tuple[tuple[str, str], ...] = ()
     arrays: tuple[Array, ...] = ()
-    about: About | None = None
+    about: Documentation | None = None
 
     def __post_init__(self) -> None:
         check(self)

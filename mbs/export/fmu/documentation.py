@@ -11,7 +11,14 @@ from casadi import SX
 from mbs.assembly import System
 from mbs.assembly.tables import JointRow, LinkRow
 from mbs.assembly.tree import Link
-from mbs.export.fmu.description import WITH_START, About, FmuModel, FmuVariable, Kind, PageTable
+from mbs.export.fmu.description import (
+    WITH_START,
+    Documentation,
+    FmuModel,
+    FmuVariable,
+    Kind,
+    PageTable,
+)
 from mbs.expressions import MORE_THAN_ZERO
 from mbs.operations import count
 from mbs.spatial.inertia import TEN_PARAMETERS
@@ -199,7 +206,7 @@ _LONGEST = 24
 """Greatest length of an expression in a table cell, in characters."""
 
 
-def about(system: System) -> About:
+def about(system: System) -> Documentation:
     """Return the drawing at the assembled configuration and tables of joints, links and loops.
 
     Args:
@@ -212,7 +219,7 @@ def about(system: System) -> About:
         _bodies(system),
         _loops(system),
     )
-    return About(tuple(table for table in tables if table.rows), drawing(system))
+    return Documentation(tuple(table for table in tables if table.rows), drawing(system))
 
 
 def _joints(system: System) -> PageTable:

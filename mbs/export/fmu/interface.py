@@ -15,13 +15,13 @@ from mbs.errors import ModelError
 from mbs.export.fmu.controller import Controller
 from mbs.export.fmu.description import FmuVariable, Member, Terminal, once, structured_name
 from mbs.export.fmu.variables import POSE, WRENCH, frame_text, pose
-from mbs.loops.closure import closure_rows
-from mbs.models.energy import energy
+from mbs.loops.closure_equations import closure_rows
+from mbs.models._energy import energy
+from mbs.models._joint_wrenches import wrenches_of_joints
+from mbs.models._measurements import readings
 from mbs.models.geometry import terminal_frame
-from mbs.models.joint_wrenches import wrenches_of_joints
-from mbs.models.measurements import readings
-from mbs.models.state.independent import DriveInputs, Seen
-from mbs.models.symbols import ModelSymbols, Surroundings, outputs_of, symbols_of
+from mbs.models.state.independent import DriveInputs, OutputContext
+from mbs.models.symbols import ExternalForces, ModelSymbols, outputs_of, symbols_of
 from mbs.recursions.poses import link_poses
 from mbs.recursions.route import BASE, relative_acceleration, relative_motion, relative_pose
 from mbs.recursions.velocities import link_accelerations, link_velocities, resting_base
@@ -167,7 +167,7 @@ Labels = Sequence[str]
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class OutputKind:
     """Kind of outputs on request. Each output group has a label, such as the name of a frame.
 
     Attributes:
@@ -179,7 +179,7 @@ class Shown:
 
     labels: Callable[[System], list[str]]
     variables: Callable[[System, str], Iterator[FmuVariable]]
-    values: Callable[[System, Seen, Labels], list[SX]]
+    values: Callable[[System, OutputContext, Labels], list[SX]]
     group: str = ""
 
 
@@ -227,7 +227,7 @@ def observed_variables(system: System, request: Request) -> tuple[FmuVariable, .
     )
 
 
-def observed_values(system: System, request: Request, seen: Seen) -> list[SX]:
+def observed_values(system: System, request: Request, seen: OutputContext) -> list[SX]:
     """Return the expressions of the requested outputs, in the order of `observed_variables`."""
     return [
         value
@@ -267,12 +267,12 @@ def _sensor_variables(system: System, label: str) -> Iterator[FmuVariable]:
                 yield FmuVariable(name=name, unit=unit, description=f"read by {label}")
 
 
-def _sensor_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
+def _sensor_values(system: System, seen: OutputContext, labels: Labels) -> list[SX]:
     for attached in system.sensors:
         if attached.joint is not None and attached.sensor.name in labels:
             _check_weld(system, seen, attached.joint)
 
-    def read(s: ModelSymbols, a: SX, tau: SX, around: Surroundings) -> list[SX]:
+    def read(s: ModelSymbols, a: SX, tau: SX, around: ExternalForces) -> list[SX]:
         every = iter(readings(system, s, a, tau, around))
         found = {
             attached.sensor.name: [next(every)[1] for _ in attached.outputs]
@@ -287,7 +287,7 @@ def _energy_variables(system: System, label: str) -> Iterator[FmuVariable]:
     yield FmuVariable(name=f"energy.{label}", unit="J", description=f"{label} energy")
 
 
-def _energy_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
+def _energy_values(system: System, seen: OutputContext, labels: Labels) -> list[SX]:
     values = outputs_of(system, energy(system, "tree"), seen.q, seen.v)
     return [dict(zip(_ENERGIES, values, strict=True))[label] for label in labels]
 
@@ -300,7 +300,7 @@ def _closure_variables(system: System, label: str) -> Iterator[FmuVariable]:
     yield FmuVariable(name="closure", description=text)
 
 
-def _closure_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
+def _closure_values(system: System, seen: OutputContext, labels: Labels) -> list[SX]:
     rows = closure_rows(system, seen.q) if system.is_closed else SX(0)
     return [SX(casadi.mmax(casadi.fabs(rows)))]
 
@@ -313,7 +313,7 @@ def _pose_variables(system: System, label: str) -> Iterator[FmuVariable]:
     return pose(label, frame_text(frame_of(system, label)))
 
 
-def _pose_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
+def _pose_values(system: System, seen: OutputContext, labels: Labels) -> list[SX]:
     values = []
     for label in labels:
         T = relative_pose(system.tree, seen.q, BASE, _frame(system, label))
@@ -334,7 +334,7 @@ def _motion_variables(system: System, label: str) -> Iterator[FmuVariable]:
         yield FmuVariable(name=f"{label}.{element}", unit=unit, description=text)
 
 
-def _motion_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
+def _motion_values(system: System, seen: OutputContext, labels: Labels) -> list[SX]:
     tree, poses = system.tree, link_poses(system.tree, seen.q)
     moving = link_velocities(tree, poses, seen.v)
     rates = link_accelerations(tree, poses, seen.v, seen.a, resting_base(zeros()))
@@ -362,19 +362,19 @@ def _wrench_variables(system: System, label: str) -> Iterator[FmuVariable]:
             yield FmuVariable(name=f"{label}.{kind}.{axis}", unit=unit, description=text)
 
 
-def _wrench_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
+def _wrench_values(system: System, seen: OutputContext, labels: Labels) -> list[SX]:
     numbers = [_joints(system).index(label) for label in labels]
     for number in numbers:
         _check_weld(system, seen, number)
 
-    def between(s: ModelSymbols, a: SX, tau: SX, around: Surroundings) -> list[SX]:
+    def between(s: ModelSymbols, a: SX, tau: SX, around: ExternalForces) -> list[SX]:
         wrenches = wrenches_of_joints(system, s, a, tau, around)
         return [casadi.vertcat(*wrenches[number]) for number in numbers]
 
     return _load(system, seen, between)
 
 
-def _check_weld(system: System, seen: Seen, number: int) -> None:
+def _check_weld(system: System, seen: OutputContext, number: int) -> None:
     """Raise if the wrench of a Fixed joint is ambiguous.
 
     An external wrench on its rigid link may act on either side of the joint.
@@ -389,14 +389,14 @@ def _check_weld(system: System, seen: Seen, number: int) -> None:
 
 def _load(
     system: System,
-    seen: Seen,
-    make: Callable[[ModelSymbols, SX, SX, Surroundings], list[SX]],
+    seen: OutputContext,
+    make: Callable[[ModelSymbols, SX, SX, ExternalForces], list[SX]],
 ) -> list[SX]:
     """Evaluate make(symbols, a, tau, surroundings) at the motion, efforts and wrenches of seen."""
     s = symbols_of(system, "tree")
     a, tau = SX.sym("a", system.nv), SX.sym("tau", system.nv)
     pushes = {link: (SX.sym("f", 3), SX.sym("m", 3)) for link in seen.external}
-    around = Surroundings(resting_base(system.tree.gravity), dict(pushes), [])
+    around = ExternalForces(resting_base(system.tree.gravity), dict(pushes), [])
     values = [casadi.vec(value) for value in make(s, a, tau, around)]
     symbols = [s.q, s.v, a, tau, *(x for push in pushes.values() for x in push), system.p]
     given = [seen.q, seen.v, seen.a, seen.tau, *(x for w in seen.external.values() for x in w)]
@@ -407,10 +407,10 @@ def _load(
 _OF_FRAMES = ("pose", "motion")
 
 KINDS = {
-    "sensor": Shown(_sensors, _sensor_variables, _sensor_values, "sensors"),
-    "energies": Shown(lambda _: list(_ENERGIES), _energy_variables, _energy_values, "energy"),
-    "loops": Shown(lambda _: [""], _closure_variables, _closure_values, "closure"),
-    "pose": Shown(_bodies, _pose_variables, _pose_values, "poses"),
-    "motion": Shown(_bodies, _motion_variables, _motion_values),
-    "wrench": Shown(_joints, _wrench_variables, _wrench_values, "cut_forces"),
+    "sensor": OutputKind(_sensors, _sensor_variables, _sensor_values, "sensors"),
+    "energies": OutputKind(lambda _: list(_ENERGIES), _energy_variables, _energy_values, "energy"),
+    "loops": OutputKind(lambda _: [""], _closure_variables, _closure_values, "closure"),
+    "pose": OutputKind(_bodies, _pose_variables, _pose_values, "poses"),
+    "motion": OutputKind(_bodies, _motion_variables, _motion_values),
+    "wrench": OutputKind(_joints, _wrench_variables, _wrench_values, "cut_forces"),
 }

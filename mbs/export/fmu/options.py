@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from mbs.assembly.symbolic import GROUPS
+from mbs.assembly._symbolic import GROUPS
 from mbs.errors import ExportError
 from mbs.export.fmu.controller import Law
 from mbs.export.fmu.description import Experiment, Origin, check_options, printable

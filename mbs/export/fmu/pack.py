@@ -91,7 +91,7 @@ _MEMORY = "memory.c"
 
 
 @dataclass(frozen=True, slots=True)
-class Face:
+class FmiVersion:
     """Version of FMI: the files of its interface to the common core.
 
     Attributes:
@@ -149,14 +149,14 @@ def _runtime(solver: Solver, target: Target) -> tuple[str, ...]:
 
 
 FACES = {
-    "2.0": Face(
+    "2.0": FmiVersion(
         ("fmi2.c",),
         ("fmi2_face.h",),
         ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
         adjoint=False,
         callbacks=True,
     ),
-    "3.0": Face(
+    "3.0": FmiVersion(
         ("fmi3.c", "fmi3_arrays.c", "fmi3_run.c", "fmi3_absent.c"),
         ("fmi3_face.h",),
         ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),

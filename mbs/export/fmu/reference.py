@@ -20,7 +20,7 @@ from casadi import DM, MX, Function
 from mbs.errors import ExportError, SolverError
 from mbs.export.fmu.description import FmuModel, FmuVariable
 from mbs.export.fmu.xml import text_of
-from mbs.solvers.integrate import integrate, integrate_events
+from mbs.solvers._integrate import integrate, integrate_events
 from mbs.solvers.problem import Events
 
 Array = npt.NDArray[np.float64]

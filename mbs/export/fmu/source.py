@@ -10,11 +10,11 @@ import numpy as np
 from mbs.errors import ExportError, ModelError
 from mbs.export.fmu.description import FmuModel, FmuVariable, Jumps
 from mbs.loops.closing import distance_units
-from mbs.loops.examine import LEAST_SINE
+from mbs.loops.examination import LEAST_SINE
 from mbs.models.state.events import MinimalEvents
 from mbs.models.state.tree import TreeState
-from mbs.native.compiled import generated, unwritten
-from mbs.native.frames import Work
+from mbs.native._compiled import generated, unwritten
+from mbs.native.frames import WorkSize
 from mbs.native.scalar_source import plain_source
 from mbs.solvers.block_triangular import Block, block_triangular
 
@@ -364,7 +364,7 @@ int {name}(const double **arg, double **res, long long *iw, double *w, int mem);
 """
 
 
-def header(model: FmuModel, guid: str, work: Work, *, adjoint: bool) -> str:
+def header(model: FmuModel, guid: str, work: WorkSize, *, adjoint: bool) -> str:
     """Return the text of the file model.h.
 
     Args:
@@ -425,11 +425,11 @@ def header(model: FmuModel, guid: str, work: Work, *, adjoint: bool) -> str:
     )
 
 
-_LEAST = Work(arg=9, res=8)
+_LEAST = WorkSize(arg=9, res=8)
 """Smallest sizes of arg and res: the C files of an FMU always set these elements."""
 
 
-def source(model: FmuModel, *, adjoint: bool) -> tuple[str, Work]:
+def source(model: FmuModel, *, adjoint: bool) -> tuple[str, WorkSize]:
     """Return the text of the file model.c and the work sizes of its functions.
 
     Args:
@@ -565,12 +565,12 @@ def _block_tables(blocks: Sequence[Block]) -> list[str]:
     ]
 
 
-def _code(model: FmuModel, functions: Iterable[casadi.Function]) -> tuple[str, Work]:
+def _code(model: FmuModel, functions: Iterable[casadi.Function]) -> tuple[str, WorkSize]:
     """Return C code and work sizes of functions.
 
     SX functions are written in short pieces, which compile fast, other functions by CasADi.
     """
-    pieces, others, most = [], [], Work()
+    pieces, others, most = [], [], WorkSize()
     for function in functions:
         try:
             piece, work = plain_source([function])
@@ -581,7 +581,7 @@ def _code(model: FmuModel, functions: Iterable[casadi.Function]) -> tuple[str, W
                     " use target='hosted', or a controller that is"
                 ) from error
             others.append(function)
-            work = Work(function.sz_arg(), function.sz_res(), function.sz_iw(), function.sz_w())
+            work = WorkSize(function.sz_arg(), function.sz_res(), function.sz_iw(), function.sz_w())
         else:
             pieces.append(piece)
         most = most.covering(work)

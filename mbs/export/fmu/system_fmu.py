@@ -35,7 +35,7 @@ from mbs.export.fmu.variables import (
     states,
 )
 from mbs.files import path_of
-from mbs.loops.examine import configuration_health, row_independence
+from mbs.loops.examination import configuration_health, row_independence
 from mbs.models.state.independent import MinimalState, consistent_start, minimal_state
 from mbs.models.state.tree import tree_state
 from mbs.options import group_values, keywords_of

@@ -7,7 +7,7 @@ from typing import Any
 
 from sympy.printing.c import C99CodePrinter
 
-from mbs.export.c_library import parameter_names
+from mbs.export._c_library import parameter_names
 from mbs.export.languages.language import (
     Argument,
     CodeUnit,

@@ -18,7 +18,7 @@ from mbs.errors import ModelError
 from mbs.identification.grouping.grouping import Check, Grouping, equation
 from mbs.identification.regressors import Column, every_column, numbers_among, regressor
 from mbs.loops.closing import Closing
-from mbs.loops.examine import examine
+from mbs.loops.examination import configuration_report
 from mbs.loops.reduction import reduction_matrix
 from mbs.numbers import NONZERO
 
@@ -118,8 +118,8 @@ _STEP, _STEPS = 0.1, 8
 _CONFIGURATIONS = 40
 """Number of closed configurations; further states reuse them with other velocities."""
 _LEAST_LEAD = 0.02
-"""Squared sine (`leads` of `mbs.loops.examine`) below which a configuration is so close to a
-singular one that the random walk could change the branch."""
+"""Squared sine (`leads` of `mbs.loops.configuration_report`) below which a configuration is so
+close to a singular one that the random walk could change the branch."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -232,7 +232,7 @@ class _ConfigurationWalk:
             )
         names = [parameter.name for parameter in system.parameters]
         values = dict(zip(names, p.tolist(), strict=True))
-        leads = examine(system, found.q.tolist(), parameters=values).leads
+        leads = configuration_report(system, found.q.tolist(), parameters=values).leads
         G = Function(reduction_matrix(system))
         return _ConfigurationWalk(system, closing, G, values, found.q, min(_LEAST_LEAD, leads / 4))
 
@@ -257,7 +257,7 @@ class _ConfigurationWalk:
         found = self.closing.nearest(ahead)
         if not found.is_closed or np.max(np.abs(found.q - ahead)) > _STEP:
             return None
-        state = examine(self.system, found.q.tolist(), parameters=self.values)
+        state = configuration_report(self.system, found.q.tolist(), parameters=self.values)
         return found.q if state.leads > self.least else None
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from mbs.models._direct_dynamics import direct_dynamics, inertia_matrix
+from mbs.models._energy import energy
+from mbs.models._inverse_dynamics import bias, gravity_effort, inverse_dynamics
+from mbs.models._joint_wrenches import joint_wrenches
+from mbs.models._lagrange import lagrange
 from mbs.models.actuation import actuation_matrix, actuation_null_space
 from mbs.models.catalogue.entry import COORDINATES, F_EXT, METHODS, MOVING_BASE, Entry, choice
 from mbs.models.derivatives import direct_dynamics_derivatives, inverse_dynamics_derivatives
-from mbs.models.direct_dynamics import direct_dynamics, inertia_matrix
-from mbs.models.energy import energy
-from mbs.models.inverse_dynamics import bias, gravity_effort, inverse_dynamics
-from mbs.models.joint_wrenches import joint_wrenches
-from mbs.models.lagrange import lagrange
 
 DYNAMIC: tuple[Entry, ...] = (
     Entry(

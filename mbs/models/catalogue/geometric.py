@@ -45,7 +45,7 @@ GEOMETRIC: tuple[Entry, ...] = (
         "Geometric",
         "Constraint geometric equations of loops",
         "phi(q) = 0",
-        function=loops.closure,
+        function=loops.closure_residual,
         structures="closed",
     ),
     Entry(

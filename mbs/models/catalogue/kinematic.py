@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbs.assembly import System
+from mbs.models._singularities import singularities
 from mbs.models.catalogue.entry import (
     AXES,
     COORDINATES,
@@ -26,7 +27,6 @@ from mbs.models.kinematics import (
     link_velocities,
 )
 from mbs.models.loop_kinematics import acceleration_closure, velocity_closure
-from mbs.models.singularities import singularities
 
 
 def _factors(system: System, **options: Any) -> str:

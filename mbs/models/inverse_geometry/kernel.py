@@ -24,8 +24,8 @@ from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, plain_branches
 from mbs.models.inverse_geometry.gathering import ILL_CONDITIONED, closed_form_name, general_ready
 from mbs.models.inverse_geometry.many import MANY, bounds_of, draft_solutions, general_draft
 from mbs.models.inverse_geometry.target import NEARLY_SINGULAR
+from mbs.native._compiled import MachineCode, machine_code
 from mbs.native.array_calls import array_builtin
-from mbs.native.compiled import MachineCode, machine_code
 
 CERTAIN, DOUBTFUL, NOT_RIGID, FAILED = range(4)
 """Status codes of the compiled solver, defined in `pose.h`."""

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Array
 from mbs.closed_forms.arm_search import polish
+from mbs.models.inverse_geometry._solve import solve_at
 from mbs.models.inverse_geometry.gathering import NOT_VARIED
 from mbs.models.inverse_geometry.path_equations import (
     POSE_ERROR,
@@ -17,7 +18,6 @@ from mbs.models.inverse_geometry.path_equations import (
     Tracker,
     pseudo_inverse,
 )
-from mbs.models.inverse_geometry.solve import solve_at
 from mbs.models.inverse_geometry.target import SOLVED
 from mbs.solvers.least_squares import gauss_newton, levenberg_marquardt
 

@@ -12,7 +12,7 @@ from mbs.closed_forms.arm import Array
 from mbs.closed_forms.ring import spin_indices
 from mbs.errors import NoClosedForm
 from mbs.loops.closing import CLOSED, TOLERANCE, Closing, difference
-from mbs.loops.modes import closed_configurations, working_modes
+from mbs.loops.mode_search import closed_configurations, working_modes
 from mbs.loops.plan import (
     Known,
     Posed,

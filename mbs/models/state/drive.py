@@ -14,8 +14,8 @@ from mbs.assembly.tree import Frame, normalised
 from mbs.errors import ModelError
 from mbs.loops.balance import require_no_balance
 from mbs.loops.reduction import reduction
+from mbs.models._direct_dynamics import hybrid_dynamics
 from mbs.models.contacts import contacts_of, require_undriven
-from mbs.models.direct_dynamics import hybrid_dynamics
 from mbs.recursions.force_elements import sum_wrenches, wrench_efforts
 from mbs.recursions.poses import link_poses
 from mbs.recursions.route import BASE, relative_pose

@@ -17,18 +17,18 @@ from casadi import MX, SX, Function
 from mbs.assembly import System
 from mbs.assembly.tree import Frame, Link, position_rate, quaternion_slices
 from mbs.loops.closing import relative_rows
-from mbs.loops.closure import facing, square_closure
+from mbs.loops.closure_equations import facing, square_closure
+from mbs.models._direct_dynamics import hybrid_dynamics, independent_dynamics, inertia_matrix
+from mbs.models._inverse_dynamics import bias
+from mbs.models._joint_wrenches import shown_outputs
+from mbs.models._measurements import with_readings
 from mbs.models.contacts import (
     ContactEquations,
     contact_equations,
     contacts_of,
     require_lasting_rows,
 )
-from mbs.models.direct_dynamics import hybrid_dynamics, independent_dynamics, inertia_matrix
 from mbs.models.geometry import terminal_frame
-from mbs.models.inverse_dynamics import bias
-from mbs.models.joint_wrenches import shown_outputs
-from mbs.models.measurements import with_readings
 from mbs.models.state.crossings import (
     WatchedCrossings,
     drive_crossings,
@@ -514,11 +514,18 @@ def _write(function: Function, symbols: list[Any], u: Any, kind: Any) -> Functio
     return Function(function.name(), symbols, values, options)
 
 
-__all__ = ["DriveInputs", "MinimalState", "Observe", "Seen", "consistent_start", "minimal_state"]
+__all__ = [
+    "DriveInputs",
+    "MinimalState",
+    "Observe",
+    "OutputContext",
+    "consistent_start",
+    "minimal_state",
+]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class OutputContext:
     """Values of a motion from which outputs are computed.
 
     Attributes:
@@ -545,7 +552,7 @@ class Seen:
     external: dict[int, Wrench]
 
 
-Observe = Callable[[Seen], Sequence[SX]]
+Observe = Callable[[OutputContext], Sequence[SX]]
 """Function that returns additional outputs of a motion."""
 
 
@@ -671,7 +678,7 @@ def _equations(
     y = outputs_vector(system, layout, motion, response, shown)
     if observe is not None:
         vectors = motion.q, motion.v, response.a, motion.v_a, response.a_a, response.every_effort
-        y = casadi.vertcat(y, *observe(Seen(s.t, system.p, *vectors, external)))
+        y = casadi.vertcat(y, *observe(OutputContext(s.t, system.p, *vectors, external)))
     point = [s.t, s.x, s.z, s.u, system.p]
     contact, states = response.contact, (layout.positions, layout.velocities)
     events = None

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.tree import norm_rows, normalised
 from mbs.loops.closing import constraint_sizes, relative_rows
-from mbs.loops.closure import independent_closure
+from mbs.loops.closure_equations import independent_closure
 from mbs.loops.velocity import (
     independent_constraint_rows,
     independent_drift,

@@ -22,7 +22,7 @@ from casadi import DM, SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.tree import norm_rows, position_rate
-from mbs.loops.closure import closure_rows
+from mbs.loops.closure_equations import closure_rows
 from mbs.loops.velocity import (
     acceleration_bias,
     constraint_rows,
@@ -30,9 +30,9 @@ from mbs.loops.velocity import (
     kept_rows,
     scales,
 )
+from mbs.models._direct_dynamics import inertia_matrix
+from mbs.models._inverse_dynamics import bias
 from mbs.models.contacts import ContactEquations
-from mbs.models.direct_dynamics import inertia_matrix
-from mbs.models.inverse_dynamics import bias
 from mbs.models.state.signals import Prescribed, with_inputs
 from mbs.models.symbols import dense_function, outputs_of
 from mbs.solvers.problem import Passage

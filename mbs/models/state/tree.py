@@ -15,13 +15,13 @@ from casadi import DM, SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.tree import position_rate, quaternion_slices
-from mbs.loops.closure import closure_rows
+from mbs.loops.closure_equations import closure_rows
 from mbs.loops.velocity import scales
+from mbs.models._direct_dynamics import direct_dynamics, hybrid_dynamics
+from mbs.models._energy import energy
+from mbs.models._joint_wrenches import shown_outputs
+from mbs.models._measurements import with_readings
 from mbs.models.contacts import ContactEquations, contact_equations, tree_jump
-from mbs.models.direct_dynamics import direct_dynamics, hybrid_dynamics
-from mbs.models.energy import energy
-from mbs.models.joint_wrenches import shown_outputs
-from mbs.models.measurements import with_readings
 from mbs.models.state.crossings import (
     drive_crossings,
     held_by,
@@ -33,7 +33,7 @@ from mbs.models.state.events import MinimalEvents, few_modes, join_part_events, 
 from mbs.models.state.independent import (
     Accelerations,
     Observe,
-    Seen,
+    OutputContext,
     StateEquations,
     minimal_layout,
     motion_of,
@@ -150,7 +150,7 @@ def tree_state(
     y = outputs_vector(system, layout, motion, response, shown)
     if observe is not None:
         seen = (q, v, a, v[active], a[active], response.every_effort)
-        y = casadi.vertcat(y, *observe(Seen(s.t, system.p, *seen, external)))
+        y = casadi.vertcat(y, *observe(OutputContext(s.t, system.p, *seen, external)))
     rate = casadi.vertcat(position_rate(system.tree, q, v), a, rates)
     projected = project_step(system, q, v, (), s.t, contact)
 

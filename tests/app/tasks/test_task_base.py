@@ -12,7 +12,7 @@ from support.catalogue_systems import catalogue_system
 import mbs
 from mbs.app.tasks.base import base
 from mbs.errors import ModelError
-from mbs.identification import base_parameters, values_of
+from mbs.identification import base_parameters, symbolic_parameters
 
 
 def test_the_table_of_the_rx90_is_that_of_the_model():
@@ -34,7 +34,7 @@ def test_the_table_of_the_rx90_is_that_of_the_model():
 def test_values_are_the_groupings_of_the_description():
     rx90 = catalogue_system("rx90")
     found = base_parameters(rx90)
-    K = np.array(casadi.DM(values_of(rx90, found.columns))).ravel()
+    K = np.array(casadi.DM(symbolic_parameters(rx90, found.columns))).ravel()
     values = [row.value for row in base(rx90).rows]
     assert np.allclose(values, found.matrix @ K)
     assert np.abs(values).max() > 1

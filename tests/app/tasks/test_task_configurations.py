@@ -58,7 +58,7 @@ def test_configurations_of_robots_with_loops_close_them(five_bar):
     found = configurations(sr400, pose_of(sr400, q), seed=q)
     assert np.allclose(found.rows[0].q, q, atol=1e-9)
     assert len(found.rows) >= 8
-    assert all(mbs.loops.examine(sr400, row.q).residual < 1e-10 for row in found.rows)
+    assert all(mbs.loops.configuration_report(sr400, row.q).residual < 1e-10 for row in found.rows)
     T = pose_of(five_bar, five_bar.configuration)
     found = configurations(five_bar, T)
     assert len(found.rows) == 2
@@ -125,7 +125,7 @@ def test_out_of_reach_tells_why_and_offers_the_nearest(rx90, five_bar):
     T[1, 3] += 5.0
     found = configurations(five_bar, T)
     assert found.rows == ()
-    assert mbs.loops.examine(five_bar, found.nearest.q).residual < 1e-10
+    assert mbs.loops.configuration_report(five_bar, found.nearest.q).residual < 1e-10
     assert 4.0 < found.nearest.distance < 5.1
 
 

@@ -71,9 +71,9 @@ def test_base_parameters_are_those_of_the_arm(arm, found):
 
 
 def _values(system, columns):
-    from mbs.identification import values_of
+    from mbs.identification import symbolic_parameters
 
-    return np.array([float(x) for x in values_of(system, columns).elements()])
+    return np.array([float(x) for x in symbolic_parameters(system, columns).elements()])
 
 
 def test_errors_of_prediction_are_the_noise(found):

@@ -44,7 +44,7 @@ def test_loops_are_closed_where_a_closed_robot_is_singular():
     found = singular(five_bar)
     assert (found.rows, found.columns) == (("Vx", "Vy"), ("q1", "q3"))
     for one in found.factors:
-        assert mbs.loops.examine(five_bar, one.configuration).residual < 1e-9
+        assert mbs.loops.configuration_report(five_bar, one.configuration).residual < 1e-9
         assert abs(one.determinant) < 1e-9
 
 

@@ -11,7 +11,14 @@ from urllib.error import HTTPError
 import pytest
 
 from mbs import MbsError
-from mbs.app.web.server import HOST, Guard, free_port, is_local, require_nicegui, robot_document
+from mbs.app.web.server import (
+    HOST,
+    HostFilter,
+    free_port,
+    is_local,
+    require_nicegui,
+    robot_document,
+)
 
 
 @pytest.mark.parametrize(
@@ -46,7 +53,7 @@ def test_the_guard_answers_strangers_itself(kind, first):
     async def send(message):
         sent.append(message)
 
-    guard = Guard(app)
+    guard = HostFilter(app)
     stranger, friend = [(b"host", b"evil.example")], [(b"host", b"127.0.0.1:1")]
     asyncio.run(guard({"type": kind, "headers": stranger}, None, send))
     assert passed == []

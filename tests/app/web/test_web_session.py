@@ -9,7 +9,7 @@ from mbs.app.web.document.tables import Cell
 from mbs.app.web.session import Session, assembly_modes, carried, handles, mode_of, moved
 from mbs.components import Free, PointMass
 from mbs.errors import Unclosable
-from mbs.loops import examine
+from mbs.loops import configuration_report
 from mbs.loops.configuration import require_closed
 
 
@@ -132,7 +132,7 @@ def test_assembly_modes_are_listed_or_a_sentence_says_why_not():
     found = assembly_modes(system, system.configuration)
     assert len(found) == 4
     for mode in found:
-        assert examine(system, mode.q).residual < 1e-9
+        assert configuration_report(system, mode.q).residual < 1e-9
     delta = Document.of_name("delta").system()
     assert len(assembly_modes(delta, delta.configuration)) == 16
     bicycle = Document.of_name("whipple_bicycle").system()

@@ -194,7 +194,7 @@ def test_everything_that_a_system_holds_knows_the_constants():
 
 def test_rules_that_are_not_exact_leave_no_parameter_that_they_ignore(monkeypatch):
     """The rank then decides, at the defaults: lengths are constants as in the numeric method."""
-    module = importlib.import_module("mbs.identification.base_parameters")
+    module = importlib.import_module("mbs.identification._base_parameters")
     rules = module.grouped_by_rules
 
     def bent(system, *arguments):

@@ -10,7 +10,7 @@ from support.base_robots import table
 import mbs
 from mbs.errors import ModelError
 from mbs.formats import read_par, write_toml
-from mbs.identification import base_parameters, columns_of, numbers_of
+from mbs.identification import base_parameters, columns_of, numeric_parameters
 from mbs.identification.grouping.grouping import Grouping
 from mbs.operations import count
 from mbs.spatial.inertia import TEN_PARAMETERS
@@ -99,7 +99,7 @@ def test_written_as_robot_files_and_read_again(name, tmp_path):
         found = np.array(mbs.models.inverse_dynamics(again)(q, v, a))
         assert found == pytest.approx(expected, abs=1e-10 * np.abs(expected).max())
         columns = columns_of(again, friction=False)
-        used = [c for c, x in zip(columns, numbers_of(again, columns), strict=True) if x]
+        used = [c for c, x in zip(columns, numeric_parameters(again, columns), strict=True) if x]
         assert (
             len(used) <= base_parameters(system, columns=columns_of(system, friction=False)).count
         )
@@ -148,7 +148,7 @@ def test_errors(puma, arguments, told):
 
 
 def test_a_grouping_that_holds_at_the_defaults_alone_is_told(symbolic, monkeypatch):
-    module = importlib.import_module("mbs.identification.base_parameters")
+    module = importlib.import_module("mbs.identification._base_parameters")
     rules = module.grouped_by_rules
 
     def bent(system, *arguments):

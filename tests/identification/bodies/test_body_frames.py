@@ -4,7 +4,7 @@ from support.measured_arm import arm, noisy_record
 
 import mbs
 from mbs.components import Body, Revolute
-from mbs.identification import columns_of, identify, numbers_of
+from mbs.identification import columns_of, identify, numeric_parameters
 from mbs.identification.bodies import bodies_table, body_values
 
 CENTRE = (0.1, -0.2, 0.3)
@@ -24,13 +24,13 @@ def turned_arm():
 def test_bodies_are_told_in_their_own_frames():
     system = turned_arm().assemble()
     columns = columns_of(system)
-    rows = body_values(system, columns, numbers_of(system, columns))
+    rows = body_values(system, columns, numeric_parameters(system, columns))
     assert [row.name for row in rows] == ["first", "second"]
     for row, mass in zip(rows, (2, 3), strict=True):
         assert row.mass == pytest.approx(mass)
         assert row.centre == pytest.approx(np.array(CENTRE))
         assert row.inertia == pytest.approx(np.diag(INERTIA))
-    lines = bodies_table(system, columns, numbers_of(system, columns)).splitlines()
+    lines = bodies_table(system, columns, numeric_parameters(system, columns)).splitlines()
     assert lines[2].split()[:5] == ["first", "2", "0.1", "-0.2", "0.3"]
 
 
@@ -42,7 +42,7 @@ def test_each_column_of_the_table_has_its_element():
     m.connect(m.world, Revolute("j1", axis="x"), body)
     system = m.assemble()
     columns = columns_of(system)
-    lines = bodies_table(system, columns, numbers_of(system, columns)).splitlines()
+    lines = bodies_table(system, columns, numeric_parameters(system, columns)).splitlines()
     heads, (name, *values) = lines[1].split(), lines[2].split()
     assert heads == ["body", "mass", "x", "y", "z", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz"]
     assert name == "body"

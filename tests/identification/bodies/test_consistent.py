@@ -15,13 +15,13 @@ from mbs.errors import ModelError
 from mbs.identification import (
     Prior,
     Record,
-    consistent,
     consistent_links,
     consistent_weighted,
+    full_parameters,
     least_squares,
     observe,
     observe_filtered,
-    recovered,
+    physically_consistent,
     regressor,
     smoothed,
 )
@@ -51,7 +51,7 @@ def test_bodies_explain_the_efforts_as_well_as_base_parameters():
 
 def test_a_good_guess_is_kept_where_the_record_says_nothing():
     truth = np.array(mbs_values(equations()[0].columns))
-    bodies = consistent(full_observations(0.05), Prior(guess=truth))
+    bodies = physically_consistent(full_observations(0.05), Prior(guess=truth))
     assert bodies["M1"] == pytest.approx(6.0, rel=0.05)
     assert bodies["MZ2"] == pytest.approx(truth[bodies.names.index("MZ2")], abs=0.05)
     assert bodies.residuals.rms == pytest.approx([0.05] * 3, rel=0.1)
@@ -66,7 +66,7 @@ def test_negative_friction_and_impossible_bodies_are_avoided():
     for name, change in (("Fv2", -1.0), ("Ia3", -0.5), ("XX3", -0.2), ("YY3", -0.2)):
         pulled += change * full.W[:, :, names.index(name)]
     wrong = replace(full, y=pulled)
-    bodies = consistent(wrong)
+    bodies = physically_consistent(wrong)
     assert bodies["Fv2"] == pytest.approx(0.0, abs=1e-4)
     assert bodies["Ia3"] >= 0
     assert consistent_links(bodies.columns, bodies.values) == [1, 2, 3]
@@ -77,7 +77,8 @@ def test_negative_friction_and_impossible_bodies_are_avoided():
 
 def test_masses_are_bounded():
     free, bounded = (
-        consistent(full_observations(), Prior(heaviest=m)) for m in (100.0, (1.5, 1.5, 1.5))
+        physically_consistent(full_observations(), Prior(heaviest=m))
+        for m in (100.0, (1.5, 1.5, 1.5))
     )
     assert max(free[f"M{j}"] for j in (1, 2, 3)) > 1.6
     assert all(bounded[f"M{j}"] <= 1.5 + 1e-6 for j in (1, 2, 3))
@@ -93,7 +94,7 @@ def test_friction_that_base_parameters_do_not_show_stays_near_nothing():
     estimate = least_squares(full_observations().grouped(base))
     matrix = base.matrix.copy()
     matrix[:, D.names.index("Fs3")] = 0.0
-    found = recovered(estimate, D.columns, matrix)
+    found = full_parameters(estimate, D.columns, matrix)
     assert np.isfinite(found.values).all()
 
 
@@ -112,7 +113,7 @@ def test_deviations_know_that_errors_repeat_from_row_to_row():
 
 def test_a_total_mass_that_was_weighed_is_kept():
     full = full_observations()
-    free, weighed = consistent(full), consistent(full, Prior(total_mass=12.0))
+    free, weighed = physically_consistent(full), physically_consistent(full, Prior(total_mass=12.0))
     masses = [sum(found[f"M{j}"] for j in (1, 2, 3)) for found in (free, weighed)]
     assert masses[1] == pytest.approx(12.0, abs=1e-6)
     assert abs(masses[0] - 12.0) > 1.0
@@ -122,10 +123,10 @@ def test_a_total_mass_that_was_weighed_is_kept():
 def test_the_search_tells_how_far_it_is():
     parts = []
     full = full_observations()
-    watched = consistent(full, watch=parts.append)
+    watched = physically_consistent(full, watch=parts.append)
     assert 5 < len(parts) < 500
     assert parts == pytest.approx(np.arange(1, len(parts) + 1) / 500)
-    assert watched.values == pytest.approx(consistent(full).values, abs=1e-9)
+    assert watched.values == pytest.approx(physically_consistent(full).values, abs=1e-9)
 
 
 def test_it_is_the_answer_of_a_conic_solver():
@@ -135,7 +136,7 @@ def test_it_is_the_answer_of_a_conic_solver():
     wrong = replace(full, y=full.y - 0.3 * full.W[:, :, [full.names.index("XX3")]][:, :, 0])
     least = least_by_cones(clarabel, wrong)
     free = float(np.linalg.norm(least_squares(wrong.grouped(equations()[1])).residuals.error))
-    ours = consistent(wrong, Prior(emphasis=1e-3))
+    ours = physically_consistent(wrong, Prior(emphasis=1e-3))
     found = float(np.linalg.norm(ours.residuals.error))
     assert least > 1.01 * free
     assert least * (1 - 1e-4) <= found <= least * 1.001
@@ -179,23 +180,23 @@ def least_by_cones(clarabel, full):
 def test_what_cannot_be_a_full_set_is_refused():
     full, (_, base, _) = full_observations(), equations()
     with pytest.raises(ModelError, match="give the observations of the full set"):
-        consistent(full.grouped(base))
+        physically_consistent(full.grouped(base))
     with pytest.raises(ModelError, match=r"heaviest is 0\.0 kg and emphasis 1; give more"):
         Prior(heaviest=0.0)
     with pytest.raises(ModelError, match="total mass is -1 kg"):
         Prior(total_mass=-1.0)
     with pytest.raises(ModelError, match="2 bounds on masses are given for 3 links"):
-        consistent(full, Prior(heaviest=[1.0, 2.0]))
+        physically_consistent(full, Prior(heaviest=[1.0, 2.0]))
     with pytest.raises(ModelError, match="total mass is 9 kg and the links may have 6 kg"):
-        consistent(full, Prior(heaviest=2.0, total_mass=9.0))
+        physically_consistent(full, Prior(heaviest=2.0, total_mass=9.0))
     with pytest.raises(ModelError, match="guess for link 1 is no body"):
-        consistent(full, Prior(guess=np.zeros(len(full.columns))))
+        physically_consistent(full, Prior(guess=np.zeros(len(full.columns))))
     with pytest.raises(ModelError, match=r"the guess has the shape \(3,\) for 39 columns"):
-        consistent(full, Prior(guess=np.ones(3)))
+        physically_consistent(full, Prior(guess=np.ones(3)))
     W = full.W.copy()
     W[:, :, full.names.index("Fv2")] = 0.0
     with pytest.raises(ModelError, match="Fv2 cannot be seen in this record; move the joint"):
-        consistent(replace(full, W=W))
+        physically_consistent(replace(full, W=W))
 
 
 def test_pseudo_inertia_of_a_ball():
@@ -211,19 +212,19 @@ def test_pseudo_inertia_of_a_ball():
 def test_full_set_from_base_parameters():
     D, base, _ = equations()
     estimate = least_squares(full_observations().grouped(base))
-    found = recovered(estimate, D.columns, base.matrix)
+    found = full_parameters(estimate, D.columns, base.matrix)
     assert consistent_links(found.columns, found.values) == [1, 2, 3]
     assert np.abs(found.misfit).max() < 3
     expected = (base.matrix @ found.values - estimate.values) / estimate.deviations
     assert found.misfit == pytest.approx(expected)
     assert found["Fv1"] == pytest.approx(0.8, abs=4 * found.deviations[found.names.index("Fv1")])
     truth = np.array(mbs_values(D.columns))
-    near = recovered(estimate, D.columns, base.matrix, Prior(guess=truth))
+    near = full_parameters(estimate, D.columns, base.matrix, Prior(guess=truth))
     assert near["M1"] == pytest.approx(6.0, rel=0.05)
     with pytest.raises(ModelError, match="no parameter 'M9'"):
         found["M9"]
     with pytest.raises(ModelError, match="give that of the base parameters identified"):
-        recovered(estimate, D.columns[:5], base.matrix)
+        full_parameters(estimate, D.columns[:5], base.matrix)
 
 
 def test_a_record_without_noise_has_bodies_too():

@@ -5,7 +5,7 @@ import pytest
 from support.measured_arm import equations, noisy_samples
 
 from mbs.identification import observe
-from mbs.identification.least_squares import EffortEquations
+from mbs.identification._least_squares import EffortEquations
 
 WEIGHTS = np.array([1.0, 2.0, 5.0])
 

@@ -6,7 +6,7 @@ from scipy.stats import f
 from support.measured_arm import equations, noisy_samples
 
 from mbs.errors import ModelError
-from mbs.identification import essential, least_squares, observe, robust, weighted
+from mbs.identification import essential, huber, least_squares, observe, weighted
 
 
 def observations(deviation):
@@ -62,7 +62,7 @@ def test_outliers_that_an_estimate_left_out_stay_out():
     samples, rng = noisy_samples(0.5), np.random.default_rng(3)
     hit = rng.uniform(size=samples.tau.shape) < 0.05
     tau = samples.tau + np.where(hit, 30 * rng.normal(size=hit.shape), 0.0)
-    found = essential(robust(observe(D, replace(samples, tau=tau)).grouped(base))).estimate
+    found = essential(huber(observe(D, replace(samples, tau=tau)).grouped(base))).estimate
     expected = truth[[base.names.index(name) for name in found.names]]
     assert len(found.names) < len(truth)
     assert np.sqrt(np.mean(((found.values - expected) / found.deviations) ** 2)) < 1.6

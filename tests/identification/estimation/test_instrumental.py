@@ -8,11 +8,11 @@ from support.measured_arm import equations, mbs_values, motion, noisy_samples
 from mbs.errors import ModelError
 from mbs.identification import (
     Samples,
-    consistent,
     instrumental,
     least_squares,
-    numbers_of,
+    numeric_parameters,
     observe,
+    physically_consistent,
     regressor,
     simulated_motion,
 )
@@ -62,7 +62,9 @@ def test_simulated_motion_follows_the_measured_one():
     assert np.sqrt(np.mean((simulated.a - a) ** 2)) < 0.1 * np.sqrt(np.mean(a**2))
     rough = noisy_motion(samples)
     full = observe(D, rough)
-    instruments = observe(D, simulated_motion(D, consistent(full).values, rough)).grouped(base)
+    instruments = observe(
+        D, simulated_motion(D, physically_consistent(full).values, rough)
+    ).grouped(base)
     found = instrumental(full.grouped(base), instruments)
     assert abs(bias(found)) < 0.5 * abs(bias(least_squares(full.grouped(base))))
 
@@ -70,7 +72,7 @@ def test_simulated_motion_follows_the_measured_one():
 def test_a_closed_robot_is_simulated_in_its_independent_joints():
     system = catalogue_system("five_bar")
     D = regressor(system)
-    K = numbers_of(system, D.columns)
+    K = numeric_parameters(system, D.columns)
     time = np.arange(400) / 200
     middle = np.array([system.configuration[k] for k in active_indices(system)])
     wave, w = np.array([0.2, -0.15]), 4.0

@@ -8,13 +8,13 @@ from support.measured_arm import equations, noisy_record, noisy_samples
 from mbs.errors import ModelError, SolverError
 from mbs.identification import (
     cross_validated,
-    held_out,
+    holdout_residuals,
+    huber,
     instrumental,
+    iteratively_reweighted,
     least_squares,
     observe,
     observe_filtered,
-    reweighted,
-    robust,
     smoothed,
     weighted,
 )
@@ -35,7 +35,7 @@ def distance(estimate):
     return float(error @ np.linalg.solve(estimate.covariance, error)) / len(error)
 
 
-@pytest.mark.parametrize("method", [least_squares, weighted, reweighted, robust])
+@pytest.mark.parametrize("method", [least_squares, weighted, iteratively_reweighted, huber])
 def test_exact_efforts_give_the_parameters(method):
     estimate = method(observations(deviation=0.0))
     assert estimate.values == pytest.approx(equations()[2], abs=1e-8)
@@ -70,7 +70,9 @@ def by_motion(observations):
     return instrumental(observations, observations, np.array([1.0, 3.0, 20.0]))
 
 
-@pytest.mark.parametrize("method", [least_squares, weighted, reweighted, robust, by_motion])
+@pytest.mark.parametrize(
+    "method", [least_squares, weighted, iteratively_reweighted, huber, by_motion]
+)
 def test_deviations_are_those_of_200_filtered_records(method):
     found = [method(record) for record in filtered_records(200, (1.0, 0.3, 0.05))]
     values = np.array([estimate.values for estimate in found])
@@ -89,7 +91,7 @@ def test_rows_that_repeat_each_other_count_as_fewer():
 
 def test_weights_use_what_is_known_of_each_joint():
     plain, better = least_squares(observations()), weighted(observations())
-    settled = reweighted(observations())
+    settled = iteratively_reweighted(observations())
     assert 1 / settled.weights == pytest.approx(DEVIATIONS, rel=0.1)
     assert distance(better) < 2
     assert distance(settled) < 2
@@ -99,7 +101,7 @@ def test_weights_use_what_is_known_of_each_joint():
 
 def test_reweighting_needs_its_rounds():
     with pytest.raises(SolverError, match=r"weights still change by .* after 1 rounds"):
-        reweighted(observations(), tolerance=1e-12, most=1)
+        iteratively_reweighted(observations(), tolerance=1e-12, most=1)
 
 
 def test_robust_estimate_resists_outliers():
@@ -108,7 +110,7 @@ def test_robust_estimate_resists_outliers():
     clean = replace(clean, y=np.where(hit, clean.y + 20.0, clean.y))
     truth = equations()[2]
     bound = 6 * weighted(observations()).deviations
-    assert (np.abs(robust(clean).values - truth) < bound).all()
+    assert (np.abs(huber(clean).values - truth) < bound).all()
     assert (np.abs(weighted(clean).values - truth) > bound).any()
 
 
@@ -124,7 +126,7 @@ def test_parameters_of_a_filtered_record_are_within_their_deviations():
 
 
 def test_held_out_and_cross_validated_errors_are_those_of_the_noise():
-    residuals = held_out(weighted, observations(), 0.6)
+    residuals = holdout_residuals(weighted, observations(), 0.6)
     assert residuals.rms == pytest.approx(DEVIATIONS, rel=0.25)
     assert residuals.time[0] > 5.9
     whole = cross_validated(weighted, observations(), 4)

@@ -11,12 +11,19 @@ import mbs
 from mbs.assembly import System
 from mbs.components import Body, Revolute
 from mbs.errors import ModelError, NoClosedForm, SolverError
-from mbs.identification import Plane, Series, Trajectory, base_parameters, excitation, regressor
+from mbs.identification import (
+    FourierSettings,
+    Plane,
+    Trajectory,
+    base_parameters,
+    excitation,
+    regressor,
+)
 from mbs.identification.leading import active_indices
 from mbs.identification.trajectory import Margin, MotionLimit, limits_of
 from mbs.loops.closing import Closing
 
-FORM = Series(period=6.0, harmonics=3, samples=40)
+FORM = FourierSettings(period=6.0, harmonics=3, samples=40)
 
 
 @cache
@@ -114,7 +121,7 @@ def test_puma_is_seen_well() -> None:
 def test_condition_of_52_columns_of_puma() -> None:
     found = excitation(
         system_of("puma560"),
-        series=Series(samples=60),
+        series=FourierSettings(samples=60),
         position=2.5,
         velocity=3.0,
         acceleration=8.0,
@@ -230,13 +237,13 @@ def test_wrong_input_is_told(options: dict[str, object], message: str) -> None:
 
 def test_wrong_series_and_planes_are_told() -> None:
     with pytest.raises(ModelError, match="1 harmonics cannot start and end at rest"):
-        Series(harmonics=1)
+        FourierSettings(harmonics=1)
     with pytest.raises(ModelError, match=r"harmonics is 2\.5; give a whole number"):
-        Series(harmonics=2.5)
+        FourierSettings(harmonics=2.5)
     with pytest.raises(ModelError, match="period is 0 s"):
-        Series(period=0.0)
+        FourierSettings(period=0.0)
     with pytest.raises(ModelError, match="10 samples are too few for 5 harmonics"):
-        Series(samples=10)
+        FourierSettings(samples=10)
     with pytest.raises(ModelError, match="normal is zero"):
         Plane("tool", (0, 0, 0), (0, 0, 0), 1.0)
     with pytest.raises(ModelError, match="no seven finite numbers"):
@@ -265,7 +272,7 @@ def test_passive_joints_of_closed_robots_keep_their_limits(
     }
     found = excitation(
         system,
-        series=Series(period=6.0, harmonics=3, samples=24),
+        series=FourierSettings(period=6.0, harmonics=3, samples=24),
         position=ranges | {joint: (low, high)},
         velocity=dict.fromkeys(ranges, 3.0),
         effort=400.0,
@@ -295,7 +302,7 @@ def test_a_platform_that_follows_keeps_its_height() -> None:
     system = system_of("delta")
     found = excitation(
         system,
-        series=Series(period=4.0, harmonics=2, samples=8),
+        series=FourierSettings(period=4.0, harmonics=2, samples=8),
         position={"q1": 0.4, "q2": 0.4, "q3": 0.4, "platform.z": (-0.55, -0.42)},
         velocity=3.0,
         starts=1,

@@ -6,7 +6,7 @@ from support.measured_arm import arm, motion, noisy_record, true_efforts
 import mbs
 from mbs import Result
 from mbs.errors import ModelError
-from mbs.identification import Record, joint_side, smoothed
+from mbs.identification import Record, motor_to_joint, smoothed
 
 TIME, Q, V, A = motion()
 TAU = true_efforts(Q, V, A)
@@ -112,13 +112,13 @@ def test_files_that_are_no_tables_are_refused(tmp_path, text, message):
 
 def test_motors_that_drive_two_joints():
     N = np.array([[50.0, 0], [20, 40]])
-    q, tau = joint_side(N, Q[:, :2] @ N.T, TAU[:, :2])
+    q, tau = motor_to_joint(N, Q[:, :2] @ N.T, TAU[:, :2])
     assert q == pytest.approx(Q[:, :2])
     assert np.sum(tau * q) == pytest.approx(np.sum(TAU[:, :2] * (Q[:, :2] @ N.T)))
     with pytest.raises(ModelError, match="N has no inverse"):
-        joint_side([50.0, 0.0], Q[:, :2], TAU[:, :2])
+        motor_to_joint([50.0, 0.0], Q[:, :2], TAU[:, :2])
     with pytest.raises(ModelError, match=r"N has the shape \(3, 3\)"):
-        joint_side(np.eye(3), Q[:, :2], TAU[:, :2])
+        motor_to_joint(np.eye(3), Q[:, :2], TAU[:, :2])
 
 
 def test_records_are_of_joints_of_one_degree_of_freedom():

@@ -11,9 +11,9 @@ from mbs.identification import (
     Column,
     base_parameters,
     columns_of,
-    numbers_of,
+    numeric_parameters,
     regressor,
-    values_of,
+    symbolic_parameters,
 )
 
 
@@ -61,7 +61,7 @@ def test_units_follow_the_joint():
 def test_values_are_those_of_the_system():
     system = cart()
     columns = columns_of(system, offsets=True)
-    found = dict(zip((c.name for c in columns), numbers_of(system, columns), strict=True))
+    found = dict(zip((c.name for c in columns), numeric_parameters(system, columns), strict=True))
     assert [found[name] for name in ("M1", "Ia1", "Fv1", "Fs1")] == [3, 0.5, 0.1, 0.2]
     assert found["M2"] == 2
     assert found["MX2"] ** 2 + found["MY2"] ** 2 == pytest.approx(1.0)
@@ -73,7 +73,7 @@ def test_values_keep_symbols():
     m.connect(m.world, Revolute("j"), m.add(Body("b", mass="m_b", com=(1, 0, 0))))
     system = m.assemble()
     columns = columns_of(system, rotors=False, friction=False)
-    assert str(values_of(system, columns)[9]) == "m_b"
+    assert str(symbolic_parameters(system, columns)[9]) == "m_b"
 
 
 def test_rotor_that_spins_with_a_joint_has_a_column():

@@ -14,7 +14,7 @@ from support.regressor_states import (
 from symbolic_robots import symbolic_robot
 
 import mbs.models
-from mbs.identification import energy_regressor, numbers_of, power_regressor, regressor
+from mbs.identification import energy_regressor, numeric_parameters, power_regressor, regressor
 from mbs.operations import count
 
 EVERY = (*OPEN, *CLOSED, *TREES, *ROTORS)
@@ -28,7 +28,7 @@ def test_energy_of_a_system_without_springs(name):
     q, v, _ = state_of(system)
     h = energy_regressor(system)
     E, U = mbs.models.energy(system)(q, v)
-    found = float(np.array(h(q, v)).ravel() @ numbers_of(system, h.columns))
+    found = float(np.array(h(q, v)).ravel() @ numeric_parameters(system, h.columns))
     assert found == pytest.approx(float(E + U), rel=1e-12, abs=1e-12)
 
 

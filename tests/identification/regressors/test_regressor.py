@@ -27,7 +27,7 @@ from mbs.identification import (
     energy_regressor,
     filtered_regressor,
     known_efforts,
-    numbers_of,
+    numeric_parameters,
     power_regressor,
     regressor,
 )
@@ -47,7 +47,7 @@ BOUNDS = {
 def error(system, coordinates="independent", seed=0):
     D = regressor(system, coordinates=coordinates)
     state = state_of(system, seed)
-    K = numbers_of(system, D.columns)
+    K = numeric_parameters(system, D.columns)
     tau = np.array(mbs.models.inverse_dynamics(system, coordinates)(*state)).ravel()
     known = np.array(known_efforts(system, coordinates)(*state[:2])).ravel()
     found = np.array(D(*state)) @ K + known
@@ -67,7 +67,7 @@ def test_tree_coordinates_of_a_closed_system(name):
     v, a = rng.normal(size=(2, system.nv))
     D = regressor(system, coordinates="tree")
     tau = np.array(mbs.models.inverse_dynamics(system, "tree")(system.configuration, v, a)).ravel()
-    found = np.array(D(system.configuration, v, a)) @ numbers_of(system, D.columns)
+    found = np.array(D(system.configuration, v, a)) @ numeric_parameters(system, D.columns)
     assert np.abs(found - tau).max() < 1e-12 * np.abs(tau).max()
 
 
@@ -175,7 +175,7 @@ def test_derivatives_go_through_it():
     D = regressor(system)
     q, v, a = (casadi.SX.sym(name, system.nv) for name in "qva")
     slope = casadi.Function("slope", [q, v, a], [casadi.jacobian(casadi.vec(D(q, v, a)), a)])
-    K = numbers_of(system, D.columns)
+    K = numeric_parameters(system, D.columns)
     state = state_of(system)
     A = np.array(mbs.models.inertia_matrix(system)(state[0]))
     found = np.array(slope(*state)).reshape(len(K), system.nv, -1).transpose(1, 0, 2)
@@ -201,8 +201,8 @@ def test_efforts_on_a_base_that_moves(name):
     state = state_of(system)
     D = regressor(system, moving_base=True)
     tau = np.array(mbs.models.inverse_dynamics(system, moving_base=True)(*state, *base)).ravel()
-    found = np.array(D(*state, *base)) @ numbers_of(system, D.columns)
-    still = np.array(regressor(system)(*state)) @ numbers_of(system, D.columns)
+    found = np.array(D(*state, *base)) @ numeric_parameters(system, D.columns)
+    still = np.array(regressor(system)(*state)) @ numeric_parameters(system, D.columns)
     assert np.abs(found - tau).max() < 1e-12 * np.abs(tau).max()
     assert np.abs(still - tau).max() > 1e-2 * np.abs(tau).max()
 
@@ -214,8 +214,8 @@ def test_base_parameters_have_columns_of_their_own():
     assert D.names == base.names
     assert "ZZ1R" in D.names
     state = state_of(system)
-    tau = np.array(regressor(system)(*state)) @ numbers_of(system, base.columns)
-    found = np.array(D(*state)) @ (base.matrix @ numbers_of(system, base.columns))
+    tau = np.array(regressor(system)(*state)) @ numeric_parameters(system, base.columns)
+    found = np.array(D(*state)) @ (base.matrix @ numeric_parameters(system, base.columns))
     assert np.abs(found - tau).max() < 1e-11 * np.abs(tau).max()
     assert count(D).total < count(regressor(system)).total
 

@@ -10,7 +10,7 @@ from support.regressor_states import Motion, state_of, system_of
 from mbs.identification import (
     energy_regressor,
     filtered_regressor,
-    numbers_of,
+    numeric_parameters,
     power_regressor,
     regressor,
 )
@@ -30,7 +30,7 @@ def agree(system, seed):
     largest = motion.largest(D, state)
     assert motion.largest(motion.rate(D1) + D2 - D, state) < 1e-10 * largest
     assert motion.largest(rate - taken, state) < 1e-10 * largest
-    K = numbers_of(system, model.columns)
+    K = numeric_parameters(system, model.columns)
     assert motion.largest((rate - taken) @ K, state) < 1e-10 * largest * np.abs(K).max()
 
 

@@ -8,7 +8,7 @@ from support.ring_loops import MADE_OF, ring_loop
 
 from mbs.assembly.tree import quaternion_slices
 from mbs.errors import Unclosable
-from mbs.loops import function, modes, reduction_matrix, solve
+from mbs.loops import assembly_modes, function, reduction_matrix, solve
 
 SEARCHED = (
     *("RSUR", "PSUR", "RSUP", "PUSP"),  # SSR and SSP, one ball a universal joint
@@ -32,7 +32,7 @@ PARALLEL = [
 def check_modes(system):
     """All of them close, and have the derivatives of the implicit function theorem."""
     q_a = active(system)
-    listed = modes(system, q_a)
+    listed = assembly_modes(system, q_a)
     assert max(mode.residual for mode in listed) < 1e-12
     assert any(same(system, mode.q, system.configuration) for mode in listed)
     for mode in listed[:2]:
@@ -99,7 +99,7 @@ def test_another_joint_may_be_driven(kinds, driven):
 def test_a_quaternion_is_of_unit_length_and_its_first_element_is_not_negative():
     system = ring_loop(1, "RUSR", cut=1).assemble()
     (part,) = quaternion_slices(system.tree)
-    for mode in modes(system):
+    for mode in assembly_modes(system):
         assert abs(np.linalg.norm(mode.q[part]) - 1) < 1e-14
         assert mode.q[part.start] >= 0
     followed = solve(system, {"j0": 0.05})
@@ -110,7 +110,7 @@ def test_a_quaternion_is_of_unit_length_and_its_first_element_is_not_negative():
 def test_out_of_reach_the_range_is_named(kinds, unit):
     system = ring_loop(1, kinds).assemble()
     reach = np.linspace(-np.pi, np.pi, 60) if unit == "rad" else np.linspace(-60, 60, 60)
-    lost = [x for x in reach if not modes(system, [x])]
+    lost = [x for x in reach if not assembly_modes(system, [x])]
     if not lost:
         assert kinds == "PCCC"  # angles do not depend on the slide
         return

@@ -7,7 +7,7 @@ from support.bennett import TWISTS, bennett
 from support.configurations import active, same, searched
 
 from mbs import Parameter
-from mbs.loops import function, modes, reduction_matrix
+from mbs.loops import assembly_modes, function, reduction_matrix
 from mbs.loops.plan import plan
 
 
@@ -17,11 +17,11 @@ def test_there_is_one_way_all_the_way_round(driven, cut):
     (stage,) = plan(system)
     assert stage.labels == ("",)
     for x in np.linspace(-3, 3, 13):
-        (mode,) = modes(system, [x])
+        (mode,) = assembly_modes(system, [x])
         assert mode.residual < 1e-12
         assert mode.branch == ()
     for x in (0.3, 2.9):
-        (mode,), (found,) = modes(system, [x]), searched(system, [x], starts=40)
+        (mode,), (found,) = assembly_modes(system, [x]), searched(system, [x], starts=40)
         assert same(system, mode.q, found)
 
 
@@ -45,7 +45,7 @@ def test_derivatives_are_finite_where_the_loop_is_flat():
         first, second = (np.array(m) for m in bend(angle))
         assert np.isfinite(first).all()
         assert np.isfinite(second).all()
-    G = np.array(reduction_matrix(system)(modes(system, [1.0])[0].q))
+    G = np.array(reduction_matrix(system)(assembly_modes(system, [1.0])[0].q))
     np.testing.assert_allclose(np.array(bend(1.0)[0]), G, atol=1e-10)
 
 

@@ -10,7 +10,7 @@ from support.flat_loops import flat_loop
 from mbs import Mechanism, Parameter
 from mbs.components import Body, Coupling, Custom, Prismatic, Revolute, custom
 from mbs.errors import LoopError, NoClosedForm
-from mbs.loops import closure, function, modes, reduction_matrix, solve
+from mbs.loops import assembly_modes, closure_residual, function, reduction_matrix, solve
 from mbs.loops.plan import plan, plan_from
 
 LENGTHS = {"crank": 0.5, "coupler": 1.0, "rocker": 0.7, "ground": 0.9}
@@ -59,7 +59,7 @@ def four_bars(count, lengths, guess=1.2, symbols=None):
 def test_a_row_of_four_bars_is_solved_one_after_the_other():
     system = four_bars(3, LENGTHS)
     assert [stage.name for stage in plan(system)] == ["x1", "x2", "x3"]
-    listed = modes(system, {"r0": 1.1})
+    listed = assembly_modes(system, {"r0": 1.1})
     found = searched(system, [1.1], starts=600)
     assert len(listed) == len(found) > 2
     assert all(any(same(system, mode.q, q) for q in found) for mode in listed)
@@ -71,7 +71,7 @@ def test_a_loop_that_no_label_names_stays_as_it_was_assembled():
     assembled = [stage.labels[stage.chosen] for stage in plan(system)]
     other = "x2:+" if "x2:-" in assembled else "x2:-"
     q = solve(system, {"r0": 1.2}, branch=other)
-    (mode,) = (mode for mode in modes(system, {"r0": 1.2}) if same(system, mode.q, q))
+    (mode,) = (mode for mode in assembly_modes(system, {"r0": 1.2}) if same(system, mode.q, q))
     assert mode.branch == (assembled[0], other, assembled[2])
     text = ", ".join(mode.branch)
     np.testing.assert_array_equal(solve(system, {"r0": 1.2}, branch=text), q)
@@ -95,12 +95,12 @@ def test_a_parallelogram_keeps_its_label_through_the_flat_configuration(symbols)
 
 def test_the_parallelogram_that_crosses():
     system = four_bars(1, EQUAL)
-    listed, found = modes(system, {"r0": 0.8}), searched(system, [0.8])
+    listed, found = assembly_modes(system, {"r0": 0.8}), searched(system, [0.8])
     assert len(listed) == len(found) == 2
     assert all(any(same(system, mode.q, q) for q in found) for mode in listed)
     (crossed,) = (mode for mode in listed if mode.branch == ("x1:crossed",))
     assert crossed.q[2] < 0
-    assert len(modes(system, {"r0": 0.0})) == 1  # the two meet
+    assert len(assembly_modes(system, {"r0": 0.0})) == 1  # the two meet
 
 
 def test_a_row_of_parallelograms_of_any_length():
@@ -113,7 +113,7 @@ def test_a_row_of_parallelograms_of_any_length():
 
 def test_too_many_branches_are_not_listed():
     with pytest.raises(LoopError, match="row: 8192 branches are too many to list; name one"):
-        modes(four_bars(13, EQUAL))
+        assembly_modes(four_bars(13, EQUAL))
 
 
 def test_lengths_stay_symbols():
@@ -128,8 +128,8 @@ def test_lengths_stay_symbols():
     np.testing.assert_allclose(np.array(f(1.2, p)), np.array(other(1.2)), atol=1e-13)
     q = solve(system, {"r0": 1.2}, branch=[], parameters=values)
     np.testing.assert_allclose(q, np.array(f(1.2, p)).ravel(), atol=1e-14)
-    assert np.abs(np.array(closure(system)(q, p))).max() < 1e-13
-    (mode, *_) = modes(system, {"r0": 1.2}, parameters=values)
+    assert np.abs(np.array(closure_residual(system)(q, p))).max() < 1e-13
+    (mode, *_) = assembly_modes(system, {"r0": 1.2}, parameters=values)
     assert mode.residual < 1e-13
 
 
@@ -181,7 +181,7 @@ def test_a_gear_leads_into_a_loop():
     m.connect(link.at(1.0), Revolute("x1"), rocker.at(0.7))
     system = m.assemble()
     assert [stage.name for stage in plan(system)] == ["gear", plan(system)[1].name]
-    listed = modes(system, {"motor_turn": 0.3})
+    listed = assembly_modes(system, {"motor_turn": 0.3})
     found = searched(system, [0.3])
     assert len(listed) == len(found) == 2
     for mode in listed:
@@ -199,13 +199,13 @@ def test_a_gear_backwards():
 
 def test_an_open_chain_has_one_mode():
     system = catalogue_system("scara")
-    (mode,) = modes(system, [0.1, 0.2, 0.3, 0.4])
+    (mode,) = assembly_modes(system, [0.1, 0.2, 0.3, 0.4])
     assert mode.q == (0.1, 0.2, 0.3, 0.4)
     assert mode.branch == ()
 
 
 def test_a_loop_of_slides_has_one_mode():
-    (mode,) = modes(flat_loop(8, "RRPP", (0,)).assemble())
+    (mode,) = assembly_modes(flat_loop(8, "RRPP", (0,)).assemble())
     assert mode.branch == ()
 
 

@@ -13,7 +13,7 @@ from mbs.components import (
     Spherical,
     Universal,
 )
-from mbs.loops import function, modes, solve
+from mbs.loops import assembly_modes, function, solve
 
 JOINTS = {
     "universal": Universal("x", axes=("z", "x")),
@@ -44,7 +44,7 @@ def loop(joint, closing, offset):
 def test_what_a_joint_of_the_tree_does_not_use_is_found_as_well(joint, closing):
     free = isinstance(joint, Cylindrical)
     system = loop(joint, closing, offset=0.35 if free else 0.05)
-    listed, found = modes(system), searched(system, active(system), starts=100)
+    listed, found = assembly_modes(system), searched(system, active(system), starts=100)
     assert len(listed) == len(found) > 0
     assert all(any(same(system, mode.q, q) for q in found) for mode in listed)
     assert max(mode.residual for mode in listed) < 1e-12

@@ -15,7 +15,7 @@ import mbs
 from mbs import Mechanism
 from mbs.components import Revolute
 from mbs.errors import LoopError, ModelError, NoClosedForm, Unclosable
-from mbs.loops import function, modes, solve
+from mbs.loops import assembly_modes, function, solve
 
 
 def double_rocker():
@@ -41,7 +41,7 @@ def test_out_of_reach_the_range_is_named():
     near = np.arccos((1.0 + 1.44 - 0.5**2) / 2.4)  # in line, one over the other
     np.testing.assert_allclose(numbers, [-limit, -near, near, limit], atol=1e-3)
     assert text.endswith(" rad")
-    assert modes(system, {"j1": 3.0}) == []
+    assert assembly_modes(system, {"j1": 3.0}) == []
     with pytest.raises(Unclosable, match="j1 can be -1"):
         function(system)(3.0)
 
@@ -110,7 +110,7 @@ def test_the_closed_form_agrees_with_following():
     system = double_rocker()
     q = solve(system, {"j1": 1.2}, branch=[])
     assert same(system, q, solve(system, {"j1": 1.2}), 1e-9)
-    listed = [mode for mode in modes(system, {"j1": 1.2}) if same(system, mode.q, q)]
+    listed = [mode for mode in assembly_modes(system, {"j1": 1.2}) if same(system, mode.q, q)]
     assert len(listed) == 1
 
 
@@ -118,7 +118,7 @@ def test_the_closed_form_agrees_with_following():
 def test_loops_of_the_other_tests(seed):
     mechanism, guess = planar_loop(seed, 3 + seed)
     system = mechanism.assemble(guess=guess)
-    assert any(same(system, mode.q, system.configuration, 1e-6) for mode in modes(system))
+    assert any(same(system, mode.q, system.configuration, 1e-6) for mode in assembly_modes(system))
     q = np.array(function(system)(active(system))).ravel()
     assert same(system, q, system.configuration, 1e-8)
 
@@ -128,7 +128,10 @@ def test_loops_without_closed_form_say_why():
     system = mechanism.assemble(guess=guess)
     with pytest.raises(NoClosedForm, match=r"closing has no closed form known here, 6 positions"):
         function(system)
-    assert modes(system).proof == "the general inverse geometric model, certified: 16 of 16 roots"
+    assert (
+        assembly_modes(system).proof
+        == "the general inverse geometric model, certified: 16 of 16 roots"
+    )
     with pytest.raises(LoopError, match=r"use mbs\.loops\.solve without branch"):
         function(system)
     with pytest.raises(NoClosedForm):
@@ -138,6 +141,6 @@ def test_loops_without_closed_form_say_why():
 
 def test_what_is_no_system():
     with pytest.raises(ModelError, match="is not a System"):
-        modes(mbs.load("four_bar"))
+        assembly_modes(mbs.load("four_bar"))
     with pytest.raises(ModelError, match="is not a System"):
         function(mbs.load("four_bar"))

@@ -21,7 +21,7 @@ from mbs.components import (
     Universal,
 )
 from mbs.errors import NoClosedForm
-from mbs.loops import function, modes, reduction_matrix, solve
+from mbs.loops import assembly_modes, function, reduction_matrix, solve
 from mbs.loops.plan import plan
 
 LOOPS = [
@@ -56,7 +56,7 @@ def system(request):
 @pytest.mark.sweep
 def test_the_modes_are_those_that_a_search_finds(system):
     q_a = active(system)
-    listed, found = modes(system, q_a), searched(system, q_a, starts=80)
+    listed, found = assembly_modes(system, q_a), searched(system, q_a, starts=80)
     assert len(listed) == len(found) > 0
     for mode in listed:
         assert mode.residual < 1e-12
@@ -67,7 +67,7 @@ def test_the_modes_are_those_that_a_search_finds(system):
 @pytest.mark.sweep
 def test_the_function_gives_every_mode(system):
     q_a = active(system)
-    for mode in modes(system, q_a):
+    for mode in assembly_modes(system, q_a):
         q = np.array(function(system, mode.branch)(q_a)).ravel()
         np.testing.assert_allclose(q, mode.q, atol=1e-12)
         np.testing.assert_allclose(solve(system, q_a, branch=mode.branch), mode.q, atol=1e-12)
@@ -88,7 +88,7 @@ def test_the_first_and_second_derivatives(system):
     q_a = active(system)
     x = casadi.SX.sym("x", len(q_a))
     G_of = reduction_matrix(system)
-    for mode in modes(system, q_a):
+    for mode in assembly_modes(system, q_a):
         q = function(system, mode.branch)(x)
         slope = casadi.jacobian(q, x)
         G = np.array(casadi.Function("G", [x], [slope])(q_a))
@@ -110,7 +110,7 @@ def test_the_first_and_second_derivatives(system):
 def test_a_joint_with_more_freedom_closes_a_plane_loop(kinds, driven, closing):
     system = flat_loop(5, kinds, driven, closing).assemble()
     found = searched(system, active(system), starts=60)
-    listed = modes(system, active(system))
+    listed = assembly_modes(system, active(system))
     assert len(listed) == len(found) == 2
     assert all(any(same(system, mode.q, q) for q in found) for mode in listed)
 
@@ -142,7 +142,7 @@ def offset_loop(closing, links=2):
 def test_what_a_closing_joint_does_not_use_is_left_out(closing, labels):
     system = offset_loop(closing)
     found = searched(system, active(system))
-    listed = modes(system)
+    listed = assembly_modes(system)
     assert [mode.branch[0] for mode in listed] == list(labels)
     assert len(found) == 2
     assert all(any(same(system, mode.q, q) for q in found) for mode in listed)
@@ -150,7 +150,7 @@ def test_what_a_closing_joint_does_not_use_is_left_out(closing, labels):
 
 def test_a_point_on_a_line():
     system = offset_loop(PointOnLine("x", axis="x"), links=1)
-    found, listed = searched(system, active(system)), modes(system)
+    found, listed = searched(system, active(system)), assembly_modes(system)
     assert [mode.branch for mode in listed] == [("x:+",), ("x:-",)]
     assert len(found) == 2
     assert all(any(same(system, mode.q, q) for q in found) for mode in listed)
@@ -164,12 +164,12 @@ def test_a_joint_without_kernel_is_named():
     m.connect(m.world, Revolute("j2", axis="x"), second)
     m.connect(first, ConstantVelocity("cv", axis=(0.6, 0.0, 0.8)), second)
     with pytest.raises(NoClosedForm, match="a ConstantVelocity closes it"):
-        modes(m.assemble())
+        assembly_modes(m.assemble())
 
 
 def test_the_sign_is_that_of_the_elbow():
     system = catalogue_system("four_bar")
-    for mode in modes(system, {"j1": 0.3}):
+    for mode in assembly_modes(system, {"j1": 0.3}):
         j1, j2, j4 = mode.q
         angle = j4 - (j1 + j2) - np.pi  # of j3, counted from where coupler and rocker are in line
         assert mode.branch == ("j3:+" if np.sin(angle) > 0 else "j3:-",)
@@ -180,7 +180,7 @@ def test_the_sign_is_that_of_the_stroke():
     (stage,) = plan(system)
     assert stage.labels == ("j3:+", "j3:-")
     system = flat_loop(6, "RRPR", (0,)).assemble()
-    strokes = {mode.branch[0]: mode.q[2] for mode in modes(system)}
+    strokes = {mode.branch[0]: mode.q[2] for mode in assembly_modes(system)}
     assert strokes["j2:+"] > strokes["j2:-"]
 
 
@@ -188,7 +188,7 @@ def test_the_sign_is_that_of_the_stroke():
 @given(st.sampled_from(LOOPS), st.integers(0, 10**6))
 def test_any_plane_loop(loop, seed):
     system = flat_loop(seed, *loop).assemble()
-    listed = modes(system)
+    listed = assembly_modes(system)
     assert 1 <= len(listed) <= 2
     assert any(same(system, mode.q, system.configuration, 1e-6) for mode in listed)
     assert max(mode.residual for mode in listed) < 1e-10

@@ -14,7 +14,7 @@ from mbs.components import (
     Spherical,
     Universal,
 )
-from mbs.loops import function, modes, reduction_matrix, solve
+from mbs.loops import assembly_modes, function, reduction_matrix, solve
 from mbs.loops.plan import plan
 
 
@@ -94,7 +94,7 @@ def leg_loop(seed, kinds):
 def check(system, starts=60):
     """Modes against a search, derivatives against the implicit function theorem."""
     q_a = active(system)
-    listed, found = modes(system, q_a), searched(system, q_a, starts=starts)
+    listed, found = assembly_modes(system, q_a), searched(system, q_a, starts=starts)
     assert len(listed) == len(found) > 1
     assert all(any(same(system, mode.q, q) for q in found) for mode in listed)
     x = casadi.SX.sym("x", len(q_a))

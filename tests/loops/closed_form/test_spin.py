@@ -10,7 +10,7 @@ from mbs import Mechanism
 from mbs.assembly.tree import quaternion_slices
 from mbs.components import Body, Revolute, Spherical
 from mbs.errors import ModelError, NoClosedForm, Unclosable
-from mbs.loops import function, modes, solve
+from mbs.loops import assembly_modes, function, solve
 from mbs.loops.closing import Closing
 from mbs.loops.plan import plan
 from mbs.models import direct_geometry
@@ -26,7 +26,7 @@ def turn_of(system, q, body):
 @pytest.mark.parametrize(("kinds", "cut"), CASES)
 def test_both_ways_close(kinds, cut):
     system = ring_loop(1, kinds, cut=cut).assemble()
-    listed = modes(system)
+    listed = assembly_modes(system)
     assert len(listed) == 2
     assert max(mode.residual for mode in listed) < 1e-12
     assert any(same(system, mode.q, system.configuration) for mode in listed)
@@ -41,7 +41,7 @@ def test_the_spin_turns_the_rod_about_its_line(cut):
     frames = {}
     for angle in (0.0, 0.4, -2.0):
         q = solve(system, {"j0": 0.1, spins[0]: angle}, branch=[])
-        assert np.abs(np.array(mbs.loops.closure(system)(q))).max() < 1e-12
+        assert np.abs(np.array(mbs.loops.closure_residual(system)(q))).max() < 1e-12
         frames[angle] = turn_of(system, q, "body2")
     for angle in (0.4, -2.0):
         R = frames[angle] @ frames[0.0].T
@@ -57,7 +57,7 @@ def test_the_rest_does_not_depend_on_the_spin():
     f = function(system)
     values = [np.array(f([0.1, angle])).ravel()[others] for angle in (0.0, 1.0)]
     np.testing.assert_array_equal(*values)
-    assert all(is_searched(system, mode) for mode in modes(system, [0.1, 0.0]))
+    assert all(is_searched(system, mode) for mode in assembly_modes(system, [0.1, 0.0]))
 
 
 def is_searched(system, mode):
@@ -77,7 +77,7 @@ def is_searched(system, mode):
 
 def test_the_range_leaves_the_spin_out():
     system = ring_loop(1, "RSSR").assemble()
-    lost = [x for x in np.linspace(-3, 3, 60) if not modes(system, [x, 0.0])]
+    lost = [x for x in np.linspace(-3, 3, 60) if not assembly_modes(system, [x, 0.0])]
     with pytest.raises(Unclosable, match=r"j0 can be [^;]* rad, the other positions as they are$"):
         solve(system, {"j0": lost[0]}, branch=[])
 
@@ -86,7 +86,7 @@ def test_a_spin_that_is_no_number():
     system = ring_loop(1, "RSSR").assemble()
     spin = next(system.speeds[k].name for k in system.free if system.speeds[k].name != "j0")
     with pytest.raises(ModelError, match="give a finite number"):
-        modes(system, {spin: np.nan})
+        assembly_modes(system, {spin: np.nan})
 
 
 def test_the_spin_is_named_among_the_inputs():
@@ -106,4 +106,4 @@ def test_a_ball_that_turns_freely_is_refused():
     m.connect(crank.at(0.5), Revolute("k"), arm)
     m.connect(arm.at(0.5), Revolute("x"), bar.at(0.3, 0.1))
     with pytest.raises(NoClosedForm, match="the quaternion of s rotates freely"):
-        modes(m.assemble(guess={"r": 0.5, "k": 1.0}))
+        assembly_modes(m.assemble(guess={"r": 0.5, "k": 1.0}))

@@ -10,7 +10,7 @@ from support.ring_loops import ring_loop
 from mbs import Mechanism, Parameter
 from mbs.components import Body, Revolute, Spherical
 from mbs.errors import NoClosedForm, Unclosable
-from mbs.loops import function, modes, reduction_matrix, solve
+from mbs.loops import assembly_modes, function, reduction_matrix, solve
 from mbs.loops.plan import plan
 
 PARALLEL = ((1, 2), (1, 3))
@@ -44,7 +44,7 @@ def test_the_modes_are_those_that_a_search_finds(kinds, parallel, ways):
     system = ring_loop(1, kinds, parallel=parallel).assemble()
     assert [len(stage.labels) for stage in plan(system)] == [ways]
     q_a = active(system)
-    listed, found = modes(system, q_a), searched(system, q_a, starts=100)
+    listed, found = assembly_modes(system, q_a), searched(system, q_a, starts=100)
     assert len(listed) == len(found) > 1
     assert all(any(same(system, mode.q, q) for q in found) for mode in listed)
     assert max(mode.residual for mode in listed) < 1e-11
@@ -53,7 +53,7 @@ def test_the_modes_are_those_that_a_search_finds(kinds, parallel, ways):
 def test_derivatives_of_a_branch():
     system = ring_loop(1, "RRRRW").assemble()
     q_a, x = active(system), casadi.SX.sym("x", 1)
-    for mode in modes(system, q_a):
+    for mode in assembly_modes(system, q_a):
         slope = casadi.jacobian(function(system, mode.branch)(x), x)
         G = np.array(casadi.Function("G", [x], [slope])(q_a))
         wanted = np.array(reduction_matrix(system)(list(mode.q)))
@@ -64,10 +64,10 @@ def test_lengths_stay_symbols():
     symbolic, q_a = askew(Parameter("L", 0.5)), [0.2]
     for length in (0.5, 0.48):
         plain, checked = askew(length), 0
-        for mode in modes(plain, q_a):
+        for mode in assembly_modes(plain, q_a):
             q = np.array(function(symbolic, mode.branch)(q_a, [length])).ravel()
             checked += same(plain, mode.q, q, 1e-9)
-        assert checked == len(modes(plain, q_a)) > 1
+        assert checked == len(assembly_modes(plain, q_a)) > 1
 
 
 def test_out_of_reach_there_is_no_configuration():
@@ -75,7 +75,7 @@ def test_out_of_reach_there_is_no_configuration():
     loops = function(system)
     q = np.array(loops([0.3])).ravel()
     assert same(system, q, system.configuration, 1e-8)
-    assert modes(system, [2.0]) == []
+    assert assembly_modes(system, [2.0]) == []
     with pytest.raises(Unclosable, match="drive can be"):
         loops([2.0])
     x = casadi.SX.sym("x")

@@ -14,7 +14,7 @@ from mbs.components import (
     Universal,
 )
 from mbs.errors import Unclosable
-from mbs.loops import function, modes, reduction_matrix, solve
+from mbs.loops import assembly_modes, function, reduction_matrix, solve
 from mbs.loops.plan import plan
 
 GUESS = {"x": 0.05, "y": -0.02, "z": -0.7, "a0": 0.3, "a1": 0.3, "a2": 0.3}
@@ -65,7 +65,7 @@ def delta(forearms, driven="arms", length=0.9):
 @pytest.mark.parametrize("forearms", ["rod", "rods"])
 def test_the_platform_of_a_delta_robot_has_two_places(forearms):
     system = delta(forearms)
-    listed, found = modes(system), searched(system, active(system), starts=60)
+    listed, found = assembly_modes(system), searched(system, active(system), starts=60)
     assert len(listed) == len(found) == 2
     assert all(any(same(system, mode.q, q) for q in found) for mode in listed)
     assert max(mode.residual for mode in listed) < 1e-12
@@ -85,14 +85,14 @@ def test_the_platform_is_where_three_spheres_meet():
 
 def test_the_arms_of_a_delta_robot_have_eight_configurations():
     system = delta("rod", driven="platform")
-    listed = modes(system)
+    listed = assembly_modes(system)
     assert len(listed) == len(searched(system, active(system), starts=200)) == 8
     assert [stage.labels for stage in plan(system)] == [(f"a{k}:+", f"a{k}:-") for k in range(3)]
 
 
 def test_forearms_that_are_bodies():
     system = delta("bodies")
-    listed = modes(system)
+    listed = assembly_modes(system)
     assert len(listed) == 16  # two places, and each elbow in either of two ways
     assert max(mode.residual for mode in listed) < 1e-12
     assert any(same(system, mode.q, system.configuration) for mode in listed)
@@ -109,7 +109,7 @@ def check_slope(system, mode):
 @pytest.mark.parametrize("forearms", ["rod", "rods"])
 def test_derivatives(forearms):
     system = delta(forearms)
-    for mode in modes(system):
+    for mode in assembly_modes(system):
         check_slope(system, mode)
 
 
@@ -124,7 +124,7 @@ def test_the_length_stays_a_symbol():
 
 def test_out_of_reach_the_range_is_named():
     system = delta("rod", length=0.59)
-    assert modes(system, [0.0, 0.0, 0.0]) == []  # the elbows are 0.6 m from the middle
+    assert assembly_modes(system, [0.0, 0.0, 0.0]) == []  # the elbows are 0.6 m from the middle
     with pytest.raises(Unclosable, match=r"a0 can be .* rad; a1 can be .* as they are$"):
         solve(system, [0.0, 0.0, 0.0], branch=[])
 
@@ -142,7 +142,7 @@ def held_in_a_plane(rods):
 
 def test_two_rods_hold_a_point_in_a_plane():
     system = held_in_a_plane(2)
-    listed, found = modes(system), searched(system, active(system), starts=60)
+    listed, found = assembly_modes(system), searched(system, active(system), starts=60)
     assert len(listed) == len(found) == 2
     assert max(mode.residual for mode in listed) < 1e-12
     heights = {mode.branch[0]: mode.q[1] for mode in listed}
@@ -152,4 +152,4 @@ def test_two_rods_hold_a_point_in_a_plane():
 def test_one_rod_for_two_slides_leaves_one_of_them_independent():
     system = held_in_a_plane(1)
     assert len(system.free) == 2
-    assert len(modes(system)) == 2
+    assert len(assembly_modes(system)) == 2

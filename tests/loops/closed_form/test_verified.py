@@ -8,7 +8,7 @@ import pytest
 from support.catalogue_systems import catalogue_system
 
 from mbs.errors import NoClosedForm
-from mbs.loops import modes
+from mbs.loops import assembly_modes
 from mbs.loops.plan import plan, started_at, verify
 
 
@@ -29,7 +29,7 @@ def test_a_way_that_never_closes_is_left_out():
     (kept,) = verify(system, [more])
     assert kept.labels == stage.labels
     assert kept.chosen == stage.chosen
-    q = started_at(system, np.array(modes(system, {"j1": 0.3})[0].q))
+    q = started_at(system, np.array(assembly_modes(system, {"j1": 0.3})[0].q))
     np.testing.assert_array_equal(np.array(kept.values(q, [])), np.array(stage.values(q, [])))
 
 

@@ -11,7 +11,7 @@ from mbs import Mechanism
 from mbs.closed_forms.arm_search import search
 from mbs.components import Body, Revolute, Spherical
 from mbs.loops.closing import Closing
-from mbs.loops.modes import closed_configurations
+from mbs.loops.mode_search import closed_configurations
 from mbs.loops.plan import complete
 from mbs.models.inverse_geometry.chain import frame_chain
 from mbs.models.inverse_geometry.whole_robot import close, configurations_at, why_searched
@@ -47,7 +47,7 @@ def solutions(system, frame, T):
 
 
 def assert_solved(system, frame, T, found):
-    closure = mbs.loops.closure(system)
+    closure = mbs.loops.closure_residual(system)
     for configuration in found:
         assert np.abs(np.array(closure(configuration.q))).max(initial=0.0) < 1e-12
         assert configuration.residual < 1e-12

@@ -13,8 +13,8 @@ from support.catalogue_systems import catalogue_system
 import mbs
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry import solve
+from mbs.models.inverse_geometry._solve import solve_rigid
 from mbs.models.inverse_geometry.chain import frame_chain, target_pose
-from mbs.models.inverse_geometry.solve import solve_rigid
 
 ANGLES = st.floats(-3.1, 3.1)
 ROBOTS = {

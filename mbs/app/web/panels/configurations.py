@@ -28,7 +28,7 @@ from mbs.app.web.app import App
 from mbs.app.web.panels.equations import open_equations
 from mbs.app.web.panels.form import FIELD, frame_label
 from mbs.app.web.panels.layout import (
-    Asking,
+    TaskButton,
     in_a_row,
     main_button,
     side_button,
@@ -412,7 +412,7 @@ class _ConfigurationsPanel:
             **redundant,
         )
         show = partial(show_configurations, self._app)
-        asking = Asking(self._app, self._button, self._shown, show)
+        asking = TaskButton(self._app, self._button, self._shown, show)
         await asking.run("Solving the inverse geometry", task, T)
 
     async def _framed(self) -> None:

@@ -22,7 +22,7 @@ from mbs.app.tasks.identification import (
     record_columns,
 )
 from mbs.app.web.app import App
-from mbs.app.web.panels.layout import Asking, tell_of_changes
+from mbs.app.web.panels.layout import TaskButton, tell_of_changes
 from mbs.app.web.panels.plots import (
     FieldLook,
     add_look,
@@ -34,7 +34,7 @@ from mbs.app.web.panels.plots import (
 )
 from mbs.app.web.panels.text_view import column
 from mbs.assembly import System
-from mbs.identification.identify import POOR
+from mbs.identification._identify import POOR
 from mbs.text import quoted
 
 # Results of an identification: tables, residuals, and files to download.
@@ -253,7 +253,9 @@ async def _run(app: App, asked: _IdentificationAsked, button: ui.button, shown: 
         come_into_view(shown)
 
     task = partial(identify, quiet=True)
-    await Asking(app, button, shown, show).run("Identifying", task, asked.content, asked.settings())
+    await TaskButton(app, button, shown, show).run(
+        "Identifying", task, asked.content, asked.settings()
+    )
 
 
 def _explain(system: System) -> None:

@@ -77,7 +77,7 @@ def new_answer(app: App, shown: ui.element, document: Document) -> Iterator[None
 
 
 @dataclass(frozen=True, slots=True)
-class Asking:
+class TaskButton:
     """Computation of a result for a panel, with a button and a container for the result.
 
     Attributes:

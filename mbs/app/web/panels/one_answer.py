@@ -12,7 +12,7 @@ from mbs.app.web.app import App
 from mbs.app.web.panels.equations import open_equations
 from mbs.app.web.panels.form import Given, OptionForm
 from mbs.app.web.panels.layout import (
-    Asking,
+    TaskButton,
     in_a_row,
     main_button,
     side_button,
@@ -84,7 +84,7 @@ async def open_one_answer(
     tell_of_changes(app, shown)
 
     async def ask() -> None:
-        asking = Asking(app, button, shown, partial(show, app))
+        asking = TaskButton(app, button, shown, partial(show, app))
         await asking.run(texts.label, task, *arguments(form.given))
 
     button.on_click(ask)

@@ -9,7 +9,7 @@ from nicegui import ui
 from mbs.app.tasks.equations import EVERY_PASS, CountRow, counts
 from mbs.app.web.app import App
 from mbs.app.web.panels.layout import (
-    Asking,
+    TaskButton,
     in_a_row,
     main_button,
     tell_of_changes,
@@ -70,7 +70,7 @@ def open_optimizer(app: App) -> None:
     tell_of_changes(app, shown)
 
     async def count_all() -> None:
-        asking = Asking(app, button, shown, _show)
+        asking = TaskButton(app, button, shown, _show)
         await asking.run("Counting operations", counts, (), passes_of(app.session))
 
     button.on_click(count_all)

@@ -12,7 +12,7 @@ from nicegui import events, ui
 from numpy.typing import NDArray
 
 from mbs.app.tasks.exporting import file_stem
-from mbs.app.tasks.simulation import Film, SimulationSettings, csv_bytes, film
+from mbs.app.tasks.simulation import Movie, SimulationSettings, csv_bytes, film
 from mbs.app.web.app import App
 from mbs.app.web.panels.layout import new_answer, tell_of_changes
 from mbs.app.web.panels.plots import (
@@ -229,7 +229,7 @@ _SPEEDS = {
 class Player:
     """Player of a movie in the picture of the app: play, pause, and a slider over time."""
 
-    def __init__(self, app: App, film: Film) -> None:
+    def __init__(self, app: App, film: Movie) -> None:
         self._app, self._film = app, film
         self._robot = app.session.robot
         self._playing = False
@@ -366,7 +366,7 @@ async def _run(app: App, texts: Texts, shown: ui.element) -> None:
     come_into_view(shown)
 
 
-def _show(app: App, system: System, made: Film) -> Player:
+def _show(app: App, system: System, made: Movie) -> Player:
     """Show plots of a motion and return its player."""
     result = made.result
 
@@ -396,7 +396,7 @@ def _show(app: App, system: System, made: Film) -> Player:
     return player
 
 
-def _draw(made: Film, charts: Charts) -> None:
+def _draw(made: Movie, charts: Charts) -> None:
     height = 225 if len(charts) == 1 else 170
     for unit, series in charts.items():
         ui.echart(line_chart(made.result.time, series, unit)).style(
@@ -404,7 +404,7 @@ def _draw(made: Film, charts: Charts) -> None:
         ).mark("chart")
 
 
-def _facts(system: System, made: Film) -> None:
+def _facts(system: System, made: Movie) -> None:
     """Show numbers that indicate the accuracy of the motion: energies and closure residual."""
     result = made.result
     energy = result["kinetic_energy"] + result["potential_energy"]

@@ -18,9 +18,9 @@ from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, RATE_UNIT
 from mbs.assembly.tree import norm_rows, position_rate, quaternion_slices
 from mbs.assembly.validity import plain_rows
 from mbs.errors import ModelError, NoClosedForm, Unclosable
-from mbs.loops.closure import independent_closure, row_groups
+from mbs.loops._function import function
+from mbs.loops.closure_equations import independent_closure, row_groups
 from mbs.loops.configuration import Guess, Start, Values, start
-from mbs.loops.function import function
 from mbs.loops.plan import branches_at, plan
 from mbs.loops.reduction import reduction, reduction_matrix
 from mbs.loops.velocity import (
@@ -29,10 +29,10 @@ from mbs.loops.velocity import (
     independent_constraint_rows,
     independent_drift,
 )
+from mbs.models._direct_dynamics import direct_dynamics, independent_dynamics
+from mbs.models._inverse_dynamics import inverse_dynamics, own_efforts
+from mbs.models._measurements import with_readings
 from mbs.models.contacts import require_no_contacts
-from mbs.models.direct_dynamics import direct_dynamics, independent_dynamics
-from mbs.models.inverse_dynamics import inverse_dynamics, own_efforts
-from mbs.models.measurements import with_readings
 from mbs.models.state.signals import by_name
 from mbs.models.symbols import ModelSymbols, devices, outputs_of, part_equations, symbols_of
 from mbs.recursions.parts import later_sources

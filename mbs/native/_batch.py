@@ -17,9 +17,9 @@ import numpy as np
 from casadi import MX, Function
 
 from mbs.errors import ModelError
+from mbs.native._compiled import require_function
 from mbs.native.array_calls import default_of_last
 from mbs.native.batch_source import batch_source
-from mbs.native.compiled import require_function
 from mbs.native.compiler import cached_library, compiler_found
 from mbs.native.kernel import FAST_FLAGS, processor
 from mbs.numbers import doubles

@@ -17,8 +17,8 @@ from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction, require_system
 from mbs.assembly.tree import normalised
 from mbs.errors import ModelError
-from mbs.models.direct_dynamics import direct_dynamics
-from mbs.models.inverse_dynamics import inverse_dynamics
+from mbs.models._direct_dynamics import direct_dynamics
+from mbs.models._inverse_dynamics import inverse_dynamics
 from mbs.models.tree_table import shapes_of, table_of, unknown_to_core
 from mbs.native import compiled
 from mbs.native.array_calls import with_array_calls

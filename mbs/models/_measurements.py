@@ -13,12 +13,12 @@ from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tables import ANGULAR, QUATERNION, AttachedSensor
 from mbs.closed_forms.spatial import unit_quaternion
 from mbs.errors import ModelError
-from mbs.models.direct_dynamics import direct_dynamics
-from mbs.models.joint_wrenches import motion_inputs, wrenches_of_joints
+from mbs.models._direct_dynamics import direct_dynamics
+from mbs.models._joint_wrenches import motion_inputs, wrenches_of_joints
 from mbs.models.loop_kinematics import cut_coordinate
 from mbs.models.symbols import (
+    ExternalForces,
     ModelSymbols,
-    Surroundings,
     check_coordinates,
     configuration_check,
     outputs_of,
@@ -81,7 +81,7 @@ def measurements(system: System, coordinates: str = "independent") -> Function:
 
 
 def readings(
-    system: System, s: ModelSymbols, a: SX, tau: SX | None, around: Surroundings
+    system: System, s: ModelSymbols, a: SX, tau: SX | None, around: ExternalForces
 ) -> list[tuple[str, SX]]:
     """Named outputs of `measurements`, with external wrenches.
 
@@ -166,7 +166,7 @@ class _Observed:
 
 
 def _observed(
-    system: System, s: ModelSymbols, a: SX, tau: SX | None, around: Surroundings
+    system: System, s: ModelSymbols, a: SX, tau: SX | None, around: ExternalForces
 ) -> _Observed:
     transmits = any(attached.joint is not None for attached in system.sensors)
     wrenches = wrenches_of_joints(system, s, a, tau, around) if transmits else []

@@ -193,7 +193,9 @@ def weighted(observations: Observations) -> Estimate:
     return weighted_solution(observations, equations, weights, "weighted least squares", 1)
 
 
-def reweighted(observations: Observations, tolerance: float = 1e-3, most: int = 50) -> Estimate:
+def iteratively_reweighted(
+    observations: Observations, tolerance: float = 1e-3, most: int = 50
+) -> Estimate:
     """Estimate parameters by iteratively reweighted least squares.
 
     Weights and parameters are updated alternately until the weights converge. The result is the
@@ -237,7 +239,7 @@ _MEDIAN_OF_NORMAL = 0.6745
 """Median absolute value of normal errors of unit standard deviation."""
 
 
-def robust(
+def huber(
     observations: Observations, bound: float = HUBER, tolerance: float = 1e-2, most: int = 100
 ) -> Estimate:
     """Estimate parameters with the Huber loss, which is linear beyond `bound` standard deviations.

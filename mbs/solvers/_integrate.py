@@ -14,7 +14,7 @@ import numpy.typing as npt
 from mbs.core import compiled_evaluation, core_library, interpreted_evaluation
 from mbs.errors import Interrupted, SolverError
 from mbs.native import cached_library, compiler_found
-from mbs.native.compiled import calls_machine_code, exact_source, unwritten
+from mbs.native._compiled import calls_machine_code, exact_source, unwritten
 from mbs.native.compiler import flags_for, known_library
 from mbs.solvers.control_c import control_c
 from mbs.solvers.problem import (

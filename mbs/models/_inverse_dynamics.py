@@ -9,8 +9,8 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.models.actuation import effort_output
 from mbs.models.symbols import (
+    ExternalForces,
     ModelSymbols,
-    Surroundings,
     configuration_check,
     exerted,
     surroundings,
@@ -140,14 +140,14 @@ def gravity_effort(
     )
 
 
-def _efforts(system: System, s: ModelSymbols, a: SX, around: Surroundings) -> tuple[SX, Named]:
+def _efforts(system: System, s: ModelSymbols, a: SX, around: ExternalForces) -> tuple[SX, Named]:
     """Efforts in input coordinates for accelerations a (nv, 1), and named intermediate results."""
     dynamics = _dynamics(system, s, a, around)
     tau = dynamics.efforts + own_efforts(system, s, a)
     return s.reduced_effort(tau), newton_euler_names(dynamics)
 
 
-def tree_efforts(system: System, s: ModelSymbols, a: SX, around: Surroundings) -> SX:
+def tree_efforts(system: System, s: ModelSymbols, a: SX, around: ExternalForces) -> SX:
     """(nv, 1) inverse dynamics of the tree for accelerations a (nv, 1), with joint friction."""
     return _dynamics(system, s, a, around).efforts + own_efforts(system, s, a)
 
@@ -158,7 +158,7 @@ def own_efforts(system: System, s: ModelSymbols, a: SX) -> SX:
     return joint_efforts(system.tree, s.q, s.v_tree, a) + acting
 
 
-def _dynamics(system: System, s: ModelSymbols, a: SX, around: Surroundings) -> Dynamics:
+def _dynamics(system: System, s: ModelSymbols, a: SX, around: ExternalForces) -> Dynamics:
     external = exerted(system, around, s.poses, s.q, s.v_tree)
     return newton_euler(system.tree, s.poses, s.v_tree, a, around.base, external)
 

@@ -19,8 +19,8 @@ from mbs.errors import ExportError, ModelError
 from mbs.export.c_check import NO_FAST_MATH, STATUS, StatusCheck, check_of
 from mbs.export.c_step import StepTexts, step_texts
 from mbs.files import path_of, write_texts
+from mbs.native._compiled import generated, require_function, require_names, unwritten
 from mbs.native.c_code import Real, literal
-from mbs.native.compiled import generated, require_function, require_names, unwritten
 from mbs.native.frames import NOINLINE
 from mbs.native.handwritten import handwritten_text, names_declared
 from mbs.native.scalar_source import Target, bare_source

@@ -8,6 +8,7 @@ import casadi
 import numpy as np
 from casadi import MX, Opti
 
+from mbs.bridges._step import advance
 from mbs.bridges.explicit import Model, explicit
 from mbs.bridges.opti import (
     Grid,
@@ -17,7 +18,6 @@ from mbs.bridges.opti import (
     require_counts,
     variable,
 )
-from mbs.bridges.step import advance
 
 
 def multiple_shooting(

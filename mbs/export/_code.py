@@ -11,7 +11,7 @@ from mbs.errors import ModelError
 from mbs.export.languages import language_of
 from mbs.export.languages.language import Language
 from mbs.files import write_text
-from mbs.native.compiled import require_function
+from mbs.native._compiled import require_function
 from mbs.text import quoted
 
 

@@ -25,9 +25,13 @@ from mbs.assembly.parts import Quantity
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.assembly.tree import position_rate
 from mbs.errors import ModelError
-from mbs.loops.closure import closure_rows, independent_closure
+from mbs.loops.closure_equations import closure_rows, independent_closure
 from mbs.loops.configuration import Guess, Start, Values, start
 from mbs.loops.velocity import velocity_rows
+from mbs.models._dae import driving, motors, start_efforts
+from mbs.models._direct_dynamics import independent_dynamics
+from mbs.models._joint_wrenches import shown_outputs
+from mbs.models._measurements import readings, with_readings
 from mbs.models.contacts import (
     KINDS,
     ContactEquations,
@@ -36,10 +40,6 @@ from mbs.models.contacts import (
     require_lasting_rows,
     require_no_contacts,
 )
-from mbs.models.dae import driving, motors, start_efforts
-from mbs.models.direct_dynamics import independent_dynamics
-from mbs.models.joint_wrenches import shown_outputs
-from mbs.models.measurements import readings, with_readings
 from mbs.models.state.signals import by_name
 from mbs.models.symbols import (
     ModelSymbols,

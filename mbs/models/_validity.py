@@ -8,7 +8,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.validity import ValidityRow, plain_rows
-from mbs.loops.examine import loop_rows
+from mbs.loops.examination import loop_rows
 
 
 def validity(system: System) -> Function:

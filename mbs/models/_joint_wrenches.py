@@ -9,7 +9,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tables import JointRow, WeldedPart
 from mbs.assembly.tree import Tree
-from mbs.loops.closure import row_groups
+from mbs.loops.closure_equations import row_groups
 from mbs.loops.velocity import (
     constraint_jacobian,
     cut_wrenches,
@@ -18,11 +18,11 @@ from mbs.loops.velocity import (
     on_links,
     part_wrenches,
 )
+from mbs.models._inverse_dynamics import tree_efforts
 from mbs.models.actuation import motors_apart, shared_efforts
-from mbs.models.inverse_dynamics import tree_efforts
 from mbs.models.symbols import (
+    ExternalForces,
     ModelSymbols,
-    Surroundings,
     check_coordinates,
     configuration_check,
     exerted,
@@ -51,7 +51,7 @@ def weld_wrench(
     system: System,
     s: ModelSymbols,
     a: SX,
-    around: Surroundings,
+    around: ExternalForces,
     joint: JointRow,
     others: dict[str, Wrench],
 ) -> Wrench:
@@ -100,7 +100,7 @@ def _on_joint(system: System, q: SX, row: JointRow, link: int, side: str, wrench
     return sign * f, sign * m
 
 
-def _outside(system: System, part: WeldedPart, around: Surroundings) -> dict[int, Wrench]:
+def _outside(system: System, part: WeldedPart, around: ExternalForces) -> dict[int, Wrench]:
     """Wrenches f_ext that the bodies of a welded part exert on their environment, by link."""
     f_ext = dict(around.inputs).get("f_ext")
     if f_ext is None:
@@ -186,7 +186,7 @@ def motion_inputs(system: System, s: ModelSymbols) -> tuple[Named, SX, SX | None
 
 
 def wrenches_of_joints(
-    system: System, s: ModelSymbols, a: SX, tau: SX | None, around: Surroundings
+    system: System, s: ModelSymbols, a: SX, tau: SX | None, around: ExternalForces
 ) -> list[Wrench]:
     """Wrench of each row of `system.joints` on the body of frame_b, about and in frame_b.
 
@@ -264,7 +264,7 @@ def shown_outputs(system: System, parts: PartsAt, a: SX, tau: SX) -> SX:
 
 
 def closure_efforts(
-    system: System, s: ModelSymbols, a: SX, tau: SX | None, around: Surroundings
+    system: System, s: ModelSymbols, a: SX, tau: SX | None, around: ExternalForces
 ) -> SX:
     """(m, 1) efforts lam of all closure rows: J' lam = required efforts minus motor efforts.
 

@@ -15,6 +15,7 @@ from mbs.assembly.tree import quaternion_slices
 from mbs.closed_forms.ring import extent, independent_indices, spin_indices
 from mbs.components.joints import Motion
 from mbs.errors import LoopError, ModelError
+from mbs.loops._function import Given, independent_positions
 from mbs.loops.blocks import Step, steps_of
 from mbs.loops.closing import (
     CLOSED,
@@ -26,7 +27,6 @@ from mbs.loops.closing import (
     difference,
     within_half_turn,
 )
-from mbs.loops.function import Given, independent_positions
 from mbs.loops.plan import Roots, Stage, every_configuration
 from mbs.loops.pose import Goal, goal
 from mbs.solvers.rank import rank
@@ -72,7 +72,7 @@ class ModeList(list[Mode]):
         self.proof = proof
 
 
-def modes(
+def assembly_modes(
     system: System,
     q_active: Given = None,
     *,

@@ -17,12 +17,12 @@ from mbs.errors import ModelError
 from mbs.loops.analysis import rows_at
 from mbs.loops.balance import obstacles, require_no_balance
 from mbs.loops.velocity import closure_jacobian, constraint_jacobian, kept_rows
+from mbs.models._inverse_dynamics import own_efforts, tree_efforts
 from mbs.models.actuation import effort_input
 from mbs.models.constrained_accelerations import constrained_accelerations
-from mbs.models.inverse_dynamics import own_efforts, tree_efforts
 from mbs.models.symbols import (
+    ExternalForces,
     ModelSymbols,
-    Surroundings,
     check_coordinates,
     configuration_check,
     exerted,
@@ -199,13 +199,13 @@ def _model(
     )
 
 
-def _articulated(system: System, s: ModelSymbols, tau: SX, around: Surroundings) -> SX:
+def _articulated(system: System, s: ModelSymbols, tau: SX, around: ExternalForces) -> SX:
     left = tau - own_efforts(system, s, SX.zeros(system.nv))
     external = exerted(system, around, s.poses, s.q, s.v)
     return articulated_accelerations(system.tree, s.poses, s.v, left, around.base, external)
 
 
-def _composite(system: System, s: ModelSymbols, tau: SX, around: Surroundings) -> SX:
+def _composite(system: System, s: ModelSymbols, tau: SX, around: ExternalForces) -> SX:
     A = tree_inertia(system.tree, s.poses)
     H = s.reduced_effort(tree_efforts(system, s, s.tree_acceleration(SX.zeros(s.size)), around))
     return solve_tree(s.reduced_matrix(A), tau - H, solution_order(system, s))

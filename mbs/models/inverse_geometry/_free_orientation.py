@@ -15,6 +15,10 @@ from mbs.components import Body, Prismatic, Revolute
 from mbs.errors import ModelError
 from mbs.mechanism import Mechanism
 from mbs.models.geometry import terminal_frame
+from mbs.models.inverse_geometry._follow import Followed
+from mbs.models.inverse_geometry._follow import follow as follow_poses
+from mbs.models.inverse_geometry._solve import solve
+from mbs.models.inverse_geometry._solve_many import ManySolutions, solve_many
 from mbs.models.inverse_geometry.answer import NO_LOOP
 from mbs.models.inverse_geometry.chain import (
     FrameChain,
@@ -22,8 +26,6 @@ from mbs.models.inverse_geometry.chain import (
     target_pose,
     target_poses,
 )
-from mbs.models.inverse_geometry.follow import Followed
-from mbs.models.inverse_geometry.follow import follow as follow_poses
 from mbs.models.inverse_geometry.path_redundancy import Redundancy
 from mbs.models.inverse_geometry.redundancy import Locked, Redundant
 from mbs.models.inverse_geometry.solutions import (
@@ -35,8 +37,6 @@ from mbs.models.inverse_geometry.solutions import (
     bounds,
     leaves_out,
 )
-from mbs.models.inverse_geometry.solve import solve
-from mbs.models.inverse_geometry.solve_many import ManySolutions, solve_many
 from mbs.models.inverse_geometry.whole_robot import close, why_searched
 from mbs.text import did_you_mean, quoted
 

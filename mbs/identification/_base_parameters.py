@@ -17,7 +17,7 @@ from mbs.assembly.model_function import ModelFunction, require_system
 from mbs.assembly.tree import Link
 from mbs.errors import ModelError
 from mbs.expressions import Expression, Parameter
-from mbs.expressions.expression import Number, Operation, operation
+from mbs.expressions._expression import Number, Operation, operation
 from mbs.identification.grouping.grouping import (
     Check,
     Grouping,
@@ -54,9 +54,9 @@ from mbs.identification.regressors import (
     chosen_columns,
     every_column,
     regressor,
-    values_of,
+    symbolic_parameters,
 )
-from mbs.loops.closure import closure_rows
+from mbs.loops.closure_equations import closure_rows
 from mbs.spatial import Inertia, elements
 from mbs.text import did_you_mean, quoted
 
@@ -408,7 +408,7 @@ class BaseParameters:
         result is valid for the present gravity only, and for a base at rest unless `moving_base`
         was set.
         """
-        inputs = [values_of(self.system, self.columns)]
+        inputs = [symbolic_parameters(self.system, self.columns)]
         inputs += [self.system.p] if self.system.parameters else []
         grouped = self.function(*inputs)
         values = SX.zeros(len(self.columns))

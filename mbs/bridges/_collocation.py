@@ -18,7 +18,7 @@ from mbs.bridges.opti import (
     variable,
 )
 from mbs.errors import ModelError
-from mbs.models.dae import Dae
+from mbs.models._dae import Dae
 from mbs.text import quoted
 
 SCHEMES = ("radau", "legendre")
@@ -46,7 +46,7 @@ def collocation(
     Args:
         opti: problem that receives the variables and constraints. Cost, boundary conditions and
             limits are added by the caller. The invariants of a Dae are not included; add them at
-            one knot, see `invariants`.
+            one knot, see `constraint_residuals`.
         model: Dae, or Function of (x, u) or (x, u, p) that returns dx/dt.
         grid: stages, their duration and evaluation.
         points: number K of collocation points per stage, 1 to 9.
@@ -95,7 +95,7 @@ def collocation(
     )
 
 
-def invariants(model: Dae, x: MX, p: Any = None) -> MX:
+def constraint_residuals(model: Dae, x: MX, p: Any = None) -> MX:
     """Return the invariants of a Dae at a knot, which are zero along every motion.
 
     Constrain them to zero at one knot only, and only if x is not fixed there.

@@ -9,7 +9,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tree import position_rate
 from mbs.errors import ModelError
-from mbs.models.inverse_dynamics import static_efforts, tree_gravity
+from mbs.models._inverse_dynamics import static_efforts, tree_gravity
 from mbs.models.symbols import ModelSymbols, configuration_check, symbols_of
 from mbs.operations.counts import cheapest
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia

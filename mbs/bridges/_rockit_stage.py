@@ -10,7 +10,7 @@ from casadi import DM, MX
 from mbs.bridges.explicit import require_dae
 from mbs.bridges.opti import CODES, parameter_values
 from mbs.errors import ModelError
-from mbs.models.dae import Dae
+from mbs.models._dae import Dae
 from mbs.text import quoted
 
 

@@ -12,7 +12,7 @@ from casadi import MX, SX, Function
 
 from mbs.bridges.explicit import Model, explicit
 from mbs.errors import ModelError
-from mbs.models.dae import Dae
+from mbs.models._dae import Dae
 from mbs.text import quoted
 
 _T = TypeVar("_T", SX, MX)

@@ -18,6 +18,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.errors import ModelError
 from mbs.loops.configuration import Values
+from mbs.models._inverse_dynamics import tree_efforts
 from mbs.models.constrained_accelerations import inertia_size, loop_rows
 from mbs.models.contacts import require_no_contacts
 from mbs.models.dae_phases import (
@@ -34,7 +35,6 @@ from mbs.models.dae_phases import (
     phase_dae,
     point_rows,
 )
-from mbs.models.inverse_dynamics import tree_efforts
 from mbs.models.symbols import ModelSymbols, surroundings, symbols_of
 from mbs.recursions.composite_body import inertia_matrix
 from mbs.solvers.linear import solve_saddle

@@ -21,7 +21,7 @@ from mbs.loops.closing import (
     relative_rows,
     row_sizes,
 )
-from mbs.loops.closure import facing, square_closure
+from mbs.loops.closure_equations import facing, square_closure
 from mbs.loops.plan import Stage, plan
 from mbs.numbers import has_boolean
 from mbs.text import did_you_mean, quoted
@@ -229,8 +229,8 @@ def function(system: System, branch: Branch = None) -> Function:
 
     Args:
         system: assembled mechanism.
-        branch: labels from `mbs.loops.modes`, such as "j3:+". A loop without a label keeps its
-            assembled branch.
+        branch: labels from `mbs.loops.assembly_modes`, such as "j3:+". A loop without a label
+            keeps its assembled branch.
 
     Returns:
         Function of q_a (m, 1) and, if the system has parameters, p; q (nq, 1) [rad or m]. A numeric
@@ -301,7 +301,7 @@ def _labels(system: System, branch: Branch) -> list[str]:
     except (AttributeError, TypeError):
         raise ModelError(
             f"{system.name}: branch is {quoted(branch)}; give labels such as 'j3:+', as"
-            " mbs.loops.modes lists them"
+            " mbs.loops.assembly_modes lists them"
         ) from None
 
 

@@ -15,7 +15,7 @@ from mbs.assembly.model_function import ConfigurationCheck, require_system
 from mbs.assembly.validity import ValidityRow
 from mbs.errors import ModelError, SingularPosture, Unclosable
 from mbs.loops.closing import OPEN, closure_parameters, row_sizes
-from mbs.loops.closure import closure_rows
+from mbs.loops.closure_equations import closure_rows
 from mbs.loops.velocity import (
     constraint_jacobian,
     determining_rows,
@@ -37,7 +37,7 @@ and speeds of one. `mbs.loops.accuracy` checks the accuracy at large speeds."""
 
 
 @dataclass(frozen=True, slots=True)
-class ConfigurationState:
+class ConfigurationReport:
     """Closure and singularity of a configuration of a system with loops.
 
     Attributes:
@@ -71,9 +71,9 @@ class ConfigurationState:
         return self.leads > _DETERMINED
 
 
-def examine(
+def configuration_report(
     system: System, q: Sequence[float], *, parameters: Mapping[str, float] | None = None
-) -> ConfigurationState:
+) -> ConfigurationReport:
     """Return the closure error of a configuration, its mobility and its distance from singularity.
 
     Args:
@@ -93,7 +93,7 @@ def examine(
     found = scales(system)
     J = np.array(constraint_jacobian(system)(position, p)) * found.rows.reshape(-1, 1)
     J *= found.columns([speed.unit for speed in system.speeds])
-    return ConfigurationState(
+    return ConfigurationReport(
         residual, opening, system.nv - rank(J), system.closure.mobility, leads
     )
 

@@ -103,7 +103,7 @@ def pose_on_plane(system: System, q: SX, cut: Cut, disc: RollingDisc) -> Pose:
     return disc.on_plane(relative_pose(system.tree, q, *cut.frames))
 
 
-def closure(system: System) -> Function:
+def closure_residual(system: System) -> Function:
     """Return ``closure(q) -> phi``: the closure residual, zero if all loops are closed.
 
     Returns:

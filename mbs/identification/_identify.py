@@ -13,15 +13,21 @@ from casadi import DM, SX
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError, SolverError
-from mbs.identification.base_parameters import BaseParameters, base_parameters, with_parameters
+from mbs.identification._base_parameters import BaseParameters, base_parameters, with_parameters
 from mbs.identification.bodies import (
     Prior,
     bodies_table,
-    consistent,
     consistent_links,
     consistent_weighted,
+    physically_consistent,
 )
-from mbs.identification.estimate import Estimate, Estimator, Residuals, cross_validated, held_out
+from mbs.identification.estimate import (
+    Estimate,
+    Estimator,
+    Residuals,
+    cross_validated,
+    holdout_residuals,
+)
 from mbs.identification.methods import LARGEST_PERCENT, METHODS, Essential, Setting, essential
 from mbs.identification.observations import (
     EQUATIONS,
@@ -342,14 +348,14 @@ def identify(
         full = stacked([EQUATIONS[equations](system, s, bandwidth, options) for s in samples])
         grouped = full.grouped(base)
         reached(_EQUATIONS_DONE)
-        physical = consistent if method == "least_squares" else consistent_weighted
+        physical = physically_consistent if method == "least_squares" else consistent_weighted
         watch = partial(_between, reached, _EQUATIONS_DONE, _BODIES_DONE)
         bodies, reason = _found_bodies(partial(physical, full, known, watch), method)
         reached(_BODIES_DONE)
         estimator = METHODS[method](Setting(D, base, samples, full, bodies, known))
         estimate = estimator(grouped)
         reached(_SOLVED)
-        validation = held_out(estimator, grouped, TRAINED)
+        validation = holdout_residuals(estimator, grouped, TRAINED)
     return Identification(
         system, base, bandwidth, full, estimator, estimate, bodies, validation, reason
     )

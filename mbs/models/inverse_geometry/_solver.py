@@ -13,12 +13,12 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Array
 from mbs.closed_forms.arm_search import Nearest
+from mbs.models.inverse_geometry._solve import chain_or_none, solve_rigid
 from mbs.models.inverse_geometry.chain import target_pose
 from mbs.models.inverse_geometry.closed_form import require_method
 from mbs.models.inverse_geometry.gathering import METHODS
 from mbs.models.inverse_geometry.kernel import CERTAIN, PoseKernel, kernel_of
 from mbs.models.inverse_geometry.solutions import Solutions
-from mbs.models.inverse_geometry.solve import chain_or_none, solve_rigid
 
 
 class PoseAnswer:

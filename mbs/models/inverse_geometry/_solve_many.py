@@ -14,6 +14,7 @@ from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, Array
 from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import NoClosedForm
+from mbs.models.inverse_geometry._solve import solve_at, solve_rigid
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_poses
 from mbs.models.inverse_geometry.closed_form import (
     CLOSED_FORMS,
@@ -40,7 +41,6 @@ from mbs.models.inverse_geometry.solutions import (
     bounds,
     leaves_out,
 )
-from mbs.models.inverse_geometry.solve import solve_at, solve_rigid
 
 Repair = Callable[[Arm, Array], Array]
 """Function (arm, T (4, 4)) -> all configurations (m, n) of the arm with end pose T."""

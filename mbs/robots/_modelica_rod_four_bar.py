@@ -6,8 +6,8 @@ import math
 
 from mbs.components import Prismatic, Revolute, Rod
 from mbs.mechanism import Mechanism
+from mbs.robots._modelica_four_bar import CRANK, DIAMETER, GRAVITY, ROCKER, ROD, STEEL
 from mbs.robots.bars import round_bar
-from mbs.robots.modelica_four_bar import CRANK, DIAMETER, GRAVITY, ROCKER, ROD, STEEL
 
 _SOURCE = (
     "Modelica Standard Library, Modelica.Mechanics.MultiBody.Examples.Loops.Fourbar2; Otter,"

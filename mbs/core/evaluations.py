@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,14 +14,18 @@ from numpy.typing import NDArray
 from mbs.core.library import core_library
 
 Arrays = tuple[NDArray[np.float64], ...]
+_MOST = 4096
+"""Number of functions whose addresses and sizes are kept: more than a process usually compiles."""
 
 
+@lru_cache(maxsize=_MOST)
 def code_address(library: ctypes.CDLL, name: str) -> int:
     """Return the address of a function in a library; zero if the library has none of this name."""
     found = ctypes.cast(library[name], ctypes.c_void_p).value if hasattr(library, name) else None
     return found or 0
 
 
+@lru_cache(maxsize=_MOST)
 def work_sizes(library: ctypes.CDLL, name: str) -> tuple[int, ...]:
     """Return the lengths of arg, res, iw and w that a function needs, by CasADi's convention."""
     sizes = [ctypes.c_longlong() for _ in range(4)]

@@ -50,7 +50,6 @@ autodoc_typehints_format = "short"
 autodoc_type_aliases = {
     name: name for name in ("Array", "Vector", "Scalar", "Number", "Rotation", "Model", "Law")
 }
-autodoc_preserve_defaults = True
 autodoc_class_signature = "mixed"
 autodoc_default_options = {"members": True}
 maximum_signature_line_length = 88

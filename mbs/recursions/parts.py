@@ -49,7 +49,7 @@ _ENDING = ("mbs.components.sources",)
 def later_signal(system: System, source: WireSource) -> SX:
     """Return the symbol of a sensor signal that depends on accelerations or forces.
 
-    `mbs.models.measurements.with_readings` substitutes its value in rates and outputs.
+    `with_readings` of `mbs.models._measurements` substitutes its value in rates and outputs.
     """
     symbol: SX = system.recent("readings", source, lambda: SX.sym(str(source)), _MOST_READINGS)
     return symbol

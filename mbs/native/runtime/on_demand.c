@@ -46,7 +46,7 @@ static int fetched(int part) {
     return 0;
   }
   const int held = PyGILState_Ensure();
-  object *module = PyImport_ImportModule("mbs.native.compiled");
+  object *module = PyImport_ImportModule("mbs.native._compiled");
   object *answer = module ? PyObject_CallMethod(module, "fetch_derivatives", "siL", RECORD,
                                                 part, (ll)(intptr_t)found)
                           : NULL;

@@ -1,4 +1,4 @@
-"""Published and textbook mechanisms, and the one way to load any mechanism."""
+"""Catalogue of published and textbook mechanisms, and `load` for mechanisms of all sources."""
 
 from mbs.robots._akr3000 import akr3000
 from mbs.robots._andrews_squeezer import andrews_squeezer

@@ -55,36 +55,38 @@ def load(
     gravity: Sequence[Scalar] | None = None,
     mount: Mounting | None = None,
 ) -> Mechanism:
-    """A mechanism from the catalogue, a dict of the TOML schema, or a file.
+    """Load a mechanism from the catalogue, from a dict of the TOML schema or from a file.
 
-    What a reader changed, ignored, doubts or completed is in `mechanism.notes`.
+    `mechanism.notes` lists the changes, ignored parts, doubts and additions of the reader.
 
     Args:
-        source: a name such as "puma560", a dict, or the path of a .toml, .par, .urdf, .xacro,
-            .sdf, .world or .xml (MJCF) file.
-        parameters: values of the symbols that it uses.
-        base: "free" connects the root body to the world by the Free joint "root_joint", whose
-            positions are root_joint.x .y .z .qw .qx .qy .qz and whose velocities
-            root_joint.vx .vy .vz .wx .wy .wz are those of the body in its own axes; "fixed" locks
-            a root that the file leaves free where the file puts it; None is as the file says.
-            An SDFormat file leaves a root free that no joint connects with the world.
-            A table of frames (dict, .toml, .par) gives no inertia of its base, so that it cannot
-            be free.
-        lock: joints by name and the positions that they are welded at, as in `Mechanism.lock`.
-        strict: refuse a file where a note would be taken.
+        source: name in the catalogue such as "puma560", a dict, or the path of a .toml, .par,
+            .urdf, .xacro, .sdf, .world or .xml (MJCF) file.
+        parameters: values of the symbols of the mechanism, by name.
+        base: connection of the root body to the world. None: as in the file. "free": a Free joint
+            "root_joint", with positions root_joint.x .y .z .qw .qx .qy .qz and velocities
+            root_joint.vx .vy .vz .wx .wy .wz in the axes of the body. "fixed": a root that is free
+            in the file is welded at its position in the file. In an SDFormat file, a root is free
+            if no joint connects it to the world. A table of frames (dict, .toml, .par) contains no
+            inertia of the base, so that its base cannot be free.
+        lock: positions by joint name [rad or m] at which joints are welded, as in `Mechanism.lock`.
+        strict: whether to raise an error instead of adding a note.
         xacro: values of the arguments of a xacro file, by name.
-        packages: folders of the packages that a xacro file or `package://` names.
-        gravity: gravity acceleration in the world frame [m/s^2] in place of that of the file.
+        packages: folders by package name, for xacro files and `package://` paths.
+        gravity: gravity acceleration in the world frame [m/s^2]. It replaces that of the file.
         mount: rotation of the base in the world, such as ("x", "pi") for a robot that hangs from
             the ceiling, or {"position": (0, 0, 2.5), "rotation": ("x", "pi")}. Gravity is rotated
-            into the axes of the base; poses, and the coordinates of a free root, stay relative to
+            into the axes of the base. Poses, and the coordinates of a free root, stay relative to
             the base. The frame "outer_world" is the world: `mbs.models.transform(system, "tool",
-            "outer_world")` is a pose in it.
+            "outer_world")` is a pose in the world.
+
+    Returns:
+        the mechanism, before its assembly.
 
     Raises:
-        DescriptionError: the name or the suffix is unknown, the description is impossible, a
-            parameter is used nowhere, the base cannot be free, a joint to be locked does not
-            exist, or reading is strict and there is a note.
+        DescriptionError: the name or the file ending is unknown, the description is invalid, a
+            parameter is not used, the base cannot be free, a joint of `lock` does not exist, or
+            strict is true and there is a note.
     """
     if base not in (None, "fixed", "free"):
         raise DescriptionError(f"base is {quoted(base)}; give 'fixed', 'free' or None")

@@ -25,26 +25,26 @@ def body(
     about_com: Sequence[float],
     **values: Any,
 ) -> Row:
-    """The row of a body whose principal inertia is published about its centre of mass.
+    """Return the row of a body from its principal moments of inertia about the centre of mass.
 
     Args:
-        number: of the frame it is fixed on.
-        mass: [kg].
+        number: number of the frame on which the body is fixed.
+        mass: mass [kg].
         com: centre of mass in that frame [m].
         about_com: moments of inertia about the centre of mass, in the frame's axes [kg m^2].
-        **values: Ia, Fv, Fs, name.
+        **values: further entries of the row: Ia, Fv, Fs, name.
 
     Returns:
         The row with the ten parameters about the origin of the frame.
     """
     c = np.array(com, dtype=float)
-    square = float(np.sum(c * c))  # not c @ c: its last digit hangs on the processor
+    square = float(np.sum(c * c))  # the last digit of c @ c depends on the processor
     J = np.diag(about_com) + mass * (square * np.eye(3) - np.outer(c, c))
     return about_origin(number, mass, com, J, **values)
 
 
 def about_origin(number: int, mass: float, com: Sequence[float], J: Any, **values: Any) -> Row:
-    """The row of a body by its (3, 3) inertia about the origin of its frame [kg m^2]."""
+    """Return the row of a body from its inertia J (3, 3) about the origin of its frame [kg m^2]."""
     keys = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
     elements = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
     ten = [*(float(J[k, m]) for k, m in elements), *(mass * float(x) for x in com), mass]
@@ -54,14 +54,14 @@ def about_origin(number: int, mass: float, com: Sequence[float], J: Any, **value
 def cuboid(
     number: int, mass: float, sides: Sequence[float], com: Sequence[float], **values: Any
 ) -> Row:
-    """The row of a homogeneous cuboid along the axes of its frame.
+    """Return the row of a homogeneous cuboid along the axes of its frame.
 
     Args:
-        number: of the frame it is fixed on.
-        mass: [kg].
+        number: number of the frame on which the body is fixed.
+        mass: mass [kg].
         sides: lengths along x, y, z [m].
-        com: its middle in the frame [m].
-        **values: Ia, Fv, Fs, name.
+        com: centre of the cuboid in the frame [m].
+        **values: further entries of the row: Ia, Fv, Fs, name.
     """
     x, y, z = (side * side for side in sides)
     about_com = [mass * (y + z) / 12, mass * (x + z) / 12, mass * (x + y) / 12]

@@ -259,6 +259,7 @@ def _rows(arm: Arm, target: Array, q: Complex) -> tuple[Complex, Complex, Array,
 
 
 def _skew(axis: Complex) -> Complex:
+    """Return the matrices (..., 3, 3) of the cross product with axes (..., 3)."""
     x, y, z = np.moveaxis(axis, -1, 0)
     o = np.zeros_like(x)
     return np.moveaxis(np.array([[o, -z, y], [z, o, -x], [-y, x, o]]), (0, 1), (-2, -1))

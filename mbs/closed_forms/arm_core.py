@@ -391,10 +391,12 @@ def _targets(T: Array, count: int) -> Array:
 
 
 def _rooms(count: int, n: int) -> tuple[Array, Array, Hits]:
+    """Return empty buffers for `count` solutions of n joints, their residuals and hits."""
     return np.empty((count, n)), np.empty(count), np.empty(count, dtype=np.int64)
 
 
 def _at(array: Array) -> int:
+    """Return the memory address of an array."""
     return int(array.ctypes.data)
 
 

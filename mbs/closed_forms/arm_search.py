@@ -182,6 +182,7 @@ def nearest(arm: Arm, T: Array) -> Nearest:
 
 
 def _measure(arm: Arm, T: Array, q: Array) -> Nearest:
+    """Return q (n,) with its pose and the distance [m] and angle [rad] of the pose to T (4, 4)."""
     pose = arm.pose(q)
     gap = gap_to(T, pose)
     return Nearest(q, float(np.linalg.norm(gap[:3])), float(np.linalg.norm(gap[3:])), pose)

@@ -122,12 +122,12 @@ class Homotopy:
 
 
 def _square(J: Complex, patch: Complex) -> Complex:
-    """Append the patch as the last row: the length of x is constant to first order."""
+    """Append the row `patch` to J, which keeps the length of x constant to first order."""
     return np.concatenate([J, patch.conj()[:, None, :]], axis=1)
 
 
 def _correction(path: Homotopy, x: Complex, t: Real, patch: Complex) -> tuple[Complex, Complex]:
-    """Return Newton's step and dx/dt, both (r, 8)."""
+    """Return Newton's step and the tangent dx/dt of a homotopy path, both (r, 8)."""
     J, rate = path.slopes(x, t)
     sides = np.zeros((len(x), _SIZE, 2), dtype=np.complex128)
     sides[:, :_ROWS, 0], sides[:, :_ROWS, 1] = np.einsum("rij,rj->ri", J, x) / 2, rate
@@ -136,7 +136,10 @@ def _correction(path: Homotopy, x: Complex, t: Real, patch: Complex) -> tuple[Co
 
 
 def follow(path: Homotopy, x: Complex, tolerance: float = TOLERANCE) -> tuple[Complex, Real]:
-    """Return the roots (r, 8) of length one at the end of a path, and the reached t (r,)."""
+    """Return the ends (r, 8) of homotopy paths from roots x, and the reached t (r,).
+
+    The ends have length one. t is 1 on a path that was followed completely.
+    """
     return homotopy.follow(functools.partial(_correction, path), x, _in_patch, tolerance)
 
 
@@ -233,6 +236,7 @@ def random_legs(rng: np.random.Generator) -> PlatformLegs:
 
 
 def _centred(legs: PlatformLegs) -> PlatformLegs:
+    """Return the legs with the mean of the points a and the mean of the points b at the origin."""
     return PlatformLegs(legs.a - legs.a.mean(axis=0), legs.b - legs.b.mean(axis=0), legs.c)
 
 
@@ -324,10 +328,12 @@ _IDLE = 3
 
 
 def _lengths(rng: np.random.Generator) -> Complex:
+    """Return random complex constants c (6,) of `Legs`."""
     return rng.normal(size=LEGS) + 1j * rng.normal(size=LEGS)
 
 
 def _distinct_roots(legs: PlatformLegs, x: Complex) -> Complex:
+    """Return the certified regular roots among x, each once."""
     ends = certify(legs, x.copy(), np.ones(len(x)))
     return ends.x[ends.regular]
 
@@ -419,6 +425,7 @@ def poses(a: Real, b: Real, length: Real) -> Poses:
 
 
 def _rotations(e: Real) -> Real:
+    """Return the rotation matrices (..., 3, 3) of unit quaternions e (r, 4), scalar part first."""
     w, x, y, z = e.T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -436,6 +443,7 @@ def _slopes(a: Real, b: Real, e: Real, p: Real) -> tuple[Real, Real]:
 
 
 def _size(a: Real, b: Real) -> float:
+    """Return the root mean square distance of the leg ends from their means [m]; 1 if it is 0."""
     return float(np.sqrt(np.mean(np.var(a, axis=0)) + np.mean(np.var(b, axis=0)))) or 1.0
 
 
@@ -487,6 +495,7 @@ def _real(a: Real, b: Real, square: Real, ends: PathEnds, t: Real) -> _RealRoots
 
 
 def _is_same(e: Real, p: Real, other_e: Real, other_p: Real) -> bool:
+    """Whether two poses are equal; quaternions e and -e are the same orientation."""
     turn = min(np.max(np.abs(e - other_e)), np.max(np.abs(e + other_e)))
     return bool(max(turn, np.max(np.abs(p - other_p))) < _SAME)
 
@@ -523,7 +532,7 @@ def _refined(a: Real, b: Real, square: Real, e: Real, p: Real) -> tuple[Real, Re
 
 
 def _products(e: Real, other: Real) -> Real:
-    """Return products (r, 4) of quaternions."""
+    """Return the Hamilton products (r, 4) of quaternions e and `other`."""
     scalar = e[:, :1] * other[:, :1] - np.sum(e[:, 1:] * other[:, 1:], axis=1, keepdims=True)
     vector = e[:, :1] * other[:, 1:] + other[:, :1] * e[:, 1:] + np.cross(e[:, 1:], other[:, 1:])
     return np.concatenate([scalar, vector], axis=1)

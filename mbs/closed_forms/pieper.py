@@ -75,6 +75,7 @@ class PieperLoop:
         return digits[number] if distinct else str(number + 1)
 
     def _named(self, k: int) -> ChainJoint:
+        """Return the joint of the original loop with the name of joint k."""
         name = self.ring.joints[k].name
         return next(joint for joint in self.problem.ring.joints if joint.name == name)
 
@@ -146,6 +147,7 @@ def three_angle_steps(
 
 
 def _axis_rotation(scene: PieperLoop, k: int) -> SX:
+    """Return the rotation matrix (3, 3) of joint k about its z axis."""
     return SX(axis_rotation("z", scene.ring.joints[k].sign * scene.x(k)).matrix)
 
 
@@ -178,6 +180,7 @@ def _square_angle(X: SX, Y: SX, Z: SX, sign: SX, G: SX) -> Root:
 
 
 def _outer(scene: PieperLoop, k: int, start: SX, end: SX) -> SequenceStep:
+    """Return the step of joint k, which rotates the vector `start` (2, 1) onto `end`."""
     return angle_step(scene, k, (start, end), 1.0)
 
 
@@ -564,11 +567,13 @@ def _cross(M: SX, k: int) -> SX:
 
 
 def _named(M: SX, p: SX, ends: list[str]) -> dict[str, SX]:
+    """Return the elements of M and p as named coefficients X, Y, Z of each joint end."""
     named = {f"{axis}{end}": M[m, k] for k, end in enumerate(ends) for m, axis in enumerate("XYZ")}
     return named | {f"{axis}0": p[m] for m, axis in enumerate("XYZ")}
 
 
 def _text(scene: PieperLoop, indices: list[int], ends: list[str]) -> str:
+    """Return the three equations of the displacements of prismatic joints as text."""
     names = [scene.ring.joints[k].name for k in indices]
     rows = (
         " + ".join(f"{axis}{end} {name}" for end, name in zip(ends, names, strict=True))
@@ -620,7 +625,7 @@ def pieper(problem: Problem) -> StepSequence:
 
 
 def _cost(sequence: StepSequence) -> tuple[int, int]:
-    """Return the number of branches and the number of quartics, as a sort key."""
+    """Return the number of branches and the number of quartics of a solution, as a sort key."""
     return sequence.branches, sum(step.kind == "quartic" for step in sequence.steps)
 
 
@@ -709,6 +714,7 @@ def _height(way: Pose) -> tuple[SX, SX, SX, SX]:
 
 
 def _refusal(names: list[str]) -> str:
+    """Return the error message for loops to which Pieper's method does not apply."""
     return (
         f"no three neighbouring axes of {names[0]} .. {names[-1]} meet in a point and no three"
         " joints are prismatic, so that Pieper's method does not apply; use the general method"

@@ -44,6 +44,7 @@ def three_revolute(ring: Ring) -> LoopBranches:
 
 
 def _three_revolute_root(ring: Ring, sign: int) -> Positions:
+    """Return the positions of a triangle of three revolute joints; sign selects the branch."""
     X1, X2, X3 = (gap.pose for gap in ring.gaps)
     g, d2, d3 = (in_plane(p) for p in (X1.inverse().p, X2.p, X3.p))
     R1, R2, R3 = (in_plane(pose.R) for pose in (X1, X2, X3))
@@ -76,6 +77,7 @@ def one_prismatic(ring: Ring) -> LoopBranches:
 
 
 def _one_prismatic_root(ring: Ring, sign: int) -> Positions:
+    """Return the positions of a plane loop of two revolute joints and one prismatic joint."""
     X1, X2, X3 = (gap.pose for gap in ring.gaps)
     R = X2.R @ X3.R
     g, e, u = (in_plane(p) for p in (X1.inverse().p, X2.p + X2.R @ X3.p, X2.R[:, 2]))
@@ -170,6 +172,7 @@ def planar(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def _spherical_last(ring: Ring) -> Ring:
+    """Return the loop, rotated so that a spherical joint is at its end."""
     for k, joint in enumerate(ring.joints):
         if joint.motion is _SPHERICAL:
             return ring.rotated((k + 1) % len(ring.joints))
@@ -177,6 +180,14 @@ def _spherical_last(ring: Ring) -> Ring:
 
 
 def _planar_branches(ring: Ring, prismatic: list[int], q: SX, p: SX) -> LoopBranches:
+    """Return both branches of a plane loop of three joints.
+
+    Args:
+        ring: loop chain.
+        prismatic: indices of the prismatic joints.
+        q: symbols of all positions.
+        p: symbols of parameters.
+    """
     has_spherical = ring.joints[2].motion is _SPHERICAL
     if len(prismatic) == 1:
         index = prismatic[0]

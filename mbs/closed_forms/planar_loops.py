@@ -71,6 +71,11 @@ class PlanarLoops:
         return value, np.concatenate([turned, carried[:, None, :] * self.slides], axis=2)
 
     def _carried(self, unit: Complex) -> Complex:
+        """Return the unit vectors (r, m), as complex numbers, along which displacements act.
+
+        Args:
+            unit: (r, n) unit vectors of the unknown directions.
+        """
         whole = np.concatenate([unit, np.ones((len(unit), 1))], axis=1)
         return whole[:, self.carriers]
 
@@ -182,6 +187,7 @@ def planar_roots(loops: PlanarLoops) -> PlanarRoots:
 
 
 def _solve(loops: PlanarLoops) -> tuple[Real, Real, list[_Found]]:
+    """Return angles and displacements of all roots, and the results of the parts."""
     n, m = loops.counts
     if n + m == 0:
         closed = int(np.all(np.abs(loops.constant) < _DEPENDENT))
@@ -210,6 +216,7 @@ loops 252."""
 
 
 def _smallest_part(loops: PlanarLoops) -> PlanarPart:
+    """Return the smallest set of rows and unknowns that can be solved by itself."""
     n, m = loops.counts
     columns = np.concatenate([loops.angles, loops.slides], axis=1)
     for size in range(1, min(n + m, _LARGEST) + 1):
@@ -236,6 +243,7 @@ def _left_null(columns: Complex) -> Complex:
 
 
 def _rank(matrix: Complex) -> int:
+    """Return the number of singular values above a small threshold."""
     if not matrix.size:
         return 0
     values = np.linalg.svd(matrix, compute_uv=False)
@@ -262,7 +270,7 @@ def _of_part(loops: PlanarLoops, part: PlanarPart) -> PlanarLoops:
 
 
 def _irreducible(loops: PlanarLoops) -> _Found:
-    """Return the roots of a part that contains no smaller part, and the solution method."""
+    """Return the roots of a part that cannot be split further, and the solution method."""
     n, m = loops.counts
     if n + m == 1:
         found = _one_unknown(loops)
@@ -320,6 +328,7 @@ dyad: rounding of lengths relative to the size."""
 
 
 def _dyad(loops: PlanarLoops) -> _Found:
+    """Return both roots of a single complex row with two unknowns."""
     method = "the quadratic equation of a dyad"
     n, _ = loops.counts
     b = loops.constant[0]
@@ -523,11 +532,13 @@ class _Pencil:
 
 
 def _sign(order: tuple[int, ...]) -> int:
+    """Return the sign of a permutation."""
     swaps = sum(a > b for k, a in enumerate(order) for b in order[k + 1 :])
     return -1 if swaps % 2 else 1
 
 
 def _pencil(angles: Complex, constant: Complex, hidden: int) -> _Pencil | None:
+    """Return the matrix pencil whose eigenvalues are the values of a hidden direction, or None."""
     L, n = angles.shape
     others = [k for k in range(n) if k != hidden]
     a, b, c = angles, constant, angles[:, hidden]
@@ -596,6 +607,7 @@ def _eigenvectors(pencil: _Pencil) -> Iterator[tuple[Complex, Complex]]:
 
 
 def _count_distinct(x: Complex) -> int:
+    """Return the number of different values of x."""
     kept = list[complex]()
     for value in x:
         if all(abs(value - other) > _APART * abs(value) for other in kept):
@@ -850,6 +862,7 @@ class _Rows:
 
 
 def _random(rng: np.random.Generator, *shape: int) -> Complex:
+    """Return random complex numbers with normally distributed parts."""
     return np.asarray(rng.normal(size=shape) + 1j * rng.normal(size=shape), np.complex128)
 
 
@@ -915,6 +928,7 @@ def path_roots(loops: PlanarLoops) -> _Found:
 
 
 def _is_near(x: Real, roots: Real, n: int) -> bool:
+    """Whether x is equal to one of the roots; the first n elements are angles."""
     gap = roots - x
     gap[:, :n] = pi - np.mod(pi - gap[:, :n], 2 * pi)
     return bool(np.any(np.max(np.abs(gap), axis=1) < _SAME_ROOT))

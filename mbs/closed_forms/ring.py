@@ -83,6 +83,7 @@ def independent_indices(system: System) -> list[int]:
 
 
 def _unplaced(system: System, link: Link) -> str:
+    """Return the error message for a quaternion that independent positions do not determine."""
     return (
         f"{system.name}: the quaternion of {link.name} rotates freely, and the positions of"
         " independent joints cannot tell how; use mbs.loops.solve without branch"
@@ -168,10 +169,12 @@ def gap_samples(ring: Ring, q: SX, p: SX) -> list[list[Matrix]]:
 
 
 def _matrices(gaps: Iterable[Gap]) -> list[SX]:
+    """Return the matrices (4, 4) of the known transforms of a loop."""
     return [gap.pose.matrix for gap in gaps]
 
 
 def _evaluate(values: list[SX], q: SX, p: SX) -> list[list[DM]]:
+    """Return expressions of q and p at several random positions and parameters."""
     rng = np.random.default_rng(_SURVEY_SEED)
     function = Function("samples", [q, p], values)
     return [
@@ -266,6 +269,7 @@ def is_planar(ring: Ring, samples: list[list[Matrix]]) -> bool:
 
 
 def _first_revolute(ring: Ring) -> int | None:
+    """Return the index of the first revolute joint of a loop, or None."""
     revolute = (k for k, joint in enumerate(ring.joints) if joint.motion is Motion.REVOLUTE)
     return next(revolute, None)
 
@@ -279,6 +283,7 @@ def _normal(gaps: list[Matrix], start: int, end: int) -> Matrix:
 
 
 def _fits(motion: Motion, normal: Matrix) -> bool:
+    """Whether a joint can move in a plane with this normal (3,) in the joint frame."""
     if motion is Motion.SPHERICAL:
         return True
     cosine = abs(float(normal[2]))
@@ -358,6 +363,8 @@ def closed_samples(ring: Ring, given: SX, p: SX) -> list[Sample]:
 
 
 def _closed(function: Function, start: Vector, fixed: NDArray[np.bool_]) -> Vector | None:
+    """Return a closed configuration from `start` with fixed positions kept; None if not found."""
+
     def residual(free: Vector) -> tuple[Vector, Vector]:
         whole = start.copy()
         whole[~fixed] = free

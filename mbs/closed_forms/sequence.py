@@ -132,6 +132,7 @@ def step(
 
 
 def _name(problem: Problem, index: int) -> str:
+    """Return the name of the joint with this index in x, or of its symbol."""
     names = {joint.index: joint.name for joint in problem.ring.joints}
     return names.get(index, str(problem.x[index]))
 
@@ -212,9 +213,11 @@ class StepSequence:
         return [self._crop(leaf) for leaf in leaves]
 
     def _start(self) -> Leaf:
+        """Return the empty configuration from which the steps start."""
         return Leaf(SX(2 * self.size, 1), SX(0, 1), SX(0, 1), {})
 
     def _crop(self, leaf: Leaf) -> Leaf:
+        """Return a configuration without the indices reserved for sums of joints."""
         return Leaf(leaf.x[: self.size], leaf.real, leaf.regular, leaf.coefficients)
 
 
@@ -399,6 +402,7 @@ def real_quartic(
 
 
 def _symmetric(row: tuple[SX, SX, SX], second: tuple[SX, SX], last: SX) -> SX:
+    """Return the symmetric matrix (3, 3) [[a, b, c], [b, d, e], [c, e, last]]."""
     (a, b, c), (d, e) = row, second
     return casadi.reshape(casadi.vertcat(a, b, c, b, d, e, c, e, last), 3, 3)
 

@@ -66,11 +66,26 @@ def aim(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def _aim_branches(ring: Ring, one: Centre, other: Centre) -> LoopBranches:
+    """Return both branches of the two intersecting revolute joints with which the loop begins.
+
+    Args:
+        ring: loop chain.
+        one: centre, at which the axes of these two joints intersect.
+        other: centre that the remaining joints keep fixed.
+    """
     branches = signed(ring.joints[1])
     return LoopBranches({label: _aim_root(ring, one, other, sign) for label, sign in branches})
 
 
 def _aim_root(ring: Ring, one: Centre, other: Centre, sign: int) -> Positions:
+    """Return the positions of two intersecting revolute joints that direct a link onto a point.
+
+    Args:
+        ring: loop chain that begins with these joints.
+        one: centre, at which their axes intersect.
+        other: centre that the remaining joints keep fixed.
+        sign: branch, 1 or -1.
+    """
     X1, X2, X3 = (gap.pose for gap in ring.gaps[:3])
     back = X1.inverse()
     target = back.p + back.R @ other.after - one.before
@@ -283,6 +298,15 @@ def _ends(span: RigidLink) -> tuple[SX, SX]:
 
 
 def _at_distance(joint: ChainJoint, m: SX, d: SX, squared: SX) -> LoopBranches:
+    """Return both positions of a joint at which the vector m + D(d) has a given length.
+
+    Args:
+        joint: revolute or prismatic joint, whose displacement is D.
+        m: (3, 1) vector in the frame before the joint.
+        d: (3, 1) point in the frame after the joint.
+        squared: (1, 1) square of the length.
+    """
+
     def value(sign: int) -> SX:
         if joint.is_rotational:
             Z = (squared - square(m) - square(d)) / 2 - m[2] * d[2]
@@ -330,6 +354,12 @@ def orientations(ring: Ring) -> LoopBranches:
 
 
 def _orientations_root(ring: Ring, sign: int) -> Positions:
+    """Return the positions of three revolute joints that close the orientations of a loop.
+
+    Args:
+        ring: loop chain of three revolute joints.
+        sign: branch, 1 or -1.
+    """
     R1, R2, R3 = (gap.pose.R for gap in ring.gaps)
     x, y = R2[2, :].T, R3[:, 2]
     dot = x[0] * y[0] + x[1] * y[1]
@@ -399,6 +429,7 @@ def _is_oriented(ring: Ring, revolute: Ring, q: SX, p: SX) -> bool:
 
 
 def _two_orientations(ring: Ring, shared: frozenset[str]) -> LoopBranches:
+    """Return the positions of two revolute joints that close the orientations of a loop."""
     values: dict[int, SX] = {}
     for begun in (ring, ring.rotated(1)):
         joint, (R1, R2) = begun.joints[0], (gap.pose.R for gap in begun.gaps)
@@ -480,6 +511,7 @@ def spin(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def _rod_branches(ring: Ring, joint: ChainJoint, q: SX) -> LoopBranches:
+    """Return the branch of a spherical joint of a rod, for a known spin about the rod's line."""
     before, after = ring.gaps[0].pose.inverse().p, ring.gaps[1].pose.p
     u, w = (after, before) if joint.sign > 0 else (before, after)
     u, w = u / casadi.norm_2(u), w / casadi.norm_2(w)
@@ -693,6 +725,7 @@ def _closure_gap(ring: Ring, angles: list[Angle]) -> SX:
 
 
 def _rotation(angle: Angle) -> Pose:
+    """Return the rotation about z by an angle with expressions."""
     c, s = casadi.cos(angle.value), casadi.sin(angle.value)
     rows = (casadi.horzcat(c, -s, 0), casadi.horzcat(s, c, 0), casadi.horzcat(SX(0), 0, 1))
     return Pose.rotation(casadi.vertcat(*rows))

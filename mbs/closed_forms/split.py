@@ -84,6 +84,7 @@ def _problem(ring: Ring, q: SX, p: SX) -> Problem | str:
 
 
 def _root(ring: Ring, problem: Problem, sequence: StepSequence) -> LoopBranches:
+    """Return the branches of a loop from the steps of a solved sequence."""
     indices = {k: joint.index for k, joint in enumerate(ring.joints) if joint.index is not None}
     needed = _up_to(sequence, set(indices))
     branches = dict[str, dict[int, SX]]()

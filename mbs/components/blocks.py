@@ -27,7 +27,7 @@ class SignalBlock(Custom):
     """Base of components with signals only."""
 
     def _require_order(self) -> None:
-        """Raise DescriptionError if both limits are numbers and not in order."""
+        """Raise DescriptionError if `low` and `high` are both numbers and low is not below high."""
         below, above = (self._number(name) for name in ("low", "high"))
         if below is not None and above is not None and below >= above:
             raise DescriptionError(
@@ -35,7 +35,7 @@ class SignalBlock(Custom):
             )
 
     def _number(self, name: str) -> float | None:
-        """Return the value of a parameter; None if it is no number."""
+        """Return the numeric value of a parameter; None if it is symbolic or left out."""
         given = getattr(self, name)
         return None if given is None else to_float(given)
 
@@ -57,7 +57,7 @@ def saturate(x: SX, low: SX | None, high: SX | None, width: SX) -> SX:
 
 
 def _ramp(x: SX, width: SX) -> SX:
-    """Return width log(1 + exp(x / width)), without overflow; fmax(x, 0) if the width is zero."""
+    """Return width log(1 + exp(x / width)) without overflow; fmax(x, 0) if the width is zero."""
     return casadi.fmax(x, 0) + width * casadi.log1p(
         casadi.exp(-casadi.fabs(x) / (width + (width == 0)))
     )
@@ -77,7 +77,7 @@ class Constant(SignalBlock):
     y = custom.output()
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the value."""
+        """Return {"y": value}."""
         return {"y": at.value}
 
 
@@ -93,7 +93,7 @@ class Gain(SignalBlock):
     y = custom.output()
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the factor times the input."""
+        """Return {"y": k u}."""
         return {"y": at.k * at.u}
 
 
@@ -130,11 +130,11 @@ class Sum(SignalBlock):
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        """Names of the inputs, as many as weights."""
+        """Names of the used inputs: the first of u1 .. u4, one per weight."""
         return ("u1", "u2", "u3", "u4")[: len(self.weights)]
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the weighted sum."""
+        """Return {"y": sum of weight times input}."""
         pairs = zip(self.weights, self.input_names, strict=True)
         return {"y": sum((to_sx(w, at.symbols) * getattr(at, u) for w, u in pairs), SX(0))}
 
@@ -166,7 +166,7 @@ class Limiter(SignalBlock):
         self._require_order()
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the limited input."""
+        """Return {"y": u limited to the range from low to high}."""
         return {"y": saturate(at.u, at.low, at.high, at.width)}
 
 
@@ -186,11 +186,11 @@ class Integrator(SignalBlock):
     y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the factor times the input."""
+        """Return {"x": k u}."""
         return {"x": at.k * at.u}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the state."""
+        """Return {"y": x}."""
         return {"y": at.x}
 
 
@@ -209,11 +209,11 @@ class FirstOrder(SignalBlock):
     y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rate towards the input."""
+        """Return {"x": (k u - x) / time}."""
         return {"x": (at.k * at.u - at.x) / at.time}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the state."""
+        """Return {"y": x}."""
         return {"y": at.x}
 
 
@@ -235,12 +235,12 @@ class SecondOrder(SignalBlock):
     y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rates of the output and of its rate."""
+        """Return {"x": v, "v": w^2 (k u - x) - 2 damping w v}."""
         pull = at.w**2 * (at.k * at.u - at.x)
         return {"x": at.v, "v": pull - 2 * at.damping * at.w * at.v}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the state."""
+        """Return {"y": x}."""
         return {"y": at.x}
 
 
@@ -265,12 +265,12 @@ class RateLimiter(SignalBlock):
     y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the limited rate towards the input."""
+        """Return {"x": (u - x) / time limited to the range from -falling to rising}."""
         down = at.rising if at.falling is None else at.falling
         return {"x": saturate((at.u - at.x) / at.time, -down, at.rising, at.width)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the state."""
+        """Return {"y": x}."""
         return {"y": at.x}
 
 
@@ -305,7 +305,7 @@ class ErrorController(SignalBlock):
             self._require_ratio()
 
     def _require_ratio(self) -> None:
-        """Raise DescriptionError if kp / ki is needed as a time constant and is not positive."""
+        """Raise DescriptionError if the default of `tracking`, kp / ki, is not a positive time."""
         found = {name: self._number(name) for name in ("kp", "ki")}
         known = {name: gain for name, gain in found.items() if gain is not None}
         if 0 in known.values() or (len(known) == 2 and known["kp"] * known["ki"] < 0):
@@ -316,7 +316,10 @@ class ErrorController(SignalBlock):
             )
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rate of the integral part."""
+        """Return {"x": ki e, plus (u - u0) / tracking if the output has limits}.
+
+        u is the limited output and u0 the output before the limits.
+        """
         rate = at.ki * (at.target - at.measured)
         if at.low is not None or at.high is not None:
             tracking = at.kp / at.ki if at.tracking is None else at.tracking
@@ -324,13 +327,15 @@ class ErrorController(SignalBlock):
         return {"x": rate}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the limited sum of the parts."""
+        """Return {"u": output, limited to the range from low to high}."""
         return {"u": self._saturate(at)}
 
     def _saturate(self, at: Any) -> SX:
+        """Return the output limited to the range from low to high."""
         return saturate(self._command(at), at.low, at.high, SX(0))
 
     def _command(self, at: Any) -> SX:
+        """Return u0, the output before the limits."""
         raise NotImplementedError
 
 
@@ -380,7 +385,7 @@ class PID(ErrorController):
     f = custom.state()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rates of the integral part and of the filtered error."""
+        """Return the rates of the integral part "x" and of the filtered error "f"."""
         error = at.target - at.measured
         return {**ErrorController.rates(self, at), "f": (error - at.f) / at.filter}
 
@@ -398,15 +403,15 @@ class SampledBlock(SignalBlock):
     left = custom.state("s")
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rate of the time to the next sample: -1."""
+        """Return {"left": -1}: the time to the next sample decreases by one second per second."""
         return {"left": SX(-1)}
 
     def events(self, at: Any) -> Mapping[str, Event]:
-        """Return the sampling event."""
+        """Return the event "samples" at left = 0, which resets `left` and sets sampled modes."""
         return {"samples": Event(at.left, {"left": at.period, **self._sample(at)})}
 
     def _sample(self, at: Any) -> Mapping[str, SX]:
-        """Return the new values of the modes at a sample."""
+        """Return the new value of each mode at a sampling instant, by name."""
         raise NotImplementedError
 
 
@@ -426,7 +431,7 @@ class SampleHold(SampledBlock):
         return {"sample": at.u}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the sampled value."""
+        """Return {"y": u at the last sampling instant}."""
         return {"y": at.sample}
 
 
@@ -475,5 +480,5 @@ class SampledPID(SampledBlock):
         return {"sample": saturate(given + x, at.low, at.high, SX(0)), "x": x, "error": error}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the sampled output."""
+        """Return {"u": output computed at the last sampling instant, within the limits}."""
         return {"u": at.sample}

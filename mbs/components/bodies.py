@@ -44,7 +44,10 @@ def check_mass(name: str, mass: Scalar) -> None:
 
 
 def _require_mass(name: str, kind: str, given: Scalar | None, other: str = "") -> Scalar:
-    """Return the mass or density of a body; raise DescriptionError if there is none."""
+    """Return `given`, the mass or density of a body. Raise DescriptionError if it is None.
+
+    `kind` is the class of the body and `other` the second possible field, for the message.
+    """
     if given is None:
         ways = f"mass= [kg] or {other} [kg/m^3]" if other else "mass= [kg]"
         raise DescriptionError(
@@ -90,7 +93,7 @@ def tensor_fault(six: Iterable[Scalar], scale: float = 0.0) -> str:
 
 
 def _principal_moments(six: Iterable[Scalar]) -> tuple[float, float, float]:
-    """Return the principal moments in ascending order; zeros if an element has no value."""
+    """Return the principal moments [kg m^2] in ascending order; zeros if an element is symbolic."""
     numbers = [value for value in map(to_float, six) if value is not None]
     if len(numbers) < 6:
         return 0.0, 0.0, 0.0
@@ -99,13 +102,16 @@ def _principal_moments(six: Iterable[Scalar]) -> tuple[float, float, float]:
 
 
 def tensor_matrix(six: list[float]) -> Any:
-    """Return the symmetric (3, 3) matrix of Ixx Ixy Ixz Iyy Iyz Izz."""
+    """Return the symmetric (3, 3) matrix of the six elements Ixx Ixy Ixz Iyy Iyz Izz."""
     XX, XY, XZ, YY, YZ, ZZ = six
     return np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
 
 
 def three(values: Any, where: str) -> tuple[Expression, ...]:
-    """Return the three scalars (x, y, z) of a vector; raise if there are not three."""
+    """Return (x, y, z) of a vector as expressions.
+
+    Raise DescriptionError if it has not three values.
+    """
     try:
         x, y, z = [] if isinstance(values, str) else list(values)
     except (TypeError, ValueError):
@@ -116,7 +122,10 @@ def three(values: Any, where: str) -> tuple[Expression, ...]:
 
 
 def six_of(values: Any, where: str) -> tuple[Expression, ...]:
-    """Return Ixx Ixy Ixz Iyy Iyz Izz of an inertia in any of the accepted forms."""
+    """Return Ixx Ixy Ixz Iyy Iyz Izz [kg m^2] of an inertia in any of three forms.
+
+    The forms are three principal moments, six elements, or a symmetric (3, 3) matrix.
+    """
     flat: list[Any] = []
     for value in values if hasattr(values, "__len__") and not isinstance(values, str) else [values]:
         nested = hasattr(value, "__len__") and not isinstance(value, str)
@@ -139,7 +148,7 @@ _TWINS = ((1, 3), (2, 6), (5, 7))
 
 
 def _equal(a: Expression, b: Expression) -> bool:
-    """Return whether two elements of a tensor are equal, up to rounding."""
+    """Return whether two elements of a tensor are equal, with a tolerance if both are numbers."""
     if isinstance(a, Number) and isinstance(b, Number):
         return math.isclose(a.value, b.value, rel_tol=_TOLERANCE, abs_tol=_ZERO)
     return a == b
@@ -154,30 +163,32 @@ class RigidBody(Component):
 
     @property
     def frame(self) -> Point:
-        """The reference frame."""
+        """The reference frame of the body, as a point to connect."""
         return Point(self)
 
     def at(
         self, x: Scalar = 0, y: Scalar = 0, z: Scalar = 0, *, rotation: Rotation | None = None
     ) -> Point:
-        """Return the point (x, y, z) [m] in the reference frame, its axes rotated by `rotation`."""
+        """Return the frame at (x, y, z) [m] in the reference frame, with its axes then rotated."""
         return self.frame.at(x, y, z, rotation=rotation)
 
     def at_khalil(self, **parameters: Scalar) -> Point:
-        """Return the frame at Khalil parameters gamma, b, alpha, d, theta, r."""
+        """Return the frame at Khalil parameters relative to the reference frame.
+
+        Angles gamma, alpha, theta are in rad, lengths b, d, r in m.
+        """
         return self.frame.at_khalil(**parameters)
 
     @property
     def inertia_fault(self) -> str:
-        """Reason why no body has this inertia; empty if it is possible.
+        """Reason why no real body has this inertia; empty if it is possible.
 
-        Only bodies that rotate about several axes require a possible inertia, which assembling
-        checks.
+        Assembling checks it for bodies that rotate about several axes.
         """
         return ""
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Return the inertia about the origin of the reference frame, in CasADi symbols."""
+        """Return the inertia about the origin of the reference frame, in its axes (CasADi)."""
         raise NotImplementedError
 
 
@@ -197,7 +208,7 @@ class World(RigidBody):
         object.__setattr__(self, "gravity", three(self.gravity, f"{self.name}, gravity"))
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Return zero inertia: the ground does not move."""
+        """Return zero inertia: the world does not move."""
         return Inertia.zero()
 
 
@@ -206,7 +217,7 @@ class Mount(RigidBody):
     """A massless frame: the ground of a nested mechanism, to be connected to a body."""
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Return zero inertia."""
+        """Return zero inertia: a mount has no mass."""
         return Inertia.zero()
 
 
@@ -246,11 +257,14 @@ class Body(RigidBody):
 
     @property
     def inertia_fault(self) -> str:
-        """Reason why no body has this inertia; empty if it is possible or not checked."""
+        """Text on a violated triangle inequality.
+
+        Empty if there is no fault or `checked` is False.
+        """
         return tensor_fault(self.inertia) if self.checked else ""
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Return the inertia about the origin of the reference frame."""
+        """Return the inertia about the origin of the reference frame, in its axes (CasADi)."""
         com = vector(to_sx(value, symbols) for value in self.com)
         tensor = Inertia.from_parameters(
             vector([*(to_sx(value, symbols) for value in self.inertia), 0, 0, 0, 0])
@@ -297,7 +311,7 @@ class KhalilBody(RigidBody):
 
     @property
     def inertia_fault(self) -> str:
-        """Reason why no body has this inertia; empty if it is possible or grouped."""
+        """Text on a violated triangle inequality; empty without a fault, or for grouped values."""
         return "" if self.grouped else tensor_fault(*self._about_com())
 
     def _about_com(self) -> tuple[list[Scalar], float]:
@@ -323,7 +337,7 @@ class KhalilBody(RigidBody):
         return [float(J[at]) for at in upper], float(max(abs(np.array(numbers[:6]))))
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Return the inertia about the origin of the reference frame."""
+        """Return the inertia about the origin of the reference frame, in its axes (CasADi)."""
         return Inertia.from_parameters(
             vector(to_sx(getattr(self, name), symbols) for name in TEN_PARAMETERS)
         )
@@ -346,7 +360,7 @@ class PointMass(RigidBody):
         check_mass(self.name, mass)
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Return the inertia about the origin of the reference frame: a mass only."""
+        """Return mass only: no first moments and no moments of inertia about the origin."""
         zero = Inertia.zero()
         return Inertia(zero.J, zero.ms, to_sx(self.mass or 0, symbols))
 
@@ -365,20 +379,21 @@ class _Bar(RigidBody):
 
     @property
     def left(self) -> Point:
-        """Left end of the solid: its reference frame."""
+        """Frame at the left end, x = 0: the reference frame."""
         return self.frame
 
     @property
     def right(self) -> Point:
-        """Right end of the solid, at x = length."""
+        """Frame at the right end, x = length, with axes of the reference frame."""
         return self.at(self.length)
 
     @property
     def center(self) -> Point:
-        """The middle of the solid, its centre of mass."""
+        """Frame at the centre of mass, x = length / 2, with axes of the reference frame."""
         return self.at(expression(self.length) / 2)
 
     def _check_solid(self, positive: Iterable[str]) -> None:
+        """Raise DescriptionError if a numeric field in `positive` is zero or negative."""
         for name in positive:
             value = to_float(getattr(self, name))
             if value is not None and value <= 0:
@@ -387,6 +402,10 @@ class _Bar(RigidBody):
                 )
 
     def _mass(self, mass: Scalar | None, density: Scalar | None, volume: Expression) -> Expression:
+        """Return the mass [kg]: `mass`, or density [kg/m^3] times volume [m^3].
+
+        Raise DescriptionError unless exactly one of mass and density is given.
+        """
         if mass is not None and density is not None:
             raise DescriptionError(
                 f"{self.name}: both mass and density are given; give only one of them"
@@ -399,6 +418,10 @@ class _Bar(RigidBody):
     def _solid_inertia(
         self, symbols: SymbolTable, mass: Expression, radii: list[Expression]
     ) -> Inertia:
+        """Return the inertia about the left end, in axes of the reference frame.
+
+        `radii` are the squared radii of gyration about x, y, z at the centre of mass [m^2].
+        """
         com = vector([to_sx(expression(self.length) / 2, symbols), 0, 0])
         Ixx, Iyy, Izz = (to_sx(mass * radius, symbols) for radius in radii)
         tensor = Inertia.from_parameters(vector([Ixx, 0, 0, Iyy, 0, Izz, 0, 0, 0, 0])).J
@@ -430,12 +453,12 @@ class Box(_Bar):
 
     @property
     def solid_mass(self) -> Expression:
-        """Mass of the solid [kg]."""
+        """Mass [kg]: `mass`, or density times volume."""
         volume = expression(self.length) * self.width * expression(self.height or 0)
         return self._mass(self.mass, self.density, volume)
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Return the inertia about the left end."""
+        """Return the inertia about the left end, in axes of the reference frame (CasADi)."""
         l2, w2, h2 = (expression(side or 0) ** 2 for side in (self.length, self.width, self.height))
         radii = [(w2 + h2) / 12, (l2 + h2) / 12, (l2 + w2) / 12]
         return self._solid_inertia(symbols, self.solid_mass, radii)
@@ -471,16 +494,17 @@ class Cylinder(_Bar):
 
     @property
     def solid_mass(self) -> Expression:
-        """Mass of the solid [kg]."""
+        """Mass [kg]: `mass`, or density times volume without the bore."""
         area = (expression(self.radius) ** 2 - expression(self.inner_radius) ** 2) * math.pi
         return self._mass(self.mass, self.density, area * self.length)
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Return the inertia about the left end."""
+        """Return the inertia about the left end, in axes of the reference frame (CasADi)."""
         squares = expression(self.radius) ** 2 + expression(self.inner_radius) ** 2
         across = squares / 4 + expression(self.length) ** 2 / 12
         return self._solid_inertia(symbols, self.solid_mass, [squares / 2, across, across])
 
 
 def _given(component: Component, *names: str) -> list[str]:
+    """Return the field names whose values are not None."""
     return [name for name in names if getattr(component, name) is not None]

@@ -49,7 +49,7 @@ _WRITTEN = 6e-12
 
 @dataclass(frozen=True, slots=True)
 class Translation:
-    """A displacement (x, y, z) [m]."""
+    """A displacement by (x, y, z) [m] along the axes of the previous frame."""
 
     x: Expression
     y: Expression
@@ -62,7 +62,7 @@ class Translation:
 
 @dataclass(frozen=True, slots=True)
 class ElementaryRotation:
-    """A rotation by an angle [rad] about the axis "x", "y" or "z"."""
+    """A rotation by `angle` [rad] about the axis "x", "y" or "z" of the previous frame."""
 
     axis: str
     angle: Expression
@@ -74,7 +74,7 @@ class ElementaryRotation:
 
 @dataclass(frozen=True, slots=True)
 class FixedRotation:
-    """A rotation given by the rows of its matrix."""
+    """A rotation by a numeric matrix, as rows. Its columns are the new axes in the old frame."""
 
     rows: tuple[tuple[float, float, float], ...]
 
@@ -95,7 +95,7 @@ class KhalilStep:
     r: Expression
 
     def khalil(self, symbols: SymbolTable) -> Khalil:
-        """Return the parameters in CasADi symbols."""
+        """Return the six parameters as CasADi expressions."""
         return Khalil(*(to_sx(getattr(self, f.name), symbols) for f in fields(self)))
 
     def pose(self, symbols: SymbolTable) -> Pose:
@@ -120,7 +120,7 @@ class Placement:
         return pose
 
     def then(self, *steps: Step) -> Placement:
-        """Return the placement with further steps at its end."""
+        """Return the placement with `steps` appended at its end."""
         return Placement(self.steps + steps)
 
     def inverse(self) -> Placement:
@@ -131,7 +131,7 @@ class Placement:
         return Placement(tuple(_inverse(step) for step in reversed(self.steps)))
 
     def expressions(self) -> Iterator[Expression]:
-        """Yield every scalar in the placement."""
+        """Yield every scalar expression in the steps, such as lengths [m] and angles [rad]."""
         for step in self.steps:
             for f in fields(step):
                 value = getattr(step, f.name)
@@ -139,7 +139,7 @@ class Placement:
                     yield value
 
     def scoped(self, prefix: str) -> Placement:
-        """Return the placement with prefixed parameter names, for a nested mechanism."""
+        """Return a copy whose parameters have the prefix "`prefix`."."""
         return Placement(tuple(_scoped(step, prefix) for step in self.steps))
 
 
@@ -155,6 +155,7 @@ def _inverse(step: Step) -> Step:
 
 
 def _scoped(step: Step, prefix: str) -> Step:
+    """Return a copy of a step whose parameters have the prefix "`prefix`."."""
     changed: dict[str, Any] = {}
     for f in fields(step):
         value = getattr(step, f.name)
@@ -170,7 +171,10 @@ Rotation = tuple[str, Scalar] | Sequence[tuple[str, Scalar]] | Sequence[Sequence
 def displacement(
     where: str, x: Scalar, y: Scalar, z: Scalar, rotation: Rotation | None
 ) -> tuple[Step, ...]:
-    """Return the steps of a translation by (x, y, z) and a rotation by `rotation`."""
+    """Return the steps of a translation by (x, y, z) [m], then a rotation by `rotation`.
+
+    Zero translations and a rotation of None have no step. `where` is for error messages.
+    """
     values = [
         expression(value, f"{where}, {name}") for name, value in zip("xyz", (x, y, z), strict=True)
     ]
@@ -211,7 +215,7 @@ def in_rotated_axes(
 
 
 def _sum(products: Iterable[tuple[Scalar, Expression]]) -> Expression:
-    """Return the sum of products, without products with zero."""
+    """Return the sum of products factor times value. Products with a zero are left out."""
     total: Expression = Number(0.0)
     for factor, value in products:
         if 0 in (to_float(factor), to_float(value)):
@@ -222,6 +226,10 @@ def _sum(products: Iterable[tuple[Scalar, Expression]]) -> Expression:
 
 
 def _rotation_steps(where: str, rotation: Any) -> Iterable[Step]:
+    """Return the steps of a rotation in any form of `Rotation`.
+
+    Raise DescriptionError if invalid.
+    """
     if _is_turn(rotation):
         return [_elementary_rotation(where, *rotation)]
     if isinstance(rotation, (list, tuple)) and all(map(_is_turn, rotation)):
@@ -240,10 +248,12 @@ def _rotation_steps(where: str, rotation: Any) -> Iterable[Step]:
 
 
 def _is_turn(part: Any) -> bool:
+    """Return whether a value is a pair (axis letter, angle)."""
     return isinstance(part, (list, tuple)) and len(part) == 2 and isinstance(part[0], str)
 
 
 def _elementary_rotation(where: str, axis: str, angle: Scalar) -> ElementaryRotation:
+    """Return the rotation about an axis; raise DescriptionError if the axis is not x, y or z."""
     if axis not in ("x", "y", "z"):
         raise DescriptionError(f"{where}: rotation axis {axis!r} is not 'x', 'y' or 'z'; use one")
     return ElementaryRotation(axis, angle_expression(angle, f"{where}, rotation about {axis}"))
@@ -291,7 +301,7 @@ class Point:
     def at(
         self, x: Scalar = 0, y: Scalar = 0, z: Scalar = 0, *, rotation: Rotation | None = None
     ) -> Point:
-        """Return a point displaced by (x, y, z) [m] in this frame, then rotated by `rotation`."""
+        """Return the frame at (x, y, z) [m] in this frame; its axes are then rotated."""
         steps = displacement(f"{self.owner.name}.at", x, y, z, rotation)
         return replace(self, placement=self.placement.then(*steps))
 
@@ -304,7 +314,10 @@ class Point:
         theta: Scalar = 0,
         r: Scalar = 0,
     ) -> Point:
-        """Return a point placed by the parameters of Khalil & Kleinfinger 1986, angles in rad."""
+        """Return the frame at the parameters of Khalil & Kleinfinger 1986 relative to this frame.
+
+        gamma, alpha and theta are angles [rad]; b, d and r are lengths [m].
+        """
         where = f"{self.owner.name}.at_khalil"
         values = (gamma, b, alpha, d, theta, r)
         names = ("gamma", "b", "alpha", "d", "theta", "r")
@@ -336,7 +349,7 @@ def check_arguments(cls: type) -> None:
 
 
 def _checking(init: Callable[..., None]) -> Callable[..., None]:
-    """Return the constructor with an ArgumentError for wrong arguments."""
+    """Return a wrapper of a constructor that raises ArgumentError for wrong arguments."""
 
     @wraps(init)
     def checked(self: Any, *args: Any, **kwargs: Any) -> None:
@@ -358,7 +371,7 @@ def _checking(init: Callable[..., None]) -> Callable[..., None]:
 def _wrong_arguments(
     init: Callable[..., None], args: Sequence[Any], kwargs: Mapping[str, Any]
 ) -> str:
-    """Return the fault of the arguments of a constructor; empty if they are right."""
+    """Return the error text for the arguments of a constructor; empty if they fit its signature."""
     known = list(signature(init).parameters.values())[1:]
     if any(one.kind in (one.VAR_POSITIONAL, one.VAR_KEYWORD) for one in known):
         return ""
@@ -409,26 +422,26 @@ class Component:
             )
 
     def expressions(self) -> Iterator[Expression]:
-        """Yield every scalar of the component that may contain parameters."""
+        """Yield every scalar field as an Expression, also inside tuples and dataclasses."""
         for f in fields(self):
             yield from _expressions(getattr(self, f.name))
 
     def parameters(self) -> frozenset[str]:
-        """Return the names of the symbols in the component."""
+        """Return the names of all symbolic parameters of the component."""
         return frozenset(p.name for value in self.expressions() for p in parameters_of(value))
 
     def _normalise(self, *names: str) -> None:
-        """Convert fields with numbers or texts to expressions, with checks."""
+        """Convert these fields, numbers or texts such as "2*L1", to Expression objects in place."""
         for name in names:
             value = expression(getattr(self, name), f"{self.name}, {name}")
             object.__setattr__(self, name, value)
 
     def scoped(self: C, prefix: str) -> C:
-        """Return the component with prefixed names, for a nested mechanism."""
+        """Return a copy whose name and parameters have the prefix "`prefix`."."""
         return self._change(lambda value: renamed(value, prefix), f"{prefix}.{self.name}")
 
     def without_defaults(self: C) -> C:
-        """Return the component without values of its parameters."""
+        """Return a copy whose symbolic parameters have no default values."""
         return self._change(without_defaults, self.name)
 
     def check_values(self: C, values: Mapping[str, float]) -> C:
@@ -440,6 +453,7 @@ class Component:
         return self._change(lambda value: with_values(value, values), self.name)
 
     def _change(self: C, change: Callable[[Expression], Expression], name: str) -> C:
+        """Return a copy with `change` applied to each scalar field, under the name `name`."""
         fresh: dict[str, Any] = {
             f.name: _map(getattr(self, f.name), change) for f in fields(self) if f.init
         }
@@ -447,6 +461,7 @@ class Component:
 
 
 def _expressions(value: object) -> Iterator[Expression]:
+    """Yield the expressions in a value, its elements or its fields."""
     if isinstance(value, Expression):
         yield value
     elif isinstance(value, tuple):
@@ -458,6 +473,7 @@ def _expressions(value: object) -> Iterator[Expression]:
 
 
 def _map(value: Any, change: Callable[[Expression], Expression]) -> Any:
+    """Return a value with `change` applied to its expressions, also in tuples and dataclasses."""
     if isinstance(value, Expression):
         return change(value)
     if isinstance(value, tuple):
@@ -470,7 +486,7 @@ def _map(value: Any, change: Callable[[Expression], Expression]) -> Any:
 
 
 def with_points(component: C, change: Callable[[Point], Point]) -> C:
-    """Return the component with `change` applied to each of its points, also in tuples."""
+    """Return a copy whose attachment points, also in tuples, are replaced by `change(point)`."""
 
     def change_points(value: Any) -> Any:
         if isinstance(value, Point):
@@ -489,7 +505,7 @@ def with_points(component: C, change: Callable[[Point], Point]) -> C:
 
 
 def named_scalars(given: Any) -> list[tuple[str, Any]] | None:
-    """Return the pairs of a name and a scalar in an argument; None if it has another form."""
+    """Return a list of (name, scalar) pairs; None if `given` is not a sequence of such pairs."""
     if isinstance(given, str) or not isinstance(given, Iterable):
         return None
     pairs = list(given)
@@ -506,7 +522,10 @@ _NAMED_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def unit_axis(name: str, axis: Any) -> tuple[float, float, float]:
-    """Return the unit vector of an axis, given as a letter or as three numbers."""
+    """Return the unit vector of an axis: "x", "y", "z", "-x", "-y", "-z" or three numbers.
+
+    Three numbers need not have unit length. `name` is the component in error messages.
+    """
     if isinstance(axis, str):
         sign, letter = (-1.0, axis[1:]) if axis.startswith("-") else (1.0, axis)
         if letter not in _NAMED_AXES:
@@ -531,7 +550,7 @@ def unit_axis(name: str, axis: Any) -> tuple[float, float, float]:
 def in_plane(
     axis: tuple[float, float, float],
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Return two unit vectors u, v with u x v = axis; they are x and y for the axis z."""
+    """Return unit vectors (u, v) normal to `axis`, with u x v = axis. For the axis z: x and y."""
     R = align_z(axis)
     u, v = ([float(R[k, column]) for k in range(3)] for column in (0, 1))
     return (u[0], u[1], u[2]), (v[0], v[1], v[2])

@@ -42,12 +42,12 @@ class Constraint(Joint):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        """No coordinates."""
+        """Empty: a constraint has no coordinates."""
         return ()
 
     @property
     def places(self) -> bool:
-        """False: other joints determine the poses of the frames."""
+        """False: other joints must determine the poses of frame_a and frame_b."""
         return False
 
 
@@ -72,7 +72,11 @@ class Rod(Constraint):
         Constraint.__post_init__(self)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return the lengthening, to first order; its effort pushes the two ends apart."""
+        """Return the row "force along": (distance^2 - length^2) / (2 length) [m].
+
+        It is the elongation to first order. Its effort is the force that pushes the two origins
+        apart [N].
+        """
         length = to_sx(self.length, symbols)
         return [("force along", (casadi.sumsqr(pose.p) - length**2) / (2 * length))]
 
@@ -93,7 +97,10 @@ class PointOnLine(_AxisConstraint):
     """The origin of frame_b stays on the axis, a line through the origin of frame_a; 2 rows."""
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return rows of the two components across the line."""
+        """Return two rows: position of the origin of frame_b across the line [m].
+
+        The rows are "force x" and "force y" in axes whose z is `axis`.
+        """
         return position_rows(along_z(pose, self.axis), "xy")
 
 
@@ -105,7 +112,10 @@ class PointOnPlane(_AxisConstraint):
     """
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return the row of the component along the normal."""
+        """Return the row "force z": height of the origin of frame_b above the plane [m].
+
+        z is `axis`, the normal of the plane.
+        """
         return position_rows(along_z(pose, self.axis), "z")
 
 
@@ -117,12 +127,19 @@ class ConstantVelocity(_AxisConstraint):
     """
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return rows for coincident origins and a rotation axis of frame_b in the x-y plane."""
+        """Return four rows: coincident origins, and no rotation component about the axis.
+
+        frame_b is then rotated relative to frame_a about a line normal to `axis` only.
+        """
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "xyz"), orientation_rows(pose)[2]]
 
     def facing(self, pose: Pose) -> list[SX]:
-        """Return a value that is negative if the shafts are folded back onto each other."""
+        """Return (trace(R) - axis' R axis) / 2, which is positive at intended configurations.
+
+        R is the orientation of frame_b in frame_a. Negative values also satisfy the rows, but with
+        the shafts folded back onto each other.
+        """
         return [0.5 * (casadi.trace(pose.R) - cosine(pose, self.axis))]
 
 
@@ -182,11 +199,11 @@ class RollingDisc(Constraint):
         Constraint.__post_init__(self)
 
     def on_plane(self, pose: Pose) -> Pose:
-        """Return the pose of frame_b in axes at frame_a whose z is the normal of the plane."""
+        """Return the pose of frame_b in axes at the origin of frame_a whose z is `normal`."""
         return Pose.rotation(align_z(self.normal)).inverse() @ pose
 
     def contact(self, pose: Pose, symbols: SymbolTable) -> RimContact:
-        """Return the contact of the disc with the plane.
+        """Return height, contact point and inclination of the disc, in axes whose z is the normal.
 
         Args:
             pose: pose of frame_b, at the centre of the disc, in axes whose z is the normal.
@@ -199,5 +216,5 @@ class RollingDisc(Constraint):
         return RimContact(pose.p[2] - radius * s, point, s)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return the row of the height of the rim above the plane."""
+        """Return the row "force normal": height of the lowest rim point above the plane [m]."""
         return [("force normal", self.contact(self.on_plane(pose), symbols).height)]

@@ -102,8 +102,8 @@ class Contact(ForceElement):
     """Contact of a body and a ground at contact points: Hunt-Crossley normal force and friction.
 
     The normal force is k d^n max(0, 1 + c d') at the depth d > 0, else zero. A shape derives from
-    this class: `ports` has the names of its two frames, `labels` those of its contact points, and
-    `spots` returns the contact points.
+    this class: `ports` has the names of the two frames, `labels` has the suffixes of the contact
+    points, and `spots` returns the contact points.
 
     Source: Hunt and Crossley 1975 for the normal force; Canudas de Wit et al. 1995 and Dupont et
     al. 2002 for the bristles.
@@ -172,7 +172,7 @@ class Contact(ForceElement):
         self._settle_restitution()
 
     def _settle_restitution(self) -> None:
-        """Check the restitution: given with an impact speed, without damping, and in its range."""
+        """Raise unless restitution and impact_speed are in range, both given, without damping."""
         given = [
             name for name in ("restitution", "impact_speed") if getattr(self, name) is not None
         ]
@@ -197,31 +197,37 @@ class Contact(ForceElement):
 
     @property
     def damping_factor(self) -> Expression:
-        """Damping c [s/m], as given or computed from the restitution."""
+        """Damping c [s/m]: `damping`, or the value that results in `restitution`.
+
+        0 without both.
+        """
         if self.restitution is not None and self.impact_speed is not None:
             return Number(damping_for(self.restitution, self.impact_speed))
         return expression(0.0 if self.damping is None else self.damping)
 
     @property
     def has_bristles(self) -> bool:
-        """Whether friction has bristle states."""
+        """Whether friction has bristle states: friction is not 0 and friction_law is "bristle"."""
         return self.friction_law == "bristle" and self.friction != Number(0.0)
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Names of the bristle states; empty without bristles."""
+        """Names bristle_AXIS + label of the bristle states. Empty without bristles."""
         return self.names_of("state") if self.has_bristles else ()
 
     def has(self, *methods: str) -> bool:
-        """Return whether a method is defined; dissipation counts as undefined with bristles."""
+        """Return whether the class overrides one of these methods of Custom.
+
+        "dissipation" does not count with bristles.
+        """
         asked = [name for name in methods if not (name == "dissipation" and self.has_bristles)]
         return custom.Custom.has(self, *asked)
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
-        """Return the contact points, one for each label.
+        """Return the contact point of each entry of `labels`, also without contact (depth < 0).
 
         Args:
-            motion: motion of the body's frame relative to the ground's frame.
+            motion: motion of the body's frame relative to the ground's frame, in its axes.
             at: values of the parameters.
         """
         raise NotImplementedError
@@ -229,7 +235,12 @@ class Contact(ForceElement):
     # Equations.
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return normal and friction forces on the body at all points, opposite on the ground."""
+        """Return the wrenches ON the body and ON the ground, by frame name of `ports`.
+
+        Each is in axes of its own frame, about its own origin [N, N m]. The ground gets the
+        reaction, with the same lines of action through the contact points. All forces are zero
+        without contact.
+        """
         body, ground = (getattr(at, port) for port in self.ports)
         motion = self._motion(at)
         force, on_body, on_ground = zeros(), zeros(), zeros()
@@ -241,13 +252,19 @@ class Contact(ForceElement):
         return custom.between(ground, body, custom.FrameLoad(-force, on_ground), on_body)
 
     def energy(self, at: Any) -> SX:
-        """Return the sum of k d^(n + 1) / (n + 1) over the contact points [J]."""
+        """Return the elastic energy [J], zero without contact.
+
+        It is the sum of k d^(n + 1) / (n + 1) over the contact points with d > 0.
+        """
         k, n = (to_sx(getattr(self, name), at.symbols) for name in ("stiffness", "exponent"))
         spots = self.spots(self._motion(at), at)
         return sum((k * _power(spot.depth, n + 1) / (n + 1) for spot in spots), SX(0))
 
     def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by damping and regularised friction [W]."""
+        """Return the power dissipated by normal damping and regularised friction [W].
+
+        It is zero without contact, and undefined for friction with bristles (see `has`).
+        """
         return sum(
             (
                 (touch.along - touch.elastic) * touch.rate - casadi.dot(touch.friction, touch.slip)
@@ -257,7 +274,10 @@ class Contact(ForceElement):
         )
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rates of the bristle states."""
+        """Return the rate [m/s] of each bristle state bristle_AXIS + label.
+
+        Empty without bristles.
+        """
         if not self.has_bristles:
             return {}
         return {
@@ -267,7 +287,11 @@ class Contact(ForceElement):
         }
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return magnitudes of normal and friction force, depth and slip speed at every point."""
+        """Return four outputs of each contact point, whose names end with its label.
+
+        normal_force and friction_force are magnitudes [N], zero without contact. depth [m] is
+        negative for a gap. slip is the tangential speed [m/s], also without contact.
+        """
         found: dict[str, SX] = {}
         for label, touch in zip(self.labels, self._touches(at), strict=True):
             values = (
@@ -280,7 +304,11 @@ class Contact(ForceElement):
         return found
 
     def crossings(self, at: Any) -> Mapping[str, SX | Approach]:
-        """Return the depths as event indicators: contact begins and ends at their zeros."""
+        """Return an event indicator "depth" + label of each contact point: its depth [m].
+
+        Contact begins and ends at its zero. An offset of 1e-9 m counts touching shapes as in
+        contact.
+        """
         motion = self._motion(at)
         return {
             f"depth{label}": Approach(spot.depth + _TOUCHING, *self.approach(motion, spot, at))
@@ -305,16 +333,19 @@ class Contact(ForceElement):
     # Helpers.
 
     def _motion(self, at: Any) -> RelativeMotion:
+        """Return the motion of the body's frame in the ground's frame, in axes of the ground."""
         body, ground = (getattr(at, port) for port in self.ports)
         found: RelativeMotion = ground.to(body)
         return found
 
     def _touches(self, at: Any) -> list[_Touch]:
+        """Return the forces and velocities at each contact point, in the order of `labels`."""
         motion = self._motion(at)
         spots = self.spots(motion, at)
         return [self._touch(at, motion, *pair) for pair in zip(self.labels, spots, strict=True)]
 
     def _touch(self, at: Any, motion: RelativeMotion, label: str, spot: Spot) -> _Touch:
+        """Return the forces and velocities at one contact point, in axes of the ground."""
         k, n, c, mu = (
             to_sx(value, at.symbols)
             for value in (self.stiffness, self.exponent, self.damping_factor, self.friction)
@@ -394,7 +425,7 @@ def _power(depth: SX, exponent: SX) -> SX:
 
 
 def _smooth_step(u: SX) -> SX:
-    """Return a step from 0 at u <= 0 to 1 at u >= 1 with a continuous slope."""
+    """Return 0 for u <= 0, 1 for u >= 1, and 3 u^2 - 2 u^3 between."""
     u = casadi.fmin(casadi.fmax(u, 0), 1)
     return u**2 * (3 - 2 * u)
 
@@ -422,17 +453,21 @@ class PlaneContact(Contact):
         return [zeros()]
 
     def reach(self, at: Any) -> SX:
-        """Return the radius of the spheres [m]."""
+        """Return the radius of the spheres [m]; zero for points."""
         return SX(0)
 
     def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
-        """Return the full speed; the pace is the angular speed, since a plane has no size."""
+        """Return a bound of the speed of the body [m/s], and its angular speed as the pace [1/s].
+
+        A plane has no size: a depth can fall and rise again only if the body rotates. See
+        `Contact.approach`.
+        """
         reach = custom.regular_length(spot.lever)
         turn = custom.regular_length(motion.w)
         return custom.regular_length(motion.V) + reach * turn, turn
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
-        """Return the lowest point of every sphere."""
+        """Return the lowest point of each sphere, with the vertical normal z of the plane."""
         found, up = [], vector([SX(0), SX(0), SX(1)])
         for centre in self.centres(motion, at):
             arm = casadi.mtimes(motion.R, centre)
@@ -455,11 +490,11 @@ class SpherePlaneContact(PlaneContact):
     radius = custom.parameter("m", 0.0, min=0)
 
     def reach(self, at: Any) -> SX:
-        """Return the radius."""
+        """Return the radius of the sphere [m]."""
         return SX(at.radius)
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return the sphere."""
+        """Return {"body": sphere to draw}; empty if the radius is zero."""
         return _ball("body", at.radius)
 
 
@@ -479,15 +514,15 @@ class CapsulePlaneContact(PlaneContact):
     length = custom.parameter("m", positive=True)
 
     def reach(self, at: Any) -> SX:
-        """Return the radius."""
+        """Return the radius of the end spheres [m]."""
         return SX(at.radius)
 
     def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
-        """Return the centres of the ends a, at z < 0, and b."""
+        """Return the centres (3, 1) [m] of the end spheres a (z < 0) and b (z > 0), in `body`."""
         return [vector([SX(0), SX(0), side * at.length / 2]) for side in (-1, 1)]
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return the capsule."""
+        """Return {"body": capsule to draw}."""
         return {"body": Shape("capsule", (at.radius, at.length))}
 
 
@@ -509,17 +544,20 @@ class WheelPlaneContact(PlaneContact):
     rim = custom.parameter("m", 0.0, min=0)
 
     def reach(self, at: Any) -> SX:
-        """Return the radius of the rounding of the rim."""
+        """Return the radius of the rounding of the rim [m]."""
         return SX(at.rim)
 
     def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
-        """Return the lowest point of the circle, which is not fixed on the body."""
+        """Return the lowest point (3, 1) of the centre circle of the rim in the frame `body` [m].
+
+        It moves along the circle while the wheel rotates.
+        """
         up = motion.R[2, :].T
         across = vector([up[0], SX(0), up[2]])
         return [-at.radius * across / custom.regular_length(across)]
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return a rounded disc as wide as the rim."""
+        """Return {"body": ellipsoid to draw}, as wide as the rim."""
         outer = at.radius + at.rim
         return {"body": Shape("ellipsoid", (outer, max(at.rim, _THIN * outer), outer))}
 
@@ -542,17 +580,21 @@ class BoxPlaneContact(PlaneContact):
         Contact.__post_init__(self)
 
     def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
-        """Return corners 1 to 8: x changes sign first, then y, then z; corner 1 is all negative."""
+        """Return the corners 1 to 8, (3, 1) each, in the frame `body` [m].
+
+        Corner 1 has negative x, y and z. From corner to corner x changes sign first, then y, then
+        z.
+        """
         half = _half_size(self, at)
         return [half * vector(map(SX, signs[::-1])) for signs in product((-1, 1), repeat=3)]
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return the box."""
+        """Return {"body": box to draw}; empty if a side has no value."""
         return _cuboid("body", self.size, at)
 
 
 def _take_size(box: Any) -> None:
-    """Convert the field `size` to expressions; raise DescriptionError if a side is not positive."""
+    """Convert the sides `size` of a box to expressions. Raise if a side is not positive."""
     sides = three(box.size, f"{box.name}, size")
     for side in sides:
         value = to_float(side)
@@ -564,23 +606,24 @@ def _take_size(box: Any) -> None:
 
 
 def _ball(port: str, radius: float) -> Mapping[str, Shape]:
-    """Return a sphere to draw; none for a point."""
+    """Return {port: sphere to draw}; empty if the radius is zero."""
     return {port: Shape("sphere", (radius,))} if radius > 0 else {}
 
 
 def _cuboid(port: str, size: Any, at: Any) -> Mapping[str, Shape]:
-    """Return a box to draw; none if a side has no value."""
+    """Return {port: box to draw}; empty if one of the sides has no value."""
     sides = [to_float(side, at.symbols) for side in size]
     known = tuple(side for side in sides if side is not None)
     return {port: Shape("box", known)} if len(known) == len(sides) else {}
 
 
 def _within(value: SX, half: SX) -> SX:
-    """Clamp a distance from the middle of a segment to half its length."""
+    """Return `value` limited to the range from -half to half."""
     return casadi.fmin(casadi.fmax(value, -half), half)
 
 
 def _half_size(box: Any, at: Any) -> SX:
+    """Return half the sides of a box along x, y, z, (3, 1) [m]."""
     return vector(to_sx(side, at.symbols) for side in box.size) / 2
 
 
@@ -603,17 +646,21 @@ class SphereSphereContact(Contact):
     radius_b = custom.parameter("m", positive=True)
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
-        """Return the point on the line between the centres, in the middle of the overlap."""
+        """Return the contact point on the line of centres, midway between both surfaces.
+
+        The depth is radius_a + radius_b less the distance of the centres. The normal points from a
+        to b.
+        """
         depth = at.radius_a + at.radius_b - motion.length
         return [Spot(depth, motion.along, -(at.radius_b - depth / 2) * motion.along)]
 
     def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
-        """Return the relative speed of the centres; the obstacle size is the sum of the radii."""
+        """Return the relative speed of the centres [m/s], and it over the sum of radii [1/s]."""
         speed = custom.regular_length(at.b.v - at.a.v)
         return speed, speed / (at.radius_a + at.radius_b)
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return both spheres."""
+        """Return {"a": sphere, "b": sphere} to draw."""
         return {**_ball("a", at.radius_a), **_ball("b", at.radius_b)}
 
 
@@ -637,7 +684,10 @@ class SphereCapsuleContact(Contact):
     length = custom.parameter("m", positive=True)
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
-        """Return the point between the nearest point of the axis and the centre of the sphere."""
+        """Return the contact point, midway between both surfaces.
+
+        The normal points from the nearest point of the capsule axis to the centre of the sphere.
+        """
         along = _within(motion.p[2], at.length / 2)
         off = motion.p - vector([SX(0), SX(0), along])
         distance = custom.regular_length(off)
@@ -645,12 +695,18 @@ class SphereCapsuleContact(Contact):
         return [Spot(depth, off / distance, -(at.radius - depth / 2) * off / distance)]
 
     def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
-        """Return the speed of the centre relative to the capsule; the size is the sum of radii."""
+        """Return the speed of the sphere centre in the capsule frame [m/s], and a pace [1/s].
+
+        The pace is this speed divided by the sum of the radii.
+        """
         speed = custom.regular_length(motion.V)
         return speed, speed / (at.radius + at.capsule_radius)
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return the sphere and the capsule."""
+        """Return {"sphere": sphere, "capsule".
+
+        Capsule} to draw, without a sphere of radius zero.
+        """
         capsule = Shape("capsule", (at.capsule_radius, at.length))
         return {**_ball("sphere", at.radius), "capsule": capsule}
 
@@ -681,7 +737,10 @@ class CapsuleCapsuleContact(Contact):
     length_b = custom.parameter("m", positive=True)
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
-        """Return the point between the nearest points, in the middle of the overlap."""
+        """Return the contact point, midway between both surfaces at the nearest points of the axes.
+
+        The normal points from the nearest point of axis a to that of axis b.
+        """
         axis = motion.R[:, 2]
         cosine, weight = axis[2], 1 + _PARALLEL
         own, other = motion.p[2], casadi.dot(motion.p, axis)
@@ -698,13 +757,16 @@ class CapsuleCapsuleContact(Contact):
         return [Spot(depth, normal, lever, length / distance)]
 
     def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
-        """Return the speed of the ends of b relative to a; the size is the sum of the radii."""
+        """Return a bound of the speed of the axis points of b in frame a [m/s], and a pace [1/s].
+
+        The pace is this speed divided by the sum of the radii.
+        """
         turn = at.length_b / 2 * custom.regular_length(motion.w)
         speed = custom.regular_length(motion.V) + turn
         return speed, speed / (at.radius_a + at.radius_b)
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return both capsules."""
+        """Return {"a": capsule, "b": capsule} to draw."""
         return {
             "a": Shape("capsule", (at.radius_a, at.length_a)),
             "b": Shape("capsule", (at.radius_b, at.length_b)),
@@ -735,7 +797,11 @@ class SphereBoxContact(Contact):
         Contact.__post_init__(self)
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
-        """Return the point between the nearest point of the box and the centre of the sphere."""
+        """Return the contact point, midway between box and sphere surface at the nearest point.
+
+        The normal points from the box to the centre of the sphere. If the centre is inside the box,
+        it is the normal of the nearest face.
+        """
         beyond = casadi.fabs(motion.p) - _half_size(self, at)
         outside = casadi.fmax(beyond, 0)
         square = casadi.dot(outside, outside)
@@ -751,12 +817,18 @@ class SphereBoxContact(Contact):
         return [Spot(depth, normal, -(at.radius - depth / 2) * normal)]
 
     def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
-        """Return the speed of the centre relative to the box; the size is its least half side."""
+        """Return the speed of the sphere centre in the box frame [m/s], and a pace [1/s].
+
+        The pace is this speed divided by the radius plus half the shortest side.
+        """
         speed = custom.regular_length(motion.V)
         return speed, speed / (at.radius + casadi.mmin(_half_size(self, at)))
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return the sphere and the box."""
+        """Return {"sphere": sphere, "box": box} to draw.
+
+        A sphere of radius zero is left out, and so is a box with a side that has no value.
+        """
         return {**_ball("sphere", at.radius), **_cuboid("box", self.size, at)}
 
 
@@ -765,7 +837,7 @@ class HeightFieldContact(Contact):
 
     The depth is measured below the tangent plane under the centre,
     radius - (z - h) / sqrt(1 + |grad h|^2). It is exact on slopes, and accurate if the field bends
-    little over the radius. The force is along its gradient, so that its energy is exact.
+    little over the radius. The force is along the gradient of the depth, so that energy is exact.
 
     Attributes:
         body: frame at the centre of the sphere.
@@ -818,18 +890,24 @@ class HeightFieldContact(Contact):
             )
 
     def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
-        """Return None for the speed, which bumps leave unbounded, and the pace over the ground."""
+        """Return None, since bumps leave the speed of the depth unbounded, and the pace [1/s].
+
+        The pace is the speed of the centre in the frame `ground` divided by `spacing`.
+        """
         size = casadi.if_else(at.radius > 0, at.radius, _SPACING)
         if self.spacing is not None:
             size = to_sx(self.spacing, at.symbols)
         return None, custom.regular_length(motion.V) / size
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return the sphere; the ground is not drawn."""
+        """Return {"body": sphere to draw}, empty for a point. The ground is not drawn."""
         return _ball("body", at.radius)
 
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
-        """Return the point under the centre, along the gradient of the depth."""
+        """Return the contact point on the line through the centre along the gradient of the depth.
+
+        The normal is the negative unit gradient. The slope is the length of the gradient.
+        """
         c = SX.sym("c", 3)
         h = SX(self.height(c[0], c[1]))
         steep = casadi.gradient(h, c)

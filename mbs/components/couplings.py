@@ -54,11 +54,14 @@ class Coupling(Component):
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of all coordinates of the relation, the driven coordinate first."""
+        """Names of all coordinates of the relation: driven, driver, then the names in `others`."""
         return (self.driven, self.driver, *(name for name, _ in self.others))
 
     def _checked_others(self) -> tuple[tuple[str, Expression], ...]:
-        """Return name and factor, as an expression, of each further coordinate."""
+        """Return pairs (coordinate name, factor as expression).
+
+        Raise if `others` has another form.
+        """
         pairs = named_scalars(self.others)
         if pairs is None:
             raise DescriptionError(
@@ -68,7 +71,7 @@ class Coupling(Component):
         return tuple((n, expression(c, f"{self.name}, factor of {n}")) for n, c in pairs)
 
     def scoped(self, prefix: str) -> Coupling:
-        """Return the coupling with prefixed names, for a nested mechanism."""
+        """Return a copy whose name, coordinates and parameters have the prefix "`prefix`."."""
         inner = Component.scoped(self, prefix)
         return replace(
             inner,
@@ -96,7 +99,10 @@ class Transmission(Coupling):
     offset: Scalar = field(kw_only=True, default=0.0)
 
     def _set_factor(self, given: str, factor: Expression) -> None:
-        """Set the factor k, computed from the attribute `given`; raise if it is zero."""
+        """Set the coefficients to (offset, factor).
+
+        Raise with the field name `given` if factor is 0.
+        """
         if to_float(factor) == 0:
             raise DescriptionError(
                 f"{self.name}: {given} is 0, which ties nothing; give another number, less than"
@@ -182,6 +188,6 @@ class Helical(Cylindrical):
 
     @property
     def companions(self) -> tuple[Component, ...]:
-        """The `Screw` between its coordinates."""
+        """The `Screw` NAME.thread that ties the coordinates NAME.s and NAME.phi."""
         name = self.name
         return (Screw(f"{name}.thread", f"{name}.s", f"{name}.phi", pitch=self.pitch),)

@@ -27,7 +27,11 @@ Rows = tuple[tuple[float, ...], ...]
 
 
 def _rows_of(name: str, what: str, given: Any, columns: int, least: int, example: str) -> Rows:
-    """Return the rows of numbers of a curve; raise DescriptionError if they are invalid."""
+    """Return a table of numbers as tuples; raise DescriptionError if it is invalid.
+
+    The table needs `columns` numbers per row and `least` rows. `what` and `example` are for
+    messages.
+    """
     try:
         values: NDArray[np.float64] = np.array(given, dtype=float)
     except (TypeError, ValueError):
@@ -86,26 +90,33 @@ class PointOnCurve(Custom):
             )
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return the vector from the curve point c(s) to the pin, in axes of the ground."""
+        """Return rows "x", "y", "z": position of the pin minus the curve point c(s) [m].
+
+        Both are vectors in axes of `ground`.
+        """
         off = at.ground.to(at.pin).p - self.spline.at(at.s)
         return dict(zip("xyz", casadi.vertsplit(off), strict=True))
 
     def crossings(self, at: Any) -> Mapping[str, SX]:
-        """Return the event indicator of the knots of the curve."""
+        """Return {"knots": event indicator}, which changes sign at each knot of the spline."""
         return {"knots": self.spline.bend(at.s)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the force of the curve on the point, in axes of the ground."""
+        """Return force_x, force_y, force_z: constraint force ON the pin, in axes of ground [N].
+
+        The body of `ground` gets the reaction, which is not part of the outputs.
+        """
         return {f"force_{axis}": at.lam[axis] for axis in "xyz"}
 
     @property
     def spline(self) -> Spline:
-        """The curve, parameterised by the cumulative distance of its points."""
+        """The curve in the frame `ground` [m], a function of the cumulative point distance [m]."""
         d, points = self._distances(), np.array(self.curve)
         t = np.concatenate([[0.0], np.cumsum(d)])
         return periodic_spline(t[:-1], points, t[-1]) if self.closed else natural_spline(t, points)
 
     def _distances(self) -> list[float]:
+        """Return the distances of successive points [m]; for a closed curve also last to first."""
         points = list(self.curve)
         following = [*points[1:], points[0]] if self.closed else points[1:]
         return [math.dist(a, b) for a, b in zip(points, following, strict=False)]
@@ -139,7 +150,7 @@ class Cam(Custom):
 
     @property
     def needs_position(self) -> bool:
-        """True: the lift needs positions."""
+        """True: the lift is a function of the position of the driver."""
         return True
 
     def __post_init__(self) -> None:
@@ -168,21 +179,24 @@ class Cam(Custom):
             )
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return the deviation of the driven coordinate from the lift."""
+        """Return {"lift": driven minus lift(driver) [m or rad]}."""
         lift = self.spline.at(at.driver.q)
         return {"lift": Row(at.driven.q - lift, "m" if at.driven.unit == "m" else "1")}
 
     def crossings(self, at: Any) -> Mapping[str, SX]:
-        """Return the event indicator of the knots of the lift."""
+        """Return {"knots": event indicator}, which changes sign at each knot of the lift."""
         return {"knots": self.spline.bend(at.driver.q)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the effort of the cam on the driven coordinate."""
+        """Return {"effort": constraint effort ON the driven coordinate [N or N m]}.
+
+        It is negative if a follower that is only pressed on would leave the cam.
+        """
         return {"effort": at.lam["lift"]}
 
     @property
     def spline(self) -> Spline:
-        """The lift as a function of the position of the driver."""
+        """Position of the driven coordinate as a function of that of the driver [rad or m]."""
         t, lift = np.array(self.profile).T
         if self.period is None:
             return natural_spline(t, lift[:, None])

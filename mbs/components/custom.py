@@ -90,12 +90,15 @@ class Declared:
 
 
 def frame() -> Any:
-    """Declare a port on a point of a body. The constructor gets a body or `body.at(...)` for it."""
+    """Declare a port on a point of a body. In `at` it is a `FrameAt`.
+
+    The constructor gets a body, `body.at(...)` or a frame of a joint for it.
+    """
     return Declared("frame")
 
 
 def flange(*, slides: bool | None = False) -> Any:
-    """Declare a port on a shaft, connected by `m.connect(component.name_of_it, joint.flange)`.
+    """Declare a port on a shaft, connected by `m.connect(component.NAME, joint.flange)`.
 
     Args:
         slides: Whether the flange is on a prismatic joint, so that its position is in m. None if
@@ -105,7 +108,10 @@ def flange(*, slides: bool | None = False) -> Any:
 
 
 def coordinate() -> Any:
-    """Declare a port on a joint coordinate. The constructor gets its name, such as "j1"."""
+    """Declare a port on a joint coordinate. In `at` it is a `CoordinateAt`.
+
+    The constructor gets the name of the coordinate, such as "j1" or "slide.s".
+    """
     return Declared("coordinate")
 
 
@@ -216,7 +222,7 @@ class Flange:
 
     @property
     def key(self) -> tuple[str, str]:
-        """Names of the component and of its flange."""
+        """(component name, port): the unique key of the flange in a mechanism."""
         return self.owner.name, self.port
 
     def __str__(self) -> str:
@@ -243,7 +249,7 @@ class _Handle:
 
 
 def port_of_flange(name: str) -> str:
-    """Return the port of the flange declared under a name: "a" for flange_a."""
+    """Return the port of a flange name: "a" for "flange_a", "" for "flange", "sun" for "sun"."""
     return name.removeprefix("flange").removeprefix("_") if name.startswith("flange") else name
 
 
@@ -255,7 +261,7 @@ SHORTEST = 1e-12
 
 
 def regular_length(x: SX) -> SX:
-    """Return the length of a vector, sqrt(x'x + 1e-24), which is differentiable at x = 0."""
+    """Return sqrt(x'x + 1e-24), the length of a column x, which is differentiable at x = 0."""
     return casadi.sqrt(casadi.dot(x, x) + SHORTEST**2)
 
 
@@ -265,8 +271,8 @@ class RelativeMotion:
 
     Attributes:
         p: (3, 1) position of the origin of b [m].
-        R: (3, 3) orientation of b.
-        V: (3, 1) rate of p [m/s].
+        R: (3, 3) orientation of b: its columns are the axes of b in axes of a.
+        V: (3, 1) rate of p, seen by an observer on a [m/s].
         w: (3, 1) angular velocity of b relative to a [rad/s].
     """
 
@@ -277,17 +283,17 @@ class RelativeMotion:
 
     @cached_property
     def length(self) -> SX:
-        """Distance of the origins [m], differentiable at zero."""
+        """Distance sqrt(p'p + 1e-24) of the origins [m], differentiable at zero."""
         return regular_length(self.p)
 
     @cached_property
     def along(self) -> SX:
-        """(3, 1) unit vector from the origin of a to the origin of b."""
+        """Unit vector (3, 1) from the origin of a to that of b, in axes of a. Zero if p is zero."""
         return self.p / self.length
 
     @cached_property
     def rate(self) -> SX:
-        """Rate of the distance [m/s]."""
+        """Rate of the distance of the origins [m/s], positive if they separate."""
         return casadi.dot(self.along, self.V)
 
 
@@ -317,7 +323,7 @@ class FrameAt:
 
     @property
     def R(self) -> SX:
-        """(3, 3) orientation in the world."""
+        """(3, 3) orientation in the world; columns are the axes of the frame in world axes."""
         return self._in_world.R
 
     @property
@@ -327,11 +333,11 @@ class FrameAt:
 
     @property
     def w(self) -> SX:
-        """(3, 1) angular velocity, in axes of the world [rad/s]."""
+        """(3, 1) angular velocity relative to the world, in axes of the world [rad/s]."""
         return self._in_world.w
 
     def to(self, other: FrameAt) -> RelativeMotion:
-        """Return the motion of another frame relative to this frame, in the axes of this frame."""
+        """Return position, rotation and velocities of `other` in this frame, in its axes."""
         return other._seen_from(self)
 
 
@@ -364,7 +370,7 @@ class FlangeAt:
 
     @property
     def position(self) -> SX:
-        """Position of a sliding flange [m]."""
+        """`angle` of a sliding flange: its position [m]."""
         return self.angle
 
 
@@ -372,8 +378,9 @@ class At:
     """Values of a component in the current state: each declared name is an attribute.
 
     Frames are `FrameAt`, flanges `FlangeAt`, coordinates `CoordinateAt`. Parameters, states, inputs
-    and unknowns are (1, 1) expressions. In `outputs`, `lam` has the efforts of the constraint rows
-    by label. `symbols` has the symbol of each parameter of the mechanism by name.
+    and unknowns are (1, 1) expressions. In `outputs`, `lam` has the constraint effort of each row
+    by label. A positive effort acts towards an increase of the value of the row. `symbols` has the
+    symbol of each parameter of the mechanism by name.
     """
 
     def __init__(
@@ -400,12 +407,12 @@ class At:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameLoad:
-    """Wrench that a component exerts on a frame.
+    """Wrench that a component exerts ON the body of a frame.
 
     Attributes:
-        force: (3, 1) [N].
-        moment: (3, 1) about the origin of the frame [N m].
-        own_axes: Whether both are in the axes of the frame. Otherwise they are in world axes.
+        force: (3, 1) force at the origin of the frame [N].
+        moment: (3, 1) moment about the origin of the frame [N m].
+        own_axes: Whether force and moment are in axes of the frame, instead of world axes.
     """
 
     force: SX
@@ -424,25 +431,32 @@ def force(value: Any, *, own_axes: bool = False) -> FrameLoad:
 
 
 def torque(value: Any, *, own_axes: bool = False) -> FrameLoad:
-    """Return the load of a torque (3, 1) [N m] on a frame. Arguments are as for `force`."""
+    """Return the load of a torque ON a frame, in axes of the world or of the frame.
+
+    Args:
+        value: (3, 1) torque [N m], or a list of three numbers and expressions.
+        own_axes: Whether the torque is in the axes of the frame.
+    """
     return FrameLoad(zeros(), _column(value), own_axes)
 
 
 def _column(value: Any) -> SX:
-    """Convert an expression, or a list of numbers and expressions, to a column."""
+    """Return a column (k, 1): an expression, or a list of numbers and expressions."""
     return vector(value) if isinstance(value, (list, tuple)) else SX(value)
 
 
 def between(
     a: FrameAt, b: FrameAt, on_a: FrameLoad, moment_b: SX | None = None
 ) -> dict[str, FrameLoad]:
-    """Return the loads of a wrench on frame a and of the opposite force on frame b, by port.
+    """Return the loads of a wrench ON frame a and of the opposite force ON frame b, by port.
+
+    Both loads are in axes of their own frames. The force on b acts at the origin of b.
 
     Args:
         a: frame of the component.
         b: second frame of the component.
-        on_a: force and moment on a, in the axes of a.
-        moment_b: (3, 1) moment on b about its origin, in the axes of a. Zero if left out.
+        on_a: force and moment ON a, about its origin, in the axes of a.
+        moment_b: (3, 1) moment ON b about its origin, in the axes of a. Zero if left out.
     """
     R = a.to(b).R
     turned = zeros() if moment_b is None else moment_b
@@ -451,7 +465,10 @@ def between(
 
 
 def pull(a: FrameAt, b: FrameAt, tension: SX) -> dict[str, FrameLoad]:
-    """Return the loads of a tension [N] that pulls the origins of two frames together."""
+    """Return the forces that a tension [N] exerts ON a and b, by port: each towards the other.
+
+    Each force acts at the origin of its frame and is in its own axes. A negative tension pushes.
+    """
     return between(a, b, FrameLoad(a.to(b).along * tension, zeros()))
 
 
@@ -567,7 +584,7 @@ class OneWay:
 
 
 Load = FrameLoad | SX | float
-"""Load on a port: a wrench on a frame, or a force [N] or torque [N m] on a coordinate or flange."""
+"""Load ON a port: wrench on a frame, or force [N] or torque [N m] on a coordinate or flange."""
 
 C = TypeVar("C", bound="Custom")
 
@@ -578,12 +595,12 @@ class Custom(OnPoints):
 
     Methods that a subclass may define:
 
-    - `loads(at)`: loads on its ports, by port. If it is left out and `energy` is there, the loads
-      are the negative derivatives of the energy.
+    - `loads(at)`: loads that the component exerts ON its ports, by port. If only `energy` is
+      defined, the loads are the negative derivatives of the energy.
     - `energy(at)`: stored energy [J], a function of positions and states. Inputs count as
       constants.
     - `dissipation(at)`: dissipated power [W], never negative.
-    - `rates(at)`: rate of every state, by name.
+    - `rates(at)`: time derivative of every state, by name.
     - `rows(at)`: constraint equations on positions, unknowns and parameters, by label, each a
       `Row`.
     - `positive(at)`: expressions by label. Among the configurations at which the rows are zero, the
@@ -595,7 +612,7 @@ class Custom(OnPoints):
     - `frictions(at)`: dry frictions, a `Friction` each, by label, for simulations and FMUs.
     - `stops(at)`: rigid stops and freewheels, a `Stop` or `OneWay` each, by label, for simulations
       and FMUs.
-    - `limits(at)`: lower and upper limit of its coordinates, a pair each, by port.
+    - `limits(at)`: pair (lower, upper) of limits of each coordinate [rad or m], by port.
     - `figures(at)`: shapes that pictures show at its frames, a `Shape` of numbers each, by port.
     - `crossings(at)`: event indicators at which simulations end a step, by label: zero at a kink of
       the law. An `Approach` is for a law that acts only briefly, such as a contact.
@@ -642,7 +659,7 @@ class Custom(OnPoints):
                 _CHECKS[what.kind](self, name, what)
 
     def require_made(self) -> None:
-        """Raise DescriptionError if the class skipped the check of the constructor arguments."""
+        """Raise DescriptionError if `__post_init__` of the class skipped Custom.__post_init__."""
         for name in self.names_of("frame", "parameter"):
             given = getattr(self, name)
             if given is not None and not isinstance(given, (Point, Expression)):
@@ -654,7 +671,7 @@ class Custom(OnPoints):
     # Ports.
 
     def names_of(self, *kinds: str) -> tuple[str, ...]:
-        """Return the names of the declarations of some kinds, in order."""
+        """Return the names of the declarations of these kinds, such as "state", in class order."""
         return tuple(name for name, what in self.declared.items() if what.kind in kinds)
 
     def drawn(self, values: Mapping[str, float]) -> Mapping[str, Shape]:
@@ -682,48 +699,60 @@ class Custom(OnPoints):
 
     @property
     def frames(self) -> Mapping[str, Point]:
-        """Points of the component, by port."""
+        """Attachment points of the component, by the name of the port."""
         return {name: getattr(self, name) for name in self.names_of("frame")}
 
     @property
     def points(self) -> tuple[Point, ...]:
-        """Points of the component."""
+        """Attachment points of the component, in the order of `frames`."""
         return tuple(self.frames.values())
 
     @property
     def coordinates(self) -> Mapping[str, tuple[tuple[str, Scalar], ...]]:
-        """Pairs of coordinate and factor by port: a port is a weighted sum of coordinates."""
+        """Pairs (coordinate name, factor) by port: the port is the sum of factor times coordinate.
+
+        A declared coordinate has the single pair (name, 1).
+        """
         return {name: ((getattr(self, name), Number(1.0)),) for name in self.names_of("coordinate")}
 
     @property
     def shaft_ports(self) -> tuple[str, ...]:
-        """Names of the flanges that the methods use."""
+        """Names of the flanges that are attributes of `at`: all declared flanges."""
         return self.names_of("flange")
 
     @property
     def flanges(self) -> tuple[Flange, ...]:
-        """All flanges of the component."""
+        """All declared flanges of the component, as `Flange` objects to connect."""
         return tuple(getattr(self, name) for name in self.names_of("flange"))
 
     def slides(self, flange: Flange) -> bool | None:
-        """Return whether a flange belongs to prismatic joints; None if it may be on either kind."""
+        """Return whether a flange has a position in m. None if it may also be an angle in rad."""
         declared = {port_of_flange(name): name for name in self.names_of("flange")}
         unit = self.declared[declared[flange.port]].unit
         return None if unit == "1" else unit == "m"
 
     @property
     def own_inertia(self) -> Expression:
-        """Inertia that the component adds to its shaft [kg m^2], or mass of a sliding part [kg]."""
+        """Inertia that the assembly adds to the shaft [kg m^2], or mass of a sliding part [kg].
+
+        It is zero by default.
+        """
         return Number(0.0)
 
     @property
     def needs_position(self) -> bool:
-        """Whether its coordinates must have positions. Rates of a spherical joint have none."""
+        """Whether `at` must have positions of its coordinates. If False, rates suffice.
+
+        A coordinate of a spherical joint has a rate but no position.
+        """
         return False
 
     @property
     def scope(self) -> str:
-        """End of a report sentence: models that contain the component. Empty if all models do."""
+        """End of the sentence that reports the component: which models contain it.
+
+        Empty if all models contain it.
+        """
         if not self.switches:
             return ""
         if self.has(*(method for method in _METHODS if method not in _SWITCHES)):
@@ -731,7 +760,7 @@ class Custom(OnPoints):
         return ", in simulations; the other models leave it out"
 
     def scoped(self: C, prefix: str) -> C:
-        """Return the component with prefixed names, for a nested mechanism."""
+        """Return a copy whose name, parameters, points and coordinates start with "`prefix`."."""
         inner = OnPoints.scoped(self, prefix)
         changed: dict[str, Any] = {
             name: f"{prefix}.{getattr(self, name)}" for name in self.names_of("coordinate")
@@ -741,51 +770,62 @@ class Custom(OnPoints):
     # Equations of the component.
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the loads on the ports, by port: wrenches on frames, efforts on other ports."""
+        """Return the loads ON the ports by port: `FrameLoad` on frames, efforts on other ports.
+
+        An effort is in N or N m along the coordinate or flange. Ports without an entry get no load.
+        """
         return {}
 
     def energy(self, at: Any) -> SX:
-        """Return the stored energy [J]."""
+        """Return the stored energy (1, 1) [J], zero by default."""
         return SX(0)
 
     def dissipation(self, at: Any) -> SX:
-        """Return the dissipated power [W]."""
+        """Return the dissipated power (1, 1) [W], zero by default."""
         return SX(0)
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rate of every state, by name."""
+        """Return the time derivative of each state, by state name."""
         return {}
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return constraint equations on positions, unknowns and parameters, by label."""
+        """Return position constraints by label.
+
+        Values that must be zero, in m or as a `Row` with unit.
+
+        They depend on positions, unknowns and parameters.
+        """
         return {}
 
     def positive(self, at: Any) -> Mapping[str, SX]:
-        """Return expressions, by label, that are positive at the intended configurations."""
+        """Return expressions by label that are positive at the intended configurations only."""
         return {}
 
     def velocity_rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return constraint equations linear in velocities, by label."""
+        """Return velocity constraints by label: values, linear in velocities, that must be zero."""
         return {}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the value of every output, by name."""
+        """Return the value of each output, by output name."""
         return {}
 
     def events(self, at: Any) -> Mapping[str, Event]:
-        """Return events, by label, of positions, velocities, states, modes and inputs."""
+        """Return the events by label, each with a trigger and new values of states or modes.
+
+        They depend on positions, velocities, states, modes and inputs.
+        """
         return {}
 
     def frictions(self, at: Any) -> Mapping[str, Friction]:
-        """Return the dry frictions, by label."""
+        """Return dry frictions with sticking by label. The label "" is a single friction."""
         return {}
 
     def stops(self, at: Any) -> Mapping[str, Stop | OneWay]:
-        """Return the rigid stops and freewheels, by label."""
+        """Return rigid stops and freewheels by label. The label "" is a single element."""
         return {}
 
     def limits(self, at: Any) -> Mapping[str, tuple[SX | None, SX | None]]:
-        """Return the limits of its coordinates, by port. None means no limit on that side."""
+        """Return (lower, upper) of its coordinates by port [rad or m]. None is an open side."""
         return {}
 
     def crossings(self, at: Any) -> Mapping[str, SX | Approach]:
@@ -797,7 +837,7 @@ class Custom(OnPoints):
         return {}
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return the shapes that pictures show, by frame; `at` has the parameters as numbers.
+        """Return shapes that pictures show, by frame port; `at` has parameters as floats.
 
         The component is not drawn if a parameter has no value.
         """
@@ -806,42 +846,45 @@ class Custom(OnPoints):
     # Properties that the assembly uses.
 
     def has(self, *methods: str) -> bool:
-        """Return whether the class defines one of these methods."""
+        """Return whether the class overrides at least one of these methods of Custom."""
         return any(getattr(type(self), name) is not getattr(Custom, name) for name in methods)
 
     @property
     def has_equations(self) -> bool:
-        """Whether the component adds equations to the models."""
+        """Whether it contributes loads, states, constraints, outputs, frictions or stops to models.
+
+        False if the assembly replaces it by joints and couplings (`lowered`).
+        """
         return not self.lowered and self.has(*_METHODS)
 
     @property
     def acts(self) -> bool:
-        """Whether the component exerts loads on its ports."""
+        """Whether the component exerts loads on its ports: it has `loads` or `energy`."""
         return self.has("loads", "energy")
 
     @property
     def binds(self) -> bool:
-        """Whether the component has constraint equations."""
+        """Whether the component has constraint rows on positions or velocities."""
         return self.has("rows", "velocity_rows")
 
     @property
     def switches(self) -> bool:
-        """Whether the component has frictions or stops, which constrain the motion at times."""
+        """Whether it has frictions, stops or freewheels, which constrain the motion at times."""
         return self.has(*_SWITCHES)
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Names of its states, with the modes."""
+        """Names of the declared states and modes, in class order."""
         return self.names_of("state", "mode")
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        """Names of its inputs."""
+        """Names of the declared inputs, in class order."""
         return self.names_of("input")
 
     @property
     def output_names(self) -> tuple[str, ...]:
-        """Names of its outputs."""
+        """Names of the declared outputs, in class order."""
         return self.names_of("output")
 
     def _require_magnitudes(self, *names: str) -> None:
@@ -882,7 +925,7 @@ _RESERVED = frozenset({"name", "declared", "symbols", "lam", *vars(Custom)})
 
 
 def _make_fields(cls: type[Custom], own: Mapping[str, Declared]) -> None:
-    """Turn the declarations of a class into fields of a frozen dataclass and into handles."""
+    """Replace declarations by dataclass fields (constructor arguments) and signal handles."""
     if "__slots__" in vars(cls):
         raise DescriptionError(f"{cls.__name__}: it has __slots__; leave them out")
     annotations: dict[str, Any] = dict(inspect.get_annotations(cls))
@@ -920,11 +963,13 @@ def _make_fields(cls: type[Custom], own: Mapping[str, Declared]) -> None:
 
 
 def _check_frame(component: Custom, name: str, what: Declared) -> None:
+    """Replace the field `name`, a body or a point, by a point; None stays if it is the default."""
     if getattr(component, name) is not None or what.default is REQUIRED:
         component._take_point(name)
 
 
 def _check_coordinate(component: Custom, name: str, what: Declared) -> None:
+    """Replace the field `name`, a joint or a coordinate name, by a coordinate name."""
     given = getattr(component, name)
     if isinstance(given, Component) and not isinstance(given, OnPoints):
         given = given.name
@@ -937,6 +982,7 @@ def _check_coordinate(component: Custom, name: str, what: Declared) -> None:
 
 
 def _check_parameter(component: Custom, name: str, what: Declared) -> None:
+    """Convert the field `name` to an expression. Raise if its value is out of bounds."""
     if getattr(component, name) is None and what.default is None:
         return
     component._normalise(name)
@@ -952,6 +998,7 @@ def _check_parameter(component: Custom, name: str, what: Declared) -> None:
 
 
 def _check_number(component: Custom, name: str, what: Declared) -> None:
+    """Convert the field `name` to a finite float; raise DescriptionError for other values."""
     object.__setattr__(
         component, name, finite(getattr(component, name), f"{component.name}, {name}")
     )

@@ -49,7 +49,7 @@ class SubMechanism:
         return self.outer.components[full]
 
     def body(self, name: str) -> RigidBody:
-        """Return the body of a name in the nested mechanism."""
+        """Return the body with the name `name` inside the nested mechanism."""
         component = self[name]
         if not isinstance(component, RigidBody):
             raise DescriptionError(
@@ -58,7 +58,7 @@ class SubMechanism:
         return component
 
     def point(self, name: str) -> Point:
-        """Return the frame of a name in the nested mechanism."""
+        """Return the named frame `name` of the nested mechanism, as a point."""
         full = f"{self.scope}.{name}"
         if full not in self.outer.frames:
             inside = sorted(n for n in self.outer.frames if n.startswith(f"{self.scope}."))
@@ -67,7 +67,7 @@ class SubMechanism:
 
     @property
     def base(self) -> RigidBody:
-        """Ground of the nested mechanism, to be connected to a body."""
+        """Ground of the nested mechanism: massless body to be connected to the outer mechanism."""
         return self.body("world")
 
 
@@ -124,7 +124,7 @@ def place(outer: Description, inner: Description, name: str) -> SubMechanism:
 
 
 def _frames_of(inner: Description) -> dict[str, Point]:
-    """Return the named frames of a mechanism; a mount adds the frame "outer_world"."""
+    """Return the named frames of a mechanism; if its base is mounted, also "outer_world"."""
     if not inner.mount.steps:
         return inner.frames
     if OUTER_WORLD in inner.frames:
@@ -136,7 +136,10 @@ def _frames_of(inner: Description) -> dict[str, Point]:
 
 
 def on_placed(point: Point, placed: Mapping[str, Component], scope: str) -> Point:
-    """Return the point of a nested mechanism on the copy of its owner."""
+    """Return a point of a nested mechanism with its owner replaced by the copy in `placed`.
+
+    Parameters of the placement get the prefix "`scope`.".
+    """
     owner = placed[point.owner.name]
     return replace(point, owner=owner, placement=point.placement.scoped(scope))
 
@@ -230,7 +233,7 @@ class Description:
 
     @property
     def gravity(self) -> tuple[Scalar, ...]:
-        """Gravity acceleration in the axes of the base [m/s^2]."""
+        """Gravity acceleration in the axes of the world of this mechanism [m/s^2]."""
         return self.world.gravity
 
     def change_gravity(
@@ -409,7 +412,11 @@ class Description:
         self.wires.append((str(source), target))
 
     def add_frame(self, name: str, point: Point | RigidBody) -> Point:
-        """Name a point, such as a tool centre point, as a frame that models can refer to."""
+        """Give a point, such as a tool centre point, a name that models accept. Return the point.
+
+        Raises:
+            DescriptionError: the name is taken, or the point is on no component of the mechanism.
+        """
         if name in self.frames or name in self.components or name == "base":
             raise DescriptionError(
                 f"{self.name}: the frame name {name!r} is taken; choose another name"
@@ -429,7 +436,7 @@ class Description:
         self.shapes.append((self._point(point), shape))
 
     def cut(self, joint: Joint) -> None:
-        """Choose the joint at which its loop is cut, instead of the automatic choice."""
+        """Cut the loop of this joint at the joint, instead of at the joint chosen automatically."""
         if not isinstance(joint, Joint):
             raise DescriptionError(
                 f"{self.name}: {_what(joint)} is not a joint; give the joint itself, not its name"
@@ -441,7 +448,7 @@ class Description:
         self.cuts.append(joint.name)
 
     def _require_use(self, component: Component) -> None:
-        """Raise DescriptionError if a component contributes to no equation."""
+        """Raise DescriptionError if a component is of no known type or returns no equations."""
         if isinstance(component, MotionJoint) and component.frame_a is None:
             raise DescriptionError(
                 f"{self.name}: {type(component).__name__} {component.name!r} is added, but a joint"
@@ -473,17 +480,17 @@ class Description:
         return f"<Description {self.name}: {bodies} bodies, {joints} joints>"
 
     def joints(self) -> Iterator[Joint]:
-        """Return all joints, in the order of their addition."""
+        """Return an iterator of all joints, in the order of addition."""
         return (c for c in self.components.values() if isinstance(c, Joint))
 
     def bodies(self) -> Iterator[RigidBody]:
-        """Return all bodies without the world, in the order of their addition."""
+        """Return an iterator of all bodies except the world, in the order of addition."""
         return (
             c for c in self.components.values() if isinstance(c, RigidBody) and c is not self.world
         )
 
     def couplings(self) -> Iterator[Coupling]:
-        """Return all couplings of coordinates, in the order of their addition."""
+        """Return an iterator of all couplings of joint coordinates, in the order of addition."""
         return (c for c in self.components.values() if isinstance(c, Coupling))
 
     def parameters(self) -> tuple[Parameter, ...]:
@@ -533,7 +540,7 @@ class Description:
         return found
 
     def _merge(self, known: Parameter, other: Parameter) -> Parameter:
-        """Merge two uses of one symbol; raise AssemblyError if their values or bounds differ."""
+        """Return one Parameter for two uses of a symbol. Raise if their values or bounds differ."""
         for what in ("default", "min", "max"):
             one, two = getattr(known, what), getattr(other, what)
             if None not in (one, two) and one != two:
@@ -551,7 +558,7 @@ class Description:
         return replace(first, unit=unit, min=low, max=high)
 
     def used_parameters(self) -> Iterator[Parameter]:
-        """Yield every symbol of components and placements, as often as it is used."""
+        """Yield each symbol of components and placements once per use, also repeatedly."""
         for component in self.components.values():
             for value in component.expressions():
                 yield from parameters_of(value)
@@ -563,6 +570,7 @@ class Description:
                 yield from parameters_of(value)
 
     def _point(self, point: Point | RigidBody) -> Point:
+        """Return a point of the mechanism; raise if its owner was not added."""
         if isinstance(point, RigidBody):
             point = point.frame
         if not isinstance(point, Point):
@@ -578,6 +586,7 @@ class Description:
         return point
 
     def _weld(self, a: Point, b: Point) -> None:
+        """Make two frames coincide; raise if a frame of a joint is connected already."""
         for point in (a, b):
             if isinstance(point.owner, Joint) and self._is_used(point):
                 raise DescriptionError(
@@ -587,13 +596,14 @@ class Description:
         self.connections.append((a, b))
 
     def _join(self, flanges: tuple[Flange, Flange]) -> None:
+        """Connect two flanges and add the components that have them."""
         for flange in flanges:
             if self.components.get(flange.owner.name) is not flange.owner:
                 self.add(flange.owner)
         self.shafts.append(flanges)
 
     def _is_used(self, point: Point) -> bool:
-        """Return whether a frame of a joint is connected; new connections are registered first."""
+        """Return whether a frame of a joint is connected, after new connections are registered."""
         if self._counted > len(self.connections):
             self._ports.clear()
             self._counted = 0

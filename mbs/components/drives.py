@@ -29,7 +29,7 @@ class OneFlange(Custom):
 
 @dataclass(frozen=True, slots=True)
 class TwoFlanges(Custom):
-    """Base of parts between two shafts, or of a part of one shaft with two ends."""
+    """Base of parts with two flanges: between two shafts, or a shaft with two ends."""
 
     flange_a = custom.flange()
     flange_b = custom.flange()
@@ -61,14 +61,17 @@ def flange_pair(where: str, *given: Any) -> tuple[Flange, Flange]:
 
 @dataclass(frozen=True, slots=True)
 class RigidPart(TwoFlanges):
-    """Base of inertias and masses, whose two flanges are the two ends of one rigid part."""
+    """Base of inertias and masses: one rigid part with flange_a and flange_b at its two ends.
+
+    The assembly adds `own_inertia` to the joint or shaft that its flanges are connected to.
+    """
 
     lowered = True
 
 
 @dataclass(frozen=True, slots=True)
 class ShaftInertia(RigidPart):
-    """A rotating inertia, whose two flanges are the two ends of one rigid shaft.
+    """A rotating inertia on a rigid shaft with a flange at each end.
 
     Attributes:
         inertia: moment of inertia about the axis of the shaft [kg m^2].
@@ -83,7 +86,7 @@ class ShaftInertia(RigidPart):
 
     @property
     def own_inertia(self) -> Expression:
-        """The inertia, all of which is on the shaft."""
+        """The moment of inertia [kg m^2], which the assembly adds to the shaft."""
         return expression(self.inertia)
 
 
@@ -143,7 +146,7 @@ def check_ratio(name: str, ratio: Scalar) -> None:
 class Device(OneFlange):
     """Base of motors: the torque on the shaft is part of the efforts tau of models.
 
-    A user-defined motor derives from this class, and its `loads` are those of the port "flange".
+    A user-defined motor derives from this class. Its `loads` returns {"flange": torque [N m]}.
     """
 
     drives = True
@@ -156,11 +159,11 @@ class TorqueSource(Device):
     w = custom.output("rad/s")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the input as the load on the flange."""
+        """Return {"flange": torque ON the shaft [N m]}, equal to the input `tau`."""
         return {"flange": at.tau}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the speed of the shaft."""
+        """Return {"w": speed of the shaft [rad/s]}."""
         return {"w": at.flange.speed}
 
 
@@ -187,7 +190,11 @@ class DCMotor(Device):
     w = custom.output("rad/s")
 
     def check_values(self, values: Mapping[str, float]) -> Self:
-        """Return the motor with values; raise DescriptionError for a symbolic inductance of 0."""
+        """Return the motor with numeric values of its parameters, checked as in `__init__`.
+
+        Raises:
+            DescriptionError: a symbolic inductance has the value 0, but the current is a state.
+        """
         checked = Component.check_values(self, values)
         if "i" in self.state_names and to_float(self.inductance, values) == 0:
             raise DescriptionError(
@@ -198,37 +205,41 @@ class DCMotor(Device):
 
     @property
     def own_inertia(self) -> Expression:
-        """Moment of inertia of the rotor."""
+        """Moment of inertia of the rotor [kg m^2], which the assembly adds to the shaft."""
         return expression(self.inertia)
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Names of the states: the current unless the inductance is 0, and those of subclasses."""
+        """("i",) if the inductance is not the number 0, plus states of subclasses."""
         every = self.names_of("state", "mode")
         return tuple(name for name in every if name != "i" or self.inductance != Number(0.0))
 
     @property
     def output_names(self) -> tuple[str, ...]:
-        """Names of torque and speed, and of the current if it is no state."""
+        """Names of outputs: "tau" and "w", preceded by "i" if the current is not a state."""
         own = self.names_of("output")
         return own if "i" in self.state_names else ("i", *own)
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rate of the current."""
+        """Return {"i": di/dt [A/s]}; empty if the inductance is the number 0."""
         left = at.voltage - at.constant * at.flange.speed - at.resistance * at.i
         return {"i": left / at.inductance} if "i" in self.state_names else {}
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the torque, proportional to the current."""
+        """Return {"flange": torque ON the shaft, constant times current [N m]}."""
         return {"flange": at.constant * self._current(at)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return torque and speed, and the current if it is no state."""
+        """Return "tau": torque ON the shaft [N m] and "w": its speed [rad/s].
+
+        The current "i" [A] is a third output if it is no state.
+        """
         i = self._current(at)
         values = {"tau": at.constant * i, "w": at.flange.speed}
         return values if "i" in self.state_names else {"i": i, **values}
 
     def _current(self, at: Any) -> SX:
+        """Return the current [A]; without inductance it is (voltage - constant w) / resistance."""
         if "i" in self.state_names:
             return SX(at.i)
         return SX((at.voltage - at.constant * at.flange.speed) / at.resistance)
@@ -274,11 +285,11 @@ class BLDCMotor(Device):
 
     @property
     def own_inertia(self) -> Expression:
-        """Moment of inertia of the rotor."""
+        """Moment of inertia of the rotor [kg m^2], which the assembly adds to the shaft."""
         return expression(self.inertia)
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rates of the currents."""
+        """Return the rates of the currents i_d and i_q [A/s]."""
         L_d, L_q = self._inductances(at)
         w = at.pole_pairs * at.flange.speed
         return {
@@ -287,20 +298,25 @@ class BLDCMotor(Device):
         }
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the torque of the magnets and of the difference of the inductances."""
+        """Return {"flange": torque ON the shaft [N m]}: the torque of the class docstring."""
         return {"flange": self._torque(at)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return torque, speed and electrical input power."""
+        """Return "tau": torque ON the shaft [N m], "w": its speed [rad/s], and "power".
+
+        "power" is the electrical input power [W].
+        """
         power = 1.5 * (at.v_d * at.i_d + at.v_q * at.i_q)
         return {"tau": self._torque(at), "w": at.flange.speed, "power": power}
 
     def _torque(self, at: Any) -> SX:
+        """Return 3/2 P (psi i_q + (L_d - L_q) i_d i_q) [N m]."""
         L_d, L_q = self._inductances(at)
         return SX(1.5 * at.pole_pairs * (at.flux * at.i_q + (L_d - L_q) * at.i_d * at.i_q))
 
     @staticmethod
     def _inductances(at: Any) -> tuple[SX, SX]:
+        """Return (L_d, L_q) [H]; L_q is L_d by default."""
         return at.inductance_d, at.inductance_d if at.inductance_q is None else at.inductance_q
 
 
@@ -321,21 +337,21 @@ class ShaftForce(CoordinateForce):
 
     @property
     def shares(self) -> Iterable[tuple[Flange, Expression]]:
-        """Pairs of flange and weight of its angle in x."""
+        """Pairs (flange, weight): x is the sum of weight times flange angle [rad]."""
         raise NotImplementedError
 
     @property
     def shaft_ports(self) -> tuple[str, ...]:
-        """No flanges: the law uses x only."""
+        """Empty: the law uses x only, not the flanges."""
         return ()
 
     @property
     def needs_position(self) -> bool:
-        """True: the twist needs positions."""
+        """True: the twist x is a sum of angles, not only of speeds."""
         return True
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the torque that twists it."""
+        """Return {"torque": `resistance` [N m]}, against which x is moved by the shafts."""
         return {"torque": self.resistance(at)}
 
 
@@ -361,16 +377,16 @@ class ElasticShaft(ShaftForce, TwoFlanges):
 
     @property
     def shares(self) -> Iterable[tuple[Flange, Expression]]:
-        """The difference of the two angles."""
+        """(flange_a, 1) and (flange_b, -1): the twist x is angle_a - angle_b [rad]."""
         return (self.flange_a, Number(1.0)), (self.flange_b, Number(-1.0))
 
     def resistance(self, at: Any) -> SX:
-        """Return the torque that twists the shaft."""
+        """Return the torque stiffness x + damping dx/dt [N m] from flange_a to flange_b."""
         stiffness, damping = to_sx(self.stiffness, at.symbols), to_sx(self.damping, at.symbols)
         return SX(stiffness * at.x.q + damping * at.x.v)
 
     def energy(self, at: Any) -> SX:
-        """Return the energy stored in the twist."""
+        """Return stiffness x^2 / 2 of the twist x [J]."""
         return SX(0.5 * to_sx(self.stiffness, at.symbols) * at.x.q**2)
 
 
@@ -397,7 +413,7 @@ class ElasticGear(ElasticShaft):
 
     @property
     def shares(self) -> Iterable[tuple[Flange, Expression]]:
-        """The angle of flange_a divided by the ratio, minus the angle of flange_b."""
+        """(flange_a, 1 / ratio) and (flange_b, -1): the twist x is angle_a / ratio - angle_b."""
         return (self.flange_a, 1 / expression(self.ratio)), (self.flange_b, Number(-1.0))
 
 
@@ -419,13 +435,13 @@ class ShaftDamper(ShaftForce, OneFlange):
 
     @property
     def shares(self) -> Iterable[tuple[Flange, Expression]]:
-        """The angle of its flange."""
+        """(flange, 1): x is the angle of the flange [rad]."""
         return ((self.flange, Number(1.0)),)
 
     def resistance(self, at: Any) -> SX:
-        """Return the friction torque of the bearing."""
+        """Return damping times shaft speed [N m]. The shaft gets the negative of this torque."""
         return SX(to_sx(self.damping, at.symbols) * at.x.v)
 
     def dissipation(self, at: Any) -> SX:
-        """Return the friction power [W]."""
+        """Return the friction torque times the speed of the shaft [W]."""
         return SX(self.resistance(at) * at.x.v)

@@ -41,7 +41,7 @@ class PairForce(OnPair, ForceElement):
 
     @property
     def frames(self) -> Mapping[str, Point]:
-        """The two points."""
+        """Map from "a" and "b" to the two attachment points."""
         return {"a": self.a, "b": self.b}
 
 
@@ -51,20 +51,29 @@ class CoordinateForce(ForceElement):
 
     @property
     def levers(self) -> tuple[tuple[str, Scalar], ...]:
-        """Pairs of joint coordinate and moment arm (weight in x)."""
+        """Pairs (coordinate name, moment arm [m/rad or 1]).
+
+        X is the sum of arm times coordinate.
+        """
         raise NotImplementedError
 
     @property
     def coordinates(self) -> Mapping[str, tuple[tuple[str, Scalar], ...]]:
-        """The coordinates of `levers`, as the port x."""
+        """Map from the single port "x" to the pairs (coordinate name, moment arm) of `levers`."""
         return {"x": self.levers}
 
     def resistance(self, at: Any) -> SX:
-        """Return the resisting effort: the effort along x that would overcome it [N m or N]."""
+        """Return the effort (1, 1) against which x must be moved. The element exerts its negative.
+
+        Unit N m if x is an angle, N if x is a length. `at.x` has the value q and the rate v of x.
+        """
         raise NotImplementedError
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the negative resistance on x; each joint gets it times its moment arm."""
+        """Return {"x": -resistance}: effort of the element along x [N m or N].
+
+        The assembly applies this effort times its moment arm to each joint coordinate.
+        """
         return {"x": -self.resistance(at)}
 
 
@@ -88,11 +97,11 @@ class JointForce(CoordinateForce):
 
     @property
     def levers(self) -> tuple[tuple[str, Scalar], ...]:
-        """The coordinate, with moment arm 1."""
+        """The single pair (`joint`, 1): x is this joint coordinate."""
         return ((self.joint, Number(1.0)),)
 
     def limits(self, at: Any) -> Mapping[str, tuple[SX | None, SX | None]]:
-        """Return the fields lower and upper of a stop as limits of x."""
+        """Return {"x": (lower, upper)} [rad or m]. None is an open side; {} without both fields."""
         lower, upper = (getattr(self, side, None) for side in ("lower", "upper"))
         if lower is None and upper is None:
             return {}
@@ -100,7 +109,7 @@ class JointForce(CoordinateForce):
         return {"x": (next(both), next(both))}
 
     def _take_limits(self) -> None:
-        """Convert the fields lower and upper of a stop to expressions, with checks."""
+        """Convert lower and upper to expressions. Raise if both are None or not in order."""
         sides = [name for name in ("lower", "upper") if getattr(self, name) is not None]
         if not sides:
             raise DescriptionError(
@@ -114,7 +123,7 @@ class JointForce(CoordinateForce):
             )
 
     def scoped(self: J, prefix: str) -> J:
-        """Return the element with prefixed names, for a nested mechanism."""
+        """Return a copy whose name, parameters and joint have the prefix "`prefix`."."""
         return replace(Component.scoped(self, prefix), joint=f"{prefix}.{self.joint}")
 
 
@@ -136,16 +145,16 @@ class PointSource(ForceElement):
 
     @property
     def frames(self) -> Mapping[str, Point]:
-        """The point, by its port."""
+        """Map from "point" to the point of application."""
         return {"point": self.point}
 
     @property
     def follows(self) -> bool:
-        """Whether its direction rotates with the body."""
+        """Whether the vector is constant in the axes of the point and rotates with the body."""
         raise NotImplementedError
 
     def _settle(self, name: str) -> None:
-        """Check the point, the axes and the vector; `name` is the field of the vector."""
+        """Convert `point` to a Point and the field `name` to three expressions, with checks."""
         Component.__post_init__(self)
         self._take_point("point")
         object.__setattr__(self, name, three(getattr(self, name), f"{self.name}, {name}"))
@@ -176,11 +185,14 @@ class Force(PointSource):
 
     @property
     def follows(self) -> bool:
-        """Whether its direction rotates with the body."""
+        """Whether `axes` is "body": the force rotates with the body."""
         return self.axes == "body"
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the force on the point, without a moment about it."""
+        """Return {"point": force ON the body at the origin of the point, in axes of the point} [N].
+
+        There is no moment about the origin of the point, and no reaction on another body.
+        """
         return {"point": custom.force(_in_point_axes(self.force, self.follows, at), own_axes=True)}
 
 
@@ -202,17 +214,21 @@ class Torque(PointSource):
 
     @property
     def follows(self) -> bool:
-        """Whether its direction rotates with the body."""
+        """Whether `axes` is "body": the torque rotates with the body."""
         return self.axes == "body"
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the torque on the point."""
+        """Return {"point": torque ON the body, in axes of the point} [N m], without a reaction."""
         return {
             "point": custom.torque(_in_point_axes(self.torque, self.follows, at), own_axes=True)
         }
 
 
 def _in_point_axes(components: tuple[Expression, ...], follows: bool, at: Any) -> SX:
+    """Return a constant vector (3, 1) in axes of the point.
+
+    The given components are in axes of the point if `follows`, else in axes of the world.
+    """
     value = vector(to_sx(component, at.symbols) for component in components)
     return value if follows else casadi.densify(casadi.mtimes(at.point.R.T, value))
 
@@ -233,26 +249,33 @@ class LineForce(PairForce):
     force = custom.output("N")
 
     def tension(self, length: SX, rate: SX, symbols: SymbolTable) -> SX:
-        """Return the force that pulls the points together [N] at a distance [m] and rate [m/s]."""
+        """Return the tension (1, 1) [N] at the distance `length` [m] of a and b and its rate [m/s].
+
+        Positive values pull the points together, negative values push them apart.
+        """
         raise NotImplementedError
 
     def potential(self, length: SX, symbols: SymbolTable) -> SX:
-        """Return the energy [J] whose derivative in the distance is the tension at rest."""
+        """Return the stored energy (1, 1) [J]; its derivative by `length` is the rest tension."""
         raise NotImplementedError
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the tension on each point, towards the other."""
+        """Return the forces ON the points "a" and "b".
+
+        Each the tension [N] towards the other point.
+        """
         return custom.pull(at.a, at.b, self._tension(at))
 
     def energy(self, at: Any) -> SX:
-        """Return the potential at the present distance."""
+        """Return `potential` [J] at the present distance of a and b."""
         return self.potential(at.a.to(at.b).length, at.symbols)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the tension."""
+        """Return {"force": tension [N]}, positive if the points are pulled together."""
         return {"force": self._tension(at)}
 
     def _tension(self, at: Any) -> SX:
+        """Return `tension` at the present distance of a and b [N]."""
         motion = at.a.to(at.b)
         return self.tension(motion.length, motion.rate, at.symbols)
 
@@ -280,12 +303,15 @@ class Spring(LineForce):
         self._require_effect("stiffness", "damping")
 
     def tension(self, length: SX, rate: SX, symbols: SymbolTable) -> SX:
-        """Return stiffness times stretch plus damping times rate."""
+        """Return stiffness (length - free length) + damping rate [N].
+
+        Negative if the spring pushes.
+        """
         stretch = length - to_sx(self.length, symbols)
         return to_sx(self.stiffness, symbols) * stretch + to_sx(self.damping, symbols) * rate
 
     def potential(self, length: SX, symbols: SymbolTable) -> SX:
-        """Return half the stiffness times the square of the stretch."""
+        """Return stiffness (length - free length)^2 / 2 [J]."""
         stretch = length - to_sx(self.length, symbols)
         return 0.5 * to_sx(self.stiffness, symbols) * stretch**2
 
@@ -307,7 +333,7 @@ class Damper(LineForce):
         self._require_effect("damping")
 
     def tension(self, length: SX, rate: SX, symbols: SymbolTable) -> SX:
-        """Return the damping times the rate of the distance."""
+        """Return damping times the rate of the distance [N]. Positive: the points move apart."""
         return to_sx(self.damping, symbols) * rate
 
     def potential(self, length: SX, symbols: SymbolTable) -> SX:
@@ -333,11 +359,11 @@ class PointGravity(LineForce):
         self._require_effect("strength")
 
     def tension(self, length: SX, rate: SX, symbols: SymbolTable) -> SX:
-        """Return the strength divided by the square of the distance."""
+        """Return mu / length^2 [N], positive if the points attract each other."""
         return to_sx(self.strength, symbols) / length**2
 
     def potential(self, length: SX, symbols: SymbolTable) -> SX:
-        """Return -mu / L, which is zero at infinity."""
+        """Return the potential energy -mu / length [J], which is zero at infinite distance."""
         return -to_sx(self.strength, symbols) / length
 
 
@@ -370,34 +396,39 @@ class SpringDamperSeries(ForceElement):
     parallel = custom.parameter("N/m", 0.0, min=0)
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rate of the elongation of the damper."""
+        """Return {"elongation": dz/dt [m/s]}, the damper force divided by `damping`."""
         return {"elongation": self._damper_force(at) / at.damping}
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the tension between the points, positive if it pulls them together."""
+        """Return the forces ON a and ON b, by "a" and "b": T [N] towards the other point."""
         return custom.pull(at.a, at.b, self._tension(at))
 
     def energy(self, at: Any) -> SX:
-        """Return the energy in the springs."""
+        """Return the energy of both springs [J].
+
+        It is stiffness (L - length - z)^2 / 2 + parallel z^2 / 2.
+        """
         stored = at.stiffness * self._stretch(at) ** 2 + at.parallel * at.elongation**2
         return SX(0.5 * stored)
 
     def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by the damper [W]."""
+        """Return the power dissipated by the damper, damper force^2 / damping [W]."""
         return SX(self._damper_force(at) ** 2 / at.damping)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the tension."""
+        """Return {"force": tension T [N]}, positive if it pulls the points together."""
         return {"force": self._tension(at)}
 
     def _stretch(self, at: Any) -> SX:
+        """Return the elongation L - length - z of the series spring [m]. Negative: compressed."""
         return SX(at.a.to(at.b).length - at.length - at.elongation)
 
     def _tension(self, at: Any) -> SX:
+        """Return the tension T of the series spring [N]."""
         return SX(at.stiffness * self._stretch(at))
 
     def _damper_force(self, at: Any) -> SX:
-        """Tension less the force of the parallel spring, from the balance at the node."""
+        """Return the damper force T - parallel z [N] from the balance at the massless node."""
         return SX(self._tension(at) - at.parallel * at.elongation)
 
 
@@ -436,21 +467,25 @@ class SpringFrictionSeries(ForceElement):
     slip = custom.output("m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the tension between the points, positive if it pulls them together."""
+        """Return the forces ON a and ON b, by "a" and "b": T [N] towards the other point."""
         return custom.pull(at.a, at.b, self._tension(at))
 
     def energy(self, at: Any) -> SX:
-        """Return the energy in the springs."""
+        """Return the energy of both springs, T^2 / (2 stiffness) + parallel z^2 / 2 [J]."""
         z = self._elongation(at)
         return SX(0.5 * (self._tension(at) ** 2 / at.stiffness + at.parallel * z**2))
 
     def dissipation(self, at: Any) -> SX:
-        """Return the power that the friction dissipates while it slides [W]."""
+        """Return the friction power during sliding [W]; zero while the friction sticks."""
         share = at.stiffness / (at.stiffness + at.parallel)
         return SX(at.friction * share * at.direction * at.a.to(at.b).rate)
 
     def events(self, at: Any) -> Mapping[str, custom.Event]:
-        """Return the events: sliding begins at the force `friction` and ends if the rate turns."""
+        """Return the events "longer" and "shorter" (sliding begins in a direction) and "sticks".
+
+        Sliding begins if |T - parallel z| reaches `friction`, and ends if the rate of L changes
+        sign.
+        """
         sticks, rate = at.direction == 0, at.a.to(at.b).rate
         force = self._tension(at) - at.parallel * at.elongation
         found = {}
@@ -466,18 +501,20 @@ class SpringFrictionSeries(ForceElement):
         return {**found, "sticks": custom.Event(turned, stop)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the tension, and the elongation of the friction."""
+        """Return "force": tension T [N], positive if it pulls, and "slip": elongation z [m]."""
         return {"force": self._tension(at), "slip": self._elongation(at)}
 
     def _sliding(self, at: Any, direction: SX | int) -> SX:
-        """Return the elongation at which the friction has the sliding force in a direction."""
+        """Return the z [m] at which T - parallel z is `direction` (1 or -1) times `friction`."""
         pull = at.stiffness * (at.a.to(at.b).length - at.length) - direction * at.friction
         return SX(pull / (at.stiffness + at.parallel))
 
     def _elongation(self, at: Any) -> SX:
+        """Return z [m]: the stored value while the friction sticks, else the value of sliding."""
         return SX(casadi.if_else(at.direction == 0, at.elongation, self._sliding(at, at.direction)))
 
     def _tension(self, at: Any) -> SX:
+        """Return T = stiffness (L - length - z) [N]."""
         return SX(at.stiffness * (at.a.to(at.b).length - at.length - self._elongation(at)))
 
 
@@ -533,18 +570,29 @@ class Bushing(PairForce):
         self._require_effect(*_STRENGTHS)
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return force and moment at the origin of b, and their transform to the origin of a."""
+        """Return the wrenches ON a and ON b, by "a" and "b", in axes of and about the own frame.
+
+        The force pulls the origins together. The force on b acts at its origin, so that the
+        reaction on a has an additional moment about the origin of a.
+        """
         motion, force, moment = self._at_b(at)
         on_a = custom.FrameLoad(force, moment + cross(motion.p, force))
         return custom.between(at.a, at.b, on_a, -moment)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the force on a at the origin of b, and the moment about it, in axes of a."""
+        """Return the wrench ON the body of a about the origin of b, in axes of a.
+
+        Names: force_x, force_y, force_z [N]; moment_x, moment_y, moment_z [N m].
+        """
         _, force, moment = self._at_b(at)
         values = (*casadi.vertsplit(force), *casadi.vertsplit(moment))
         return dict(zip(self.output_names, values, strict=True))
 
     def _at_b(self, at: Any) -> tuple[RelativeMotion, SX, SX]:
+        """Return the motion of b in a, and force and moment (3, 1) ON a about the origin of b.
+
+        All are in axes of a [N, N m].
+        """
         motion, symbols = at.a.to(at.b), at.symbols
         half, cosine = _half_turn(motion.R)
         w = motion.w
@@ -555,7 +603,7 @@ class Bushing(PairForce):
         return motion, force, moment
 
     def energy(self, at: Any) -> SX:
-        """Return the energy p' K p / 2 + phi' K_phi phi / 2."""
+        """Return the energy p' K p / 2 + phi' K_phi phi / 2 [J], zero if the frames coincide."""
         motion = at.a.to(at.b)
         half, _ = _half_turn(motion.R)
         total = SX(0)
@@ -564,14 +612,16 @@ class Bushing(PairForce):
         return total
 
     def _sum(self, one: str, x: SX, other: str, rate: SX, symbols: SymbolTable) -> SX:
+        """Return field `one` times x plus field `other` times rate: (3, 1), elementwise."""
         return self._vector(one, symbols) * x + self._vector(other, symbols) * rate
 
     def _vector(self, name: str, symbols: SymbolTable) -> SX:
+        """Return the three values of the field `name` as a column (3, 1)."""
         return vector(to_sx(value, symbols) for value in getattr(self, name))
 
 
 def _half_turn(R: SX) -> tuple[SX, SX]:
-    """Return sin(theta / 2) u and cos(theta / 2) of a rotation by theta about u."""
+    """Return sin(theta / 2) u (3, 1) and cos(theta / 2) of the rotation R by theta about u."""
     cosine = 0.5 * casadi.sqrt(1 + casadi.trace(R) + _HALF_REVOLUTION**2)
     axis = vector([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     return axis / (4 * cosine), cosine
@@ -634,15 +684,23 @@ class JointStop(JointForce):
 
     @property
     def needs_position(self) -> bool:
-        """True: a limit needs a position."""
+        """True: the depth beyond a limit depends on the position, not only on the rate."""
         return True
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the effort on the joint."""
+        """Return {"effort": effort ON the joint [N m or N]}: negative at the upper limit.
+
+        It is positive at the lower limit and zero between the limits.
+        """
         return {"effort": -self.resistance(at)}
 
     def resistance(self, at: Any) -> SX:
-        """Return stiffness times depth, and damping while the stop is in contact."""
+        """Return the effort against which the joint is moved: positive beyond the upper limit.
+
+        It is negative beyond the lower limit and zero between the limits. Its size is stiffness
+        times the ramp of the depth (see `smooth_ramp`) plus the damping effort, limited to that of
+        the spring.
+        """
         stiffness, damping = to_sx(self.stiffness, at.symbols), to_sx(self.damping, at.symbols)
         total = SX(0)
         for sign, depth, width in self._sides(at.x.q, at.symbols):
@@ -652,7 +710,7 @@ class JointStop(JointForce):
         return total
 
     def energy(self, at: Any) -> SX:
-        """Return the energy stored in the stops."""
+        """Return the energy of the stop springs [J]; zero between the limits."""
         stiffness = to_sx(self.stiffness, at.symbols)
         areas = (
             smooth_ramp(depth, width)[2] for _, depth, width in self._sides(at.x.q, at.symbols)
@@ -660,7 +718,10 @@ class JointStop(JointForce):
         return stiffness * sum(areas, SX(0))
 
     def _sides(self, q: SX, symbols: SymbolTable) -> list[tuple[float, SX, SX]]:
-        """Return direction, depth beyond the limit and width of every stop."""
+        """Return (1 for upper or -1 for lower, depth beyond that limit, width) of each stop.
+
+        The depth [rad or m] is negative within the limits.
+        """
         width = to_sx(self.width, symbols)
         sides = []
         if self.upper is not None:
@@ -731,11 +792,11 @@ class JointFriction(JointForce):
         self._require_effect("coulomb", "stribeck", "viscous")
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the effort on the joint."""
+        """Return {"effort": friction effort ON the joint [N m or N]}, opposed to its velocity."""
         return {"effort": -self.resistance(at)}
 
     def resistance(self, at: Any) -> SX:
-        """Return Coulomb friction, which falls from rest to sliding, plus viscous friction."""
+        """Return the friction effort (1, 1) of the class docstring; its sign is that of v."""
         v, symbols = at.x.v, at.symbols
         coulomb = to_sx(self.coulomb, symbols)
         if self.stribeck != Number(0.0):
@@ -745,7 +806,7 @@ class JointFriction(JointForce):
         return total + coulomb * smooth_sign(v, to_sx(self.width, symbols))
 
     def dissipation(self, at: Any) -> SX:
-        """Return the friction power, all of which is dissipated [W]."""
+        """Return the friction power: resistance times velocity [W], never negative."""
         return SX(self.resistance(at) * at.x.v)
 
 
@@ -804,16 +865,19 @@ class FixedTendon(CoordinateForce):
 
     @property
     def needs_position(self) -> bool:
-        """True: the length needs positions."""
+        """True: the length x is a sum of joint positions, not only of rates."""
         return True
 
     def scoped(self, prefix: str) -> FixedTendon:
-        """Return the tendon with prefixed names, for a nested mechanism."""
+        """Return a copy whose name, parameters and coordinates have the prefix "`prefix`."."""
         inner = Component.scoped(self, prefix)
         return replace(inner, levers=tuple((f"{prefix}.{n}", c) for n, c in inner.levers))
 
     def resistance(self, at: Any) -> SX:
-        """Return the tension."""
+        """Return the tension of the class docstring [N]; negative if the tendon pushes.
+
+        Damping and friction also act while the spring is slack.
+        """
         x, rate, symbols = at.x.q, at.x.v, at.symbols
         total = to_sx(self.stiffness, symbols) * self._stretch(x, symbols)
         total += to_sx(self.damping, symbols) * rate
@@ -823,21 +887,25 @@ class FixedTendon(CoordinateForce):
         return total
 
     def energy(self, at: Any) -> SX:
-        """Return half the stiffness times the square of the stretch."""
+        """Return stiffness times stretch^2 / 2 [J]; zero while the spring is slack."""
         return 0.5 * to_sx(self.stiffness, at.symbols) * self._stretch(at.x.q, at.symbols) ** 2
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the tension."""
+        """Return {"tension": tension [N]}, negative if the tendon pushes."""
         return {"tension": self.resistance(at)}
 
     def _stretch(self, x: SX, symbols: SymbolTable) -> SX:
+        """Return x less its relaxed length [m]: positive above `length`, negative below.
+
+        With two lengths it is zero between them.
+        """
         low, high = (to_sx(end, symbols) for end in self.length)
         if self.length[0] == self.length[1]:
             return x - low
         return casadi.fmax(x - high, 0) + casadi.fmin(x - low, 0)
 
     def _checked_levers(self) -> tuple[tuple[str, Expression], ...]:
-        """Return the moment arms as expressions; raise if a coordinate occurs twice."""
+        """Return pairs (coordinate name, moment arm as expression); raise if a name is repeated."""
         pairs = named_scalars(self.levers) or []
         if not pairs or len({name for name, _ in pairs}) < len(pairs):
             raise DescriptionError(
@@ -849,7 +917,7 @@ class FixedTendon(CoordinateForce):
 
 # Contacts along a joint coordinate: rigid stops, and Coulomb friction with sticking.
 #
-# They lock the coordinate at times and release it at others. Simulations change between the two at
+# A contact locks and releases the coordinate during the motion. Simulations change its state at
 # events. Smooth models, such as inverse dynamics, do not contain these contacts.
 
 
@@ -894,11 +962,11 @@ class RigidStop(JointContact):
 
     @property
     def needs_position(self) -> bool:
-        """True: a limit needs a position."""
+        """True: the limits are limits of a position."""
         return True
 
     def stops(self, at: Any) -> Mapping[str, Stop | OneWay]:
-        """Return the stop of the coordinate."""
+        """Return {"": Stop} that keeps the coordinate between lower and upper [rad or m]."""
         lower, upper = self.limits(at)["x"]
         e, slowest = (to_sx(x, at.symbols) for x in (self.restitution, self.rest_speed))
         return {"": Stop(at.x.q, lower, upper, restitution=e, rest_speed=slowest)}
@@ -938,7 +1006,7 @@ class CoulombFriction(JointContact):
             )
 
     def frictions(self, at: Any) -> Mapping[str, Friction]:
-        """Return the friction of the coordinate."""
+        """Return {"": Friction} whose slip is the velocity of the coordinate [rad/s or m/s]."""
         assert self.sticking is not None
         sliding, sticking = (to_sx(x, at.symbols) for x in (self.sliding, self.sticking))
         return {"": Friction(at.x.v, sliding, sticking)}

@@ -47,7 +47,11 @@ class ForceInput(_GivenOnPoint):
     z = custom.input("N")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the force on the point, without a moment about it."""
+        """Return {"point": force (x, y, z) ON the body [N]} at the origin of the point.
+
+        The components are along the axes of the world or of the point, see `axes`. No other body
+        gets a reaction.
+        """
         F = casadi.vertcat(at.x, at.y, at.z)
         return {"point": custom.force(F, own_axes=self.axes == "body")}
 
@@ -66,7 +70,10 @@ class TorqueInput(_GivenOnPoint):
     z = custom.input("N.m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the torque on the point."""
+        """Return {"point": torque (x, y, z) ON the body [N m]}, without a reaction on other bodies.
+
+        The components are along the axes of the world or of the point, see `axes`.
+        """
         T = casadi.vertcat(at.x, at.y, at.z)
         return {"point": custom.torque(T, own_axes=self.axes == "body")}
 
@@ -88,7 +95,10 @@ class PairForceInput(Custom):
     z = custom.input("N")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the force on b and the opposite wrench on a."""
+        """Return the wrenches by "a" and "b": force (x, y, z) ON b at its origin, reaction ON a.
+
+        Each is in axes of its own frame, about its own origin [N, N m].
+        """
         F = casadi.vertcat(at.x, at.y, at.z)
         on_a = custom.FrameLoad(-F, -casadi.cross(at.a.to(at.b).p, F))
         return custom.between(at.a, at.b, on_a)
@@ -110,7 +120,10 @@ class PairTorqueInput(Custom):
     z = custom.input("N.m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the torque on b and the opposite torque on a."""
+        """Return the torques by "a" and "b": (x, y, z) ON b, the opposite ON a [N m].
+
+        The inputs are along the axes of a. Each load is converted to axes of its own frame.
+        """
         T = casadi.vertcat(at.x, at.y, at.z)
         return custom.between(at.a, at.b, custom.FrameLoad(SX.zeros(3), -T), T)
 
@@ -131,11 +144,14 @@ class LineForceInput(Custom):
     speed = custom.output("m/s")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the tension on each point, towards the other."""
+        """Return the forces ON the points "a" and "b".
+
+        Each `tension` [N] towards the other point.
+        """
         return custom.pull(at.a, at.b, at.tension)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the distance of the points and its rate."""
+        """Return "length": distance of the points [m], and "speed": its rate [m/s]."""
         motion = at.a.to(at.b)
         return {"length": motion.length, "speed": motion.rate}
 
@@ -154,7 +170,7 @@ class JointEffort(Custom):
     tau = custom.input(custom.EFFORT)
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the input as the effort on the coordinate."""
+        """Return {"joint": effort ON the coordinate [N m or N]}, equal to the input `tau`."""
         return {"joint": at.tau}
 
 
@@ -164,7 +180,7 @@ class ShaftTorqueInput(TwoFlanges):
     tau = custom.input("N.m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the input on flange_b and its reaction on flange_a."""
+        """Return the torques ON the shafts [N m]: `tau` on "flange_b", -`tau` on "flange_a"."""
         return {"flange_a": -at.tau, "flange_b": at.tau}
 
 
@@ -176,7 +192,7 @@ class SlidingForceInput(TwoFlanges):
     force = custom.input("N")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the input on flange_b and its reaction on flange_a."""
+        """Return the forces ON the flanges [N]: `force` on "flange_b", -`force` on "flange_a"."""
         return {"flange_a": -at.force, "flange_b": at.force}
 
 
@@ -191,9 +207,9 @@ class ForceSource(Device):
     v = custom.output("m/s")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the input as the load on the flange."""
+        """Return {"flange": force ON the sliding part [N]}, equal to the input `force`."""
         return {"flange": at.force}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the velocity of the flange."""
+        """Return {"v": velocity of the flange [m/s]}."""
         return {"v": at.flange.speed}

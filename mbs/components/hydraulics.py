@@ -70,7 +70,7 @@ class HydraulicCylinder(Custom):
     force = custom.output("N")
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rates of the pressures."""
+        """Return the rates of the gauge pressures p_a and p_b of the two chambers [Pa/s]."""
         motion = at.a.to(at.b)
         s, rate = motion.length - at.closed, motion.rate
         past = at.leakage * (at.p_a - at.p_b)
@@ -81,18 +81,22 @@ class HydraulicCylinder(Custom):
         }
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the force, which pushes the points apart."""
+        """Return the forces ON the points "a" and "b".
+
+        Each `force` [N] away from the other point.
+        """
         return custom.pull(at.a, at.b, -self._force(at))
 
     def energy(self, at: Any) -> SX:
-        """Return the energy in the end stops."""
+        """Return the energy of the end stops [J], zero between them; the oil is not included."""
         return SX(at.end_stiffness * sum((area for _, _, _, area in self._ends(at)), SX(0)))
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the force."""
+        """Return {"force": total force of the class docstring [N]}, positive if it pushes."""
         return {"force": self._force(at)}
 
     def _force(self, at: Any) -> SX:
+        """Return pressure force, friction and end stop force [N]; positive if it pushes apart."""
         rate = at.a.to(at.b).rate
         total = at.p_a * at.area_a - at.p_b * at.area_b - at.friction * rate
         for sign, share, depth, _ in self._ends(at):
@@ -102,7 +106,11 @@ class HydraulicCylinder(Custom):
 
     @staticmethod
     def _ends(at: Any) -> list[tuple[float, SX, SX, SX]]:
-        """Return sign of the force, slope of the ramp, ramp and its integral for both stops."""
+        """Return sign, ramp slope, ramp [m] and its integral [m^2] of the stops at 0 and at stroke.
+
+        The sign is 1 if the stop pushes the points apart. The rest is zero while it is not in
+        contact.
+        """
         s = at.a.to(at.b).length - at.closed
         sides = ((1.0, -s), (-1.0, s - at.stroke))
         return [(sign, *smooth_ramp(depth, at.end_width)) for sign, depth in sides]
@@ -139,7 +147,7 @@ class HydraulicValve(Custom):
     flow_b = custom.output("m3/s")
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the flows into the chambers."""
+        """Return flow_a and flow_b: flows from the valve INTO chambers a and b [m^3/s]."""
         s = casadi.fmin(casadi.fmax(at.spool, -1), 1)
         ahead, back = casadi.fmax(s, 0), casadi.fmax(-s, 0)
         fill_a, drain_a = self._flow(at, at.supply - at.p_a), self._flow(at, at.p_a - at.tank)
@@ -151,6 +159,6 @@ class HydraulicValve(Custom):
 
     @staticmethod
     def _flow(at: Any, drop: SX) -> SX:
-        """Return the flow through an open edge at a pressure difference."""
+        """Return the flow through a fully open edge [m^3/s]; its sign is that of `drop` [Pa]."""
         root = drop / (drop**2 + at.transition**2) ** 0.25
         return SX(at.rated_flow * root / casadi.sqrt(at.rated_drop))

@@ -38,12 +38,12 @@ class Motion(Enum):
 
     @property
     def nq(self) -> int:
-        """Number of position coordinates."""
+        """Number of position coordinates: 1, 4 (unit quaternion) or 7 (position and quaternion)."""
         return {"spherical": 4, "free": 7}.get(self.value, 1)
 
     @property
     def nv(self) -> int:
-        """Number of velocities."""
+        """Number of velocities: 1, 3 (angular velocity) or 6 (linear and angular velocity)."""
         return {"spherical": 3, "free": 6}.get(self.value, 1)
 
 
@@ -63,7 +63,7 @@ class Freedom:
     suffix: str = ""
 
     def coordinate_of(self, joint: str) -> str:
-        """Return the name of its coordinate in a joint: the joint's name and the suffix, if any."""
+        """Return the name of its coordinate: "JOINT", or "JOINT.SUFFIX" if it has a suffix."""
         return f"{joint}.{self.suffix}" if self.suffix else joint
 
 
@@ -79,17 +79,26 @@ Rows = list[tuple[str, SX]]
 
 
 def position_rows(pose: Pose, axes: str) -> Rows:
-    """Return rows of the position of the origin of frame_b along axes of frame_a."""
+    """Return a row "force AXIS" for each letter in `axes`: position of frame_b along it [m].
+
+    The position is that of the origin of frame_b in frame_a, along an axis of frame_a.
+    """
     return [(f"force {axis}", pose.p["xyz".index(axis)]) for axis in axes]
 
 
 def tilt_rows(pose: Pose) -> Rows:
-    """Return rows of the components of the z axis of frame_b along x and y of frame_a."""
+    """Return "moment y", "moment x": cosines of z of frame_b with x and with y of frame_a.
+
+    Both are zero if the z axes of the two frames are parallel or opposed.
+    """
     return [("moment y", pose.R[0, 2]), ("moment x", pose.R[1, 2])]
 
 
 def orientation_rows(pose: Pose) -> Rows:
-    """Return rows that are zero if frame_b is not rotated relative to frame_a."""
+    """Return rows "moment x", "moment y", "moment z" that are zero if the frames are parallel.
+
+    The values are sin(theta) u, in axes of frame_a, for the rotation of frame_b by theta about u.
+    """
     R = pose.R
     return [
         ("moment x", 0.5 * (R[2, 1] - R[1, 2])),
@@ -99,24 +108,27 @@ def orientation_rows(pose: Pose) -> Rows:
 
 
 def weld_rows(pose: Pose) -> Rows:
-    """Return rows that are zero if the frames coincide."""
+    """Return the six rows "force x" .. "moment z" that are zero if the frames coincide."""
     return [*position_rows(pose, "xyz"), *orientation_rows(pose)]
 
 
 def along_z(pose: Pose, axis: Sequence[float]) -> Pose:
-    """Return the pose expressed in axes whose z is the given axis."""
+    """Return the pose of frame_b in frame_a, both rotated by one rotation so that z is `axis`."""
     inside = Pose.rotation(align_z(axis))
     return inside.inverse() @ pose @ inside
 
 
 def cosine(pose: Pose, axis: Sequence[float]) -> SX:
-    """Return the cosine between an axis of frame_b and the same axis of frame_a."""
+    """Return the cosine between a vector `axis` fixed in frame_b and the same vector in frame_a.
+
+    The value is 1 for parallel vectors and -1 for opposed vectors.
+    """
     z = SX(DM(list(axis)))
     return casadi.dot(z, casadi.mtimes(pose.R, z))
 
 
 def diagonal(pose: Pose) -> list[SX]:
-    """Return the cosines between the axes of frame_b and the same axes of frame_a."""
+    """Return the cosines x-x, y-y and z-z between equal axes of frame_b and frame_a."""
     return [pose.R[k, k] for k in range(3)]
 
 
@@ -202,12 +214,13 @@ def motor_range(where: str, quantity: str, given: Any) -> Range | None:
 
 
 def _both(given: Any) -> Range:
+    """Return (-given, given); NaN if it is not a number."""
     largest = _pair((given, given))[0]
     return -largest, largest
 
 
 def _pair(pair: Any) -> Range:
-    """Return two numbers; NaN if the value is not a pair of numbers."""
+    """Return (low, high) as floats; (NaN, NaN) if the value is not a pair of numbers."""
     if has_boolean(pair):
         return math.nan, math.nan
     try:
@@ -218,6 +231,7 @@ def _pair(pair: Any) -> Range:
 
 
 def _interval(name: str, suffix: Any, pair: Any, known: set[str]) -> Range:
+    """Return (lower, upper); raise if the suffix is unknown or the pair is not in order."""
     if suffix not in known:
         raise DescriptionError(
             f"{name}: limits {quoted(pair)} name no coordinate of one number; "
@@ -232,6 +246,7 @@ def _interval(name: str, suffix: Any, pair: Any, known: set[str]) -> Range:
 
 
 def _is_named_interval(item: Any) -> bool:
+    """Return whether an entry of limits is a pair of a coordinate suffix and a range."""
     return isinstance(item, tuple) and len(item) == 2 and isinstance(item[0], str)
 
 
@@ -304,7 +319,7 @@ class Joint(Component):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        """Elementary motions from frame_a to frame_b, in order."""
+        """Elementary motions of the joint, in order from frame_a to frame_b; empty if fixed."""
         raise NotImplementedError
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows | None:
@@ -319,37 +334,54 @@ class Joint(Component):
         return None
 
     def facing(self, pose: Pose) -> list[SX]:
-        """Return cosines that must be positive at closed loops, so that no axes are opposed."""
+        """Return cosines that must all be positive in a closed loop, in addition to the zero rows.
+
+        The constraint rows are also zero if an axis of frame_b is opposed to that of frame_a.
+        Positive cosines exclude these configurations. The list is empty if none exist.
+
+        Args:
+            pose: pose of frame_b in frame_a.
+        """
         return []
 
     @property
     def closes(self) -> bool:
-        """Whether the joint can be cut and replaced by constraint rows."""
+        """Whether a loop can be cut at the joint: its class defines `closing_rows`."""
         return type(self).closing_rows is not Joint.closing_rows
 
     @property
     def companions(self) -> tuple[Component, ...]:
-        """Components that are added to the mechanism together with the joint."""
+        """Components, such as a Coupling, that `connect` adds to the mechanism with the joint."""
         return ()
 
     @property
     def places(self) -> bool:
-        """Whether its coordinates determine the pose of frame_b, as a tree requires."""
+        """Whether the coordinates determine the pose of frame_b in frame_a.
+
+        False for constraints.
+        """
         return True
 
     @property
     def frame_a(self) -> Point:
-        """Frame relative to which frame_b moves."""
+        """Frame of the joint on the first body, relative to which frame_b moves."""
         return Point(self, "a")
 
     @property
     def frame_b(self) -> Point:
-        """Frame that the joint moves relative to frame_a."""
+        """Frame of the joint on the second body, at the end of its motions."""
         return Point(self, "b")
 
     @property
     def flange(self) -> Flange:
-        """Flange of the joint, on which a drive line exerts a torque, or a force if prismatic."""
+        """Flange on the joint coordinate, to connect motors, gears and shafts.
+
+        A drive line exerts a torque there, or a force if the joint is prismatic. It acts on the
+        body of frame_b, with the reaction on the body of frame_a.
+
+        Raises:
+            DescriptionError: the joint has not exactly one degree of freedom.
+        """
         if self.nv != 1 or len(self.freedoms) != 1:
             raise DescriptionError(
                 f"{self.name}: a {type(self).__name__} joint has no flange, since it has not one"
@@ -359,25 +391,25 @@ class Joint(Component):
 
     @property
     def nv(self) -> int:
-        """Number of degrees of freedom."""
+        """Number of degrees of freedom: velocities of the joint."""
         return sum(freedom.motion.nv for freedom in self.freedoms)
 
     @property
     def carries_effort(self) -> bool:
-        """Whether a motor, friction, a spring or a rotor acts on it."""
+        """Whether `actuated` is True, or friction, rotor inertia, a spring or a rotor is given."""
         efforts = (expression(value) for value in (self.Fv, self.Fs, self.Ia, self.stiffness))
         acts = self.rotor is not None or any(effort != Number(0.0) for effort in efforts)
         return bool(self.actuated) or acts
 
     def _magnitudes(self) -> Iterator[tuple[str, Scalar]]:
-        """Yield name and value of each quantity that must not be negative."""
+        """Yield (name, value) of each quantity that must not be negative, such as Fv and Ia."""
         for name in ("Fv", "Fs", "Fs_width", "Ia", "stiffness"):
             yield name, getattr(self, name)
         if self.rotor is not None:
             yield "inertia of the rotor", self.rotor.inertia
 
     def _refuse_drive(self) -> None:
-        """Raise if a joint without a single position has a spring, a rotor or motor limits."""
+        """Raise if a spring, rotor or motor limits are given to a joint without one coordinate."""
         given = [name for name in ("stiffness", "rest") if getattr(self, name) != Number(0.0)]
         given += [n for n in ("rotor", "velocity", "effort") if getattr(self, n) is not None]
         for name in given:
@@ -404,16 +436,16 @@ class Revolute(_AxisJoint):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        """The angle [rad]."""
+        """One rotation about `axis`; coordinate NAME [rad]."""
         return (Freedom(Motion.REVOLUTE, self.axis),)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return rows for coincident origins and parallel axes."""
+        """Return five rows: coincident origins, and parallel joint axes of frame_a and frame_b."""
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "xyz"), *tilt_rows(pose)]
 
     def facing(self, pose: Pose) -> list[SX]:
-        """Return the cosine of the axes, which must not be opposed."""
+        """Return the cosine between the joint axes of both frames, positive if not opposed."""
         return [cosine(pose, self.axis)]
 
 
@@ -423,16 +455,16 @@ class Prismatic(_AxisJoint):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        """The displacement [m]."""
+        """One displacement along `axis`; coordinate NAME [m]."""
         return (Freedom(Motion.PRISMATIC, self.axis),)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return rows for a displacement along the axis only, without rotation."""
+        """Return five rows: no displacement across the axis, and no rotation."""
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "xy"), *orientation_rows(pose)]
 
     def facing(self, pose: Pose) -> list[SX]:
-        """Return the cosines of the axes, none of which may be opposed."""
+        """Return the cosines x-x, y-y, z-z of both frames, positive if the axes are not opposed."""
         return diagonal(pose)
 
 
@@ -442,19 +474,19 @@ class Cylindrical(_AxisJoint):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        """Displacement [m], then angle [rad]."""
+        """Displacement NAME.s [m] along `axis`, then rotation NAME.phi [rad] about it."""
         return (
             Freedom(Motion.PRISMATIC, self.axis, "s"),
             Freedom(Motion.REVOLUTE, self.axis, "phi"),
         )
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return rows for a displacement along the axis only, and parallel axes."""
+        """Return four rows: no displacement across the axis, and parallel axes of both frames."""
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "xy"), *tilt_rows(pose)]
 
     def facing(self, pose: Pose) -> list[SX]:
-        """Return the cosine of the axes, which must not be opposed."""
+        """Return the cosine between the joint axes of both frames, positive if not opposed."""
         return [cosine(pose, self.axis)]
 
 
@@ -467,7 +499,7 @@ class Planar(_AxisJoint):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        """Displacements [m], then angle [rad]."""
+        """Displacements NAME.s_x and NAME.s_y [m] in the plane, then rotation NAME.phi [rad]."""
         u, v = in_plane(self.axis)
         return (
             Freedom(Motion.PRISMATIC, u, "s_x"),
@@ -476,12 +508,12 @@ class Planar(_AxisJoint):
         )
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return rows for an origin in the plane, and parallel axes."""
+        """Return three rows: no displacement along the normal `axis`, and parallel normals."""
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "z"), *tilt_rows(pose)]
 
     def facing(self, pose: Pose) -> list[SX]:
-        """Return the cosine of the axes, which must not be opposed."""
+        """Return the cosine between the normals of both frames, positive if not opposed."""
         return [cosine(pose, self.axis)]
 
 
@@ -494,7 +526,7 @@ class Cartesian(Joint):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        """Three displacements [m]."""
+        """Displacements NAME.x, NAME.y, NAME.z [m] along the axes of frame_a."""
         axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
         return tuple(Freedom(Motion.PRISMATIC, axis, name) for name, axis in axes.items())
 
@@ -530,7 +562,10 @@ class Gimbal(Joint):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        """Three angles [rad]."""
+        """Rotations NAME.phi_1, NAME.phi_2, NAME.phi_3 [rad] about the three `axes`, in order.
+
+        Each axis rotates with the rotations before it.
+        """
         return tuple(
             Freedom(Motion.REVOLUTE, axis, f"phi_{k}") for k, axis in enumerate(self.axes, start=1)
         )
@@ -560,7 +595,7 @@ class PinSlot(_AxisJoint):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        """Displacement [m], then angle [rad]."""
+        """Displacement NAME.s [m] along `slot`, then rotation NAME.phi [rad] about `axis`."""
         return (
             Freedom(Motion.PRISMATIC, self.slot, "s"),
             Freedom(Motion.REVOLUTE, self.axis, "phi"),
@@ -595,7 +630,7 @@ class Universal(Joint):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        """Two angles [rad]."""
+        """Rotations NAME.phi_a about the first axis, then NAME.phi_b about the second [rad]."""
         first, second = self.axes
         return (
             Freedom(Motion.REVOLUTE, first, "phi_a"),
@@ -603,7 +638,11 @@ class Universal(Joint):
         )
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return rows for coincident origins and orthogonal axes."""
+        """Return four rows: coincident origins and orthogonal axes.
+
+        "moment across" is the cosine between the first axis in frame_a and the second axis in
+        frame_b.
+        """
         first, second = (SX(DM(list(axis))) for axis in self.axes)
         across = casadi.dot(first, casadi.mtimes(pose.R, second))
         return [*position_rows(along_z(pose, (0.0, 0.0, 1.0)), "xyz"), ("moment across", across)]
@@ -618,11 +657,11 @@ class Spherical(Joint):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        """The orientation of frame_b in frame_a."""
+        """One spherical motion: unit quaternion of frame_b in frame_a, three velocities."""
         return (Freedom(Motion.SPHERICAL),)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return rows for coincident origins."""
+        """Return three rows: position of the origin of frame_b in frame_a [m]."""
         return position_rows(along_z(pose, (0.0, 0.0, 1.0)), "xyz")
 
 
@@ -636,11 +675,11 @@ class Free(Joint):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        """Position and orientation of frame_b in frame_a."""
+        """One free motion: position [m], unit quaternion of frame_b in frame_a, six velocities."""
         return (Freedom(Motion.FREE),)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return no rows."""
+        """Return no rows: a free joint constrains nothing."""
         return []
 
 
@@ -650,13 +689,13 @@ class Fixed(Joint):
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
-        """No motions."""
+        """Empty: frame_b does not move relative to frame_a."""
         return ()
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return rows for coincident origins without rotation."""
+        """Return six rows: coincident origins and no rotation."""
         return weld_rows(pose)
 
     def facing(self, pose: Pose) -> list[SX]:
-        """Return the cosines of the axes, none of which may be opposed."""
+        """Return the cosines x-x, y-y, z-z of both frames, positive if the axes are not opposed."""
         return diagonal(pose)

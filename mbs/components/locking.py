@@ -59,7 +59,11 @@ class _Locks:
     changed: dict[str, Coupling] = field(default_factory=dict)
 
     def add(self, name: str, given: Any) -> None:
-        """Add the position of a joint to lock."""
+        """Record the position of the joint `name`: a number, or one number per element of its q.
+
+        Angles are in rad, lengths in m, and quaternions are w, x, y, z. Raise if their number
+        differs.
+        """
         joint = self._joint(name)
         where = f"{self.mechanism.name}: lock of {name}"
         many = given if np.ndim(given) else (given,)
@@ -77,6 +81,10 @@ class _Locks:
             at += freedom.motion.nq
 
     def _joint(self, name: str) -> Joint:
+        """Return the joint `name`.
+
+        Raise DescriptionError if it does not exist or has no coordinate.
+        """
         joints = {
             joint.name: joint
             for joint in self.mechanism.joints()
@@ -90,7 +98,11 @@ class _Locks:
         return joints[name]
 
     def follow_couplings(self) -> None:
-        """Lock the joints that couplings tie to locked joints."""
+        """Lock the joints whose positions follow from locked joints by couplings, repeatedly.
+
+        Couplings without unlocked coordinates are recorded in `gone`, reduced couplings in
+        `changed`.
+        """
         pending = list(self.mechanism.couplings())
         while True:
             touched = [c for c in pending if set(c.coordinates) & self.values.keys()]
@@ -107,7 +119,7 @@ class _Locks:
                     pending.append(left)
 
     def _among_free(self, coupling: Coupling) -> Coupling:
-        """Return a coupling whose locked coordinates are absorbed in its first coefficient."""
+        """Return a coupling without its locked coordinates, whose constant terms join c_0."""
         if not coupling.others:
             return coupling
         offset = sum(
@@ -134,7 +146,10 @@ class _Locks:
         return left
 
     def _linear(self, coupling: Coupling) -> tuple[Expression, Expression]:
-        """Return offset and factor of a linear coupling; raise if it cannot be inverted."""
+        """Return (offset, factor) of driven = offset + factor driver.
+
+        Raise DescriptionError if the polynomial is not linear or its factor is zero.
+        """
         terms = [expression(c) for c in coupling.coefficients]
         offset, factor = (*terms, Number(0.0), Number(0.0))[:2]
         if len(terms) > 2 or to_float(factor) == 0:
@@ -145,6 +160,7 @@ class _Locks:
         return offset, factor
 
     def _follow(self, coupling: Coupling) -> None:
+        """Lock the unlocked coordinate of a coupling; raise if both are locked and disagree."""
         driver, driven = (self.values.get(name) for name in (coupling.driver, coupling.driven))
         if driver is None:
             assert driven is not None
@@ -162,10 +178,12 @@ class _Locks:
             )
 
     def _driver(self, coupling: Coupling, driven: Expression) -> Expression:
+        """Return the position of the driver at the position `driven` of a linear coupling."""
         offset, factor = self._linear(coupling)
         return (driven - offset) / factor
 
     def _add_coupled(self, coupling: Coupling, coordinate: str, value: Expression) -> None:
+        """Lock the joint of a coordinate; raise if the joint has several coordinates."""
         joint = self.mechanism.components.get(coordinate)
         if not isinstance(joint, Joint):
             raise DescriptionError(
@@ -176,6 +194,7 @@ class _Locks:
 
 
 def _polynomial(coupling: Coupling, driver: Expression) -> Expression:
+    """Return the driven position at the position `driver`; a Number if it has a value."""
     value = expression(0.0)
     for coefficient in reversed(coupling.coefficients):
         value = value * driver + expression(coefficient)
@@ -184,7 +203,11 @@ def _polynomial(coupling: Coupling, driver: Expression) -> Expression:
 
 
 def lock(mechanism: Description, positions: Mapping[str, Any]) -> None:
-    """Weld joints of a mechanism at positions; see `Mechanism.lock`."""
+    """Replace joints of a mechanism by welds at given positions, in place.
+
+    `positions` maps a joint name to its position. Joints that couplings tie to them are welded too.
+    See `Mechanism.lock`.
+    """
     locks = _Locks(mechanism)
     for name, given in positions.items():
         locks.add(name, given)
@@ -221,14 +244,17 @@ def lock(mechanism: Description, positions: Mapping[str, Any]) -> None:
 
 
 def _acts_on(component: Component, coordinates: Mapping[str, Expression]) -> bool:
-    """Return whether a force acts along locked coordinates only, so that it has no effect."""
+    """Return whether all coordinates of a force element are locked, so that it has no effect."""
     return isinstance(component, CoordinateForce) and all(
         name in coordinates for name, _ in component.levers
     )
 
 
 def _require_free_of_others(mechanism: Description, locks: _Locks) -> None:
-    """Raise if sensors, drive lines, or tendons with other joints use the joints to lock."""
+    """Raise if a drive line, a sensor or a component also uses a joint to lock.
+
+    A force element on locked coordinates only is allowed.
+    """
     driven = {flange.owner.name for pair in mechanism.shafts for flange in pair}
     for name in locks.positions:
         if name in driven:
@@ -260,12 +286,12 @@ def _require_free_of_others(mechanism: Description, locks: _Locks) -> None:
 
 
 def _with_points(component: Component, reattach: Any) -> Component:
-    """Return the component with its points reattached."""
+    """Return a copy with `reattach` applied to each point; components without points unchanged."""
     return with_points(component, reattach) if isinstance(component, OnPoints) else component
 
 
 def _steps(mechanism: Description, name: str, values: Sequence[Expression]) -> tuple[Step, ...]:
-    """Return the steps from frame_a to frame_b of a joint at a position."""
+    """Return the displacement steps from frame_a to frame_b of a joint at a position."""
     joint = mechanism.components[name]
     assert isinstance(joint, Joint)
     steps: list[Step] = []
@@ -278,6 +304,7 @@ def _steps(mechanism: Description, name: str, values: Sequence[Expression]) -> t
 
 
 def _freedom_steps(where: str, freedom: Freedom, values: Sequence[Expression]) -> Iterable[Step]:
+    """Return the displacement steps of an elementary motion at its position `values`."""
     match freedom.motion:
         case Motion.PRISMATIC:
             return [
@@ -291,6 +318,7 @@ def _freedom_steps(where: str, freedom: Freedom, values: Sequence[Expression]) -
 
 
 def _axis_rotation(axis: Sequence[float], angle: Expression) -> list[Step]:
+    """Return the steps of a rotation by `angle` [rad] about a unit vector."""
     for letter, part in zip("xyz", axis, strict=True):
         if abs(part) == 1:
             return [ElementaryRotation(letter, angle if part > 0 else -angle)]
@@ -305,7 +333,7 @@ def _axis_rotation(axis: Sequence[float], angle: Expression) -> list[Step]:
 
 
 def _orientation(where: str, values: Sequence[Scalar]) -> FixedRotation:
-    """Return the rotation of a unit quaternion w, x, y, z; raise if it is not of unit length."""
+    """Return the rotation of a unit quaternion (w, x, y, z). Raise if its length is not 1."""
     numbers = [to_float(expression(value)) for value in values]
     length = math.nan if None in numbers else math.hypot(*(n or 0.0 for n in numbers))
     if not abs(length - 1) < 1e-6:  # quaternions in files have about six digits
@@ -359,7 +387,7 @@ def free_root(mechanism: Description) -> None:
 
 
 def fix_root(mechanism: Description) -> None:
-    """Lock Free joints on the world at the positions in the guess; the default is zero."""
+    """Weld Free joints on the world, in place, at their positions in `guess` (zero by default)."""
     positions = {}
     for joint, forward in _free_joints(mechanism):
         names = ("x", "y", "z", "qw", "qx", "qy", "qz")
@@ -370,7 +398,7 @@ def fix_root(mechanism: Description) -> None:
 
 
 def _inverse(values: Sequence[float]) -> list[float]:
-    """Return position and quaternion of the inverse displacement."""
+    """Return the inverse of a displacement (x, y, z, qw, qx, qy, qz), in the same form."""
     R = np.array(_orientation("", [Number(v) for v in values[3:]]).rows)
     p = -R.T @ np.array(values[:3])
     w, x, y, z = values[3:]
@@ -378,7 +406,10 @@ def _inverse(values: Sequence[float]) -> list[float]:
 
 
 def _free_joints(mechanism: Description) -> list[tuple[str, bool]]:
-    """Return Free joints on the ground, and whether their frame_a (not frame_b) is on it."""
+    """Return (name, flag) of each Free joint with a frame fixed to the world.
+
+    The flag is True if this frame is frame_a, False if it is frame_b.
+    """
     neighbours: dict[str, list[str]] = {}
     for a, b in mechanism.connections:
         if all(isinstance(p.owner, (RigidBody, Fixed)) for p in (a, b)):

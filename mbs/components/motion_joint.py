@@ -47,16 +47,20 @@ class MotionJoint(Custom):
             )
 
     def motion(self, at: Any) -> Pose:
-        """Return the pose of frame_b in frame_a."""
+        """Return the required pose of frame_b in frame_a, a function of the coordinates in `at`."""
         raise NotImplementedError
 
     def between(self, a: Point, b: Point) -> tuple[MotionJoint, Free]:
-        """Return the joint between two points, and the Free joint that connects its frames."""
+        """Return a copy of the joint on points a and b, and a Free joint to connect a and b."""
         points: dict[str, Any] = {"frame_a": a, "frame_b": b}
         return replace(self, **points), Free(f"{self.name}.free")
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return rows for the pose of frame_b: coincident origins and no rotation from `motion`."""
+        """Return six rows: position and rotation of frame_b relative to the pose of `motion`.
+
+        "force x", "force y", "force z" are the position error in axes of frame_a [m]. "moment x",
+        "moment y", "moment z" are the rotation error sin(theta) u in axes of `motion`.
+        """
         offset, R = self._displacement(at)
         p = casadi.vertsplit(casadi.densify(offset))
         x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
@@ -66,12 +70,18 @@ class MotionJoint(Custom):
         }
 
     def positive(self, at: Any) -> Mapping[str, SX]:
-        """Return cosines of the axes of frame_b and of `motion`, which must not be opposed."""
+        """Return "axis x", "axis y", "axis z": cosines between the axes of frame_b and of `motion`.
+
+        Positive values exclude configurations whose rows are zero with an opposed axis.
+        """
         _, R = self._displacement(at)
         return {f"axis {axis}": R[k, k] for k, axis in enumerate("xyz")}
 
     def _displacement(self, at: Any) -> tuple[SX, SX]:
-        """Return (3, 1) position and (3, 3) orientation of frame_b relative to `motion`."""
+        """Return frame_b relative to the pose of `motion`: position error (3, 1), rotation (3, 3).
+
+        The position error is in axes of frame_a [m], the rotation in axes of `motion`.
+        """
         seen, target = at.frame_a.to(at.frame_b), self.motion(at)
         if not isinstance(target, Pose):
             raise DescriptionError(
@@ -82,12 +92,12 @@ class MotionJoint(Custom):
 
 
 def rotation(axis: str, angle: Any) -> Pose:
-    """Return the pose of a rotation about "x", "y" or "z" by an angle [rad]."""
+    """Return the pose of a frame rotated by `angle` [rad] about "x", "y" or "z"."""
     if axis not in ("x", "y", "z"):
         raise DescriptionError(f'a rotation is about {quoted(axis)}; give "x", "y" or "z"')
     return Pose.about(axis, SX(angle))
 
 
 def translation(x: Any = 0, y: Any = 0, z: Any = 0) -> Pose:
-    """Return the pose of a displacement [m]."""
+    """Return the pose of a displacement by (x, y, z) [m] without rotation."""
     return Pose.translation(vector([SX(x), SX(y), SX(z)]))

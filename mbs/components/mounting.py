@@ -45,7 +45,7 @@ _REVOLUTION = 2 * math.pi
 
 
 def notes_on_degrees(steps: Iterable[Step]) -> list[ImportNote]:
-    """Return a note on each angle of a mount that looks like degrees."""
+    """Return a note "doubted" for each rotation by more than one revolution: probably degrees."""
     angles = [
         (step.axis, to_float(step.angle)) for step in steps if isinstance(step, ElementaryRotation)
     ]

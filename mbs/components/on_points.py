@@ -15,25 +15,29 @@ P = TypeVar("P", bound="OnPoints")
 
 @dataclass(frozen=True, slots=True)
 class OnPoints(Component):
-    """Base of components that contain their points: added by `add` without `connect`."""
+    """Base of components that have attachment points as fields: `add` alone places them."""
 
     @property
     def points(self) -> tuple[Point, ...]:
-        """Points that the component is attached to."""
+        """Points of bodies to which the component is attached; empty without such points."""
         return ()
 
     def scoped(self: P, prefix: str) -> P:
-        """Return the component with prefixed names, for a nested mechanism."""
+        """Return a copy whose name, parameters and owners of points have the prefix "`prefix`."."""
         return with_points(
             Component.scoped(self, prefix),
             lambda point: replace(point, owner=Component(f"{prefix}.{point.owner.name}")),
         )
 
     def _take_point(self, name: str) -> None:
-        """Convert the field `name`, a body or a point, to a point."""
+        """Replace a body in the field `name` by its reference frame. Raise if it is no point."""
         object.__setattr__(self, name, self._as_point(getattr(self, name), name))
 
     def _as_point(self, value: Any, name: str) -> Point:
+        """Return a point, or the reference frame of a body.
+
+        Raise DescriptionError for other values.
+        """
         if isinstance(value, RigidBody):
             value = value.frame
         if not isinstance(value, Point):
@@ -62,5 +66,5 @@ class OnPair(OnPoints):
 
     @property
     def points(self) -> tuple[Point, ...]:
-        """The two points."""
+        """The two attachment points (a, b)."""
         return (self.a, self.b)

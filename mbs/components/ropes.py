@@ -39,15 +39,16 @@ class _Rope(Custom):
 
     @property
     def frames(self) -> Mapping[str, Point]:
-        """Points along the rope: p0, p1, ..."""
+        """Map from "p0", "p1", ... to the points of `path`, in order."""
         return {f"p{k}": point for k, point in enumerate(self.path)}
 
     def _segments(self, at: Any) -> list[tuple[Any, Any]]:
-        """Return the pairs of frames at both ends of every straight segment."""
+        """Return the two end frames of each straight segment, in the order of `path`."""
         ports = [getattr(at, port) for port in self.frames]
         return list(pairwise(ports))
 
     def _length(self, at: Any) -> SX:
+        """Return the length of the path [m]: sum of the distances of successive points."""
         return sum((a.to(b).length for a, b in self._segments(at)), SX(0))
 
 
@@ -66,11 +67,14 @@ class RopeOverPulleys(_Rope):
     """
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return the length of the path minus the length of the rope."""
+        """Return {"length": length of the path minus length of the rope [m]}."""
         return {"length": self._length(at) - at.length}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the tension."""
+        """Return {"tension": constraint force along the rope [N]}.
+
+        Positive values pull the points together. It is negative where a real rope would be slack.
+        """
         return {"tension": -at.lam["length"]}
 
 
@@ -99,7 +103,10 @@ class ElasticRope(_Rope):
     width = custom.parameter("m", _TAUT, positive=True)
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the tension on every point, towards its neighbours."""
+        """Return the force ON each point by "p0", "p1", ...: the tension towards each neighbour.
+
+        A force is in axes of its own point [N]. All forces are zero while the rope is slack.
+        """
         T = self._tension(at)
         total: dict[str, FrameLoad] = {}
         for a, b in self._segments(at):
@@ -110,28 +117,40 @@ class ElasticRope(_Rope):
         return total
 
     def energy(self, at: Any) -> SX:
-        """Return the energy stored in the stretch."""
+        """Return the energy of the stretched rope [J]; zero while the rope is slack."""
         return SX(at.stiffness * self._stretch(at)[2])
 
     def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by the damper [W]."""
+        """Return the power dissipated by the damper [W]; zero while the rope is slack."""
         return SX(self._tensions(at)[1] * self._rate(at))
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the tension."""
+        """Return {"tension": tension [N]}, never negative and zero while the rope is slack."""
         return {"tension": self._tension(at)}
 
     def _stretch(self, at: Any) -> tuple[SX, SX, SX]:
+        """Return slope, ramp [m] and integral of the ramp [m^2] at the stretch, see `smooth_ramp`.
+
+        All are zero while the rope is slack.
+        """
         return smooth_ramp(self._length(at) - at.length, at.width)
 
     def _rate(self, at: Any) -> SX:
+        """Return the rate of the length of the path [m/s]."""
         return sum((a.to(b).rate for a, b in self._segments(at)), SX(0))
 
     def _tension(self, at: Any) -> SX:
+        """Return the tension of the spring plus that of the damper [N]."""
         return sum(self._tensions(at), SX(0))
 
     def _tensions(self, at: Any) -> tuple[SX, SX]:
-        """Return the tensions of the spring and of the damper."""
+        """Return the tensions of the spring and of the damper [N].
+
+        Both zero while the rope is slack.
+
+        The damper tension is negative while the rope shortens, and at most as large as the spring
+        tension.
+        """
         slope, ramped, _ = self._stretch(at)
         spring = at.stiffness * ramped
         return spring, one_sided_damping(at.damping * slope * self._rate(at), spring)

@@ -39,18 +39,20 @@ class _BetweenShafts(TwoFlanges):
     torque = custom.output("N.m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the torque on flange_b and the opposite torque on flange_a."""
+        """Return {"flange_a": -T, "flange_b": T}: torques ON the shafts [N m]; `torque` is T."""
         T = self._torque(at)
         return {"flange_a": -T, "flange_b": T}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the torque from a to b."""
+        """Return {"torque": torque that flange_b gets from flange_a [N m]}."""
         return {"torque": self._torque(at)}
 
     def _torque(self, at: Any) -> SX:
+        """Return the torque ON flange_b [N m]; flange_a gets the opposite torque."""
         raise NotImplementedError
 
     def _slip(self, at: Any) -> SX:
+        """Return the speed of flange_a minus the speed of flange_b [rad/s]."""
         return SX(at.flange_a.speed - at.flange_b.speed)
 
 
@@ -58,7 +60,7 @@ class _SlippingShafts(_BetweenShafts):
     """Base of elements that dissipate all the power of their torque."""
 
     def dissipation(self, at: Any) -> SX:
-        """Return the slip power [W]."""
+        """Return the torque from a to b times the slip speed w_a - w_b [W]."""
         return SX(self._torque(at) * self._slip(at))
 
 
@@ -68,18 +70,19 @@ class _BrakingTorque(OneFlange):
     torque = custom.output("N.m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the torque against the speed."""
+        """Return {"flange": -T}: torque ON the shaft [N m], opposed to its speed."""
         return {"flange": -self._torque(at)}
 
     def dissipation(self, at: Any) -> SX:
-        """Return the power of the torque [W]."""
+        """Return the braking torque times the speed of the shaft [W]."""
         return SX(self._torque(at) * at.flange.speed)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the braking torque."""
+        """Return {"torque": T [N m]}, with the sign of the speed. The shaft gets -T."""
         return {"torque": self._torque(at)}
 
     def _torque(self, at: Any) -> SX:
+        """Return the braking torque [N m], with the sign of the speed of the shaft."""
         raise NotImplementedError
 
 
@@ -107,22 +110,23 @@ class ShaftSpringDamperSeries(_BetweenShafts):
     parallel = custom.parameter("N.m/rad", 0.0, min=0)
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rate of the twist of the damper."""
+        """Return {"twist": dz/dt [rad/s]}, the damper torque divided by `damping`."""
         return {"twist": self._damper_torque(at) / at.damping}
 
     def energy(self, at: Any) -> SX:
-        """Return the energy in the springs."""
+        """Return the energy of both springs, stiffness (x - z)^2 / 2 + parallel z^2 / 2 [J]."""
         return SX(0.5 * (at.stiffness * self._stretch(at) ** 2 + at.parallel * at.twist**2))
 
     def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by the damper [W]."""
+        """Return the power dissipated by the damper, damper torque^2 / damping [W]."""
         return SX(self._damper_torque(at) ** 2 / at.damping)
 
     def _damper_torque(self, at: Any) -> SX:
-        """Return the torque minus that of the parallel spring, from the balance at their node."""
+        """Return the damper torque T - parallel z [N m], from the balance at the massless node."""
         return SX(self._torque(at) - at.parallel * at.twist)
 
     def _stretch(self, at: Any) -> SX:
+        """Return the twist x - z of the series spring [rad]."""
         return SX(at.flange_a.angle - at.flange_b.angle - at.twist)
 
     def _torque(self, at: Any) -> SX:
@@ -153,20 +157,20 @@ class ElastoBacklash(_BetweenShafts):
     width = custom.parameter("rad", _FLANK, positive=True)
 
     def energy(self, at: Any) -> SX:
-        """Return the energy stored in the flanks."""
+        """Return the energy of the flanks in contact [J]; zero within the backlash."""
         return SX(
             at.stiffness * sum((smooth_ramp(d, at.width)[2] for _, d in self._sides(at)), SX(0))
         )
 
     def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by the damper [W]."""
+        """Return the power dissipated by the damper [W]; zero within the backlash."""
         return SX(self._torques(at)[1] * self._slip(at))
 
     def _torque(self, at: Any) -> SX:
         return sum(self._torques(at), SX(0))
 
     def _torques(self, at: Any) -> tuple[SX, SX]:
-        """Return the torques of the spring and of the damper."""
+        """Return the torques of spring and damper from a to b [N m], zero within the backlash."""
         elastic, damped = SX(0), SX(0)
         for sign, depth in self._sides(at):
             slope, ramped, _ = smooth_ramp(depth, at.width)
@@ -176,7 +180,10 @@ class ElastoBacklash(_BetweenShafts):
         return elastic, damped
 
     def _sides(self, at: Any) -> list[tuple[float, SX]]:
-        """Return direction and depth beyond the backlash of the two flanks."""
+        """Return (sign of the torque, depth beyond the backlash [rad]) of both flanks.
+
+        The depth is negative if the flank is not in contact.
+        """
         x = at.flange_a.angle - at.flange_b.angle
         return [(1.0, x - at.backlash / 2), (-1.0, -x - at.backlash / 2)]
 
@@ -206,12 +213,15 @@ class PlanetaryGear(custom.Custom):
     torque_carrier = custom.output("N.m")
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return the residual of the gear equation."""
+        """Return {"mesh": angle_sun + ratio angle_ring - (1 + ratio) angle_carrier [rad]}."""
         value = at.sun.angle + at.ratio * at.ring.angle - (1 + at.ratio) * at.carrier.angle
         return {"mesh": Row(value, "1")}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the torques of the gear on its three shafts."""
+        """Return the constraint torques ON the shafts [N m].
+
+        Names: torque_sun, torque_ring, torque_carrier.
+        """
         T = at.lam["mesh"]
         return {
             "torque_sun": T,
@@ -264,12 +274,12 @@ class LossyGear(TwoFlanges):
             )
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the torque on b, and the torque with losses, divided by the ratio, on a."""
+        """Return the torques ON the shafts [N m]: "flange_b": T, "flange_a": -T (1 + e) / ratio."""
         T = self._torque(at)
         return {"flange_a": -T * (1 + self._losses(at)) / at.ratio, "flange_b": T}
 
     def energy(self, at: Any) -> SX:
-        """Return the energy stored in the twist."""
+        """Return stiffness x^2 / 2 of the twist x at flange_b [J]."""
         return SX(0.5 * at.stiffness * self._twist(at) ** 2)
 
     def dissipation(self, at: Any) -> SX:
@@ -277,22 +287,27 @@ class LossyGear(TwoFlanges):
         return SX(at.damping * self._rate(at) ** 2 + self._loss(at))
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the torque at flange_b, and the power lost in the mesh [W]."""
+        """Return "torque": T ON flange_b [N m], and "loss": power lost in the mesh only [W]."""
         return {"torque": self._torque(at), "loss": self._loss(at)}
 
     def _twist(self, at: Any) -> SX:
+        """Return the twist x = angle_a / ratio - angle_b [rad]."""
         return SX(at.flange_a.angle / at.ratio - at.flange_b.angle)
 
     def _rate(self, at: Any) -> SX:
+        """Return the rate of the twist x [rad/s]."""
         return SX(at.flange_a.speed / at.ratio - at.flange_b.speed)
 
     def _torque(self, at: Any) -> SX:
+        """Return T, the torque ON flange_b [N m]."""
         return SX(at.stiffness * self._twist(at) + at.damping * self._rate(at))
 
     def _loss(self, at: Any) -> SX:
+        """Return the power lost in the mesh [W], never negative."""
         return SX(self._torque(at) * self._losses(at) * at.flange_a.speed / at.ratio)
 
     def _losses(self, at: Any) -> SX:
+        """Return the loss e of the class docstring: lost power as a fraction of T w."""
         w = at.flange_a.speed / at.ratio
         s = casadi.tanh(w / at.width) * casadi.tanh(self._torque(at) / at.torque_width)
         forward, back = 1 / at.efficiency - 1, at.efficiency_back - 1
@@ -364,7 +379,10 @@ class Clutch(_SlippingShafts):
 
 
 def friction_of(at: Any, w: SX) -> SX:
-    """Return the smooth Coulomb friction of a brake or clutch at a slip speed w."""
+    """Return the smooth Coulomb friction [N m or N] of a brake or clutch, with the sign of w.
+
+    `w` is the slip speed [rad/s or m/s]. The size is capacity max(engagement, 0) tanh(|w| / width).
+    """
     return SX(at.capacity * casadi.fmax(at.engagement, 0) * smooth_sign(w, at.width))
 
 
@@ -411,7 +429,10 @@ class RigidBrake(OneFlange):
     engagement = custom.input()
 
     def frictions(self, at: Any) -> Mapping[str, Friction]:
-        """Return the friction on the speed of the shaft."""
+        """Return {"": Friction} whose slip is the speed of the shaft [rad/s].
+
+        Its limit is capacity times max(engagement, 0).
+        """
         return {"": capacity_of(at, at.flange.speed)}
 
 
@@ -435,12 +456,19 @@ class RigidClutch(TwoFlanges):
     engagement = custom.input()
 
     def frictions(self, at: Any) -> Mapping[str, Friction]:
-        """Return the friction on the difference of the speeds."""
+        """Return {"": Friction} whose slip is the speed of flange_b minus that of flange_a [rad/s].
+
+        Its effort is the torque ON flange_b [N m].
+        """
         return {"": capacity_of(at, at.flange_b.speed - at.flange_a.speed)}
 
 
 def capacity_of(at: Any, slip: SX) -> Friction:
-    """Return the Coulomb friction with sticking of a brake or clutch for a slip velocity."""
+    """Return the Coulomb friction with sticking of a brake or clutch.
+
+    The sliding limit is capacity times max(engagement, 0), the sticking limit `sticking` times
+    that. `slip` is the slip velocity [rad/s or m/s].
+    """
     sliding = at.capacity * casadi.fmax(at.engagement, 0)
     return Friction(slip, sliding, at.sticking * sliding)
 
@@ -455,5 +483,5 @@ class RigidOneWayClutch(TwoFlanges):
     """
 
     def stops(self, at: Any) -> Mapping[str, Stop | OneWay]:
-        """Return the one-way condition on the difference of the speeds."""
+        """Return {"": OneWay}: the speed of flange_b minus that of flange_a stays at least zero."""
         return {"": OneWay(at.flange_b.speed - at.flange_a.speed)}

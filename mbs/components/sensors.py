@@ -31,7 +31,10 @@ class Quantity:
 
     @property
     def elements(self) -> tuple[str, ...]:
-        """Suffixes of the element names, column by column; one empty suffix for a scalar."""
+        """Suffixes of the names of the elements, column by column: "" for a scalar.
+
+        Vectors have "x", "y", "z". Matrices have row and column, such as "yx".
+        """
         rows, columns = self.shape
         if (rows, columns) == (1, 1):
             return ("",)
@@ -64,10 +67,14 @@ class Sensor(OnPoints):
 
     @property
     def measured(self) -> tuple[Quantity, ...]:
-        """Measured quantities, except those that depend on the joint, which assembly determines."""
+        """Measured quantities in the order of the readings.
+
+        Empty for a joint sensor: the assembly determines its quantities from the coordinate.
+        """
         raise NotImplementedError
 
     def _check_axes(self, allowed: tuple[str, ...], meaning: str) -> None:
+        """Raise DescriptionError, with the advice `meaning`, if `axes` is not allowed."""
         axes = getattr(self, "axes", None)
         if axes not in allowed:
             raise DescriptionError(f"{self.name}: axes is {quoted(axes)}; use {meaning}")
@@ -79,11 +86,12 @@ class MotionSensor(Sensor):
 
     @property
     def measured(self) -> tuple[Quantity, ...]:
-        """Requested quantities."""
+        """The quantities in `quantities`, in the order p, R, v, w, a, wd."""
         names = getattr(self, "quantities", ())
         return tuple(quantity for quantity in _MOTION if quantity.name in names)
 
     def _check_quantities(self) -> None:
+        """Replace None by all quantities; raise DescriptionError for unknown names."""
         given = getattr(self, "quantities", None)
         known = [quantity.name for quantity in _MOTION]
         if given is None:
@@ -130,7 +138,7 @@ class AbsoluteSensor(MotionSensor):
 
     @property
     def points(self) -> tuple[Point, ...]:
-        """The point of the sensor."""
+        """Tuple with the measured point only."""
         return (self.point,)
 
 
@@ -170,7 +178,7 @@ class DistanceSensor(OnPair, Sensor):
 
     @property
     def measured(self) -> tuple[Quantity, ...]:
-        """Distance and rate of the distance."""
+        """Distance L [m] and its rate Ld [m/s]."""
         return _DISTANCE
 
 
@@ -198,7 +206,7 @@ class OnJoint(Sensor):
             )
 
     def scoped(self: S, prefix: str) -> S:
-        """Return the sensor with prefixed names, for a nested mechanism."""
+        """Return a copy whose name and joint have the prefix "`prefix`."."""
         return replace(Component.scoped(self, prefix), joint=f"{prefix}.{self.joint}")
 
 
@@ -216,7 +224,7 @@ class JointSensor(OnJoint):
 
     @property
     def measured(self) -> tuple[Quantity, ...]:
-        """Empty: the quantities depend on the coordinate."""
+        """Empty: the assembly determines q, v and a from the type of the coordinate."""
         return ()
 
 
@@ -224,13 +232,12 @@ class JointSensor(OnJoint):
 class WrenchSensor(OnJoint):
     """Constraint wrench of a joint or constraint: force f and moment m (the cut force).
 
-    It is the wrench that the body of frame_a exerts on the body of frame_b, about the origin of
+    It is the wrench that the body of frame_a exerts ON the body of frame_b, about the origin of
     frame_b.
 
     Attributes:
         joint: name of the joint or constraint.
-        axes: axes of the vectors: "a" or "b" for those of the joint's frame_a or frame_b, or
-            "world".
+        axes: axes of the vectors: "a" for frame_a of the joint, "b" for frame_b, or "world".
     """
 
     reads = "wrench"
@@ -243,7 +250,7 @@ class WrenchSensor(OnJoint):
 
     @property
     def measured(self) -> tuple[Quantity, ...]:
-        """Force and moment."""
+        """Force f [N] and moment m [N m], (3, 1) each."""
         return Quantity("f", "N", (3, 1)), Quantity("m", "N.m", (3, 1))
 
 
@@ -261,5 +268,5 @@ class PowerSensor(OnJoint):
 
     @property
     def measured(self) -> tuple[Quantity, ...]:
-        """The power."""
+        """The power P [W]."""
         return (Quantity("P", "W"),)

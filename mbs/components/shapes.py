@@ -78,7 +78,7 @@ class Shape:
             )
 
     def _is_possible(self, size: tuple[float, ...]) -> bool:
-        """Return whether the lengths are valid for the kind of shape."""
+        """Return whether `size` has the number of lengths of its kind, all of them in range."""
         expected = {"sphere": 1, "cylinder": 2, "capsule": 2}.get(self.kind, 3)
         if len(size) != expected or not all(map(math.isfinite, size)):
             return False

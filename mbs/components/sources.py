@@ -43,12 +43,12 @@ class SignalSource(SignalBlock):
     y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Rate of the clock, one second per second."""
+        """Return {"clock": 1}: one second per second."""
         return {"clock": SX(1)}
 
 
 def _held(begun: SX, signal: SX) -> SX:
-    """The signal after its begin, zero before."""
+    """Return `signal` if `begun`, the time since its start, is at least zero; else zero."""
     return casadi.if_else(begun >= 0, signal, 0)
 
 
@@ -69,11 +69,11 @@ class Step(SignalSource):
     offset = custom.parameter("1", 0.0)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Value of the step."""
+        """Return {"y": offset, plus height from start_time on}."""
         return {"y": at.offset + _held(at.clock - at.start_time, at.height)}
 
     def crossings(self, at: Any) -> Mapping[str, SX]:
-        """Time since the step."""
+        """Return {"start": time since start_time [s]}, the event indicator of the step."""
         return {"start": at.clock - at.start_time}
 
 
@@ -93,12 +93,12 @@ class Ramp(SignalSource):
     offset = custom.parameter("1", 0.0)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Value of the ramp."""
+        """Return {"y": ramp of the class docstring}, constant before and after the rise."""
         part = (at.clock - at.start_time) / at.duration
         return {"y": at.offset + at.height * casadi.fmin(casadi.fmax(part, 0), 1)}
 
     def crossings(self, at: Any) -> Mapping[str, SX]:
-        """Times since the begin and the end of the rise."""
+        """Return the times since the start ("start") and the end ("end") of the rise [s]."""
         begun = at.clock - at.start_time
         return {"start": begun, "end": begun - at.duration}
 
@@ -123,15 +123,16 @@ class Sine(SignalSource):
     offset = custom.parameter("1", 0.0)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Value of the sine."""
+        """Return {"y": value of the class equation; offset before start_time}."""
         begun = at.clock - at.start_time
         return {"y": at.offset + _held(begun, self._wave(at, begun))}
 
     def _wave(self, at: Any, begun: SX) -> SX:
+        """Return the deviation of y from the offset at the time `begun` since start_time [s]."""
         return SX(at.amplitude * casadi.sin(2 * math.pi * at.frequency * begun + at.phase))
 
     def crossings(self, at: Any) -> Mapping[str, SX]:
-        """Time since the begin of the sine."""
+        """Return {"start": time since start_time [s]}."""
         return {"start": at.clock - at.start_time}
 
 
@@ -197,7 +198,10 @@ class KinematicPTP(SignalSource):
         return float(casadi.evalf(times[-1]))
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Position, velocity and acceleration."""
+        """Return position "y", its rate "v" and the rate "a" of v.
+
+        Before the motion y is `begin`, after it `end`; v and a are then zero.
+        """
         rise, brake, last = _ptp_times(at.begin, at.end, at.v_max, at.a_max)
         slower, distance = self._slower(at, last), casadi.fabs(at.end - at.begin)
         sign = casadi.if_else(at.end < at.begin, -1, 1)
@@ -219,7 +223,10 @@ class KinematicPTP(SignalSource):
         }
 
     def crossings(self, at: Any) -> Mapping[str, SX]:
-        """Times since the begin, the end of the rise, the begin of the braking and the end."""
+        """Return the times since "start", "rise", "brake" and "end" [s], where a jumps.
+
+        "rise" is the end of the acceleration, "brake" the begin of the braking.
+        """
         times = _ptp_times(at.begin, at.end, at.v_max, at.a_max)
         slower, begun = self._slower(at, times[-1]), at.clock - at.start_time
         after = {
@@ -228,7 +235,7 @@ class KinematicPTP(SignalSource):
         return {"start": begun, **after}
 
     def _slower(self, at: Any, shortest: SX) -> SX:
-        """Ratio of the duration to the shortest duration; 1 for a motion without length."""
+        """Return `duration` divided by the shortest duration; 1 without duration or distance."""
         if at.duration is None:
             return SX(1)
         return casadi.if_else(
@@ -237,7 +244,10 @@ class KinematicPTP(SignalSource):
 
 
 def _ptp_times(begin: SX, end: SX, v_max: SX, a_max: SX) -> tuple[SX, SX, SX]:
-    """End of the rise, begin of the braking and end of the fastest motion [s]."""
+    """Return the end of the acceleration, begin of the braking and end of the motion [s].
+
+    All are times since the start of the fastest motion.
+    """
     distance = casadi.fabs(end - begin)
     rise = casadi.fmin(v_max / a_max, casadi.sqrt(distance / a_max))
     peak = a_max * rise
@@ -264,14 +274,15 @@ class PeriodicSource(SignalSource):
     entered = custom.mode()
 
     def _durations(self, at: Any) -> list[SX]:
-        """Durations of the phases of a period [s]."""
+        """Return the duration of each phase of a period [s]."""
         raise NotImplementedError
 
     def _level(self, at: Any, since: SX) -> list[SX]:
-        """Height in each phase as a part of the amplitude, at a time since its begin [s]."""
+        """Return the height in each phase by the amplitude, `since` seconds after its start."""
         raise NotImplementedError
 
     def _require_count(self) -> None:
+        """Raise DescriptionError if `count` is a number that is negative or not whole."""
         count = self._number("count")
         if count is not None and (count < 0 or count != int(count)):
             raise DescriptionError(
@@ -279,7 +290,10 @@ class PeriodicSource(SignalSource):
             )
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Offset, and the height of the present phase."""
+        """Return {"y": offset, plus amplitude times the height of the present phase}.
+
+        It is the offset before start_time and after the last period.
+        """
         level = self._level(at, at.clock - at.entered)
         height = sum((casadi.if_else(at.phase == k, h, 0) for k, h in enumerate(level)), SX(0))
         return {
@@ -287,17 +301,20 @@ class PeriodicSource(SignalSource):
         }
 
     def _runs(self, at: Any, number: SX) -> SX:
-        """Whether the index of a period is between 0 and count - 1."""
+        """Return whether the period of index `number` exists: 0 <= number < count."""
         begun = number >= 0
         return begun if at.count is None else casadi.logic_and(begun, number < at.count)
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Rates of the clock and of the time to the next event; zero after the last period."""
+        """Return {"clock": 1, "left": -1}; the rate of `left` is zero after the last period."""
         over = SX(0) if at.count is None else at.number >= at.count
         return {**SignalSource.rates(self, at), "left": casadi.if_else(over, 0, -1)}
 
     def events(self, at: Any) -> Mapping[str, Event]:
-        """End of a phase; at the first time, the phase at that time is found."""
+        """Return the event "switches" at left = 0, which sets phase, number, left and entered.
+
+        It starts the next phase. The first event, at the first time, finds the phase of that time.
+        """
         durations = self._durations(at)
         period = sum(durations, SX(0))
         last = len(durations) - 1
@@ -335,7 +352,7 @@ class PeriodicSource(SignalSource):
 
 
 def _at(values: Sequence[SX], index: SX) -> SX:
-    """Return the value at an index that is an expression."""
+    """Return the element of `values` at `index`, an expression; zero if it is out of range."""
     return sum((casadi.if_else(index == k, value, 0) for k, value in enumerate(values)), SX(0))
 
 
@@ -494,6 +511,10 @@ class Table(SignalSource):
         self._intervals()  # raises here, not during assembly, if scipy is missing
 
     def _column(self, name: str) -> Array:
+        """Return the field `name` as an array (n,).
+
+        Raise DescriptionError if it is not finite numbers.
+        """
         try:
             found = np.array(getattr(self, name), dtype=float).reshape(-1)
         except (TypeError, ValueError):
@@ -552,10 +573,10 @@ class Table(SignalSource):
         return table
 
     def _intervals(self) -> tuple[Array, Array]:
-        """Begins of the intervals (n + 1,) [s], and their polynomials (n + 1, 4), c0 first.
+        """Return starts (n + 1,) [s] of intervals and their polynomials (n + 1, 4), c0 first.
 
-        The first interval lies before the table, and its polynomial starts at the first time. The
-        last interval lies behind it.
+        The first interval is before the table, and its polynomial starts at the first time. The
+        last interval is after the table. The n - 1 others are between successive points.
         """
         t, y = np.array(self.times), np.array(self.values)
         keep = np.diff(t) > 0
@@ -577,17 +598,21 @@ class Table(SignalSource):
         return np.concatenate([begins[:1], begins, t[-1:]]), every
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Rates of the clock and of the time to the next event, which stops after the table."""
+        """Return {"clock": 1, "left": -1}; the rate of `left` is zero after the table."""
         last = len(self._intervals()[0]) - 1
         return {**SignalSource.rates(self, at), "left": casadi.if_else(at.row == last, 0, -1)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Polynomial of the present interval."""
+        """Return {"y": polynomial of the present interval at the clock}."""
         s = at.clock - at.knot
         return {"y": at.c0 + s * (at.c1 + s * (at.c2 + s * at.c3))}
 
     def events(self, at: Any) -> Mapping[str, Event]:
-        """Begin of the next interval; at the first time, the interval of that time is found."""
+        """Return the event "next" at left = 0, which sets left, row, knot and c0 .. c3.
+
+        It starts the next interval. The first event, at the first time, finds the interval of that
+        time.
+        """
         begins, polynomials = self._intervals()
         last, span = len(begins) - 1, begins[-1] - begins[0]
         periodic = self.extrapolation == "periodic"
@@ -612,14 +637,14 @@ class Table(SignalSource):
 
 
 def _rows_at(table: Array, row: SX) -> list[SX]:
-    """Columns of a table of numbers in a row that is an expression."""
+    """Return the elements of row `row`, an expression, of a numeric table."""
     picked = casadi.vertcat(*(row == k for k in range(len(table))))
     found = casadi.mtimes(picked.T, DM(table))
     return [found[k] for k in range(table.shape[1])]
 
 
 def _cubics(name: str, smoothness: str, t: Array, y: Array) -> Array:
-    """(n, 4) coefficients of the cubic polynomials between points, c0 first."""
+    """Return (n, 4) coefficients of the cubic between successive points, c0 first."""
     try:
         from scipy.interpolate import Akima1DInterpolator, PchipInterpolator
     except ImportError:
@@ -633,7 +658,7 @@ def _cubics(name: str, smoothness: str, t: Array, y: Array) -> Array:
 
 
 def _csv_rows(name: str, path: Path) -> list[tuple[int, list[str]]]:
-    """Line numbers and cells of the lines of a file."""
+    """Return (line number from 1, cells) of each line that is neither empty nor a comment."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -648,7 +673,7 @@ def _csv_rows(name: str, path: Path) -> list[tuple[int, list[str]]]:
 
 
 def _csv_column(name: str, path: str | Path, given: str | int, names: list[str], count: int) -> int:
-    """Index of a column by its name or index."""
+    """Return the index of the column `given`, a name or an index; raise if it does not exist."""
     if isinstance(given, str):
         if given in names:
             return names.index(given)
@@ -662,6 +687,7 @@ def _csv_column(name: str, path: str | Path, given: str | int, names: list[str],
 
 
 def _is_number(cell: str) -> bool:
+    """Return whether a cell is a finite number."""
     try:
         return math.isfinite(float(cell))
     except ValueError:
@@ -695,14 +721,15 @@ class ReferenceFilter(SignalBlock):
     a = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Rates of position and velocity."""
+        """Return {"x": w, "w": acceleration [1/s2]}."""
         return {"x": at.w, "w": self._acceleration(at)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Position, velocity and acceleration."""
+        """Return the filtered position "q", its rate "v" and the rate "a" of v."""
         return {"q": at.x, "v": at.w, "a": self._acceleration(at)}
 
     def _acceleration(self, at: Any) -> SX:
+        """Return the rate of w that the filter sets for the input u [1/s2]."""
         w = 2 * math.pi * at.frequency
         # Bessel filter of order 2: 1 / (1 + 1.3617 s/w + 0.6180 (s/w)^2), -3 dB at w
         return SX((w * (at.u - at.x) - 1.3617 * at.w) * w / 0.6180)

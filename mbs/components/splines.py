@@ -35,7 +35,7 @@ class Spline:
     period: float | None
 
     def at(self, t: SX) -> SX:
-        """Return the point (d, 1) of the curve at t, (1, 1)."""
+        """Return the point (d, 1) of the curve at the parameter t, (1, 1)."""
         t, _ = self._within(t)
         steps = [t >= knot for knot in self.knots[1:]]
         u = t - _chosen(self.knots, steps)
@@ -60,13 +60,14 @@ class Spline:
         return SX(sign * (t - before) * (after - t) / (after - before))
 
     def _within(self, t: SX) -> tuple[SX, SX]:
-        """Return t reduced to the first period, and the number of periods between."""
+        """Return t reduced to the first period, and the number of removed periods (or 0)."""
         if self.period is None:
             return t, SX(0)
         turns = casadi.floor((t - self.knots[0]) / self.period)
         return SX(t - self.period * turns), SX(turns)
 
     def _element(self, k: int, u: SX, steps: Sequence[SX]) -> SX:
+        """Return element k of the active piece at the distance u from its knot."""
         value = SX(0)
         for power in (3, 2, 1, 0):
             value = value * u + _chosen(self.coefficients[power, :, k], steps)
@@ -74,7 +75,7 @@ class Spline:
 
 
 def _chosen(values: Array, steps: Sequence[SX]) -> SX:
-    """Return the value of the active piece."""
+    """Return the entry of `values` whose index is the number of true `steps`: the active piece."""
     found = SX(float(values[0]))
     for step, jump in zip(steps, np.diff(values), strict=True):
         found += step * float(jump)
@@ -82,7 +83,10 @@ def _chosen(values: Array, steps: Sequence[SX]) -> SX:
 
 
 def natural_spline(t: Array, points: Array) -> Spline:
-    """Return the natural spline through points (n, d) at t (n,), straight beyond its ends."""
+    """Return the spline through points (n, d) at t (n,), straight beyond its ends.
+
+    Its second derivatives are zero at both ends.
+    """
     h: Array = np.diff(t)
     slopes: Array = np.diff(points, axis=0) / h[:, None]
     # second derivatives are zero at the ends, where straight lines continue
@@ -103,7 +107,7 @@ def natural_spline(t: Array, points: Array) -> Spline:
 
 
 def periodic_spline(t: Array, points: Array, period: float) -> Spline:
-    """Return the spline through points (n, d) at t (n,) that is periodic."""
+    """Return the spline of period `period` through points (n, d) at t (n,), within one period."""
     n = len(t)
     h: Array = np.diff(np.append(t, t[0] + period))
     slopes = np.diff(np.concatenate([points, points[:1]]), axis=0) / h[:, None]
@@ -120,7 +124,10 @@ def periodic_spline(t: Array, points: Array, period: float) -> Spline:
 
 
 def _pieces(points: Array, slopes: Array, h: Array, M: Array) -> Array:
-    """Return (4, m, d) coefficients from values, slopes of chords and second derivatives."""
+    """Return (4, m, d) coefficients of the powers 0 .. 3 of each piece.
+
+    `slopes` (m, d) of chords, lengths `h` (m,) of pieces, second derivatives `M` at knots.
+    """
     h = h[:, None]
     first = slopes - h * (2 * M[:-1] + M[1:]) / 6
     return np.stack([points[: len(h)], first, M[:-1] / 2, np.diff(M, axis=0) / (6 * h)])

@@ -26,7 +26,7 @@ _CREEP = 1e-3
 
 
 class SlidingMass(RigidPart):
-    """A sliding mass, whose two flanges are the two ends of one rigid body without length.
+    """A sliding mass: one rigid body of zero length with a flange at each end.
 
     Gravity does not act on it, since a line of sliding parts has no direction in space.
 
@@ -40,7 +40,7 @@ class SlidingMass(RigidPart):
 
     @property
     def own_inertia(self) -> Expression:
-        """The mass, all of which slides."""
+        """The mass [kg], which the assembly adds to the sliding line of its flanges."""
         return expression(self.mass)
 
 
@@ -52,21 +52,24 @@ class _BetweenSlides(TwoFlanges):
     force = custom.output("N")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the tension on each flange, towards the other."""
+        """Return the forces ON the flanges [N]: "flange_a": tension, "flange_b": -tension."""
         F = self._tension(at)
         return {"flange_a": F, "flange_b": -F}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the tension, negative if the flanges are pushed apart."""
+        """Return {"force": tension [N]}, negative if the flanges are pushed apart."""
         return {"force": self._tension(at)}
 
     def _tension(self, at: Any) -> SX:
+        """Return the tension [N] that pulls the flanges together; negative if it pushes."""
         raise NotImplementedError
 
     def _extent(self, at: Any) -> SX:
+        """Return x = position_b - position_a [m]."""
         return SX(at.flange_b.position - at.flange_a.position)
 
     def _rate(self, at: Any) -> SX:
+        """Return dx/dt, the speed of flange_b minus that of flange_a [m/s]."""
         return SX(at.flange_b.speed - at.flange_a.speed)
 
 
@@ -90,11 +93,11 @@ class SlidingSpring(_BetweenSlides):
         self._require_effect("stiffness", "damping")
 
     def energy(self, at: Any) -> SX:
-        """Return the energy stored in the spring."""
+        """Return stiffness (x - length)^2 / 2 [J]."""
         return SX(0.5 * at.stiffness * (self._extent(at) - at.length) ** 2)
 
     def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by the damper [W]."""
+        """Return damping (dx/dt)^2 [W]."""
         return SX(at.damping * self._rate(at) ** 2)
 
     def _tension(self, at: Any) -> SX:
@@ -112,7 +115,7 @@ class SlidingDamper(_BetweenSlides):
     damping = custom.parameter("N.s/m", min=0)
 
     def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by the damper [W]."""
+        """Return damping (dx/dt)^2 [W]."""
         return SX(at.damping * self._rate(at) ** 2)
 
     def _tension(self, at: Any) -> SX:
@@ -143,23 +146,30 @@ class ElastoGap(_BetweenSlides):
     width = custom.parameter("m", _TOUCH, positive=True)
 
     def energy(self, at: Any) -> SX:
-        """Return the energy stored in the contact."""
+        """Return the energy of the contact spring [J]; zero without contact."""
         return SX(at.stiffness * self._contact(at)[2])
 
     def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by the damper [W]."""
+        """Return the power dissipated by the damper [W]; zero without contact."""
         return SX(self._tensions(at)[1] * self._rate(at))
 
     def _tension(self, at: Any) -> SX:
         return sum(self._tensions(at), SX(0))
 
     def _tensions(self, at: Any) -> tuple[SX, SX]:
-        """Return the tension of the spring, never positive, and the tension of the damper."""
+        """Return the tensions of spring and damper [N]; both zero without contact.
+
+        The tension of the spring is negative in contact: the spring pushes the parts apart.
+        """
         slope, ramped, _ = self._contact(at)
         spring = at.stiffness * ramped
         return -spring, one_sided_damping(at.damping * slope * self._rate(at), spring)
 
     def _contact(self, at: Any) -> tuple[SX, SX, SX]:
+        """Return slope, ramp [m] and integral of the ramp [m^2] at the depth, see `smooth_ramp`.
+
+        All are zero without contact.
+        """
         return smooth_ramp(at.length - self._extent(at), at.width)
 
 
@@ -184,18 +194,19 @@ class SlidingBrake(OneFlange):
     force = custom.output("N")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the force against the speed."""
+        """Return {"flange": -F}: force ON the part [N], opposed to its speed."""
         return {"flange": -self._force(at)}
 
     def dissipation(self, at: Any) -> SX:
-        """Return the power of the friction [W]."""
+        """Return the braking force times the speed of the part [W]."""
         return SX(self._force(at) * at.flange.speed)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the braking force."""
+        """Return {"force": F [N]}, with the sign of the speed. The part gets -F."""
         return {"force": self._force(at)}
 
     def _force(self, at: Any) -> SX:
+        """Return the braking force F [N], with the sign of the speed."""
         return friction_of(at, at.flange.speed)
 
 
@@ -215,5 +226,8 @@ class RigidSlidingBrake(OneFlange):
     engagement = custom.input()
 
     def frictions(self, at: Any) -> Mapping[str, Friction]:
-        """Return the friction on the speed of the part."""
+        """Return {"": Friction} whose slip is the speed of the part [m/s].
+
+        Its limit is capacity times max(engagement, 0).
+        """
         return {"": capacity_of(at, at.flange.speed)}

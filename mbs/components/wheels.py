@@ -49,16 +49,27 @@ class WheelSet(Custom):
     force_normal = custom.output("N")
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return rows of the height of the axle and of its inclination."""
+        """Return the position rows "height" [m] and "level".
+
+        "height" is the height of the axle centre above the plane less the radius. "level" is the
+        cosine between the axle and the normal of the plane.
+        """
         motion = at.ground.to(at.axle)
         return {"height": motion.p[2] - at.radius, "level": Row(motion.R[2, 1], "1")}
 
     def positive(self, at: Any) -> Mapping[str, SX]:
-        """Return the cosine of the z axes of axle and plane: the pitch is below a right angle."""
+        """Return {"upright".
+
+        Cosine of the z axes of `axle` and `ground`}, which must be positive.
+        """
         return {"upright": at.ground.to(at.axle).R[2, 2]}
 
     def velocity_rows(self, at: Any) -> Mapping[str, SX]:
-        """Return velocities of the lowest wheel points, along the axle and in travel direction."""
+        """Return slip velocities [m/s]: "lateral" along the axle, "left" and "right" ahead.
+
+        "left" and "right" are the velocities of the lowest point of each wheel in the direction of
+        travel.
+        """
         motion = at.ground.to(at.axle)
         axle = motion.R[:, 1]
         ahead = casadi.vertcat(axle[1], -axle[0], SX(0))
@@ -71,7 +82,10 @@ class WheelSet(Custom):
         }
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the forces of the ground."""
+        """Return the forces of the ground ON the wheels [N].
+
+        Names: force_left, force_right (in the direction of travel), force_lateral, force_normal.
+        """
         return {
             "force_left": at.lam["left"],
             "force_right": at.lam["right"],

@@ -87,6 +87,7 @@ def with_parameters(system: System, columns: Sequence[Column], values: SX) -> Sy
 
 
 def _with(link: Link, values: Mapping[str, SX]) -> Link:
+    """Return a link with some of its inertial, rotor and joint parameters replaced, by name."""
     ten = elements(link.inertia.parameters)
     ten = [values.get(name, old) for name, old in zip(INERTIAL, ten, strict=True)]
     rotor = link.rotor
@@ -289,6 +290,7 @@ def grouped_by_rules(
 
 
 def _by_tree(structure: Structure, grouping: Grouping, indices: Mapping[Key, int]) -> Grouping:
+    """Return the grouping after the symbolic rules for trees."""
     for removal in tree_rules(structure):
         dropped, terms = indices.get(removal.parameter), _terms(removal.effects, indices)
         if dropped is not None and terms is not None and dropped in grouping.columns[dropped]:
@@ -546,6 +548,7 @@ def _configurations(system: System, seed: int, *, symbolic: bool) -> list[Closed
 def _result(
     system: System, method: str, columns: tuple[Column, ...], grouping: Grouping, check: Check
 ) -> BaseParameters:
+    """Return the base parameters with their combinations, from the kept columns of a grouping."""
     kept = grouping.kept
     K = casadi.vertcat(SX(0, 1), *(SX.sym(column.name) for column in columns))
     values = {k: K[k] for k in kept}
@@ -574,6 +577,7 @@ def _result(
 
 
 def _check_method(system: System, method: str, order: Sequence[str] | None) -> None:
+    """Raise ModelError if the method is unknown or does not accept an order."""
     if method not in METHODS:
         raise ModelError(f"{system.name}: method is {quoted(method)}; use 'symbolic' or 'numeric'")
     if order and method == "symbolic":
@@ -584,6 +588,7 @@ def _check_method(system: System, method: str, order: Sequence[str] | None) -> N
 
 
 def _first(system: System, columns: Sequence[Column], order: Sequence[str]) -> list[int]:
+    """Return column indices of the parameters that the user wants to keep first."""
     names = [column.name for column in columns]
     for name in order:
         if name not in names:

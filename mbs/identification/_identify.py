@@ -113,6 +113,7 @@ def identification_report(
 
 
 def _parameters(estimate: Estimate) -> list[str]:
+    """Return the lines of the table of parameters: value, deviation and relative deviation."""
     lines = [f"{'parameter':<12}{'value':>12}{'deviation':>12}{'%':>9}  unit"]
     rows = zip(
         estimate.columns, estimate.values, estimate.deviations, estimate.percent, strict=True
@@ -127,6 +128,7 @@ def _parameters(estimate: Estimate) -> list[str]:
 
 
 def _residuals(title: str, residuals: Residuals) -> list[str]:
+    """Return the lines of the table of residuals of the efforts."""
     lines = [
         f"{title}: {residuals.total_percent:.2f} % of all efforts",
         f"{'effort':<12}{'error':>10}{'rms':>12}  {'unit':<6}{'independent rows':>18}",
@@ -156,6 +158,7 @@ def _fit(residuals: Residuals) -> list[str]:
 
 
 def _drop(observations: Observations) -> list[str]:
+    """Return a remark on instants near singular configurations that are left out."""
     if not observations.dropped:
         return []
     rows = len(observations.time)
@@ -286,6 +289,7 @@ class Identification:
         return "\n".join(lines)
 
     def _bodies(self) -> Estimate:
+        """Return the estimated bodies. Raise ModelError if none were found."""
         if self.bodies is None:
             raise ModelError(
                 f"{self.system.name}: no bodies were found ({self.bodies_reason}); give a prior, or"
@@ -372,6 +376,7 @@ def _found_bodies(search: Callable[[], Estimate], method: str) -> tuple[Estimate
 
 
 def _between(reached: Callable[[float], None], first: float, last: float, part: float) -> None:
+    """Report a progress between `first` and `last`, for a fraction `part` from 0 to 1."""
     reached(first + part * (last - first))
 
 
@@ -396,10 +401,12 @@ def _records(
 
 
 def _options(rotors: bool, offsets: bool, couplings: Sequence[Joints]) -> dict[str, Any]:
+    """Return the options of the regressor as a dict."""
     return {"rotors": rotors, "offsets": offsets, "couplings": couplings}
 
 
 def _check(system: System, method: str, equations: str, smoothing: object) -> None:
+    """Raise ModelError if an option of the identification is invalid."""
     require_system(system)
     if not callable(smoothing):
         raise ModelError(

@@ -469,6 +469,7 @@ def _kind(regressor: Any) -> Any:
 
 
 def _runge_kutta(acceleration: Function, h: float) -> Function:
+    """Return the Function of a Runge-Kutta step of length h [s]."""
     m = acceleration.size1_out(0)
     kind: Any = MX if acceleration.is_a("MXFunction") else SX
     x, now, then = (kind.sym(*pair) for pair in (("x", 2 * m), ("now", 3 * m), ("then", 3 * m)))

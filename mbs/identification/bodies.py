@@ -279,7 +279,10 @@ class _PhysicalProblem:
 
 
 def _triangle(x: SX) -> SX:
-    """Return L (4, 4), from four logarithms of its diagonal, then six other elements row by row."""
+    """Return a triangular factor L (4, 4) from ten numbers x (10, 1).
+
+    They are the logarithms of its diagonal, then the other elements row by row.
+    """
     L = SX(4, 4)
     for k in range(4):
         L[k, k] = casadi.exp(x[k])
@@ -332,16 +335,19 @@ def _covariance(misfit: Misfit, columns: Sequence[Column], values: Array, emphas
 
 
 def _unit(k: int) -> Array:
+    """Return the pseudo-inertia (4, 4) of unit inertial parameter k, the others zero."""
     ten = SX(DM([float(k == n) for n in range(10)]))
     return _numbers(_matrix(PseudoInertia.of(Inertia.from_parameters(ten))))
 
 
 def _matrix(body: PseudoInertia) -> SX:
+    """Return the pseudo-inertia (4, 4) of a body."""
     upper = casadi.horzcat(body.S, body.ms)
     return casadi.densify(casadi.vertcat(upper, casadi.horzcat(body.ms.T, body.m)))
 
 
 def _numbers(value: Any) -> Array:
+    """Return a constant expression as a NumPy array."""
     return np.asarray(DM(value).full(), dtype=float)
 
 
@@ -485,6 +491,7 @@ def _positive(deviation: float, efforts: Array) -> float:
 def _with_weights(
     observations: Observations, weights: Array, prior: Prior, watch: Watch | None
 ) -> Estimate:
+    """Return the estimate of physically consistent bodies for given weights of the equations."""
     unseen = set(excitation_quality(observations).unseen)
     hidden = [c.name for c in observations.columns if c.kind not in INERTIAL and c.name in unseen]
     if hidden:

@@ -363,6 +363,7 @@ class Programme:
         return variables, W, bounded
 
     def _evaluation(self) -> Callable[[Array], float]:
+        """Return a callable from the variables of a motion to the value of its criterion."""
         variables, W, _ = self._graph()
         gram = Function("gram", [variables], [W @ W.T])
         return lambda x: self.criterion(np.array(gram(x)))[0]
@@ -423,6 +424,7 @@ def _spans(ends: Array) -> Array:
 
 
 def _options(rounds: int) -> dict[str, Any]:
+    """Return the options of the Ipopt solver, with at most `rounds` iterations."""
     return {
         "ipopt": {
             "print_level": 0,
@@ -646,6 +648,7 @@ def _measure(
 
 
 def _form(series: FourierSettings | None) -> FourierSettings:
+    """Return the settings of the Fourier series; defaults for None. Raise for a wrong type."""
     if series is None:
         return FourierSettings()
     if not isinstance(series, FourierSettings):
@@ -659,6 +662,7 @@ def _form(series: FourierSettings | None) -> FourierSettings:
 def _columns(
     system: System, columns: BaseParameters | Sequence[Column] | None
 ) -> tuple[Column, ...]:
+    """Return the parameters to identify; the base parameters for None."""
     if columns is None:
         return tuple(base_parameters(system).kept)
     chosen = tuple(columns if isinstance(columns, Sequence) else columns.kept)
@@ -683,6 +687,7 @@ def _smooth(system: System, limits: MotionLimits, form: FourierSettings) -> Syst
 
 
 def _check(system: System, objective: str, starts: int, rounds: int) -> None:
+    """Raise ModelError for an unknown objective or a number of starts or rounds below 1."""
     if objective not in CRITERIA:
         raise ModelError(
             f"excitation: there is no objective {objective!r}; {did_you_mean(objective, CRITERIA)}"
@@ -698,5 +703,6 @@ def _check(system: System, objective: str, starts: int, rounds: int) -> None:
 
 
 def _condition(W: Array) -> float:
+    """Return the condition number of W."""
     values = np.linalg.svd(W, compute_uv=False)
     return float(values[0] / values[-1])

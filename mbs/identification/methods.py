@@ -102,6 +102,7 @@ def _by_bodies(setting: Setting) -> Estimator:
 
 
 def _always(estimator: Estimator) -> Callable[[Setting], Estimator]:
+    """Return a factory that returns the same estimator for all settings."""
     return lambda _: estimator
 
 
@@ -229,6 +230,7 @@ def _ratio(estimate: Estimate, dropped: Sequence[int]) -> float:
 def _estimate(
     estimate: Estimate, kept: Sequence[int], values: Array, covariance: Array
 ) -> Estimate:
+    """Return the estimate of the kept ("essential") parameters only."""
     names = [estimate.names[k] for k in kept]
     return Estimate(
         f"{estimate.method}, essential",

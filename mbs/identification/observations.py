@@ -153,6 +153,7 @@ def _is_reduced(model: Any) -> bool:
 
 
 def _has_elements(system: System) -> bool:
+    """Whether the system has joint springs or force elements."""
     springs = any(not link.stiffness.is_zero() for link in system.tree.links)
     return springs or bool(system.parts)
 
@@ -302,6 +303,7 @@ class Observations:
         return self._rows_of(np.isin(self.time, time))
 
     def _rows_of(self, keep: npt.NDArray[np.bool_]) -> Observations:
+        """Return the observations of the instants of a mask (n,) only."""
         return replace(self, time=self.time[keep], W=self.W[keep], y=self.y[keep])
 
 
@@ -537,6 +539,14 @@ def observe_momentum(filtered: Any, samples: Samples, corner: float) -> Observat
 
 
 def _filtered_signal(values: Array, numerator: list[float], corner: float, rate: float) -> Array:
+    """Return values (n, m) filtered by numerator / (s + corner)^2.
+
+    Args:
+        values: (n, m) samples.
+        numerator: three coefficients of the numerator, highest power of s first.
+        corner: corner frequency [rad/s].
+        rate: sampling rate [Hz].
+    """
     signal = optional_module("scipy.signal", "identify")
     b, a = signal.bilinear(numerator, [1.0, 2 * corner, corner**2], fs=rate)
     return np.asarray(signal.lfilter(b, a, values, axis=0), dtype=float)
@@ -671,5 +681,6 @@ def require_visible(observations: Observations) -> ExcitationQuality:
 
 
 def _list(names: tuple[str, ...]) -> str:
+    """Return a list of names as text; long lists are shortened."""
     more = len(names) - _LISTED
     return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")

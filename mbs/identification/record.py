@@ -67,6 +67,7 @@ def check_record(record: Record) -> None:
 
 
 def _check_shapes(record: Record) -> None:
+    """Raise ModelError if the arrays of a record have wrong shapes or too few rows."""
     n = record.time.size
     wanted = {"q": record.q, "tau": record.tau, "v": record.v}
     if record.time.ndim != 1:
@@ -105,6 +106,7 @@ def _check_shapes(record: Record) -> None:
 
 
 def _check_names(record: Record) -> None:
+    """Raise ModelError if names of a record are repeated or units of efforts are invalid."""
     for what, names in (("positions", record.names), ("efforts", record.efforts)):
         twice = [name for k, name in enumerate(names) if name in names[:k]]
         if twice:
@@ -119,6 +121,7 @@ def _check_names(record: Record) -> None:
 
 
 def _check_finite(record: Record) -> None:
+    """Raise ModelError if the time or a value of a record is not finite."""
     names = {"q": record.names, "tau": record.efforts, "v": record.names}
     if not np.isfinite(record.time).all():
         row = int(np.argmin(np.isfinite(record.time)))
@@ -135,6 +138,10 @@ def _check_finite(record: Record) -> None:
 
 
 def _check_time(record: Record) -> None:
+    """Raise ModelError if the times of a record do not increase, or leave a gap.
+
+    The longest step is `longest_gap` of the record, or a multiple of the median step.
+    """
     steps = np.diff(record.time)
     if (steps <= 0).any():
         row = int(np.argmax(steps <= 0))
@@ -155,6 +162,7 @@ def _check_time(record: Record) -> None:
 
 
 def _check_position(record: Record, k: int) -> None:
+    """Raise ModelError if position column k has an invalid unit or is far beyond its limits."""
     name, unit, limits, q = record.names[k], record.units[k], record.limits[k], record.q[:, k]
     if unit not in ("rad", "m"):
         raise ModelError(f"record: {name} is in {unit!r}; convert it to 'rad' or 'm'")
@@ -304,6 +312,7 @@ def _check_header(path: str | os.PathLike[str], header: Sequence[str]) -> None:
 
 
 def _is_number(text: str) -> bool:
+    """Whether a text is a floating-point number."""
     try:
         float(text)
     except ValueError:
@@ -510,6 +519,7 @@ class Record:
         return found
 
     def _rows(self, keep: npt.NDArray[np.bool_]) -> Record:
+        """Return the record with the rows of a mask (n,) only."""
         v = None if self.v is None else self.v[keep]
         return replace(self, time=self.time[keep], q=self.q[keep], tau=self.tau[keep], v=v)
 
@@ -548,6 +558,7 @@ def motor_to_joint(N: Any, q_motor: Any, tau_motor: Any) -> tuple[Array, Array]:
 
 
 def _check_joints(system: System, joints: Sequence[Coordinate], width: int) -> None:
+    """Raise ModelError unless `joints` are revolute or prismatic, and their number is `width`."""
     turning = [c for c in joints if c.unit not in ("rad", "m")]
     if turning:
         remedy = ", or give the independent joints alone" if system.is_closed else ""
@@ -564,6 +575,7 @@ def _check_joints(system: System, joints: Sequence[Coordinate], width: int) -> N
 
 
 def _check_motors(system: System) -> None:
+    """Raise ModelError unless the motors of a system are its independent joints."""
     if system.motors != system.active:
         motors = ", ".join(system.speeds[k].name for k in system.motors)
         raise ModelError(
@@ -593,6 +605,7 @@ def _check_order(what: str, given: Sequence[str], joints: Sequence[str]) -> None
 
 
 def _numbers(name: str, values: Any) -> Array:
+    """Return values as a read-only array of floats. Raise ModelError for other types."""
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError):
@@ -798,6 +811,7 @@ def _without_gaps(record: Record, bandwidth: float) -> Record:
 
 
 def _rate(record: Record) -> float:
+    """Return the mean sampling rate [Hz]."""
     return (len(record.time) - 1) / float(record.time[-1] - record.time[0])
 
 

@@ -345,6 +345,7 @@ def numeric_parameters(
 
 
 def _joint_value(link: Link, kind: str) -> SX:
+    """Return the value of a joint parameter of a link: "Ia", "Jm", "Fv" or "Fs"; 0 without it."""
     if kind == "Jm":
         return link.rotor.inertia if link.rotor is not None else SX(0)
     known = {"Ia": link.Ia, "Fv": link.Fv, "Fs": link.Fs}
@@ -352,22 +353,29 @@ def _joint_value(link: Link, kind: str) -> SX:
 
 
 def _inertial(number: int) -> list[Column]:
+    """Return the columns of the ten inertial parameters of a link by its number."""
     pairs = zip(INERTIAL, _INERTIAL_UNITS, strict=True)
     return [Column(f"{kind}{number}", kind, number, unit) for kind, unit in pairs]
 
 
 def _rotor_kinds(system: System, link: Link) -> list[str]:
+    """Return the rotor parameters of a joint that are identified: "Ia" and "Jm", if it has them."""
     driven = system.speeds[link.v.start].actuated and link.rotor is None
     kinds = ["Ia"] if driven or not link.Ia.is_zero() else []
     return [*kinds, "Jm"] if link.rotor is not None else kinds
 
 
 def _friction_kinds(link: Link) -> list[str]:
+    """Return the friction parameters of a joint, "Fv" and "Fs".
+
+    A free joint has only the parameters that are nonzero.
+    """
     given = {"Fv": link.Fv, "Fs": link.Fs}
     return [k for k, x in given.items() if link.motion is not Motion.FREE or not x.is_zero()]
 
 
 def _unit(link: Link, kind: str) -> str:
+    """Return the unit of a joint parameter, which differs for prismatic joints."""
     return (_SLIDING if link.motion is Motion.PRISMATIC else _TURNING)[kind]
 
 
@@ -532,6 +540,7 @@ class JointColumns:
 
 
 def _law(link: Link, v: SX, a: SX) -> SX:
+    """Return the efforts of rotor inertia and friction of the joint of a link."""
     alone = replace(link, v=slice(0, link.motion.nv))
     return rotor_and_friction(Tree((alone,), zeros()), v, a)
 

@@ -92,6 +92,7 @@ class FourierSeries:
         return moved + DM(self.middle) if order == 0 else moved
 
     def _sum(self, t: npt.ArrayLike, order: int) -> Array:
+        """Return a derivative of the Fourier series at times t; order 0 is its value."""
         if isinstance(t, SX | MX):
             raise ModelError("excitation: the time is a symbol; use law(t), which takes symbols")
         instants = np.asarray(t, dtype=float)
@@ -397,6 +398,7 @@ def _positions(
 
 
 def _check_names(system: System, what: str, given: Mapping[str, Any], known: Sequence[str]) -> None:
+    """Raise ModelError if limits or ranges (`what`) name an unknown joint."""
     for name in given:
         if name not in known:
             raise ModelError(
@@ -408,6 +410,7 @@ def _check_names(system: System, what: str, given: Mapping[str, Any], known: Seq
 def _join(
     names: Sequence[str], units: Sequence[str], pairs: Sequence[tuple[float, float]]
 ) -> list[tuple[str, str, float, float]]:
+    """Return (name, unit, lower, upper) of each quantity."""
     rows = zip(names, units, pairs, strict=True)
     return [(name, unit, lower, upper) for name, unit, (lower, upper) in rows]
 
@@ -436,6 +439,7 @@ def _pairs(
 
 
 def _pair(system: System, quantity: str, value: Range, name: str) -> tuple[float, float]:
+    """Return lower and upper limit of a range: a single number is symmetric, None is unlimited."""
     if value is None:
         return -np.inf, np.inf
     ends = np.asarray(value, dtype=float).ravel()
@@ -569,6 +573,7 @@ class Trajectory:
 
 
 def _line(margin: Margin) -> str:
+    """Return one line of the table of margins."""
     limit = margin.limit
     ends = f"{limit.lower:9.4g} .. {limit.upper:<9.4g}"
     return (

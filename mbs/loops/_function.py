@@ -60,7 +60,7 @@ def fixed_positions(system: System, values: Given) -> dict[str, float]:
 
 
 def _numbers(values: Any) -> list[float] | None:
-    """Return the elements of a sequence as numbers; None if one is no number."""
+    """Return the elements of a sequence as floats; None if an element is no number."""
     try:
         return None if has_boolean(values) else [float(x) for x in values]
     except (TypeError, ValueError):
@@ -128,6 +128,10 @@ def reachable(system: System, loops: Function, q_a: Vector, p: Vector) -> str:
 
 
 def _test(loops: Function, q_a: Vector, p: Vector, number: int) -> Callable[[float], bool]:
+    """Return a predicate: whether loops close with independent position `number` at a value.
+
+    The other independent positions are taken from q_a (m,).
+    """
     arguments = [p] if p.size else []
 
     def is_reached(value: float) -> bool:
@@ -141,7 +145,11 @@ def _test(loops: Function, q_a: Vector, p: Vector, number: int) -> Callable[[flo
 def _span(
     system: System, k: int, value: float, is_reached: Callable[[float], bool]
 ) -> tuple[float, float]:
-    """Return the range of the search: a full rotation, or a stroke around the assembled value."""
+    """Return the interval to search for reachable positions of coordinate k [rad or m].
+
+    It is a full rotation for an angle. For a length it is symmetric about the assembled value and
+    grows until both of its ends are unreachable.
+    """
     if system.coordinates[k].unit == "rad":
         return -np.pi, np.pi
     middle = system.configuration[k]
@@ -156,7 +164,7 @@ def _span(
 def _intervals(
     is_reached: Callable[[float], bool], low: float, high: float
 ) -> list[tuple[float, float]]:
-    """Return the intervals of reachable positions between `low` and `high`."""
+    """Return the intervals (low, high) of reachable positions in the search interval."""
     points = np.linspace(low, high, _POINTS)
     inside = np.array([is_reached(float(x)) for x in points])
     changes = np.flatnonzero(inside[1:] != inside[:-1])
@@ -166,7 +174,7 @@ def _intervals(
 
 
 def _edge(is_reached: Callable[[float], bool], low: float, high: float) -> float:
-    """Return the limit of the reachable range between two positions, by bisection."""
+    """Return the limit of reachability between one reachable and one unreachable position."""
     first = is_reached(low)
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
@@ -214,6 +222,7 @@ class LoopFunction(ModelFunction):
         return (q_a, p) if fits and np.all(np.isfinite(q_a)) and np.all(np.isfinite(p)) else None
 
     def _refusal(self, q_a: Vector, p: Vector) -> str:
+        """Return the error message for unreachable q_a (m,), with the reachable ranges."""
         names = independent_names(self.system)
         at = ", ".join(f"{name} = {value:.4g}" for name, value in zip(names, q_a, strict=True))
         return f"{self.system.name}: no configuration on this branch has {at}; " + reachable(
@@ -273,6 +282,14 @@ def configuration_on(
 
 
 def _configuration(system: System, stages: Sequence[Stage], ways: Sequence[int], q_a: SX) -> SX:
+    """Return q (nq, 1) from q_a by solving all loops in order on the given branches.
+
+    Args:
+        system: assembled mechanism.
+        stages: closed form of each loop, in the order of solution.
+        ways: branch index of each stage.
+        q_a: (m, 1) independent positions.
+    """
     q = SX.zeros(extent(system))
     q[independent_indices(system)] = q_a
     for stage, way in zip(stages, ways, strict=True):
@@ -281,7 +298,7 @@ def _configuration(system: System, stages: Sequence[Stage], ways: Sequence[int],
 
 
 def _ways(system: System, stages: Sequence[Stage], branch: Branch) -> tuple[int, ...]:
-    """Return the branch index of each stage from the labels of `branch`."""
+    """Return the branch index of each loop; loops without a label keep their assembled branch."""
     labels = _labels(system, branch)
     known = [label for stage in stages for label in stage.labels if label]
     for label in labels:
@@ -293,6 +310,7 @@ def _ways(system: System, stages: Sequence[Stage], branch: Branch) -> tuple[int,
 
 
 def _labels(system: System, branch: Branch) -> list[str]:
+    """Return the branch labels of the user, such as "j3:+", as a list."""
     if branch is None:
         return []
     given = branch.split(",") if isinstance(branch, str) else branch
@@ -306,6 +324,7 @@ def _labels(system: System, branch: Branch) -> list[str]:
 
 
 def _way(system: System, stage: Stage, labels: Sequence[str]) -> int:
+    """Return the branch index of a loop: the labelled branch, else the assembled branch."""
     named = [k for k, label in enumerate(stage.labels) if label and label in labels]
     if len(named) > 1:
         raise ModelError(
@@ -369,6 +388,7 @@ def follow_active(system: System) -> Function:
 
 
 def _merge(system: System, active: list[int], passive: list[int]) -> Function:
+    """Return Function (z, q_a) -> q of passive and independent positions in their order."""
     z, q_a = SX.sym("z", len(passive)), SX.sym("q_a", len(active))
     q = SX.zeros(system.nq)
     q[passive], q[active] = z, q_a
@@ -376,6 +396,7 @@ def _merge(system: System, active: list[int], passive: list[int]) -> Function:
 
 
 def _newton(system: System, active: list[int], passive: list[int]) -> Function:
+    """Return ``(z, q_a, p) -> z``: passive positions that close the loops, by Newton's method."""
     q, z, q_a = (
         SX.sym(n, k) for n, k in zip("qza", (system.nq, len(passive), len(active)), strict=True)
     )
@@ -393,7 +414,17 @@ def _newton(system: System, active: list[int], passive: list[int]) -> Function:
 
 
 def _stage(system: System, active: list[int], passive: list[int]) -> Function:
-    """Return ``stage(led, q_a, p) -> z, good``: passive positions by Newton from a prediction."""
+    """Return ``stage(led, q_a, p) -> z, good``: passive positions z by Newton's method.
+
+    Args:
+        system: mechanism with closed loops.
+        active: indices in q of the independent positions.
+        passive: indices in q of the passive positions.
+
+    Returns:
+        Function with the predicted passive positions `led` as start. good is 1 if the loops close
+        near the prediction, else 0.
+    """
     led, q_a = MX.sym("led", len(passive)), MX.sym("q_a", len(active))
     p = MX.sym("p", system.p.numel())
     z = _newton(system, active, passive)(led, q_a, p)
@@ -407,7 +438,10 @@ def _stage(system: System, active: list[int], passive: list[int]) -> Function:
 
 
 def _closed(system: System) -> Function:
-    """Return Function: 1 if all rows are closed and no axis is opposed, else 0; NaN is open."""
+    """Return ``closed(q, p)``: 1 if all loops are closed and no axis is opposed, else 0.
+
+    It is 0 also if q has NaN.
+    """
     q = SX.sym("q", system.nq)
     openness = casadi.sum1(casadi.fabs(relative_rows(system, q)))  # a maximum would drop NaN
     cosines = facing(system, q)

@@ -89,6 +89,12 @@ def require_accurate(
 
 
 def _refuse(system: System, leads: float) -> None:
+    """Raise SingularPosture that names the independent joints and the sine between constraint rows.
+
+    Args:
+        system: mechanism with closed loops.
+        leads: smallest squared sine between a row of the passive joints and the rows before it.
+    """
     names = ", ".join(system.speeds[k].name for k in system.active)
     raise SingularPosture(
         f"{system.name}: the configuration is so near a singular one that second derivatives of the"
@@ -99,7 +105,13 @@ def _refuse(system: System, leads: float) -> None:
 
 
 def _column(value: DM, k: int, count: int) -> Array:
-    """Return the part of an output that belongs to column k of the inputs."""
+    """Return the columns of an output (m, n count) that belong to column k of batched inputs.
+
+    Args:
+        value: output of a mapped function: one block of n columns for each input column.
+        k: index of the input column.
+        count: number of input columns.
+    """
     full = np.asarray(value.full(), dtype=float)
     width = full.shape[1] // count
     return full[:, k * width : (k + 1) * width]
@@ -112,14 +124,27 @@ def _floors(
     outputs: Sequence[DM],
     tested: Sequence[int],
 ) -> dict[int, list[Array]]:
-    """Return the allowed effects of rounding in each row of an output, for each input column."""
+    """Return the changes by rounding that count as zero, {output index: [(rows,) for each column]}.
+
+    They are 1e-10 of the largest squared speed, times the typical size of each row of the output.
+
+    Args:
+        system: mechanism with closed loops.
+        names: names of the outputs.
+        v: (m, n) independent velocities, one column per configuration.
+        outputs: values of the outputs.
+        tested: indices of the outputs that are tested.
+    """
     units = scales(system).columns([system.speeds[k].unit for k in system.active])
     count = v.shape[1]
     squares = np.max((v / units[:, None]) ** 2, axis=0, initial=0.0)
     masses = [k for k, name in enumerate(names) if name.startswith("dtau") and "_da" in name]
 
     def rows(number: int, k: int) -> Array:
-        """Return accelerations of size one, or the efforts that belong to them."""
+        """Return the typical size (rows,) of output `number` at configuration k.
+
+        It is 1 for accelerations, and the effort of a unit acceleration for efforts.
+        """
         found = np.zeros(outputs[number].shape[0])
         if names[number].startswith("dtau"):
             sizes = (float(np.max(np.abs(_column(outputs[i], k, count)))) for i in masses)
@@ -146,7 +171,10 @@ def _point(system: System, inputs: Mapping[str, Any]) -> list[Array]:
 
 
 def _columns(value: Any, size: int) -> Array:
-    """Return the values (size, n) of an input; a scalar is repeated."""
+    """Return an input as columns (size, n).
+
+    A vector becomes one column, a scalar becomes (1, 1).
+    """
     full = np.asarray(value.full() if isinstance(value, DM) else value, dtype=float)
     if full.ndim < _PLANE:
         return full.reshape(-1, 1)
@@ -154,7 +182,7 @@ def _columns(value: Any, size: int) -> Array:
 
 
 def _delicate(system: System, q: SX) -> SX:
-    """Return 1 at configurations at which rounding is tested, else 0."""
+    """Return 1 if q (nq, 1) is so near a singularity that rounding must be tested, else 0."""
     return SX(configuration_health(system)(q, system.p)[1] < _ROUNDED)
 
 

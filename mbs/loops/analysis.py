@@ -163,7 +163,14 @@ def _require_mobile(system: System, configurations: Sequence[Matrix]) -> None:
 
 
 def _target_near(system: System, guess: Mapping[str, float], q: Matrix, p: Matrix) -> GuessTarget:
-    """Return the target with positions of the guess, and of q (nq,) for all other joints."""
+    """Return a target for the search of a closed configuration: the guess, and q for other joints.
+
+    Args:
+        system: mechanism with loops.
+        guess: approximate positions by coordinate name.
+        q: (nq,) closed configuration. Positions of cut joints without a guess are computed from it.
+        p: (np,) parameters.
+    """
     names = [coordinate.name for coordinate in system.coordinates]
     start = np.array([guess.get(name, x) for name, x in zip(names, q, strict=True)])
     return GuessTarget.of(system, p, start, guess, _cut_values(system, q, p))
@@ -175,10 +182,11 @@ def _branches(
     active: Sequence[int],
     is_regular: Callable[[Matrix], bool],
 ) -> list[Matrix]:
-    """Return regular configurations on the branches that meet at q, nearest to a target first.
+    """Return regular closed configurations on the branches that meet at a singular configuration q.
 
-    All of them have the same independent positions. The list is empty if none is found, or if
-    independent velocities have no positions of their own.
+    Independent positions are displaced by 0.1 in both directions. All configurations of the result
+    have the same independent positions; the nearest to the target is first. The list is empty if
+    none is found, if an independent velocity has no position of its own, or in large mechanisms.
 
     Args:
         target: guessed positions, and those of q for joints without a guess.
@@ -205,7 +213,11 @@ def _branches(
 
 
 def _is_clearly_nearer(closing: Closing, target: GuessTarget, q: Matrix, other: Matrix) -> bool:
-    """Whether q is nearer to a target than `other`, by more than rounding."""
+    """Whether q (nq,) is nearer to the guess than `other` by more than 1e-4.
+
+    Distances are compared in this order: Euclidean distance from the guessed positions, then
+    largest difference of any position.
+    """
     pairs = [(target.miss(closing, x), target.distances(closing, x)[1]) for x in (q, other)]
     for distance, least in zip(*pairs, strict=True):
         if abs(distance - least) > _CLEAR:
@@ -214,18 +226,19 @@ def _is_clearly_nearer(closing: Closing, target: GuessTarget, q: Matrix, other: 
 
 
 def _names(system: System) -> list[str]:
+    """Return the names of all coordinates: of the tree, then of the cut joints."""
     return [row.name for row in (*system.coordinates, *system.cut_coordinates)]
 
 
 def _cut_values(system: System, q: Matrix, p: Matrix) -> Matrix:
-    """Return the positions of the cut joints at q."""
+    """Return the positions (c,) of the cut joints at q (nq,) for parameters p (np,)."""
     return np.array(cut_positions(system)(q, p)).ravel()
 
 
 def _at_cut(
     system: System, guess: Mapping[str, float], q: Matrix, p: Matrix
 ) -> tuple[tuple[str, float], ...]:
-    """Return the names and positions of the cut joints that have a guess."""
+    """Return (name, position at q) of each cut-joint coordinate that has a guess, or ()."""
     names = [row.name for row in system.cut_coordinates]
     if not any(name in guess for name in names):
         return ()
@@ -234,7 +247,10 @@ def _at_cut(
 
 
 def _measures(system: System, p: Matrix) -> tuple[Matrix, Matrix]:
-    """Return divisors of rows (m, 1) and factors of columns (nv,) that make J dimensionless."""
+    """Return factors that make the constraint Jacobian (m, nv) dimensionless.
+
+    The first array (m, 1) divides the rows, the second (nv,) multiplies the columns.
+    """
     at = Function("sizes", [system.p], [mechanism_size(system), constraint_sizes(system)])
     size, rows = at(p)
     slides = [speed.unit.startswith("m") for speed in system.speeds]
@@ -242,33 +258,38 @@ def _measures(system: System, p: Matrix) -> tuple[Matrix, Matrix]:
 
 
 def _ranks(jacobians: Sequence[Matrix]) -> list[int]:
-    """Return the rank of each Jacobian, relative to the largest singular value of all of them."""
+    """Return the rank of each Jacobian, relative to the largest singular value of all."""
     values = [np.linalg.svd(_without_zeros(matrix), compute_uv=False) for matrix in jacobians]
     largest = max(float(np.max(row, initial=0.0)) for row in values)
     return [int(np.sum(row > _GAP * largest)) for row in values]
 
 
 def _without_zeros(matrix: Matrix) -> Matrix:
-    """Return the nonzero rows. About half the rows of planar loops are zero."""
+    """Return the rows of a matrix that are not entirely zero."""
     return matrix[matrix.any(axis=1)]
 
 
 @dataclass(frozen=True, slots=True)
 class _Kept:
-    """Indices of independent position rows, and of independent velocity rows, each from zero."""
+    """Indices of the independent constraint rows that the model keeps.
+
+    Attributes:
+        positions: indices among the rows that constrain positions.
+        slips: indices among the rows that constrain velocities only, counted from zero.
+    """
 
     positions: tuple[int, ...]
     slips: tuple[int, ...]
 
 
 def _kept_rows(jacobians: Sequence[Matrix], positions: int, held: int, slips: int) -> _Kept:
-    """Return the independent rows at regular configurations, position rows before velocity rows.
+    """Return indices of independent constraint rows. Rows on positions precede velocity rows.
 
     Args:
-        jacobians: Jacobians (m, nv), with position rows first.
-        positions: number of position rows.
-        held: rank of the position rows.
-        slips: rank that the velocity rows add.
+        jacobians: constraint Jacobians (m, nv) at regular configurations, rows on positions first.
+        positions: number of rows that constrain positions.
+        held: rank of these rows.
+        slips: increase of the rank by the velocity rows.
     """
     rows = independent_rows([J[:positions] for J in jacobians], held)
     every = independent_rows(jacobians, held + slips, tuple(rows))
@@ -276,7 +297,15 @@ def _kept_rows(jacobians: Sequence[Matrix], positions: int, held: int, slips: in
 
 
 def _varies(jacobians: Sequence[Matrix], positions: int, kept: _Kept) -> bool:
-    """Whether the coefficients of dropped rows, in terms of kept rows, vary with configuration."""
+    """Whether the dependent rows are combinations of the kept rows that vary with configuration.
+
+    If they vary, no fixed selection of rows is independent at all configurations.
+
+    Args:
+        jacobians: constraint Jacobians (m, nv) at several configurations.
+        positions: number of rows that constrain positions.
+        kept: indices of the kept rows.
+    """
     rows = [*kept.positions, *(positions + k for k in kept.slips)]
     dropped = [k for k in range(len(jacobians[0])) if k not in rows]
     if not dropped:
@@ -288,7 +317,7 @@ def _varies(jacobians: Sequence[Matrix], positions: int, kept: _Kept) -> bool:
 
 
 def rows_at(system: System, q: Matrix, p: Matrix) -> System:
-    """Return the system with the rows that are most independent at a given configuration.
+    """Return the system with the constraint rows that are most independent at a configuration.
 
     Args:
         system: mechanism with closed loops.
@@ -312,7 +341,11 @@ def rows_at(system: System, q: Matrix, p: Matrix) -> System:
 def _free_positions(
     jacobians: Sequence[Matrix], kept: _Kept, active: Sequence[int]
 ) -> tuple[int, ...]:
-    """Return velocities whose positions can be chosen: active, then those only slip rows hold."""
+    """Return indices in v of the coordinates whose positions can be chosen freely.
+
+    They are the independent velocities (`active`), then further ones that only velocity rows, such
+    as no-slip conditions, constrain.
+    """
     if not kept.slips:
         return tuple(active)
     size = jacobians[0].shape[1] - len(kept.positions)
@@ -322,12 +355,13 @@ def _free_positions(
 
 @dataclass(frozen=True, slots=True)
 class _Drive:
-    """Indices of independent and driven velocities.
+    """Independent velocities of a mechanism, and the velocities that motors drive.
 
     Attributes:
-        active: independent velocities.
-        motors: velocities whose efforts drive the mechanism.
-        named: names of velocities that the user named as active beyond the mobility.
+        active: indices in v of the independent velocities.
+        motors: indices in v of the velocities whose efforts drive the mechanism.
+        named: names of velocities that the user named as independent beyond the mobility. They are
+            driven too.
         leads: smallest singular value of the independent velocities in an orthonormal basis of all
             velocities at the first configuration; 0 at a dead centre.
     """
@@ -341,11 +375,17 @@ class _Drive:
 def _drive(
     system: System, chosen: tuple[int, ...], jacobians: Sequence[Matrix], mobility: int
 ) -> _Drive:
-    """Select independent velocities: chosen, motors, then those best conditioned for the rest.
+    """Select independent velocities: the user's choice first, then motors, then any others.
 
-    If the loops make chosen velocities and motors dependent, pivoting selects independent ones
-    among them. All of these drive the mechanism, together with velocities for the remaining
-    mobility.
+    Their number is the mobility. If the user's choice and the motors are dependent, pivoting
+    selects independent ones among them. All of these drive the mechanism, together with velocities
+    for the remaining mobility.
+
+    Args:
+        system: mechanism with loops.
+        chosen: indices in v of velocities that the user requires as independent.
+        jacobians: constraint Jacobians (m, nv) at regular configurations.
+        mobility: number of independent velocities.
     """
     if mobility == 0:
         return _Drive((), tuple(k for k, speed in enumerate(system.speeds) if speed.actuated))
@@ -369,12 +409,15 @@ def _drive(
 
 
 def _hold(free: Matrix, active: Sequence[int]) -> float:
-    """Return the smallest singular value of the independent rows of a basis of all velocities."""
+    """Return the smallest singular value of rows `active` of a basis `free` (nv, m) of velocities.
+
+    It is 0 if the independent velocities `active` do not determine the others.
+    """
     return float(np.min(np.linalg.svd(free[list(active)], compute_uv=False), initial=1.0))
 
 
 def _own_velocities(system: System) -> list[int]:
-    """Return all velocities except those of auxiliary frames of imposed motions (MotionJoint)."""
+    """Return indices in v of all velocities, without those of frames of imposed motions."""
     placed = {f"{p.name}.free" for p in system.parts if isinstance(p.element, MotionJoint)}
     return [k for k, speed in enumerate(system.speeds) if speed.joint not in placed]
 
@@ -409,6 +452,7 @@ _Labels = list[tuple[list[str], tuple[str, ...]]]
 
 
 def _labels(system: System) -> _Labels:
+    """Return the labels of the position rows and of the velocity rows of each loop or component."""
     return [
         ([label for label, _ in group.positions], tuple(label for label, _ in group.velocities))
         for group in row_groups(system)
@@ -416,6 +460,7 @@ def _labels(system: System) -> _Labels:
 
 
 def _with_rows(loops: Sequence[LoopRow], labels: _Labels, kept: _Kept) -> tuple[LoopRow, ...]:
+    """Return the loop table with the labels of all rows, and of the dropped (dependent) rows."""
     result = []
     row = slip = 0
     for loop, (names, slips) in zip(loops, labels, strict=True):

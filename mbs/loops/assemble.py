@@ -65,7 +65,11 @@ def _analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...
 
 
 def _choose(system: System, active: Sequence[str]) -> tuple[int, ...]:
-    """Return the indices of the velocities that the user named."""
+    """Return the indices in v of velocities that the user requires as independent.
+
+    Raises:
+        AssemblyError: a name is no velocity, or belongs to a cut joint.
+    """
     names = [speed.name for speed in system.speeds]
     for name in active:
         if name in [coordinate.name for coordinate in system.cut_coordinates]:
@@ -82,7 +86,10 @@ def _choose(system: System, active: Sequence[str]) -> tuple[int, ...]:
 
 
 def _laid_over(*guesses: Mapping[str, float]) -> dict[str, float]:
-    """Merge guesses. A later guess replaces earlier ones of the same coordinate."""
+    """Merge guesses {variable name: position}.
+
+    A later guess of a coordinate replaces earlier guesses.
+    """
     found: dict[str, float] = {}
     for guess in guesses:
         later = {_base(name) for name in guess}
@@ -92,13 +99,13 @@ def _laid_over(*guesses: Mapping[str, float]) -> dict[str, float]:
 
 
 def _base(name: str) -> str:
-    """Return the name of the coordinate in the name of a variable, such as j1 in j1.q."""
+    """Return the coordinate of a variable: j1 for j1.q. Return any other name unchanged."""
     base, _, kind = str(name).rpartition(".")
     return base if kind in GUESSES else str(name)
 
 
 def _plain_guess(system: System, guess: Mapping[str, float]) -> dict[str, float]:
-    """Return a guess by names of coordinates, such as j1 for j1.q.
+    """Return a guess {coordinate name: number}. Names of variables such as j1.q become j1.
 
     Raises:
         AssemblyError: a name is no coordinate, or a value is no number.

@@ -83,7 +83,7 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
 
 
 def rest_positions(system: System, p: Vector) -> dict[int, float]:
-    """Return positions without spring force [rad or m] of joints with a spring, by index in q."""
+    """Return {index in q: position without spring force [rad or m]} of joints with a spring."""
     found = dict[int, float]()
     for link in system.tree.links:
         if link.motion in (Motion.FREE, Motion.SPHERICAL):
@@ -96,7 +96,7 @@ def rest_positions(system: System, p: Vector) -> dict[int, float]:
 
 
 def _unknowns(system: System) -> set[int]:
-    """Return indices of the coordinates that are unknowns of components, or massless nodes."""
+    """Return indices in q of the unknowns of components and of massless nodes."""
     names = {
         f"{part.name}.{name}" for part in system.parts for name in part.element.names_of("unknown")
     }
@@ -107,9 +107,16 @@ def _unknowns(system: System) -> set[int]:
 def _stages(
     system: System, unknown: set[int], guessed: set[int], rest: set[int]
 ) -> Iterator[list[set[int]]]:
-    """Yield the sets of indices of held positions to try, with fewer positions in each stage.
+    """Yield groups of index sets. The positions of a set are fixed while the loops are closed.
 
-    Results of all sets of a stage are compared. Indices from nq belong to positions of cut joints.
+    The caller compares the results of all sets of a group and tries the next group if none closes.
+    Later groups have smaller sets. Indices from nq on belong to cut joints.
+
+    Args:
+        system: mechanism with loops.
+        unknown: indices of unknowns of components and of massless nodes.
+        guessed: indices of guessed positions.
+        rest: indices of joints with a spring, fixed where the spring has no force.
     """
     motors = {k for k, c in enumerate(system.coordinates) if c.actuated}
     stages = list[list[set[int]]]()

@@ -114,7 +114,14 @@ def velocity_balance_rows(system: System, q: SX, v: SX) -> list[tuple[str, list[
 def _rows(
     system: System, q: SX, v: SX, *, is_damped: bool
 ) -> list[tuple[str, list[tuple[str, Row]]]]:
-    """Return the balances that constrain positions, or velocities, with their names."""
+    """Return force balances of massless nodes as constraint rows, [(group name, [(node, row)])].
+
+    Args:
+        system: mechanism with massless nodes.
+        q: (nq, 1) symbols of positions.
+        v: (nv, 1) velocities.
+        is_damped: True for rows on velocities (nodes with dampers), False for rows on positions.
+    """
     own = [balance for balance in system.balances if balance.is_damped is is_damped]
     if not own:
         return []
@@ -163,7 +170,7 @@ def require_no_drift(system: System, what: str, velocities: Iterable[int]) -> No
 
 
 def _limit(system: System, names: Sequence[str], q: SX) -> SX:
-    """Return the sum of the limits of the named dry frictions (1, 1) [N or N m]."""
+    """Return the sum (1, 1) of the limits [N or N m] of the dry frictions of these components."""
     at, total = PartsAt(system, q, SX.zeros(system.nv)), SX(0)
     for part in system.parts:
         if part.name in names:
@@ -195,7 +202,7 @@ def require_no_balance(
 
 
 def without_values(system: System) -> str:
-    """Return text on parameters without value that prevent a search of massless nodes, or ""."""
+    """Return a hint that parameters without value prevent the search of massless nodes, or ""."""
     missing = [parameter.name for parameter in system.parameters if parameter.default is None]
     nodes = [system.speeds[system.tree.links[j].v.start].name for j in _massless_links(system)]
     if system.nodes or not nodes or not missing:
@@ -242,7 +249,15 @@ def obstacles(system: System, velocity: int) -> str:
 
 
 def _obstacle(system: System, part: ComponentInstance, velocity: int) -> str:
-    """Return why a component excludes a force balance on a node; empty text if it does not."""
+    """Return a clause "which ..." on why a component prevents the force balance of a massless node.
+
+    Empty if it does not.
+
+    Args:
+        system: mechanism with the node.
+        part: component that acts on the node.
+        velocity: index in v of the velocity of the node.
+    """
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     if part.element.has("stops"):
         return "which locks and releases"
@@ -262,13 +277,16 @@ def _obstacle(system: System, part: ComponentInstance, velocity: int) -> str:
 
 
 def _joint(system: System, link: int) -> str:
-    """Return the name of the joint of a link."""
+    """Return the name of the joint between a link (by index) and its parent."""
     name: str = system.coordinates[system.tree.links[link].q.start].joint
     return name
 
 
 def _massless_links(system: System) -> list[int]:
-    """Return indices of the one-freedom links without moved mass that are in no loop."""
+    """Return indices of links with one freedom whose joint moves no inertia and is in no loop.
+
+    A link counts if all its descendants are massless too. Empty if all links are massless.
+    """
     links = system.tree.links
     bound = {name for loop in system.loops for name in loop.joints}
     found = set(range(len(links)))
@@ -284,7 +302,7 @@ def _massless_links(system: System) -> list[int]:
 
 
 def _is_plain(link: Link) -> bool:
-    """Whether a link moves along one coordinate without rotor inertia."""
+    """Whether the joint of a link is revolute or prismatic and has no rotor inertia."""
     is_one = link.motion in (Motion.REVOLUTE, Motion.PRISMATIC)
     return is_one and link.rotor is None and link.Ia.is_zero()
 
@@ -295,7 +313,10 @@ def _has_mass(link: Link) -> bool:
 
 
 def _static_efforts(system: System, q: SX, v: SX) -> SX:
-    """Return the efforts (nv, 1) that hold the tree at q with velocities v, without inertia."""
+    """Return the efforts (nv, 1) of gravity, joint laws and components at q and v.
+
+    They hold the tree without inertia: accelerations and inertial velocity terms are zero.
+    """
     poses, rest = link_poses(system.tree, q), SX.zeros(system.nv)
     weight = newton_euler(system.tree, poses, rest, rest, resting_base(system.tree.gravity))
     own = joint_efforts(system.tree, q, v, rest)
@@ -303,9 +324,13 @@ def _static_efforts(system: System, q: SX, v: SX) -> SX:
 
 
 def _balances(system: System, nodes: Sequence[tuple[int, int]]) -> tuple[Balance, ...] | None:
-    """Return the force balances of nodes; None if the forces do not determine the nodes.
+    """Return the force balances that determine the motion of massless nodes; None if they do not.
 
     Forces on nodes must be linear in velocities, and may depend on positions and parameters.
+
+    Args:
+        system: mechanism with massless nodes.
+        nodes: (index in q, index in v) of each massless node.
     """
     positions, velocities = [k for k, _ in nodes], [k for _, k in nodes]
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
@@ -352,7 +377,17 @@ _Frictions = dict[int, list[tuple[str, Friction]]]
 
 
 def _frictions(system: System, nodes: Sequence[tuple[int, int]], q: SX, v: SX) -> _Frictions | None:
-    """Return dry frictions on nodes; None for a stop or for a friction of more than one node."""
+    """Return the dry frictions that act on massless nodes, by node.
+
+    None if a stop or one-way element acts on a node, or if a friction does not act on a single node
+    alone.
+
+    Args:
+        system: mechanism with massless nodes.
+        nodes: (index in q, index in v) of each massless node.
+        q: (nq, 1) symbols of positions.
+        v: (nv, 1) symbols of velocities.
+    """
     at, found = PartsAt(system, q, v), _Frictions()
     own = casadi.vertcat(*(x for k, j in nodes for x in (q[k], v[j])))
     for part in system.parts:
@@ -372,12 +407,12 @@ def _frictions(system: System, nodes: Sequence[tuple[int, int]], q: SX, v: SX) -
 
 
 def _same(one: SX, other: SX) -> bool:
-    """Whether two expressions have equal operations."""
+    """Whether two simplified expressions consist of the same operations."""
     return bool(casadi.is_equal(casadi.simplify(one), casadi.simplify(other), _DEPTH))
 
 
 def _motion(law: Friction | Stop | OneWay) -> list[SX]:
-    """Return the gap of a stop, or the velocity of a friction or one-way element."""
+    """Return the variable that switches a law: gap of a stop, or velocity of any other element."""
     if isinstance(law, Stop):
         return [SX(law.gap)]
     return [SX(law.slip if isinstance(law, Friction) else law.velocity)]
@@ -402,7 +437,7 @@ def _is_alone(damping: SX, velocities: Sequence[int], node: int) -> bool:
 
 
 def _without_velocities(efforts: SX, D: SX, damped: Sequence[int], others: Sequence[int]) -> SX:
-    """Return combinations of efforts that are independent of velocities, one per row of `others`.
+    """Return force balances from which the velocities are eliminated, one per row of `others`.
 
     Args:
         efforts: (n, 1) efforts at rest.
@@ -418,7 +453,7 @@ def _without_velocities(efforts: SX, D: SX, damped: Sequence[int], others: Seque
 
 
 def _samples(system: System, q: SX, matrix: SX) -> list[NDArray[np.float64]]:
-    """Return the finite values of a matrix at eight random configurations."""
+    """Return the finite numeric values of a matrix expression at eight random configurations."""
     function = Function("matrix", [q, system.p], [casadi.densify(matrix)])
     rng = np.random.default_rng(_SEED)
     at = np.array(system.configuration) + rng.uniform(-_REACH, _REACH, (8, system.nq))
@@ -427,7 +462,10 @@ def _samples(system: System, q: SX, matrix: SX) -> list[NDArray[np.float64]]:
 
 
 def _typical(matrices: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return medians (n,) of the absolute diagonals of (n, n) matrices; zeros without matrices."""
+    """Return medians (n,) of the absolute diagonals of several (n, n) matrices.
+
+    Without matrices, the result is a single zero.
+    """
     if not matrices:
         return np.zeros(1)
     found: NDArray[np.float64] = np.median([np.abs(np.diag(M)) for M in matrices], axis=0)

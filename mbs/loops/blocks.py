@@ -89,7 +89,14 @@ def steps_of(system: System) -> tuple[Step, ...]:
 
 
 def _block(work: PlanWork, waiting: Sequence[int]) -> LoopBlock | None:
-    """Return the first block whose roots contain the assembled configuration, or None."""
+    """Return the first block of unsolved loops that a numerical method solves, or None.
+
+    A block counts only if its solutions contain the assembled configuration.
+
+    Args:
+        work: state of the plan: known positions and solved loops.
+        waiting: indices of the unsolved loops and couplings.
+    """
     for find in (gear_trains, planar_blocks, single_loops, platforms):
         for block in find(work, waiting):
             if _gives_assembled(work, block):
@@ -105,7 +112,7 @@ def _assembled(system: System) -> tuple[Vector, Vector]:
 
 
 def _gives_assembled(work: PlanWork, block: LoopBlock) -> bool:
-    """Whether the assembled configuration is among the roots of a block."""
+    """Whether the solutions of a block contain the positions of the assembled configuration."""
     system = work.system
     q = np.array(system.configuration)
     try:
@@ -127,7 +134,13 @@ def _gives_assembled(work: PlanWork, block: LoopBlock) -> bool:
 
 
 class _Joined(NamedTuple):
-    """Unknown tree joint `link` from the group `parent`; `at` is its frame in that group."""
+    """Joint with unknown position between two rigid groups of links.
+
+    Attributes:
+        link: index of the child link.
+        parent: rigid group on the parent side.
+        at: frame of the joint at position zero, in the frame of the parent group.
+    """
 
     link: int
     parent: int
@@ -150,6 +163,7 @@ class _RigidGroups:
 
 
 def _groups(work: PlanWork) -> _RigidGroups:
+    """Return the rigid groups: sets of links between which all joint positions are known."""
     group, pose, joints = {-1: -1}, {-1: Pose.identity()}, dict[int, _Joined]()
     for k, link in enumerate(work.system.tree.links):
         before = pose[link.antecedent] @ link.pose()
@@ -164,14 +178,18 @@ def _groups(work: PlanWork) -> _RigidGroups:
 
 
 def _unknown_links(work: PlanWork, number: int) -> set[int]:
-    """Return the indices of the tree links in the loop of a cut joint whose joints are unknown."""
+    """Return indices of links with unknown joint positions in the loop of cut joint `number`."""
     tree = work.system.tree
     back, out = loop_links(work.system, work.system.cuts[number])
     return {k for k in (*back, *out) if tree.links[k].q.start not in work.known}
 
 
 def _connected(links: dict[int, set[int]]) -> list[list[int]]:
-    """Partition loops (with their unknown links) into sets that are connected by shared links."""
+    """Partition loops into sets that share unknown joints, directly or through other loops.
+
+    Args:
+        links: indices of the links with unknown joints, by loop.
+    """
     left, found = list(links), list[list[int]]()
     while left:
         own, before = [left.pop(0)], 0
@@ -188,7 +206,10 @@ def _connected(links: dict[int, set[int]]) -> list[list[int]]:
 
 
 def _free_groups(work: PlanWork, waiting: Sequence[int]) -> Iterator[tuple[list[int], list[int]]]:
-    """Yield each set of joint-closed loops connected by unknown links, and these links."""
+    """Yield sets of unsolved loops that share unknown joints, and the child links of these joints.
+
+    Loops that a constraint other than a rod or a point on a line closes are omitted.
+    """
     system = work.system
     links = {
         number: _unknown_links(work, number)
@@ -239,7 +260,7 @@ def gear_trains(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
 
 
 def _is_coaxial(work: PlanWork, ring: Ring) -> bool:
-    """Whether all unknown joints of a loop are revolute joints about one line."""
+    """Whether all unknown joints of a loop are revolute about one common line."""
     if any(joint.motion is not Motion.REVOLUTE for joint in ring.joints):
         return False
     across = [casadi.vertcat(gap.pose.R[0:2, 2], gap.pose.p[0:2]) for gap in ring.gaps]
@@ -247,6 +268,7 @@ def _is_coaxial(work: PlanWork, ring: Ring) -> bool:
 
 
 def _is_linear(work: PlanWork, coupling: CoordinateCoupling) -> bool:
+    """Whether a coupling of coordinates is linear in its unknown positions."""
     return coupling.driver in work.known or len(coupling.coefficients) <= _LINEAR
 
 
@@ -256,7 +278,9 @@ _LINEAR = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _GearTrain:
-    """Linear equations A x = b of joint positions. Rows of loops hold up to full rotations.
+    """Linear equations A x = b of joint positions x of a gear train.
+
+    Rows of loops are equations of angles and hold up to multiples of a full rotation.
 
     Attributes:
         indices: indices in q of the unknown positions x.
@@ -274,7 +298,10 @@ class _GearTrain:
     def of(
         work: PlanWork, rings: list[Ring], couplings: list[CoordinateCoupling]
     ) -> _GearTrain | None:
-        """Return the equations; None with fewer equations than unknowns, or too many loops."""
+        """Return the equations of loops of coaxial joints and of couplings.
+
+        None without loops, with fewer equations than unknowns, or with more than four loops.
+        """
         looped = {_index(joint) for ring in rings for joint in ring.joints}
         coupled = {number for coupling in couplings for number in coupling.coordinates}
         indices = tuple(sorted(looped | (coupled - work.known)))
@@ -292,7 +319,13 @@ class _GearTrain:
         return _GearTrain(indices, places, len(rings), equations)
 
     def roots(self, q: Vector, p: Vector) -> Roots:
-        """Return all solutions, with angles of loop joints within half a rotation of zero."""
+        """Return all solutions x for known positions q and parameters p.
+
+        Angles of joints in loops are within half a rotation of zero.
+
+        Raises:
+            NoClosedForm: the equations do not determine all unknown positions.
+        """
         A, b = (np.array(value) for value in self.equations(q, p))
         if rank(A, _LOCKED) < len(self.indices):
             raise NoClosedForm("gears leave joints a motion while all that is known stays")
@@ -357,7 +390,12 @@ _MOST = 6
 
 
 def _some(numbers: list[int], links: dict[int, set[int]]) -> Iterator[list[int]]:
-    """Yield the whole set of loops, then each smaller subset connected by unknown joints."""
+    """Yield the whole set of loops, then each smaller subset that is connected by unknown joints.
+
+    Args:
+        numbers: indices of the loops.
+        links: indices of the links with unknown joints, by loop.
+    """
     yield numbers
     for count in range(len(numbers) - 1, 0, -1) if len(numbers) <= _MOST else ():
         for chosen in combinations(numbers, count):
@@ -366,7 +404,7 @@ def _some(numbers: list[int], links: dict[int, set[int]]) -> Iterator[list[int]]
 
 
 def _is_flat_kind(work: PlanWork, number: int) -> bool:
-    """Whether all unknown tree joints of a loop are revolute or prismatic, and no rod closes it."""
+    """Whether a loop can be plane: unknown joints revolute or prismatic, closed by no rod."""
     if is_bound(work.system, number) or isinstance(work.system.cuts[number].edge.joint, Rod):
         return False
     links = work.system.tree.links
@@ -419,7 +457,7 @@ class _Plane:
         return plane
 
     def drawing(self, q: Vector, p: Vector) -> _Drawing | None:
-        """Return the loops in their plane at given positions; None if they are not in one plane."""
+        """Return the loops as equations in their plane at known positions q; None if not plane."""
         return _draw(self, _side_by_side(self.frames, q, p))
 
     def roots(self, q: Vector, p: Vector) -> Roots:
@@ -437,7 +475,12 @@ class _Plane:
 
 @dataclass(slots=True)
 class _Turn:
-    """Rotation of a group: that of group `number`, plus a constant `offset` [rad]."""
+    """Angle of a rigid group in the plane: unknown angle plus a constant.
+
+    Attributes:
+        number: index of the unknown angle.
+        offset: constant angle [rad].
+    """
 
     number: int
     offset: float
@@ -474,25 +517,36 @@ class _Drawing:
 
 @dataclass(slots=True)
 class _Point:
-    """Point of a group: complex coefficients by index of rotation and by index of displacement."""
+    """Point of a rigid group in the plane, as a linear form with complex coefficients.
+
+    Attributes:
+        turned: vectors that rotate with a group, by index of its unknown angle.
+        slid: directions of prismatic displacements, by index of the displacement.
+    """
 
     turned: dict[int, complex]
     slid: dict[int, complex]
 
     def plus(self, number: int, value: complex) -> _Point:
-        """Return the point plus a vector that rotates with group `number`."""
+        """Return the point plus a vector (as a complex number) that rotates with angle `number`."""
         return _Point({**self.turned, number: self.turned.get(number, 0) + value}, self.slid)
 
     def slides(self, number: int, value: complex) -> _Point:
-        """Return the point plus displacement `number` along a vector."""
+        """Return the point plus displacement `number` along a direction `value`."""
         return _Point(self.turned, {**self.slid, number: value})
 
 
 class _Bent(Exception):
-    """The loops are not in one plane."""
+    """Raised if the loops are not in one plane."""
 
 
 def _draw(plane: _Plane, frames: Matrix) -> _Drawing | None:
+    """Return the equations of plane loops; None if they are not plane.
+
+    Args:
+        plane: loops of the system.
+        frames: (k, 4, 4) frames of joints and cut joints in their groups.
+    """
     try:
         return _Draughtsman(plane, frames).drawing()
     except _Bent:
@@ -522,6 +576,10 @@ class _Draughtsman:
         self.carriers = list[int]()
 
     def _normal(self) -> Vector:
+        """Return the normal (3,) of the plane: axis of the first revolute joint.
+
+        Raise _Bent without one.
+        """
         links = self.plane.system.tree.links
         for k in self.plane.links:
             if links[k].motion is Motion.REVOLUTE:
@@ -530,7 +588,7 @@ class _Draughtsman:
         raise _Bent
 
     def vector(self, value: Vector) -> complex:
-        """Return a vector of the plane as a complex number."""
+        """Return the components of a vector (3,) in the plane as a complex number."""
         return complex(self.x @ value, self.y @ value)
 
     def drawing(self) -> _Drawing:
@@ -545,7 +603,19 @@ class _Draughtsman:
         return self._equations(rows, joints, merged)
 
     def _pass(self, k: int, parent: int) -> tuple[int, int] | int:
-        """Pass a tree joint; return (sign of its axis, parent group) or its displacement index."""
+        """Compute angle and origin of the group after a joint; return data of the joint's position.
+
+        Args:
+            k: child link of the joint, which names the group after it.
+            parent: group on the parent side.
+
+        Returns:
+            (sign of the axis along the normal, parent group) of a revolute joint; index of the
+            displacement of a prismatic joint.
+
+        Raises:
+            _Bent: the axis is neither normal to the plane nor in it.
+        """
         axis = self.zero[k][:3, 2]
         cosine = float(self.normal @ axis)
         before = self.turns[parent]
@@ -563,16 +633,25 @@ class _Draughtsman:
         return len(self.carriers) - 1
 
     def _slide(self, point: _Point, axis: Vector, turn: _Turn) -> _Point:
+        """Return the point plus a new unknown displacement along an axis (3,)."""
         self.carriers.append(turn.number)
         return point.slides(len(self.carriers) - 1, self.vector(axis) * np.exp(1j * turn.offset))
 
     def _end(self, group: int, frame: Matrix) -> _Point:
+        """Return the origin of a frame (4, 4) of a group as a point of that group.
+
+        The frame is given with all unknown joints at zero.
+        """
         turn = self.turns[group]
         step = self.vector(frame[:3, 3] - self.zero[group][:3, 3])
         return self.points[group].plus(turn.number, step * np.exp(1j * turn.offset))
 
     def _close(self, number: int, welds: list[tuple[int, int, float]]) -> _Point:
-        """Return the closure vector of a cut joint; append rotations that it couples to welds."""
+        """Return the closure vector of a cut joint, which is zero if the loop is closed.
+
+        If the joint prevents relative rotation, (group a, group b, angle between them) is appended
+        to `welds`.
+        """
         cut, (group_a, group_b) = self.plane.cuts[number], self.plane.ends[number]
         frame_a, frame_b = self.a[number], self.b[number]
         a, b = self._end(group_a, frame_a), self._end(group_b, frame_b)
@@ -592,7 +671,11 @@ class _Draughtsman:
         return _Point(turned, slid)
 
     def _freedoms(self, cut: Cut, frame: Matrix) -> tuple[bool, list[Vector]]:
-        """Return whether a cut joint rotates in the plane, and its axes of translation."""
+        """Return whether a cut joint rotates in the plane, and its translation axes (3,).
+
+        Raises:
+            _Bent: a freedom leaves the plane.
+        """
         joint = cut.edge.joint
         if cut.welded or isinstance(joint, Fixed):
             return False, []
@@ -616,7 +699,12 @@ class _Draughtsman:
         return turning, axes
 
     def _merge(self, welds: list[tuple[int, int, float]]) -> dict[int, _Turn]:
-        """Return each group's rotation after the welds: independent group and constant offset."""
+        """Return the angle of each group in terms of independent angles.
+
+        Args:
+            welds: pairs of groups with a constant angle between them: (group a, group b, angle
+                [rad]).
+        """
         merged = {k: _Turn(k, 0.0) for k in [KNOWN, *self.plane.links]}
 
         def resolved(turn: _Turn) -> _Turn:
@@ -639,6 +727,13 @@ class _Draughtsman:
     def _equations(
         self, rows: list[_Point], joints: list[tuple[int, int] | int], merged: dict[int, _Turn]
     ) -> _Drawing:
+        """Return the closure equations with lengths as fractions of the largest length.
+
+        Args:
+            rows: closure vectors, one per cut joint.
+            joints: joint data of `_pass`, in the order of the joints.
+            merged: independent angle and constant offset of each group.
+        """
         used = {merged[turn.number].number for turn in self.turns.values()}
         numbers = sorted(used - {KNOWN})
         place = {number: k for k, number in enumerate(numbers)} | {KNOWN: KNOWN}
@@ -698,6 +793,7 @@ def single_loops(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
 
 
 def _index(joint: ChainJoint) -> int:
+    """Return the index in q of the position of a revolute or prismatic joint."""
     assert joint.index is not None  # it is revolute or prismatic
     return joint.index
 
@@ -721,6 +817,7 @@ class _SingleLoop:
 
     @staticmethod
     def of(work: PlanWork, ring: Ring) -> _SingleLoop:
+        """Return the loop of a cyclic chain, rotated to start at a variable transform."""
         moving = [casadi.depends_on(gap.pose.matrix, work.q) for gap in ring.gaps]
         ring = ring.rotated(moving.index(True) if any(moving) else 0)
         values = casadi.horzcat(*(casadi.densify(gap.pose.matrix) for gap in ring.gaps))
@@ -729,7 +826,7 @@ class _SingleLoop:
         )
 
     def roots(self, q: Vector, p: Vector) -> Roots:
-        """Return all solutions of the loop at known positions q and parameters p."""
+        """Return all positions (r, n) of the loop's unknown joints at known positions q."""
         gaps = _side_by_side(self.gaps, q, p)
         signs = np.array([joint.sign for joint in self.joints])
         n = len(self.joints)
@@ -738,7 +835,7 @@ class _SingleLoop:
         return Roots(q * signs, found.proof, found.complete)
 
     def is_locked(self, q: Vector, p: Vector) -> bool:
-        """Whether all roots are found and regular: no joint moves while known ones are fixed."""
+        """Whether known positions fix all joints of the loop (all its solutions are regular)."""
         try:
             roots = self.roots(q, p)
         except NoClosedForm:
@@ -750,6 +847,11 @@ class _SingleLoop:
         return all(rank(own, _LOCKED) == n for own in J[:, :, :n])
 
     def _arm(self, gaps: Matrix) -> CertifiedArm:
+        """Return the arm of six joints that is equivalent to the loop; cached.
+
+        Args:
+            gaps: (n, 4, 4) transforms before the joints. The first is the end pose of the arm.
+        """
         key = gaps[1:].tobytes()
         if self.arm is None or self.arm[0] != key:
             added = _JOINTS - len(self.joints)
@@ -763,7 +865,12 @@ class _SingleLoop:
 
 
 def _added_gaps(count: int, size: float) -> Matrix:
-    """Return (count + 1, 4, 4) random transforms before added joints, and their inverse product."""
+    """Return (count + 1, 4, 4) random transforms before added joints; the last undoes the others.
+
+    Args:
+        count: number of joints that are added to reach six.
+        size: length of the loop [m], which scales the transforms.
+    """
     rng = np.random.default_rng(_SEED)
     gaps, back = list[Matrix](), np.eye(4)
     for _ in range(count):
@@ -781,7 +888,7 @@ def _added_gaps(count: int, size: float) -> Matrix:
 
 
 def platforms(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
-    """Yield the block of a platform on six legs, with all loops that share its unknown joints."""
+    """Yield a block for each platform on six legs among the unsolved loops."""
     system = work.system
     for numbers, links in _free_groups(work, waiting):
         hexapod = _Hexapod.of(work, numbers, links)
@@ -843,13 +950,21 @@ def _edges(work: PlanWork, numbers: list[int], links: list[int]) -> tuple[list[_
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Leg:
-    """Joints of a leg, ground to platform, each with whether its groups are in this order."""
+    """Joints of a leg of a platform, from ground to platform.
+
+    Attributes:
+        edges: each joint, and whether its first group is nearer to the ground than its second.
+    """
 
     edges: list[tuple[_Edge, bool]]
 
 
 def _legs(edges: Sequence[_Edge]) -> tuple[int, list[_Leg]] | None:
-    """Return the platform's group and its legs; None unless six legs join it to the ground."""
+    """Return the rigid group of the platform and its six legs; None for any other structure.
+
+    Args:
+        edges: joints between rigid groups.
+    """
     at = dict[int, list[_Edge]]()
     for edge in edges:
         for group in edge.ends:
@@ -895,7 +1010,13 @@ class _Axis(NamedTuple):
 
 
 class _Distance(NamedTuple):
-    """Distance that a leg keeps: points a of the ground, b of the platform (in its own frame)."""
+    """Constant distance between two points, which a leg imposes.
+
+    Attributes:
+        a: (3,) point on the ground, in the base frame.
+        b: (3,) point on the platform, in its frame.
+        length: distance [m].
+    """
 
     a: Vector
     b: Vector
@@ -936,7 +1057,12 @@ def _distance(leg: _Leg, frames: Matrix, *, slides: bool = False) -> _Distance |
 
 
 def _centre(axes: Sequence[_Axis], size: float) -> Vector | None:
-    """Return the point that all consecutive joints keep fixed; None if it is not unique."""
+    """Return the point (3,) that all joints at an end of a leg keep fixed; None if not unique.
+
+    Args:
+        axes: consecutive joints.
+        size: size of the leg [m], unit of the tolerance.
+    """
     balls = [axis.point for axis in axes if axis.motion is Motion.SPHERICAL]
     lines = [axis for axis in axes if axis.motion is Motion.REVOLUTE]
     if balls:
@@ -1003,7 +1129,10 @@ class _Hexapod:
         return tuple(sorted(index for index in every if index < self.system.nq))
 
     def roots(self, q: Vector, p: Vector) -> Roots:
-        """Return all poses of the platform, with each joint on its assembled branch."""
+        """Return positions of the unknown joints at all poses of the platform.
+
+        Each joint of a leg has the branch in which the system was assembled.
+        """
         frames = _side_by_side(self.frames, q, p)
         kept = [_distance(leg, frames) for leg in self.legs]
         legs = [leg for leg in kept if leg is not None]

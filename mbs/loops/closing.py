@@ -95,12 +95,15 @@ def relative_rows(system: System, q: SX) -> SX:
 
 
 def _lengths(system: System) -> list[bool]:
-    """Return whether each closure row is a length."""
+    """Return a list with True for each closure row that is a length, False for a cosine."""
     return [unit == "m" for *_, unit in position_rows(system)]
 
 
 def _configurations(system: System) -> list[list[float]]:
-    """Return the zero configuration and random ones, with zero displacements, unit quaternions."""
+    """Return the configurations (nq,) at which moment arms are evaluated: zero, then random angles.
+
+    Prismatic displacements are zero and quaternions are 1 in all of them.
+    """
     rng, configurations = np.random.default_rng(_SEED), list[list[float]]()
     for number in range(_SAMPLES):
         reach = np.pi if number else 0.0
@@ -255,10 +258,10 @@ class Closing:
                 yield closed.q
 
     def acting(self, *, norms: bool) -> NDArray[np.bool_]:
-        """Return whether a closure row depends on each position (nq,).
+        """Return a mask (nq,) of the positions on which a closure row depends.
 
         Args:
-            norms: whether the norm rows of quaternions, which are no loops, count.
+            norms: whether the unit-norm rows of quaternions, which are no loops, count too.
         """
         acting = np.zeros(self.system.nq, dtype=bool)
         rows, columns = self._functions().places
@@ -271,7 +274,7 @@ class Closing:
         return bool(np.all((cosines if self.axes is None else cosines[list(self.axes)]) > 0))
 
     def gap(self, q: Vector) -> str:
-        """Return text with the joint of the largest opening at q, and its size."""
+        """Return the joint with the largest closure error at q, and the error, as text."""
         units = [(name, unit) for name, _, unit in position_rows(self.system)]
         gaps: dict[str, list[float]] = {}
         for (name, unit), value in zip(units, self.rows(q)[0], strict=False):
@@ -288,7 +291,7 @@ class Closing:
         return ", ".join(f"{names[k]} = {q[k]:.4g}" for k in self.locked)
 
     def _newton(self) -> NewtonEquations:
-        """Return the rows that count as equations for the free positions."""
+        """Return the closure rows as equations for the free positions; rows `kept` only, if set."""
         kept = self.kept
         if kept is None:
             return self._functions().newton
@@ -300,6 +303,7 @@ class Closing:
         return found
 
     def _functions(self) -> ClosingFunctions:
+        """Return the compiled functions of the closure, cached in the system."""
         functions: ClosingFunctions = self.system.cached(
             ("closing", self.aims), lambda: _functions(self.system, self.aims)
         )
@@ -307,7 +311,7 @@ class Closing:
 
     @property
     def _given(self) -> Vector:
-        """Second argument of the functions: the parameters, then the values of cut positions."""
+        """Second argument of compiled functions: parameters, then targets of cut joints."""
         return self.p if self.cut is None or not self.aims else np.concatenate([self.p, self.cut])
 
 
@@ -346,7 +350,12 @@ def closure_parameters(system: System, values: Mapping[str, float] | None = None
 
 
 def _symbolic_rows(system: System, aims: tuple[int, ...]) -> tuple[SX, SX, SX, SX]:
-    """Return the symbols q and p (with cut targets), all rows, and the units of the rows."""
+    """Return symbols q, symbols p with targets of cut joints, all closure rows, and row units.
+
+    Args:
+        system: mechanism with loops.
+        aims: indices of cut-joint coordinates with a target. Each adds one row.
+    """
     q, p = SX.sym("q", system.nq), system.p
     norms = norm_rows(system.tree, q)
     sizes = casadi.vertcat(row_sizes(system), SX.ones(norms.shape))
@@ -362,7 +371,7 @@ def _symbolic_rows(system: System, aims: tuple[int, ...]) -> tuple[SX, SX, SX, S
 
 
 def _equations_of(system: System, aims: tuple[int, ...], kept: Sequence[int]) -> NewtonEquations:
-    """Return the rows `kept` as equations for the positions."""
+    """Return the closure rows with indices `kept` as equations for the positions."""
     q, p, r, _ = _symbolic_rows(system, aims)
     r = r[list(kept)]
     equations = Function("equations", [q, p], [r, casadi.jacobian(r, q)])
@@ -370,6 +379,7 @@ def _equations_of(system: System, aims: tuple[int, ...], kept: Sequence[int]) ->
 
 
 def _functions(system: System, aims: tuple[int, ...]) -> ClosingFunctions:
+    """Return the compiled closure functions, with one row for each cut-joint target `aims`."""
     q, p, r, sizes = _symbolic_rows(system, aims)
     J = casadi.jacobian(r, q)
 
@@ -387,7 +397,10 @@ def _functions(system: System, aims: tuple[int, ...]) -> ClosingFunctions:
 
 
 def _cut_moves(system: System, q: SX, target: SX) -> SX:
-    """Return differences (c, 1) of cut positions from a target, as in `row_difference`."""
+    """Return differences (c, 1) of cut-joint positions from a target (c, 1).
+
+    Angles are within half a rotation of zero, and quaternions are compared up to their sign.
+    """
     found, rows = cut_positions(system)(q, system.p), system.cut_coordinates
     for first in [k for k, row in enumerate(rows) if row.kind == "quaternion"][::4]:
         part = slice(first, first + 4)
@@ -400,6 +413,7 @@ def _cut_moves(system: System, q: SX, target: SX) -> SX:
 
 
 def _replace(q: Vector, indices: Sequence[int], values: Vector) -> Vector:
+    """Return a copy of q with `values` at `indices`."""
     result = q.copy()
     result[list(indices)] = values
     return result
@@ -414,7 +428,7 @@ def difference(system: System, q: Vector, other: Vector) -> Vector:
 
 
 def row_difference(rows: Sequence[Coordinate], q: Vector, other: Vector) -> Vector:
-    """Return q - other (n,) as `difference`, for any coordinates of the tree or of a cut."""
+    """Return q - other (n,) for any coordinates; angles are within half a rotation of zero."""
     gap = _within_half_turn(rows, q - other)
     for first in [k for k, row in enumerate(rows) if row.kind == "quaternion"][::4]:
         part = slice(first, first + 4)
@@ -429,6 +443,7 @@ def within_half_turn(system: System, q: Vector) -> Vector:
 
 
 def _within_half_turn(rows: Sequence[Coordinate], q: Vector) -> Vector:
+    """Return values of coordinates (n,) with angles within half a rotation of zero."""
     turned = np.array(q, dtype=float)
     turns = np.array([row.unit == "rad" for row in rows], dtype=bool)
     turned[turns] = np.remainder(turned[turns] + np.pi, 2 * np.pi) - np.pi
@@ -480,7 +495,9 @@ _REACHES = 1.0, 0.3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Line:
-    """Straight line of locked positions and parameters, as a function of its length s.
+    """Straight path of the locked positions and of the parameters during a continuation.
+
+    The path is a function of its arc length s.
 
     Attributes:
         system: mechanism with loops.
@@ -499,13 +516,13 @@ class _Line:
     scales: Vector
 
     def closing(self, s: float) -> Closing:
-        """Return the closure rows with the parameters at s."""
+        """Return the closure rows with the parameters of path position s."""
         first, last = self.parameters
         p = last if s == self.length else first + s / self.length * (last - first)
         return Closing(self.system, p, self.locked)
 
     def placed(self, q: Vector, s: float) -> Vector:
-        """Return the configuration q with the locked positions at s."""
+        """Return the configuration q (nq,) with its locked positions moved to path position s."""
         (first, last), indices = self.ends, list(self.locked)
         if s == self.length:
             at = last
@@ -517,7 +534,7 @@ class _Line:
         return _replace(q, indices, at[indices])
 
     def slope(self, q: Vector, s: float) -> Vector | None:
-        """Return dq/ds (nq,) of the branch through the closed q; None if the branch turns there."""
+        """Return the tangent dq/ds (nq,) of the branch at a closed q; None if it turns there."""
         if 0 < len(self.closing(s).free) < MANY:
             return self._exact_slope(q, s)
         ahead = s + _OFFSET if s + _OFFSET <= self.length else s - _OFFSET
@@ -528,7 +545,10 @@ class _Line:
         return slope if np.max(np.abs(slope / self.scales), initial=0.0) < _STEEP else None
 
     def _exact_slope(self, q: Vector, s: float) -> Vector | None:
-        """Return dq/ds from derivatives of the rows, which is accurate near singular branches."""
+        """Return the tangent dq/ds (nq,) from derivatives of the rows.
+
+        It is accurate near singular branches. None if q is singular or the slope too steep.
+        """
         low, high = max(s - _OFFSET, 0.0), min(s + _OFFSET, self.length)
         before, after = self.placed(q, low), self.placed(q, high)
         rows = replace(self.closing(s), locked=()).rows(q)[1] @ (after - before)
@@ -541,7 +561,10 @@ class _Line:
         return slope if np.max(np.abs(slope / self.scales), initial=0.0) < _STEEP else None
 
     def _shortest(self, q: Vector, s: float, rows: Vector) -> Vector | None:
-        """Return the smallest move (nq,) of free positions that gives a change of rows, or None."""
+        """Return the smallest change (nq,) of free positions that changes the rows by `rows`.
+
+        None if the closure is singular at q.
+        """
         closing = self.closing(s)
         scales = self.scales[closing.free]
         J = closing.rows(q)[1] / closing.sizes[:, None] * scales
@@ -555,7 +578,12 @@ class _Line:
         return move
 
     def _rank(self, rows: int, most: int) -> int:
-        """Return the rank of the rows by the free positions at regular configurations."""
+        """Return the rank that the closure rows have at regular configurations.
+
+        Args:
+            rows: number of all rows, with those of quaternion norms last.
+            most: number of singular values, an upper limit.
+        """
         closure = self.system.closure
         return (
             most if closure is None else min(len(closure.rows) + len(self._free_norms(rows)), most)
@@ -574,7 +602,10 @@ class _Line:
         return q
 
     def side(self, q: Vector, s: float) -> float:
-        """Return the sign of the determinant of the loops by free positions; 0 if undefined."""
+        """Return the sign of det of the closure Jacobian by free positions; 0 if it is not square.
+
+        The sign changes if a continuation passes a singular configuration.
+        """
         closure, closing = self.system.closure, self.closing(s)
         free = closing.free
         if closure is None or closure.varies or not 0 < len(free) < MANY:
@@ -584,7 +615,11 @@ class _Line:
         return float(np.linalg.slogdet(J[kept])[0]) if len(kept) == len(free) else 0.0
 
     def _free_norms(self, count: int) -> list[int]:
-        """Return the row indices of quaternion norms whose quaternion is not locked as a whole."""
+        """Return indices of the quaternion norm rows of quaternions that are not entirely locked.
+
+        Args:
+            count: number of all rows, norm rows last.
+        """
         parts = [range(turn.start, turn.stop) for turn in quaternion_slices(self.system.tree)]
         first, locked = count - len(parts), set(self.locked)
         return [first + k for k, part in enumerate(parts) if not locked >= set(part)]
@@ -648,7 +683,7 @@ def follow_configuration(
 
 
 def _end_of_branch(line: _Line, start: Vector) -> Vector:
-    """Return the configuration (nq,) at the end of a line, on the branch of a start.
+    """Return the configuration (nq,) at the end of a path, by continuation from the closed `start`.
 
     Raises:
         Unclosable: the branch turns or the start is singular.
@@ -678,9 +713,10 @@ def _end_of_branch(line: _Line, start: Vector) -> Vector:
 
 
 def _singular_end(line: _Line, q: Vector) -> Vector:
-    """Return the configuration (nq,) at a singular end, extrapolated from its branch.
+    """Return a more accurate singular configuration (nq,) at the end of a path.
 
-    The closing rows determine a singular configuration to the square root of rounding only.
+    It is extrapolated from five closed configurations before the end, since closure rows determine
+    a singular configuration to the square root of rounding only. q is returned if this fails.
     """
     points = list[Vector]()
     for s in line.length - _BEFORE_END * np.arange(1, len(_EXTRAPOLATION) + 1):
@@ -718,12 +754,18 @@ def _line(
     locked: tuple[int, ...],
     parameters: tuple[Vector, Vector],
 ) -> _Line:
-    """Return the line of locked positions and of parameters from a start to a target.
+    """Return the straight path of locked positions and parameters between two configurations.
 
-    Positions that no loop depends on are at the target from the start.
+    Positions on which no loop depends have their final value from the start.
 
     Raises:
         Unclosable: the line is too long.
+
+    Args:
+        system: mechanism with loops.
+        ends: (nq,) configurations at the start and at the end.
+        locked: indices in q of the positions that move on the path.
+        parameters: (np,) parameters at the start and at the end.
     """
     closing = Closing(system, parameters[1])
     size = closing.size
@@ -748,11 +790,19 @@ def _line(
 
 
 _Point = tuple[Vector, Vector, float]
-"""Configuration, its slope, and the sign of the determinant of the loops."""
+"""Closed configuration (nq,), tangent dq/ds (nq,), and sign of the determinant of the closure
+Jacobian by free positions."""
 
 
 def _step(line: _Line, point: _Point, s: float, to: float) -> _Point | None:
-    """Return the result of one step on a branch from s to `to`; None if it may leave the branch."""
+    """Return the point after a continuation step from s to `to`; None if it may leave the branch.
+
+    Args:
+        line: path of the continuation.
+        point: closed configuration at s, its tangent dq/ds, and the sign of the determinant.
+        s: path position at the start of the step.
+        to: path position at the end of the step.
+    """
     (q, slope, side), h = point, to - s
     predicted = line.placed(q + h * slope, to)
     found = line.closing(to).nearest(predicted)
@@ -777,7 +827,14 @@ def _step(line: _Line, point: _Point, s: float, to: float) -> _Point | None:
 
 
 def _ended(line: _Line, q: Vector, s: float, what: str) -> str:
-    """Return the error message for the end of a branch (`what`), with other configurations."""
+    """Return the error message for a continuation that cannot reach its target.
+
+    Args:
+        line: path of the continuation.
+        q: (nq,) last configuration.
+        s: path position of q.
+        what: verb of the branch: "ends" or "meets others".
+    """
     system, closing, target = line.system, line.closing(line.length), line.ends[1]
     where = closing.locked_positions(q) or "it"
     text = (
@@ -812,7 +869,10 @@ def unwound(closing: Closing, q: Vector, start: Vector) -> Vector:
 
 
 def _sign(quaternion: Vector, start: Vector) -> float:
-    """Return -1 if the negative of a quaternion is nearer to the start, else 1."""
+    """Return -1 if the negative of a unit quaternion is nearer to the quaternion `start`, else 1.
+
+    If both are equally near, the sign makes the first nonzero element positive.
+    """
     for value in (float(quaternion @ start), *quaternion):
         if abs(value) > _HALF_TURN:
             return float(np.sign(value))

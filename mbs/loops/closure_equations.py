@@ -31,7 +31,7 @@ from mbs.spatial import Pose, cross
 
 
 def cut_twist(system: System, pose: Pose, q: SX, v: SX) -> tuple[SX, SX]:
-    """Return velocity (3, 1) of the origin and angular velocity (3, 1) of a frame, relative.
+    """Return the relative velocity and angular velocity (3, 1) of the two frames of a cut joint.
 
     Args:
         system: mechanism with closed loops.
@@ -52,7 +52,10 @@ def cut_twist(system: System, pose: Pose, q: SX, v: SX) -> tuple[SX, SX]:
 
 
 def slip_rows(system: System, q: SX) -> list[tuple[str, SX]]:
-    """Return name and velocity rows (k, nv) of each rolling disc, component and damped node."""
+    """Return (name, rows (k, nv)) of all constraints on velocities only: J such that J v + g = 0.
+
+    They belong to rolling discs (no slip), components, and massless nodes with dampers.
+    """
     v = SX.sym("v", system.nv)
     result = []
     for cut, disc in rolling_discs(system):
@@ -71,13 +74,13 @@ def slip_rows(system: System, q: SX) -> list[tuple[str, SX]]:
 
 
 def drift_rows(system: System, q: SX) -> SX | None:
-    """Return the values of the velocity rows of damped massless nodes at v = 0, or None."""
+    """Return the constant part g of the velocity rows of damped massless nodes, or None."""
     rows = velocity_balance_rows(system, q, SX.zeros(system.nv))
     return casadi.vertcat(*(row.value for _, row in rows[0][1])) if rows else None
 
 
 def least_upright(system: System) -> Function:
-    """Return ``upright(q, p)``: the smallest sine between a rolling disc and its plane."""
+    """Return ``upright(q, p)``: smallest sine of the angle between a rolling disc and its plane."""
 
     def build() -> Function:
         q = SX.sym("q", system.nq)
@@ -125,7 +128,7 @@ def closure_rows(system: System, q: SX) -> SX:
 
 
 def independent_closure(system: System, q: SX) -> SX:
-    """Return the independent closure rows (r, 1), found by the analysis, at the symbols q."""
+    """Return the independent closure rows (r, 1), selected by the loop analysis, at symbols q."""
     if system.closure is None:
         raise ModelError(f"{system.name}: an open chain has no closure; use the open-chain models")
     return closure_rows(system, q)[list(system.closure.rows)]
@@ -217,6 +220,8 @@ class _Equations:
 
 
 def _equations(system: System) -> _Equations:
+    """Return the closure equations of loops, couplings, components and massless nodes."""
+
     def build() -> _Equations:
         q = SX.sym("q", system.nq)
         loops, cosines = list[tuple[str, list[tuple[str, Row]]]](), list[SX]()

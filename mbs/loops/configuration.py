@@ -112,7 +112,14 @@ def _closed(
     guess: Mapping[str, float],
     parameters: Mapping[str, float] | None,
 ) -> Vector:
-    """Return the configuration (nq,) of `solve` for positions by name."""
+    """Return the closed configuration (nq,) for positions by name; implementation of `solve`.
+
+    Args:
+        system: assembled mechanism.
+        fixed: positions that the result must have, by coordinate name.
+        guess: approximate positions by coordinate name, cut joints included.
+        parameters: values of symbols by name.
+    """
     p = closure_parameters(system, parameters)
     at_cut = system.positions_at_cuts(guess)
     own = {name: value for name, value in guess.items() if name not in at_cut}
@@ -145,6 +152,7 @@ def _closed(
 
 
 def _coordinate_names(system: System) -> list[str]:
+    """Return the names of the coordinates of the tree, in the order of q."""
     return [coordinate.name for coordinate in system.coordinates]
 
 
@@ -160,10 +168,17 @@ def _with_dependent_positions(
     guess: Mapping[str, float],
     p: Vector,
 ) -> Vector:
-    """Return the configuration (nq,) with all independent positions and some dependent ones.
+    """Return the configuration for all independent and some dependent positions, which are checked.
 
     Raises:
         Unclosable: the loops give the dependent joints other positions.
+
+    Args:
+        system: mechanism with closed loops.
+        target: (nq,) required and approximate positions.
+        fixed: required positions by name.
+        guess: approximate positions by name, cut joints included.
+        p: (np,) parameters.
     """
     names = independent_names(system)
     independent, surplus = _indices(system, names), [name for name in fixed if name not in names]
@@ -198,10 +213,14 @@ def _with_positions(q: Vector, target: Vector, indices: Sequence[int]) -> Vector
 
 
 def _guessed_configuration(closing: Closing, start: Vector, guess: Mapping[str, float]) -> Vector:
-    """Return the configuration (nq,) whose guessed positions are nearest to their guesses.
+    """Return the closed configuration (nq,) whose guessed positions are nearest to their guesses.
 
-    The search method is that of `mbs.loops.assembled`. The target of a cut joint without a guess
-    is its position in the assembled configuration.
+    The target of a cut joint without a guess is its position in the assembled configuration.
+
+    Args:
+        closing: closure rows and the locked positions.
+        start: (nq,) locked positions, and start values of the others.
+        guess: approximate positions by name.
     """
     system, p = closing.system, closing.p
     cut = cut_positions_and_slopes(system)(np.array(system.configuration), p)[0].ravel()
@@ -238,7 +257,15 @@ def closed_configuration(closing: Closing, start: Vector, restarts: int = _RESTA
 
 
 def starts(first: Vector, free: list[int], restarts: int = _RESTARTS) -> Iterator[Vector]:
-    """Yield the guess, then random starts at increasing distances from it, always the same."""
+    """Yield start configurations: `first` (nq,), then random ones at increasing distances from it.
+
+    The sequence is the same at every call.
+
+    Args:
+        first: (nq,) first guess.
+        free: indices in q of the positions that may differ.
+        restarts: number of random starts.
+    """
     rng = np.random.default_rng(_SEED)
     yield first
     for k in range(restarts):
@@ -260,7 +287,7 @@ def require_closed(
 
 
 def _require_joined(closing: Closing, q: Vector) -> None:
-    """Raise LoopError if the configuration q (nq,) leaves the loops open."""
+    """Raise LoopError if the configuration q (nq,) leaves the loops open or an axis opposed."""
     name = closing.system.name
     if closing.openness(q) > OPEN:
         missed = np.abs(closing.rows(q)[0])
@@ -334,7 +361,7 @@ def start_position(
     parameters: Mapping[str, float] | None,
     guess: Guess = None,
 ) -> Vector:
-    """Return the initial positions (nq,) of `start`."""
+    """Return initial positions (nq,) that close the loops, with the arguments of `start`."""
     given: Values = system.plain_names(positions_of(q0), POSITIONS)
     if guess is not None and not isinstance(given, Mapping | None):
         raise ModelError(
@@ -356,7 +383,7 @@ def start_position(
 def start_velocity(
     system: System, q: Vector, v0: Values, parameters: Mapping[str, float] | None
 ) -> Vector:
-    """Return the initial velocities (nv,) of `start` at its positions q.
+    """Return initial velocities (nv,) at the closed positions q, with the arguments of `start`.
 
     They are the smallest velocities that keep the loops closed and agree with v0. Joints with
     springs stay at rest if the loops allow it.
@@ -388,7 +415,7 @@ def start_velocity(
 
 
 def _spring_speeds(system: System) -> list[str]:
-    """Return the names of the velocities of joints with springs."""
+    """Return names of the velocities of one-freedom joints with springs, without massless nodes."""
     return [
         system.speeds[link.v.start].name
         for link in system.tree.links
@@ -451,7 +478,10 @@ def smallest_velocity(
 
 
 def _less(system: System, v0: Values, own: Vector) -> Values:
-    """Return the velocities v0 minus the velocities `own` (nv,), in the format of v0."""
+    """Return velocities v0 (by name or as a list) minus `own` (nv,) in the same format.
+
+    None stays None.
+    """
     less = np.array(system.velocity(v0)) - own
     if v0 is None:
         return None
@@ -461,7 +491,7 @@ def _less(system: System, v0: Values, own: Vector) -> Values:
 
 
 def _fit(v: Vector, target: Vector) -> bool:
-    """Whether velocities agree with the required ones, up to `_FITS` and `_SLOW`."""
+    """Whether velocities v agree with `target`, up to 1e-6 of the target and 1e-9 rad/s or m/s."""
     return bool(np.all(np.abs(v - target) <= _SLOW + _FITS * np.abs(target)))
 
 

@@ -81,5 +81,5 @@ def cut_position(cut: Cut, number: int, pose: Pose) -> SX:
 
 
 def _angle(axis: SX, start: SX, end: SX) -> SX:
-    """Return the rotation about `axis` from `start` to `end` [rad]; both are orthogonal to it."""
+    """Return the angle [rad] about `axis` from `start` to `end`, vectors (3, 1) normal to it."""
     return casadi.atan2(casadi.dot(cross(axis, start), end), casadi.dot(start, end))

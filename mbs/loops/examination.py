@@ -137,7 +137,7 @@ def require_determined(system: System, q: Vector, p: Vector, least: float = _DET
 
 
 def loop_rows(system: System, q: SX, least: float = _DETERMINED) -> list[ValidityRow]:
-    """Return the conditions on a configuration of closed loops for models in independent joints.
+    """Return validity conditions of models in independent joints: loops closed, joints determined.
 
     Args:
         system: mechanism with closed loops.
@@ -198,7 +198,10 @@ def row_independence(system: System) -> Function:
 
 
 def _scale(system: System, J: SX) -> SX:
-    """Return J, with the kept rows or all rows, scaled to be independent of units."""
+    """Return a constraint Jacobian J with row and column factors that remove the units.
+
+    J has either all rows of the system, or only its independent rows.
+    """
     found, kept = scales(system), kept_rows(system)
     rows = found.rows[kept] if J.shape[0] == len(kept) else found.rows
     columns = DM(found.columns([speed.unit for speed in system.speeds]))

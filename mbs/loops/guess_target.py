@@ -43,7 +43,7 @@ class GuessTarget:
 
     @staticmethod
     def at(closing: Closing, start: Vector, guessed: Sequence[int]) -> GuessTarget:
-        """Return the target of a start, with indices in q of its guessed positions.
+        """Return a target with positions `start` (nq,); `guessed` are indices in q.
 
         Positions of cut joints do not count.
         """
@@ -75,7 +75,10 @@ class GuessTarget:
         return GuessTarget(system, p, start, np.array(at_cut, dtype=float), guessed)
 
     def closing(self, held: set[int]) -> Closing:
-        """Return the closure rows with the positions of indices `held` fixed at the target."""
+        """Return the closure rows with the positions of indices `held` locked at the target.
+
+        Indices from nq on belong to cut joints.
+        """
         nq = self.system.nq
         locked = tuple(sorted(k for k in held if k < nq))
         aims = () if self.cut is None else tuple(sorted(k - nq for k in held if k >= nq))
@@ -104,7 +107,7 @@ class GuessTarget:
         return np.concatenate([own, row_difference(cut, self._at_cut(q), self._at_cut(other))])
 
     def _at_cut(self, q: Vector) -> Vector:
-        """Return the positions (c,) of the cut joints [rad, m or 1]."""
+        """Return the positions (c,) of the cut joints at q (nq,) [rad, m or 1]."""
         return cut_positions_and_slopes(self.system)(q, self.p)[0].ravel()
 
     def units(self, closing: Closing) -> Vector:
@@ -112,7 +115,10 @@ class GuessTarget:
         return distance_units((row.unit for row in self.rows), closing.size)
 
     def miss(self, closing: Closing, q: Vector) -> float:
-        """Return the Euclidean distance from the guessed positions [rad, or sizes]."""
+        """Return the Euclidean distance of q (nq,) from the guessed positions [rad, or sizes].
+
+        Other positions do not count. Lengths are divided by the size of the mechanism.
+        """
         moves = self.moves(q) / self.units(closing)
         return float(np.linalg.norm(moves[list(self.guessed)]))
 
@@ -141,4 +147,5 @@ class GuessTarget:
 
 
 def _largest(values: Vector) -> float:
+    """Return the largest absolute value; 0 for an empty array."""
     return float(np.max(np.abs(values), initial=0.0))

@@ -89,12 +89,12 @@ def least_distance(closing: Closing, target: GuessTarget, starts: Iterable[Vecto
 
 
 def _is_listed(closing: Closing, q: Vector, found: Iterable[Vector], reach: float) -> bool:
-    """Whether a configuration is in a list, within `reach` of all its positions [rad or m]."""
+    """Whether `found` has a configuration within `reach` [rad or m] of q in every position."""
     return any(np.max(np.abs(difference(closing.system, q, x))) < reach for x in found)
 
 
 def _with_met_guesses(closing: Closing, target: GuessTarget, q: Vector) -> Vector:
-    """Return q with exact values of the guessed positions that it meets up to rounding."""
+    """Return the closed q (nq,) with guessed positions set to their guess if they agree to 1e-9."""
     moves = target.moves(q) / target.units(closing)
     met = {k for k in target.guessed if abs(moves[k]) < MET}
     locked = tuple(sorted({*closing.locked, *(k for k in met if k < closing.system.nq)}))
@@ -156,7 +156,13 @@ class _Objective:
         return _ManifoldPoint(value, N.T @ gradient, N.T @ hessian @ N, N, units[free])
 
     def moved(self, q: Vector, point: _ManifoldPoint, step: Vector) -> Vector | None:
-        """Return the closed configuration after a step on the manifold; None if none is near."""
+        """Return the closed configuration after a step from q; None if none is near.
+
+        Args:
+            q: (nq,) closed configuration.
+            point: derivatives at q.
+            step: (m,) step in the basis of the motions that the loops allow at q.
+        """
         free, predicted = self.closing.free, q.copy()
         predicted[free] += point.units * (point.basis @ step)
         found = self.closing.nearest(predicted)
@@ -165,7 +171,7 @@ class _Objective:
 
 
 def _objective(closing: Closing, target: GuessTarget, indices: Iterable[int]) -> _Objective:
-    """Return the objective of some positions, by their indices among all positions."""
+    """Return half the squared distance from a target, of the positions with these indices."""
     units = target.units(closing)
     counted = np.zeros(len(units))
     counted[list(indices)] = 1.0
@@ -194,7 +200,7 @@ class _ManifoldPoint:
 def _descended(objective: _Objective, start: Vector, known: Sequence[Vector] = ()) -> Vector | None:
     """Return the minimum (nq,) of an objective reached by Newton's method from a closed start.
 
-    The result is None if the iteration comes close to a known minimum.
+    None if the iteration comes close to one of the `known` minima.
     """
     q, longest = start, _LONGEST
     point = objective.point(q)
@@ -224,7 +230,10 @@ def _is_better(
 
 
 def _newton_step(gradient: Vector, hessian: Vector, longest: float) -> Vector:
-    """Return the Newton step (m,) with absolute curvatures, which avoids maxima and saddles."""
+    """Return the step (m,) -|H|^-1 g of at most `longest`; |H| has absolute eigenvalues.
+
+    Absolute eigenvalues of the Hessian avoid maxima and saddle points.
+    """
     if not len(gradient):
         return np.zeros(0)
     values, vectors = np.linalg.eigh(hessian)
@@ -236,7 +245,10 @@ def _newton_step(gradient: Vector, hessian: Vector, longest: float) -> Vector:
 
 
 def nearest_in_all(closing: Closing, target: GuessTarget, q: Vector) -> Vector:
-    """Return the minimum of the distance of all positions at a constant distance of the guess.
+    """Return the closed configuration nearest in all positions among those nearest to the guess.
+
+    If the guess does not determine the configuration, it moves along configurations of equal
+    distance from the guess.
 
     Args:
         closing: closure rows and the locked positions.
@@ -267,7 +279,7 @@ def nearest_in_all(closing: Closing, target: GuessTarget, q: Vector) -> Vector:
 
 
 def _null_space(closing: Closing, q: Vector) -> tuple[Vector, Vector, Vector, Vector]:
-    """Return the singular value decomposition of the rows at q, split at its rank r.
+    """Return the singular value decomposition of the closure Jacobian at q, split at its rank r.
 
     Returns:
         Left vectors (m, r), basis of the null space (n, n - r), singular values (r,), right

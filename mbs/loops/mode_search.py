@@ -121,6 +121,7 @@ def assembly_modes(
 
 
 def _distinct(modes: Iterable[Mode | None]) -> list[Mode]:
+    """Return the modes without repeated configurations; None is skipped."""
     found: list[Mode] = []
     for mode in modes:
         if mode is not None and not any(_same(mode, other) for other in found):
@@ -129,6 +130,7 @@ def _distinct(modes: Iterable[Mode | None]) -> list[Mode]:
 
 
 def _checked(system: System, q: Vector, branch: tuple[str, ...], p: Vector) -> Mode | None:
+    """Return the mode with positions q (nq,); None if q does not close the loops."""
     residual = 0.0
     if system.is_closed:
         closing = Closing(system, p)
@@ -139,6 +141,7 @@ def _checked(system: System, q: Vector, branch: tuple[str, ...], p: Vector) -> M
 
 
 def _same(mode: Mode, other: Mode) -> bool:
+    """Whether the positions of two modes are equal to 1e-9."""
     return bool(np.max(np.abs(np.subtract(mode.q, other.q)), initial=0.0) < _SAME)
 
 
@@ -157,6 +160,17 @@ a fold, the closing iteration returns to the mode, to 1e-6."""
 
 
 def _of_blocks(system: System, steps: Sequence[Step], start: Vector, p: Vector) -> ModeList:
+    """Return all modes of loops that are solved stage by stage and block by block.
+
+    Args:
+        system: assembled mechanism.
+        steps: closed forms and numerical blocks, in their order of solution.
+        start: all positions; the independent ones are known.
+        p: (np,) parameters.
+
+    Raises:
+        LoopError: the number of modes is infinite.
+    """
     told = list[Roots]()
     try:
         every = list(_every(steps, start, p, told))
@@ -184,12 +198,20 @@ def _of_blocks(system: System, steps: Sequence[Step], start: Vector, p: Vector) 
 
 
 def _near(system: System, q: Vector, mode: Mode) -> bool:
+    """Whether a configuration q (nq,) is a mode, up to full rotations and 1e-6."""
     gap = difference(system, q, np.array(mode.q))
     return bool(np.max(np.abs(gap), initial=0.0) < _SAME_START)
 
 
 def _every(steps: Sequence[Step], q: Vector, p: Vector, told: list[Roots]) -> Iterator[Vector]:
-    """Yield all positions of all branches; append the result of each block to the list `told`."""
+    """Yield all positions of each combination of solutions of the steps.
+
+    Args:
+        steps: closed forms and numerical blocks, in their order of solution.
+        q: all positions, of which the known ones count.
+        p: (np,) parameters.
+        told: list to which the solutions of each block are appended.
+    """
     if not steps:
         yield q
         return
@@ -207,6 +229,10 @@ def _every(steps: Sequence[Step], q: Vector, p: Vector, told: list[Roots]) -> It
 
 
 def _refined(closing: Closing, q: Vector) -> Vector:
+    """Return a root q (nq,) corrected by Newton steps on all closure rows.
+
+    If the correction is larger than 1e-4, q is returned unchanged.
+    """
     if closing.openness(q) <= TOLERANCE:
         return q
     near = closing.nearest(q)
@@ -221,7 +247,7 @@ _REMEDY = (
 
 
 def _require_locked(closing: Closing, q: Vector) -> None:
-    """Raise if a mode can move while the independent joints are fixed.
+    """Raise if the loops allow a motion at a mode q (nq,) while the independent joints are fixed.
 
     Raises:
         LoopError: the mode moves. The message contains the joints that move most.
@@ -340,6 +366,7 @@ def working_modes(
 
 
 def _starts(system: System, middle: Vector, reach: float, tries: int) -> list[Vector]:
+    """Return start configurations: `middle` (nq,), then random ones within `reach` of it."""
     rng = np.random.default_rng(_SEED)
     drawn = [middle, *(middle + rng.uniform(-reach, reach, middle.shape) for _ in range(tries - 1))]
     for q in drawn:
@@ -349,6 +376,7 @@ def _starts(system: System, middle: Vector, reach: float, tries: int) -> list[Ve
 
 
 def _add(target: Goal, found: list[WorkingMode], q: Vector) -> None:
+    """Append the configuration q as a working mode, or count one more hit if it is in the list."""
     system = target.closing.system
     for number, mode in enumerate(found):
         if _distance(system, np.array(mode.q), q) < _SAME_WORKING_MODE:
@@ -360,11 +388,15 @@ def _add(target: Goal, found: list[WorkingMode], q: Vector) -> None:
 
 
 def _distance(system: System, q: Vector, other: Vector) -> float:
+    """Return the largest difference of a position of two configurations (nq,) [rad or m]."""
     return float(np.max(np.abs(difference(system, q, other)), initial=0.0))
 
 
 def _tidy(target: Goal, q: Vector) -> Vector:
-    """Return q with angles within half a rotation of zero, if that still closes; else q (gears)."""
+    """Return q with angles within half a rotation of zero and positive quaternions.
+
+    If that does not close the loops, as with gears, q is returned unchanged.
+    """
     system = target.closing.system
     tidy = within_half_turn(system, q)
     for part in quaternion_slices(system.tree):
@@ -421,7 +453,7 @@ def closed_configurations(closing: Closing, start: Vector) -> list[Vector]:
 
 
 def _closed_configurations(closing: Closing, start: Vector) -> Iterator[Vector]:
-    """Yield each new configuration as soon as it is found."""
+    """Yield the results of `closed_configurations`, each as soon as it is found."""
     rng = np.random.default_rng(_START_SEED)
     found, hits, newest = list[Vector](), list[int](), 0
     for number in range(1, _START_TRIES + 1):
@@ -443,6 +475,7 @@ def _closed_configurations(closing: Closing, start: Vector) -> Iterator[Vector]:
 
 
 def _moved(closing: Closing, start: Vector, rng: np.random.Generator) -> Vector:
+    """Return `start` (nq,) with random changes of its free positions and unit quaternions."""
     q = start.copy()
     q[closing.free] += rng.uniform(-_REACH, _REACH, len(closing.free))
     for part in quaternion_slices(closing.system.tree):
@@ -451,11 +484,15 @@ def _moved(closing: Closing, start: Vector, rng: np.random.Generator) -> Vector:
 
 
 def _tidy_start(closing: Closing, q: Vector) -> Vector:
-    """Return q with angles within half a rotation of zero, if that still closes; else q (gears)."""
+    """Return q with its free angles within half a rotation of zero.
+
+    If that does not close the loops, as with gears, q is returned unchanged.
+    """
     tidy = within_half_turn(closing.system, q)
     tidy[list(closing.locked)] = q[list(closing.locked)]
     return tidy if closing.openness(tidy) < OPEN else q
 
 
 def _start_distance(closing: Closing, q: Vector, other: Vector) -> float:
+    """Return the largest difference of a position of two configurations (nq,) [rad or m]."""
     return float(np.max(np.abs(difference(closing.system, q, other)), initial=0.0))

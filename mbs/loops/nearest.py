@@ -94,7 +94,16 @@ def nearest_configuration(closing: Closing, target: GuessTarget) -> Assembled | 
 
 
 def moved_to_guess(closing: Closing, target: GuessTarget, starts: list[Vector]) -> list[Vector]:
-    """Return `least_distance` if no start meets the guess and loops can move; else the starts."""
+    """Return configurations nearest to the guess, by minimisation from closed configurations.
+
+    The start configurations are returned unchanged if one of them agrees with the guess, or if the
+    loops allow no motion.
+
+    Args:
+        closing: closure rows and the locked positions.
+        target: guess of all positions.
+        starts: (nq,) closed configurations.
+    """
     if not target.guessed:
         return starts
     missed = [q for q in starts if target.miss(closing, q) > MET]
@@ -104,7 +113,7 @@ def moved_to_guess(closing: Closing, target: GuessTarget, starts: list[Vector]) 
 
 
 def _met(closing: Closing, target: GuessTarget, found: list[Vector]) -> Vector:
-    """Return the first configuration, or one that is nearer to guesses that it does not meet.
+    """Return found[0], or a closed configuration that is nearer to the guessed positions.
 
     Args:
         closing: closure rows and the locked positions.
@@ -125,7 +134,9 @@ def _met(closing: Closing, target: GuessTarget, found: list[Vector]) -> Vector:
 
 
 def _modes(closing: Closing, target: GuessTarget, q: Vector | None) -> list[Vector]:
-    """Return the configuration q, and others with the same independent positions.
+    """Return closed configurations that have the same independent positions as q, q first.
+
+    They are found from random starts.
 
     Args:
         closing: closure rows and the locked positions.
@@ -141,13 +152,16 @@ def _modes(closing: Closing, target: GuessTarget, q: Vector | None) -> list[Vect
 
 
 def _held(closing: Closing, target: GuessTarget, q: Vector | None) -> tuple[Closing, Vector]:
-    """Return the loops with independent positions locked as at q, and the start with these values.
+    """Lock as many positions at their values in q as determine the others; guessed ones preferred.
 
     Args:
         closing: closure rows and the locked positions.
         target: guess of all positions.
-        q: (nq,) closed configuration. If it is None (Newton's method found none), no position is
-            locked.
+        q: (nq,) closed configuration. If it is None, no further position is locked.
+
+    Returns:
+        Closure rows with these positions locked, and the start configuration (nq,) with their
+        values.
     """
     if q is None:
         return closing, target.start
@@ -161,7 +175,10 @@ def _held(closing: Closing, target: GuessTarget, q: Vector | None) -> tuple[Clos
 
 
 def _others(closing: Closing, best: Vector, found: list[Vector]) -> tuple[Vector, ...]:
-    """Return the configurations that differ from the best configuration and from each other."""
+    """Return the configurations of a list that differ from `best` and from each other.
+
+    Quaternions do not count, since a rod that spins about its axis is no other configuration.
+    """
     turning = np.zeros(closing.system.nq, dtype=bool)
     for part in quaternion_slices(closing.system.tree):
         turning[part] = True
@@ -225,7 +242,9 @@ def _is_nearer(
 
 
 def _by_blocks(closing: Closing, target: GuessTarget, q: Vector | None) -> Vector | None:
-    """Return the closed configuration from solving blocks in order, each nearest to a target.
+    """Return a closed configuration found block by block, each block nearest to the target.
+
+    If the loops do not separate into blocks or the search fails, q is returned.
 
     Args:
         closing: closure rows and the locked positions.
@@ -255,7 +274,10 @@ def _by_blocks(closing: Closing, target: GuessTarget, q: Vector | None) -> Vecto
 
 
 def _options(block: Closing, start: Vector) -> list[Vector]:
-    """Return configurations that close a block: one if it is near the start, or else several."""
+    """Return configurations that close a block; positions of other loops stay at `start` (nq,).
+
+    A configuration near the start is returned alone.
+    """
     first = block.nearest(start)
     found = [unwound(block, first.q, start)] if first.is_closed else []
     near = GuessTarget.at(block, start, ())
@@ -268,7 +290,13 @@ def _options(block: Closing, start: Vector) -> list[Vector]:
 
 
 def _independent(closing: Closing, q: Vector, guessed: set[int]) -> list[int]:
-    """Return free positions that determine the others at q, with guessed positions preferred."""
+    """Return indices in q of free positions that determine the other free positions at q.
+
+    Args:
+        closing: closure rows and the locked positions.
+        q: (nq,) configuration at which ranks are evaluated.
+        guessed: indices of guessed positions, which are preferred.
+    """
     J = closing.rows(q)[1] / closing.sizes[:, None]
     J = J * distance_units((closing.system.coordinates[k].unit for k in closing.free), closing.size)
     left = list(range(len(closing.free)))
@@ -284,7 +312,9 @@ def _independent(closing: Closing, q: Vector, guessed: set[int]) -> list[int]:
 
 
 def _blocks(closing: Closing, q: Vector) -> list[Closing] | None:
-    """Return the loops in blocks, each solvable after the blocks before it; None for one block.
+    """Split the loops into blocks that can be closed one after the other; None for a single block.
+
+    A block is a set of loops that determine their positions once the blocks before it are closed.
 
     Args:
         closing: closure rows and the locked positions.
@@ -329,7 +359,17 @@ def _next_block(
     known: set[int],
     waiting: list[str],
 ) -> list[str]:
-    """Return the smallest connected set of row groups that determine their unknowns, or all."""
+    """Return the smallest connected set of unsolved row groups that determines its unknowns.
+
+    If there is none, all groups connected to the first one are returned.
+
+    Args:
+        J: (m, nq) dimensionless closure Jacobian.
+        groups: row indices of each loop, coupling, component and quaternion norm, by name.
+        depends: indices of free positions on which each group depends.
+        known: indices of the positions that earlier blocks determine.
+        waiting: names of the unsolved groups.
+    """
     paths = [[name] for name in waiting]
     for _ in range(_LOOPS):
         for names in paths:
@@ -348,7 +388,10 @@ def _next_block(
 
 
 def _connected(depends: dict[str, set[int]], known: set[int], waiting: list[str]) -> Iterator[str]:
-    """Yield the waiting row groups that are connected to the first one by unknown positions."""
+    """Yield the unsolved row groups that are connected to waiting[0] by unknown positions.
+
+    Groups connected through further groups are included.
+    """
     reached, names = set(depends[waiting[0]]) - known, {waiting[0]}
     grown = True
     while grown:
@@ -362,7 +405,13 @@ def _connected(depends: dict[str, set[int]], known: set[int], waiting: list[str]
 
 
 def _axes_of(system: System, known: set[int], free: set[int]) -> tuple[int, ...]:
-    """Return indices of facing cosines that depend on a block and known positions only."""
+    """Return indices of the cosines of axes that a block determines, to check against opposed axes.
+
+    Args:
+        system: mechanism with loops.
+        known: indices of positions that are known after the block.
+        free: indices of the positions of the block.
+    """
 
     def build() -> list[set[int]]:
         q = SX.sym("q", system.nq)

@@ -121,7 +121,7 @@ def branches_at(system: System, stages: Sequence[Stage], q: Vector, p: Vector) -
 
 
 def started_at(system: System, q: Vector, known: Collection[int] | None = None) -> Vector:
-    """Return all positions: the known ones from the configuration q, the others zero.
+    """Return a vector of all positions, with known elements from q (nq,) and zeros elsewhere.
 
     Args:
         system: mechanism with the positions.
@@ -189,7 +189,10 @@ def every_configuration(
 
 
 def _agree(system: System, indices: Sequence[int], reached: Vector, q: Vector) -> bool:
-    """Whether tree positions agree with q, up to full rotations and signs of quaternions."""
+    """Whether positions `indices` of `reached` and q are equal, up to full rotations.
+
+    Signs of quaternions and positions of cut joints do not count.
+    """
     gap = difference(system, reached[: system.nq], q)
     return bool(np.all(np.abs(gap[[k for k in indices if k < system.nq]]) < _NEAR))
 
@@ -249,6 +252,7 @@ def verify(
 def _without_open_branches(
     system: System, stages: Sequence[Stage], starts: Sequence[Vector], p: Vector
 ) -> list[Stage]:
+    """Return the stages without branches that close the loops at no tested start."""
     result = list[Stage]()
     for number, stage in enumerate(stages):
         kept = [
@@ -264,7 +268,10 @@ def _without_open_branches(
 def _may_close(
     system: System, stages: Sequence[Stage], number: int, branch: int, start: Vector, p: Vector
 ) -> bool:
-    """Whether the loops close, or a value is NaN, if one stage takes `branch`, others `chosen`."""
+    """Whether the loops close if stage `number` uses `branch` and all others the assembled branch.
+
+    It is true also if the positions have NaN.
+    """
     reached = start.copy()
     for k, stage in enumerate(stages):
         values = np.array(stage.values(reached, p))
@@ -275,7 +282,7 @@ def _may_close(
 
 
 def _only(stage: Stage, kept: Sequence[int]) -> Stage:
-    """Return the stage with the branches of the indices `kept` only."""
+    """Return the stage with only the branches whose indices are in `kept`."""
     q, p = (casadi.SX.sym(name, stage.values.size1_in(k)) for k, name in enumerate("qp"))
     values = Function("ways", [q, p], [stage.values(q, p)[:, list(kept)]])
     labels = tuple(stage.labels[branch] for branch in kept)
@@ -419,7 +426,14 @@ def order_steps(
 
 
 def _attempt(work: PlanWork, number: int) -> Stage | str | None:
-    """Return the stage of a loop or coupling, the reason for failure, or None if all is known."""
+    """Return the closed form of a loop, coupling or component, or the reason why there is none.
+
+    None if all its positions are known already.
+
+    Args:
+        work: state of the plan.
+        number: index among cut joints, then couplings, then components with constraints.
+    """
     system = work.system
     if number >= len(system.cuts) + len(system.couplings):
         return _bound_by_part(work, number - len(system.cuts) - len(system.couplings))
@@ -437,7 +451,7 @@ def _attempt(work: PlanWork, number: int) -> Stage | str | None:
 
 
 def _point_stage(work: PlanWork, waiting: Sequence[int]) -> Stage | None:
-    """Return a stage of prismatic joints that rigid links of several loops determine, or None."""
+    """Return a stage of prismatic displacements that links of several loops determine, or None."""
     system, groups = work.system, dict[frozenset[int], dict[int, RigidLink]]()
     for number in waiting:
         if number < len(system.cuts) and not is_bound(system, number):
@@ -454,13 +468,18 @@ def _point_stage(work: PlanWork, waiting: Sequence[int]) -> Stage | None:
 
 
 def is_bound(system: System, number: int) -> bool:
-    """Whether a constraint other than a rod or a point on a line closes the loop of a cut joint."""
+    """Whether a loop is closed by a constraint other than a rod or a point on a line.
+
+    Args:
+        system: mechanism with loops.
+        number: index of the cut joint of the loop.
+    """
     joint = system.cuts[number].edge.joint
     return isinstance(joint, Constraint) and not isinstance(joint, (PointOnLine, Rod))
 
 
 def _bound_by_part(work: PlanWork, number: int) -> str | None:
-    """Return why the constraint rows of a component have no closed form; None if all is known."""
+    """Return why a component with constraint rows has no closed form; None if all is known."""
     binding = [part for part in work.system.parts if part.element.has("rows")]
     part = binding[number]
     q = SX.sym("q", work.system.nq)
@@ -472,6 +491,7 @@ def _bound_by_part(work: PlanWork, number: int) -> str | None:
 
 
 def _coupling_stage(work: PlanWork, coupling: CoordinateCoupling) -> Stage | str | None:
+    """Return the stage of a coupling, why it has none, or None if all its positions are known."""
     if work.known.issuperset(coupling.coordinates):
         return None
     root = coupled_position(coupling, work.known, work.q)
@@ -479,6 +499,7 @@ def _coupling_stage(work: PlanWork, coupling: CoordinateCoupling) -> Stage | str
 
 
 def _stage(work: PlanWork, name: str, root: LoopBranches) -> Stage:
+    """Return a stage from the closed form `root` of the loop or coupling `name`."""
     arguments, branches = [work.q, work.system.p], list(root.branches.values())
     indices = tuple(sorted(branches[0]))
     columns = [casadi.vertcat(*(branch[index] for index in indices)) for branch in branches]
@@ -490,6 +511,13 @@ def _stage(work: PlanWork, name: str, root: LoopBranches) -> Stage:
 
 
 def _refusal(system: System, waiting: Sequence[int], reasons: dict[int, str]) -> str:
+    """Return the error message for loops without closed form.
+
+    Args:
+        system: mechanism with loops.
+        waiting: indices of the unsolved loops, couplings and components.
+        reasons: reason for each of them.
+    """
     names = [cut.edge.joint.name for cut in system.cuts]
     names += [coupling.name for coupling in system.couplings]
     names += [part.name for part in system.parts if part.element.has("rows")]
@@ -501,6 +529,7 @@ def _refusal(system: System, waiting: Sequence[int], reasons: dict[int, str]) ->
 
 
 def _require_all(system: System, known: set[int]) -> None:
+    """Raise NoClosedForm if a position of q is not known (`known` are indices in q)."""
     for k, coordinate in enumerate(system.coordinates):
         if k not in known:
             raise NoClosedForm(
@@ -540,7 +569,9 @@ class Known:
 
 
 def complete(system: System, given: Sequence[int]) -> Known:
-    """Split given joints into independent and dependent joints, and add the missing joints.
+    """Split given joints into independent and dependent joints, and add joints that are missing.
+
+    Together, the independent and the added joints determine all positions.
 
     Args:
         system: assembled mechanism.
@@ -558,7 +589,7 @@ def complete(system: System, given: Sequence[int]) -> Known:
 
 
 def undetermined_beside(system: System, free: Vector, first: tuple[int, ...]) -> tuple[int, ...]:
-    """Return indices in q of joints that, with the known ones, determine all positions.
+    """Return indices in q of further joints that, with known joints, determine all positions.
 
     Motors are preferred, then other revolute and prismatic joints, then joints of several freedoms.
 
@@ -604,7 +635,13 @@ def regular_configuration(system: System) -> Vector:
 
 
 def _raising(free: Vector, candidates: Sequence[int], first: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the candidates, in their order, that are independent of `first` and each other."""
+    """Return the candidates that are independent of joints `first` and of each other, in order.
+
+    Args:
+        free: (nq, m) basis of the directions in which the positions can move.
+        candidates: indices in q.
+        first: indices in q of independent joints.
+    """
     taken = list(first)
     for k in candidates:
         if k not in taken and _gain(free, tuple(taken), (k,)):
@@ -659,6 +696,7 @@ def plan_to(system: System, frame: str | int) -> Posed:
 
 
 def _plan_to(system: System, frame: str | int) -> Posed:
+    """Return the plan from the pose of a frame to all positions; implementation of `plan_to`."""
     number, pose = system.frame(frame)
     welded = replace(system, cuts=(*system.cuts, _weld(number, pose, Pose.identity())), _cache={})
     first = extent(welded)
@@ -725,6 +763,7 @@ def posed_stages(system: System, link: int, known: Collection[int]) -> PosedStag
 
 
 def _weld(link: int, pose: Pose, goal: Pose) -> Cut:
+    """Return a rigid cut joint between frame `pose` of a link and frame `goal` of the base."""
     joint = JointEdge(Fixed("pose"), 0, 0, Pose.identity(), Pose.identity(), None)
     return Cut(joint, -1, link, goal, pose, True)
 
@@ -737,6 +776,7 @@ def _pose_locked(system: System, at: Function, p: Vector) -> tuple[int, ...]:
 
 
 def _pose_and_slope(system: System, frame: str | int) -> Function:
+    """Return ``pose(q, p) -> T, dT``: pose (4, 4) of a frame in the base, and its derivative."""
     q = SX.sym("q", system.nq)
     T = relative_pose(system.tree, q, system.frame("base"), system.frame(frame)).matrix
     slope = casadi.jacobian(casadi.vec(T), q)
@@ -744,5 +784,6 @@ def _pose_and_slope(system: System, frame: str | int) -> Function:
 
 
 def _quaternion(R: Vector) -> Vector:
+    """Return the unit quaternion (4,) of a rotation matrix (3, 3)."""
     matrix = SX.sym("R", 3, 3)
     return np.array(Function("quaternion", [matrix], [unit_quaternion(matrix)])(DM(R))).ravel()

@@ -104,7 +104,7 @@ def defect(T: Array, name: str = "T") -> str:
 
 
 def _skewed_axes(R: Array, name: str) -> str:
-    """Return text on the axis with the worst length or on the two axes with the worst angle."""
+    """Return text on the worst error of R (3, 3): length of an axis, angle, or handedness."""
     with np.errstate(over="ignore"):
         lengths = np.linalg.norm(R, axis=0)
     faults = {
@@ -233,6 +233,10 @@ def goal(
 
 
 def _named(system: System, rows: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of pose rows from the user as a tuple.
+
+    Raise ModelError for unknown names.
+    """
     given = [rows] if isinstance(rows, str) or not isinstance(rows, Iterable) else list(rows)
     for name in given:
         if not isinstance(name, str) or name not in ROWS:
@@ -246,10 +250,12 @@ def _named(system: System, rows: Sequence[str]) -> tuple[str, ...]:
 
 
 def _elements(T: Vector) -> Vector:
+    """Return the origin and the axes x, y, z of a pose (4, 4) as one vector (12,)."""
     return np.concatenate([T[:3, 3], T[:3, :3].ravel(order="F")])
 
 
 def _pose_and_slope(system: System, frame: str | int) -> Function:
+    """Return ``pose(q, p) -> x, s``: origin and axes (12,) of a frame, derivative (12, nq) by q."""
     q = SX.sym("q", system.nq)
     pose = relative_pose(system.tree, q, system.frame("base"), system.frame(frame))
     elements = casadi.densify(casadi.vertcat(pose.p, casadi.vec(pose.R)))

@@ -85,7 +85,7 @@ def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
 
 
 def tree_rows(system: System, passive: SX, active: SX) -> SX:
-    """Merge passive and active rows into (nv, m) rows in the order of the velocities."""
+    """Merge rows of passive and of independent velocities into (nv, m), in the order of v."""
     closure = system.closure
     assert closure is not None
     rows = zeros(system.nv, active.shape[1])

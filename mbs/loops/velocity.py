@@ -242,7 +242,7 @@ def part_wrenches(system: System, q: SX, lam: SX) -> dict[int, Wrench]:
 
 
 def _displace(d: SX) -> Pose:
-    """Return a small displacement: translation d[:3] and rotation d[3:]."""
+    """Return the first-order pose of a small translation d[:3] [m] and rotation d[3:] [rad]."""
     return Pose(SX(DM.eye(3)) + skew(d[3:]), d[:3])
 
 
@@ -313,7 +313,13 @@ def scales(system: System) -> Scales:
 
 
 def _largest_lever(J: NDArray[np.float64], rows: list[str], units: list[str]) -> float | None:
-    """Return the largest moment arm of an angle on the position rows [m]; None without angles."""
+    """Return the largest moment arm of an angle on the position rows [m]; None without angles.
+
+    Args:
+        J: (m, nv) constraint rows.
+        rows: units of the position rows.
+        units: units of the velocities.
+    """
     turns = [k for k, unit in enumerate(units) if unit.startswith("rad")]
     places = [k for k, unit in enumerate(rows) if unit == "m"]
     moved = np.abs(J[np.ix_(places, turns)])

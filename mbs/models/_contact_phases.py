@@ -307,4 +307,5 @@ def contact_phases(system: System, points: Iterable[ContactPoint]) -> ContactPha
 
 
 def _efforts(system: System, s: ModelSymbols, a: SX) -> SX:
+    """Return the efforts of the tree for accelerations a, without contact forces."""
     return tree_efforts(system, s, a, surroundings(system))

@@ -190,7 +190,7 @@ def implicit(system: System, form: str, constrained: ConstraintRows | None = Non
 
 
 def _keep(rows: Rows, form: str) -> SX:
-    """Constraint residuals that are algebraic equations of a form."""
+    """Return the constraint residuals that are algebraic equations in a form of the DAE."""
     match form:
         case "index1":
             return rows.accelerations
@@ -392,7 +392,7 @@ def elements_of(
 
 
 def _coordinates(system: System) -> tuple[Elements, Elements, Elements, Elements]:
-    """Elements of q, v, a and tau, named as in simulation results."""
+    """Return the named elements of q, v, a and tau, as in simulation results."""
     q = tuple((f"{c.name}.q", c.unit) for c in system.coordinates)
     v = tuple((f"{s.name}.v", s.unit) for s in system.speeds)
     a = tuple((f"{s.name}.a", ACCELERATION_UNIT[s.unit]) for s in system.speeds)
@@ -421,6 +421,14 @@ def _rows(system: System) -> tuple[Elements, Elements]:
 
 
 def _of(what: str, rows: Elements, unit: Mapping[str, str], end: str = ")") -> Elements:
+    """Return constraint rows with names "what(name)" and converted units.
+
+    Args:
+        what: prefix of the names.
+        rows: names and units of the constraint rows.
+        unit: unit of the result for each unit of a row.
+        end: text after the name.
+    """
     return tuple((f"{what}({name}{end}", unit[u]) for name, u in rows)
 
 
@@ -537,6 +545,15 @@ _Kind = tuple[str, tuple[str, ...]]
 
 
 def _kind(system: System, form: str, q: Array, p: Array) -> _Kind:
+    """Return the kind of equations that a requested DAE form needs, and branch labels.
+
+    Args:
+        system: mechanism.
+        form: requested form. For "reduced" the kind is "open" (open chain), "closed form"
+            (positions from closed forms of the loops) or "carried" (all positions are states).
+        q: (nq,) start positions.
+        p: (np,) parameters.
+    """
     if form != "reduced":
         return form, ()
     if not system.is_closed:
@@ -553,7 +570,7 @@ def _kind(system: System, form: str, q: Array, p: Array) -> _Kind:
 def _winds(system: System) -> bool:
     """Whether a full revolution of some passive joint changes efforts or couplings.
 
-    Closed forms return angles modulo 2 pi and are not valid for such systems.
+    Closed forms of loops return angles modulo 2 pi, so that they are not valid then.
     """
 
     def find() -> bool:
@@ -591,6 +608,8 @@ def _branch(system: System, q: Array, p: Array) -> tuple[str, ...]:
 
 
 def _built(system: System, kind: _Kind) -> tuple[DaeEquations, Mapping[str, Elements]]:
+    """Return the equations of a kind from `_kind`, and the named elements of their vectors."""
+
     def build() -> tuple[DaeEquations, Mapping[str, Elements]]:
         form, branch = kind
         match form:
@@ -627,6 +646,7 @@ def start_efforts(system: System, tau0: Values) -> Array:
 
 
 def _start_states(system: System, form: str, q: Array, v: Array) -> Array:
+    """Return initial states from q (nq,) and v (nv,) for a kind of equations from `_kind`."""
     active = list(system.active)
     if form == "closed form":
         return np.concatenate([q[active], v[active]])
@@ -658,4 +678,5 @@ def _start_algebraic(system: System, point: tuple[Array, ...], size: int) -> Arr
 
 
 def _unpickle(*parts: Any) -> Dae:
+    """Return a Dae from its pickled fields."""
     return Dae(**unpacked(*parts))

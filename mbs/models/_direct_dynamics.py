@@ -145,6 +145,7 @@ def independent_dynamics(system: System) -> Function:
 
 
 def _check_method(system: System, method: str) -> None:
+    """Raise ModelError if a method is unknown, or "articulated" for a system with loops."""
     if method not in _METHODS:
         raise ModelError(
             f"{system.name}: method is {quoted(method)}; use one of {', '.join(_METHODS)}"
@@ -157,7 +158,7 @@ def _check_method(system: System, method: str) -> None:
 
 
 def _candidates(system: System) -> tuple[str, ...]:
-    """Methods among which "auto" selects the fewest operations."""
+    """Return the methods among which "auto" selects the fewest operations."""
     if system.is_closed:
         return ("composite",)
     return ("composite", "articulated") if _composite_may_win(system) else ("articulated",)
@@ -177,6 +178,7 @@ def _composite_may_win(system: System) -> bool:
 def _model(
     system: System, method: str, coordinates: str, f_ext: bool, moving_base: bool
 ) -> Function:
+    """Build the direct dynamic model by a method; f_ext and moving_base add inputs."""
     in_tree = coordinates == "tree" and system.is_closed
 
     def build() -> tuple[Named, Named]:
@@ -200,12 +202,14 @@ def _model(
 
 
 def _articulated(system: System, s: ModelSymbols, tau: SX, around: ExternalForces) -> SX:
+    """Return the accelerations of an open chain for efforts tau, by articulated bodies."""
     left = tau - own_efforts(system, s, SX.zeros(system.nv))
     external = exerted(system, around, s.poses, s.q, s.v)
     return articulated_accelerations(system.tree, s.poses, s.v, left, around.base, external)
 
 
 def _composite(system: System, s: ModelSymbols, tau: SX, around: ExternalForces) -> SX:
+    """Return the independent accelerations for efforts tau by solving A a = tau - H."""
     A = tree_inertia(system.tree, s.poses)
     H = s.reduced_effort(tree_efforts(system, s, s.tree_acceleration(SX.zeros(s.size)), around))
     return solve_tree(s.reduced_matrix(A), tau - H, solution_order(system, s))
@@ -238,7 +242,7 @@ def require_inertia(system: System) -> None:
 
 
 def _loose_in_tree(system: System) -> int | None:
-    """Index of a velocity of an open chain that moves no inertia with free descendants, or None."""
+    """Return the index in v of a velocity that moves no inertia, with descendants free; or None."""
     q = SX.sym("q", system.nq)
     poses = link_poses(system.tree, normalised(system.tree, q))
     both = casadi.horzcat(*inertia_pivots(system.tree, poses))
@@ -252,7 +256,7 @@ def _loose_in_tree(system: System) -> int | None:
 
 
 def _loose_in_loops(system: System) -> int | None:
-    """Index in `system.active` of an independent velocity that moves no inertia, or None."""
+    """Return the index in `system.active` of a velocity that moves no inertia, or None."""
     closure, q = system.closure, list(system.configuration)
     assert closure is not None
     active, passive = list(closure.active), list(closure.passive)
@@ -307,6 +311,7 @@ def hybrid_dynamics(system: System, prescribed: Sequence[str]) -> Function:
 
 
 def _numbers(system: System, prescribed: Sequence[str]) -> tuple[int, ...]:
+    """Return the indices in v of prescribed velocities. Raise ModelError for invalid names."""
     names = [speed.name for speed in system.speeds]
     prescribed = names_given(f"{system.name}: prescribed", prescribed, names[0])
     if not prescribed:

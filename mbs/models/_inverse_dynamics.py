@@ -141,7 +141,10 @@ def gravity_effort(
 
 
 def _efforts(system: System, s: ModelSymbols, a: SX, around: ExternalForces) -> tuple[SX, Named]:
-    """Efforts in input coordinates for accelerations a (nv, 1), and named intermediate results."""
+    """Return the efforts in input coordinates for tree accelerations a (nv, 1).
+
+    The second result has the named intermediate quantities.
+    """
     dynamics = _dynamics(system, s, a, around)
     tau = dynamics.efforts + own_efforts(system, s, a)
     return s.reduced_effort(tau), newton_euler_names(dynamics)
@@ -159,6 +162,7 @@ def own_efforts(system: System, s: ModelSymbols, a: SX) -> SX:
 
 
 def _dynamics(system: System, s: ModelSymbols, a: SX, around: ExternalForces) -> Dynamics:
+    """Return the Newton-Euler recursion for accelerations a (nv, 1), with external wrenches."""
     external = exerted(system, around, s.poses, s.q, s.v_tree)
     return newton_euler(system.tree, s.poses, s.v_tree, a, around.base, external)
 

@@ -58,6 +58,7 @@ def lagrange(system: System, method: str = "auto", coordinates: str = "independe
 
 
 def _cheapest(system: System, coordinates: str) -> Function:
+    """Return the Lagrange form with fewer operations: Renaud's, or by Christoffel symbols."""
     renaud = _model(system, "renaud", coordinates)
     if system.nv > _SHORT or system.nq > system.nv:
         return renaud
@@ -65,6 +66,8 @@ def _cheapest(system: System, coordinates: str) -> Function:
 
 
 def _model(system: System, method: str, coordinates: str) -> Function:
+    """Build the Lagrange form (A, B, Q) by "renaud" or "christoffel"."""
+
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)
         form = _by_renaud(system, s) if method == "renaud" else _by_christoffel(system, s)
@@ -83,11 +86,13 @@ def _model(system: System, method: str, coordinates: str) -> Function:
 
 
 def _by_renaud(system: System, s: ModelSymbols) -> LagrangeForm:
+    """Return A, B and Q of the tree by the recursion of Renaud."""
     form = lagrange_form(system.tree, s.poses, s.v_tree)
     return LagrangeForm(form.A, form.B, form.Q + static_efforts(system, s))
 
 
 def _by_christoffel(system: System, s: ModelSymbols) -> LagrangeForm:
+    """Return A, B and Q of the tree, with B from the Christoffel symbols of A."""
     A = tree_inertia(system.tree, s.poses)
     v = SX.sym("v", system.nv)
     B = casadi.substitute(christoffel(system.tree, s.q, v, A), v, s.v_tree)

@@ -80,12 +80,13 @@ def limits(system: System, *, speed: Largest = None, effort: Largest = None) -> 
 
 
 def _ends(ranges: list[tuple[float, float] | None]) -> tuple[Array, Array]:
-    """Lower and upper bounds as arrays; infinite for None."""
+    """Return arrays of lower and upper bounds; infinite for None."""
     lower, upper = zip(*(given or (-np.inf, np.inf) for given in ranges), strict=True)
     return np.array(lower, dtype=float), np.array(upper, dtype=float)
 
 
 def _positions(system: System) -> tuple[Array, Array]:
+    """Return lower and upper limits (nq,) of positions, from coordinates and from stops."""
     lower, upper = np.full(system.nq, -np.inf), np.full(system.nq, np.inf)
     for k, coordinate in enumerate(system.coordinates):
         if coordinate.kind == "quaternion":
@@ -113,6 +114,11 @@ def _number(limit: SX | None, otherwise: float) -> float:
 
 
 def _magnitudes(system: System, what: str, given: Largest) -> list[tuple[int, float]]:
+    """Return (index in v, largest magnitude) for each named velocity of the user's mapping.
+
+    Raises:
+        ModelError: a name is unknown, or a value is not positive.
+    """
     if given is not None and not isinstance(given, Mapping):
         raise ModelError(
             f"{system.name}: {what} is {quoted(given)}; give a mapping from names to numbers"

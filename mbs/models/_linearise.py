@@ -315,7 +315,7 @@ def _contact(
 
 
 def _output_units(system: System) -> dict[str, str]:
-    """Unit of each possible output, by name."""
+    """Return the unit of each possible output, by its name."""
     found = {f"{row.name}.q": row.unit for row in system.coordinates}
     found |= {f"{row.name}.v": row.unit for row in system.speeds}
     found |= {f"{row.name}.a": ACCELERATION_UNIT[row.unit] for row in system.speeds}
@@ -326,6 +326,15 @@ def _output_units(system: System) -> dict[str, str]:
 def _matrices(
     system: System, s: ModelSymbols, tau: SX, names: Sequence[str], modes: Sequence[float]
 ) -> tuple[SX, SX, SX, SX]:
+    """Return the matrices A, B, C and D of the linearised state equations and outputs.
+
+    Args:
+        system: mechanism.
+        s: symbols of the model.
+        tau: (nv, 1) symbols of joint efforts, to which component efforts are added.
+        names: names of the requested outputs.
+        modes: mode of each contact.
+    """
     q, v_a, v = s.q, s.v, s.v_tree
     efforts, given, rates = driving(system, q, v, resolved=False)
     motor_efforts = efforts[: efforts.numel() - system.u.numel()]
@@ -376,7 +385,7 @@ def _matrices(
 
 
 def _tangents(system: System, q: SX) -> SX:
-    """(nv, m) tree velocities for unit rates of the free coordinates, with closed loops."""
+    """Return tree velocities (nv, m) for unit rates of the free coordinates, with closed loops."""
     free = list(system.free)
     if system.closure is None:
         return SX(DM.eye(system.nv))
@@ -395,7 +404,7 @@ def _tangents(system: System, q: SX) -> SX:
 
 
 def _selected(system: System, N: SX) -> SX:
-    """(m, nq) left inverse of N: maps position rates dq/dt to rates of the m free coordinates."""
+    """Return a left inverse (m, nq) of N: maps dq/dt to the rates of the m free coordinates."""
     # columns of N are orthogonal; the columns of a quaternion have the squared length 1/4
     sizes = casadi.sum1(N * N)
     inverse = casadi.mtimes(casadi.diag(1 / sizes.T), N.T)

@@ -168,6 +168,7 @@ class _Observed:
 def _observed(
     system: System, s: ModelSymbols, a: SX, tau: SX | None, around: ExternalForces
 ) -> _Observed:
+    """Return the motions and joint wrenches from which sensor signals are computed."""
     transmits = any(attached.joint is not None for attached in system.sensors)
     wrenches = wrenches_of_joints(system, s, a, tau, around) if transmits else []
     return _Observed(
@@ -187,6 +188,7 @@ def _on_frames(state: _Observed, attached: AttachedSensor) -> Readings:
 
 
 def _coordinate(state: _Observed, attached: AttachedSensor) -> Readings:
+    """Return position, velocity and acceleration of the coordinate that a sensor measures."""
     system, s, name = state.system, state.s, attached.coordinate
     if attached.frames:
         return _cut_rotation(state, attached)
@@ -211,6 +213,7 @@ def _cut_rotation(state: _Observed, attached: AttachedSensor) -> Readings:
 
 
 def _transmitted(state: _Observed, attached: AttachedSensor) -> Readings:
+    """Return force and moment that a joint transmits, in the axes of its sensor."""
     assert attached.joint is not None
     f, m = state.wrenches[attached.joint]
     home = attached.frames[1]
@@ -218,6 +221,7 @@ def _transmitted(state: _Observed, attached: AttachedSensor) -> Readings:
 
 
 def _power(state: _Observed, attached: AttachedSensor) -> Readings:
+    """Return the power that the wrench of a joint delivers to the body of its frame_b."""
     assert attached.joint is not None
     f, m = state.wrenches[attached.joint]
     V, w = frame_velocity(attached.frames[1], state.velocities)

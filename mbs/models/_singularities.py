@@ -79,6 +79,7 @@ def _add(result: Polynomial, monomial: Monomial, coefficient: Fraction) -> None:
 
 
 def _join(m: Monomial, n: Monomial) -> Monomial:
+    """Return the product of two monomials: exponents of equal atoms (sines, cosines) are added."""
     powers = dict(m)
     for atom, power in n:
         powers[atom] = powers.get(atom, 0) + power
@@ -86,6 +87,7 @@ def _join(m: Monomial, n: Monomial) -> Monomial:
 
 
 def _within_reason(polynomial: Polynomial) -> Polynomial:
+    """Return a polynomial; raise NotTrigonometric if it has too many terms."""
     if len(polynomial) > _MOST_TERMS:
         raise NotTrigonometric
     return polynomial
@@ -108,6 +110,14 @@ def polynomial_of(expression: SX, variables: SX) -> Polynomial:
 
 
 def _value(graph: Graph, number: int, values: list[Polynomial], least: float) -> Polynomial:
+    """Return the polynomial of node `number` of an expression graph.
+
+    Args:
+        graph: expression graph.
+        number: index of the node.
+        values: polynomials of all earlier nodes.
+        least: size below which a constant is zero.
+    """
     node = graph.nodes[number]
     operands = [values[k] for k in graph.operands(number)]
     match node.op:
@@ -125,6 +135,7 @@ def _value(graph: Graph, number: int, values: list[Polynomial], least: float) ->
 
 
 def _operation(op: int, operands: list[Polynomial]) -> Polynomial:
+    """Return the polynomial of a CasADi operation (`op`) on polynomials."""
     two: dict[int, Callable[[Polynomial, Polynomial], Polynomial]] = {
         casadi.OP_ADD: total,
         casadi.OP_SUB: lambda a, b: total(a, b, -1),
@@ -222,6 +233,7 @@ def _times_wave(waves: Polynomial, atom: Atom) -> Polynomial:
 def _sum_of(
     a: Iterable[tuple[int, int]], b: Iterable[tuple[int, int]], sign: int
 ) -> tuple[tuple[int, int], ...]:
+    """Return a + sign b of two integer combinations of angles, ((index, factor), ...)."""
     times = dict(a)
     for number, factor in b:
         times[number] = times.get(number, 0) + sign * factor
@@ -231,6 +243,10 @@ def _sum_of(
 def _wave(
     kind: Literal["s", "c"], angle: tuple[tuple[int, int], ...], coefficient: Fraction
 ) -> Polynomial:
+    """Return coefficient times sine ("s") or cosine ("c") of an integer combination of angles.
+
+    The sign of the first factor is made positive.
+    """
     if not angle:
         return {(): coefficient} if kind == "c" else {}
     if angle[0][1] < 0:
@@ -266,11 +282,13 @@ def factored(polynomial: Polynomial) -> Factored:
 
 
 def _shortest(polynomial: Polynomial) -> Polynomial:
+    """Return a polynomial, with sums of angles if that has fewer terms."""
     summed = with_sums_of_angles(polynomial)
     return summed if len(summed) < len(polynomial) else polynomial
 
 
 def _factored(polynomial: Polynomial) -> Factored:
+    """Return a trigonometric polynomial as a product of factors with powers."""
     if len(polynomial) == 1:
         ((monomial, coefficient),) = polynomial.items()
         return Factored(
@@ -296,6 +314,7 @@ def _factored(polynomial: Polynomial) -> Factored:
 
 
 def _from_powers(terms: Mapping[tuple[int, ...], object], atoms: list[Atom]) -> Polynomial:
+    """Return a polynomial from coefficients by the exponents of its atoms."""
     return {
         tuple((atom, power) for atom, power in zip(atoms, powers, strict=True) if power): Fraction(
             str(coefficient)
@@ -478,6 +497,7 @@ def singularities(
 
 
 def _singularities(system: System, chosen: Selection) -> Singularities:
+    """Return the factors of the determinant of a selected square Jacobian."""
     q, square = chosen.of(system)
     whole = chosen.determinant(system)
     if square.blocks is None:
@@ -489,6 +509,7 @@ def _singularities(system: System, chosen: Selection) -> Singularities:
 def _constant_and_factors(
     system: System, chosen: Selection, square: SquareJacobian, q: SX
 ) -> tuple[str, list[SingularFactor]]:
+    """Return the constant factor of a determinant as text, and its factors that depend on q."""
     writer, variables = Writer(system), casadi.vertcat(q, system.p)
     number = Fraction(square.sign)
     powers: dict[str, int] = {}
@@ -550,6 +571,7 @@ def _scale(polynomial: Polynomial) -> tuple[Polynomial, Fraction]:
 
 
 def _product_text(number: Fraction, constants: dict[str, int]) -> str:
+    """Return a number times powers of constant expressions as text."""
     if not constants:
         return f"{float(number):.12g}"
     sign = "-" if number < 0 else ""
@@ -561,11 +583,14 @@ def _product_text(number: Fraction, constants: dict[str, int]) -> str:
 
 
 def _label(chosen: Selection, block: Block) -> str:
+    """Return text for a block of the Jacobian that is not factored."""
     names = ", ".join(chosen.names[column] for column in block.columns)
     return f"determinant of the {block.size} x {block.size} block of {names}"
 
 
 def _factor(system: System, chosen: Selection, number: int, q: SX, expression: SX) -> Function:
+    """Return ``singular_factor(q) -> value``: factor `number` of the determinant."""
+
     def build() -> tuple[Named, Named]:
         return [("q", q)], [("value", expression)]
 

@@ -58,4 +58,5 @@ def validity_rows(system: System) -> tuple[str, ...]:
 
 
 def _rows(system: System, q: SX) -> list[ValidityRow]:
+    """Return the conditions under which a configuration q is valid for the models."""
     return [*plain_rows(system, q), *(loop_rows(system, q) if system.is_closed else [])]

@@ -128,14 +128,17 @@ def shared_efforts(system: System, s: ModelSymbols, needed: SX) -> SX:
 
 
 def _velocities(system: System, s: ModelSymbols) -> SX:
-    """(k, m) matrix B' that maps independent velocities to motor velocities."""
+    """Return the matrix B' (k, m) that maps independent velocities to the k motor velocities."""
     if s.reduction is None:
         return SX.eye(s.size)
     return s.reduction.G[list(system.motors), :]
 
 
 def _independent_motors(system: System) -> list[int]:
-    """Indices into `system.motors` of m independent motors; motors on active joints first."""
+    """Return m indices into `system.motors` of motors with independent velocities.
+
+    Motors on independent joints come first.
+    """
     if system.closure is None:
         return list(range(system.nv))
     J = np.array(constraint_jacobian(system)(system.configuration, closure_parameters(system)))

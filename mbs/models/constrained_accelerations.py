@@ -134,12 +134,13 @@ def every_velocity_moves_its_link(system: System) -> bool:
 
 
 def _is_tensor(J: NDArray[np.float64]) -> bool:
+    """Whether the symmetric matrix J (3, 3) has no negative eigenvalue, up to rounding."""
     values = np.linalg.eigvalsh(J)
     return bool(values[0] >= -_ROUNDING * values[-1])
 
 
 def _own_inertia(link: Link) -> list[SX]:
-    """Inertia of a link alone, without descendants, against each velocity of its joint.
+    """Return the inertias of a link alone, without descendants, along the velocities of its joint.
 
     For a spherical joint: leading principal minors of the inertia tensor. Zero for a free joint.
     """

@@ -326,7 +326,7 @@ def require_undriven(system: System, contacts: Contacts, driven: Sequence[int]) 
 
 
 def _is_independent(system: System, contacts: Contacts, driven: Sequence[int], j: int) -> bool:
-    """Whether contact row j is independent of the prescribed motions, as assembled."""
+    """Whether contact row j is independent of the prescribed motions, at the assembled position."""
     number = contacts.velocities[j]
     if number is not None:
         return are_independent(system, (*driven, number))
@@ -370,12 +370,14 @@ class _ContactRow:
 
     @property
     def element(self) -> ContactElement:
+        """Stop of the row, or else its friction."""
         found = self.stop or self.friction
         assert found is not None
         return found
 
 
 def _contacts(system: System) -> Contacts:
+    """Return the stops, freewheels and dry frictions of all components as contact rows."""
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     at = PartsAt(system, q, v)
     found = list[_ContactRow]()
@@ -434,7 +436,7 @@ def effort_unit(part: ComponentInstance, law: Friction | Stop | OneWay) -> str:
 def _collect(
     system: System, rows: list[_ContactRow], element: ContactElement, q: SX, v: SX
 ) -> None:
-    """Add an element to an equal row without an element of its kind, or to a new row."""
+    """Merge an element into an equal row without an element of its kind, or append a new row."""
     w = contact_velocity(system, element.law, q, v)
     E = SX(casadi.sparsify(casadi.jacobian(w, v)))
     at_rest = casadi.simplify(casadi.substitute(w, v, SX.zeros(system.nv)))
@@ -473,7 +475,10 @@ def contact_velocity(system: System, law: Friction | Stop | OneWay, q: SX, v: SX
 
 
 def _levers(system: System, found: Sequence[_ContactRow], rows: SX, q: SX) -> Array:
-    """(k, nv) largest magnitudes of E over the assembled and some random configurations."""
+    """Return the largest absolute elements (k, nv) of the contact rows over several configurations.
+
+    These are the assembled configuration and random ones.
+    """
     rng = np.random.default_rng(_SEED)
     p = [1.0 if x.default is None else x.default for x in system.parameters]
     E = Function("E", [q, system.p], [casadi.densify(rows)])
@@ -492,7 +497,7 @@ def _levers(system: System, found: Sequence[_ContactRow], rows: SX, q: SX) -> Ar
 
 
 def _measure(row: _ContactRow) -> SX | None:
-    """Quantity that a stop limits: its gap, or the velocity of a freewheel; None for no stop."""
+    """Return the gap of a stop or the velocity of a freewheel in a row; None without either."""
     if row.stop is None:
         return None
     law = row.stop.law
@@ -500,7 +505,7 @@ def _measure(row: _ContactRow) -> SX | None:
 
 
 def _index(value: SX | None, q: SX) -> int | None:
-    """Index in q of an expression that is a single position, else None."""
+    """Return the index in q of an expression that is a single position; None for any other."""
     if value is None:
         return None
     elements = casadi.vertsplit(q) if q.numel() else []
@@ -508,7 +513,7 @@ def _index(value: SX | None, q: SX) -> int | None:
 
 
 def _anchor(system: System, row: _ContactRow, q: SX, v: SX) -> SX | None:
-    """Expression whose time derivative is the velocity of a row; None if it is not known."""
+    """Return an expression whose rate is the velocity of a contact row; None if unknown."""
     if row.stop is not None and isinstance(row.stop.law, Stop):
         return SX(row.stop.law.gap)
     at_rest = casadi.simplify(casadi.substitute(row.velocity, v, SX.zeros(system.nv)))
@@ -533,11 +538,12 @@ def _require_unread(system: System, part: ComponentInstance) -> None:
 
 
 def _stack(values: Iterable[SX]) -> SX:
+    """Return values as one dense column (k, 1)."""
     return SX(casadi.densify(casadi.vertcat(SX(0, 1), *values)))
 
 
 def _column(elements: Sequence[ContactElement | None], *names: str) -> SX:
-    """(k, 1) first of the named fields of each law that is not None; zero without an element."""
+    """Return (k, 1) the first named field of each law that is not None; 0 without a law."""
     values = []
     for element in elements:
         found = [getattr(element.law, name, None) for name in names] if element else []

@@ -380,6 +380,10 @@ class Standing:
         return q, self._velocity(q, p, begin.v0)
 
     def _velocity(self, q: Array, p: Array, v0: Values) -> Array:
+        """Return the smallest velocities (nv,) that keep loops and contacts closed.
+
+        They agree with v0, velocities by name or all of them.
+        """
         _, _, J_loops, _, J, _ = (np.array(x) for x in _numbers(self)(q, np.zeros(1), p))
         rows = np.vstack([J_loops, J[self.constrained]])
         v, missed = smallest_velocity(self.system, rows, v0)
@@ -481,11 +485,13 @@ def _touching(standing: Standing) -> Function:
 
 
 def _pair(results: Any) -> tuple[Array, Array]:
+    """Return a residual (m,) and its derivative (m, n) as NumPy arrays."""
     r, J = results
     return np.array(r).ravel(), np.array(J)
 
 
 def _with(q: Array, places: list[int], values: Array) -> Array:
+    """Return a copy of q with `values` at the indices `places`."""
     result = q.copy()
     result[places] = values
     return result
@@ -548,6 +554,14 @@ _Built = tuple[DaeEquations, SX, Mapping[str, Elements]]
 
 
 def _built(standing: Standing, explicit: Function, form: str, kept: tuple[int, ...]) -> _Built:
+    """Return equations, plane forces and named elements of a contact phase; cached.
+
+    Args:
+        standing: points in contact and their modes.
+        explicit: function of the accelerations of the phase.
+        form: form of the DAE.
+        kept: indices of the constraint rows that are kept.
+    """
     system = standing.system
 
     def build() -> _Built:

@@ -211,7 +211,10 @@ def staged_accelerations(system: System, names: Sequence[str]) -> tuple[dict[str
 
 
 def _front(system: System, names: Sequence[str]) -> Function:
-    """Function of q, v, tau: factors of A, accelerations, right-hand sides of the derivatives."""
+    """Return Function of q, v, tau: factors of A, accelerations, and right-hand sides.
+
+    The derivatives of the accelerations are the solutions for these right-hand sides.
+    """
     s = symbols_of(system, "tree")
     tau = SX.sym("tau", s.size)
     factor, a, sides = implicit_formula(system, s, tau, names)
@@ -367,6 +370,7 @@ def _stage(system: System, names: tuple[str, ...]) -> Function:
 def _checked(
     system: System, coordinates: str, with_respect_to: Iterable[str], known: tuple[str, ...]
 ) -> tuple[str, ...]:
+    """Return the names of the inputs of the requested derivatives. Raise ModelError if invalid."""
     check_coordinates(system, coordinates)
     given = [with_respect_to] if isinstance(with_respect_to, str) else list(with_respect_to)
     for name in given:
@@ -394,6 +398,7 @@ def _checked(
 
 
 def _check_method(system: System, coordinates: str, method: str, known: tuple[str, ...]) -> None:
+    """Raise ModelError if a method is unknown, or "analytical" for a system with loops."""
     if method not in known:
         words = ", ".join(map(repr, known))
         raise ModelError(f"{system.name}: method is {quoted(method)}; use one of {words}")
@@ -430,6 +435,7 @@ def _choose(
 
 
 def _outputs(of: str, s: ModelSymbols, names: tuple[str, ...], blocks: Blocks, value: SX) -> Named:
+    """Return named derivatives "d<of>_d<name>", followed by the value itself."""
     labels = [name if name in "zup" else name + s.suffix for name in names]
     pairs = zip(labels, names, strict=True)
     return [*((f"d{of}_d{label}", blocks[name]) for label, name in pairs), (of, value)]
@@ -487,6 +493,7 @@ def with_implicit_jacobian(system: System, ddm: Function) -> Function:
 
 
 def _check(system: System, ddm: Function) -> None:
+    """Raise ModelError unless `ddm` is the direct dynamic model of an open chain."""
     if system.is_closed:
         raise ModelError(
             f"{system.name}: the implicit Jacobian is for open chains and this system has loops;"

@@ -42,6 +42,14 @@ def transform(system: System, frame: str | int, relative_to: str | int = "base")
 def _pose(
     system: System, key: tuple[str | int, ...], frame: str | int, relative_to: str | int
 ) -> Function:
+    """Return ``(q) -> T``: pose (4, 4) of a frame relative to the frame `relative_to`.
+
+    Args:
+        system: mechanism.
+        key: key of the function in the cache.
+        frame: frame whose pose is returned.
+        relative_to: reference frame.
+    """
     target, reference = system.frame(frame), system.frame(relative_to)
 
     def build() -> tuple[Named, Named]:
@@ -75,7 +83,7 @@ def terminal_frame(system: System) -> str | int:
 
 
 def _open_ends(system: System) -> set[int]:
-    """Indices (1-based) of the links at the ends of open branches, in no loop."""
+    """Return indices (1-based) of the links at the ends of open branches, in no loop."""
     tree = system.tree
     inner = {link.antecedent for link in tree.links}
     inner |= {k for cut in system.cuts for k in tree.path(cut.link_a) + tree.path(cut.link_b)}
@@ -114,6 +122,10 @@ def direct_geometry(system: System, frame: str | int | None = None) -> Function:
 
 
 def _closed_geometry(system: System, name: str | int, pose: Function) -> Function:
+    """Return ``(q_a) -> T`` for a system with loops: closed form of the loops, then the pose.
+
+    Without a closed form, the loops are solved by continuation.
+    """
     try:
         loops = closed_form(system)
     except NoClosedForm:
@@ -135,6 +147,7 @@ class _FollowedGeometry(LoopFunction):
     """Direct geometric model by continuation; its error message reports where the branch ends."""
 
     def _refusal(self, q_a: NDArray[np.float64], p: NDArray[np.float64]) -> str:
+        """Return the error message for independent positions q_a (m,) that cannot be reached."""
         names = [parameter.name for parameter in self.system.parameters]
         try:
             solve(self.system, q_a.tolist(), parameters=dict(zip(names, p.tolist(), strict=True)))
@@ -144,6 +157,8 @@ class _FollowedGeometry(LoopFunction):
 
 
 def _followed_geometry(system: System, name: str | int, pose: Function) -> Function:
+    """Return ``(q_a) -> T`` with the loops solved by continuation from the assembled position."""
+
     def make() -> Function:
         follow = follow_active(system)
         inputs = [MX.sym("q_a", len(system.free))]

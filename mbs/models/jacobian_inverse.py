@@ -59,6 +59,7 @@ class Selection:
         return found
 
     def _form(self, system: System) -> tuple[SX, SquareJacobian]:
+        """Return the symbols q and the selected square Jacobian in block triangular form."""
         q = SX.sym("q", system.nq)
         frame, axes = system.frame(self.frame), system.frame(self.expressed_in)
         target = VelocityTarget(system.tree, q, system.p, frame, axes)
@@ -138,6 +139,11 @@ def selection(
 def _numbers(
     system: System, what: str, given: Iterable[Any], names: Sequence[str]
 ) -> tuple[int, ...]:
+    """Return the indices of rows or columns (`what`) given by name or index.
+
+    Raises:
+        ModelError: a name or index does not exist.
+    """
     numbers: list[int] = []
     if isinstance(given, str) or not isinstance(given, Iterable):
         given = [given]
@@ -160,6 +166,7 @@ def _numbers(
 
 
 def _is_number(value: object, size: int) -> bool:
+    """Whether a value is an integer index from 0 to size - 1."""
     return hasattr(value, "__index__") and not isinstance(value, bool) and value in range(size)
 
 

@@ -252,6 +252,7 @@ def jacobian_dot_velocity(
 
 
 def _state(s: ModelSymbols) -> Named:
+    """Return the named inputs q and v (or v_a in independent coordinates)."""
     return [("q", s.q), ("v" + s.suffix, s.v)]
 
 

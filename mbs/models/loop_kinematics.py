@@ -134,6 +134,7 @@ class _LoopRows:
 
 
 def _require_loops(system: System) -> None:
+    """Raise ModelError if the system is an open chain or has damped massless nodes."""
     require_no_drift(system, "the closure of velocities", range(system.nv))
     if system.closure is None:
         raise ModelError(
@@ -143,6 +144,7 @@ def _require_loops(system: System) -> None:
 
 
 def _loop_rows(system: System, q: SX) -> _LoopRows:
+    """Return the independent constraint rows, and the velocity rows of the cut joints."""
     _require_loops(system)
     closure = system.closure
     assert closure is not None
@@ -184,7 +186,7 @@ def _freedom_velocities(cut: Cut, pose: Pose, V: SX, w: SX) -> list[SX]:
 
 
 def _rate(system: System, matrix: SX, q: SX, v: SX) -> SX:
-    """Time derivative of a matrix that depends on q, for velocities v of the tree."""
+    """Return the time derivative of a matrix that depends on q, for tree velocities v."""
     rate = casadi.jtimes(casadi.vec(matrix), q, position_rate(system.tree, q, v))
     return casadi.reshape(rate, *matrix.shape)
 

@@ -69,6 +69,10 @@ def _is_new(points: Array, k: int, apart: float) -> bool:
 
 
 def _polygon(points: Array, corners: list[int]) -> list[tuple[int, int]]:
+    """Return edges of a polygon through points `corners`; a line if they are in one row.
+
+    Edges are pairs of indices of the points (n, 3).
+    """
     away = points[corners] - points[corners].mean(axis=0)
     _, sizes, axes = np.linalg.svd(away)
     flat = away @ axes[:2].T
@@ -224,10 +228,12 @@ class _Marks:
     directions: list[tuple[int, SX]] = field(default_factory=list)
 
     def point(self, frame: Frame) -> int:
+        """Add the origin of a frame and return its index."""
         self.points.append(frame)
         return len(self.points) - 1
 
     def direction(self, link: int, axis: SX) -> int:
+        """Add a direction (3, 1) in the frame of a link and return its index."""
         self.directions.append((link, axis))
         return len(self.directions) - 1
 
@@ -243,6 +249,7 @@ class _Marks:
 
 
 def _built(system: System) -> Skeleton:
+    """Return the skeleton of a system: points, links, joints, frames and forces."""
     marks = _Marks(system)
     joints = tuple(_joint(marks, row) for row in system.joints)
     forces = tuple(
@@ -263,6 +270,7 @@ def _built(system: System) -> Skeleton:
 
 
 def _joint(marks: _Marks, row: JointRow) -> SkeletonJoint:
+    """Return name, end points and axes of a joint for drawing."""
     (a, pose_a), (b, pose_b) = row.frame_a, row.frame_b
     return SkeletonJoint(
         name=row.name,
@@ -299,17 +307,20 @@ def _cut_axes(marks: _Marks, row: JointRow) -> tuple[SkeletonAxis, ...]:
 
 
 def _axis(marks: _Marks, link: int, motion: Motion, axis: SX) -> SkeletonAxis:
+    """Return the drawn axis of a freedom; `axis` (3, 1) is its direction in the link frame."""
     kind: Literal["revolute", "prismatic"]
     kind = "revolute" if motion is Motion.REVOLUTE else "prismatic"
     return SkeletonAxis(kind, marks.direction(link, axis))
 
 
 def _shown_frames(system: System) -> list[str | int]:
+    """Return the names of the frames that are drawn."""
     outer = [OUTER_WORLD] if OUTER_WORLD in system.frames else []
     return list(dict.fromkeys([*outer, *system.named_frames, terminal_frame(system)]))
 
 
 def _frame(marks: _Marks, name: str | int) -> SkeletonFrame:
+    """Return origin and axes of a named frame for drawing."""
     link, pose = marks.system.frame(name)
     x, y, z = (marks.direction(link, pose.R[:, k]) for k in range(3))
     label = f"link {name}" if isinstance(name, int) else name
@@ -317,6 +328,7 @@ def _frame(marks: _Marks, name: str | int) -> SkeletonFrame:
 
 
 def _link(marks: _Marks, number: int, joints: Sequence[SkeletonJoint]) -> SkeletonLink:
+    """Return joints, bodies and line segments of a link for drawing."""
     bodies = tuple(row.name for row in marks.system.bodies if row.link == number)
     if number == 0:
         return SkeletonLink(0, bodies, (), None)
@@ -344,6 +356,7 @@ def _link(marks: _Marks, number: int, joints: Sequence[SkeletonJoint]) -> Skelet
 def _segments(
     marks: _Marks, joined: Sequence[int], shown: Sequence[int]
 ) -> tuple[tuple[int, int], ...]:
+    """Return line segments (pairs of points) between joints of a link and its shown points."""
     columns = [*joined, *shown]
     if not columns:
         return ()
@@ -377,7 +390,7 @@ def _farthest_frame(marks: _Marks, number: int, joint: int, centre: int | None) 
 
 
 def _mass_centre(marks: _Marks, number: int) -> int | None:
-    """Column of the centre of mass; None for zero mass, or if parameters have no default."""
+    """Return the index of the centre of mass among the points; None for zero or unknown mass."""
     inertia, system = marks.system.tree.links[number - 1].inertia, marks.system
     known = casadi.vertcat(inertia.m, inertia.ms)
     at = Function("centre", [system.p], [known])(system.parameter_values(needed=()))
@@ -387,6 +400,8 @@ def _mass_centre(marks: _Marks, number: int) -> int | None:
 
 
 def _function(system: System, marks: _Marks) -> Function:
+    """Return the function of q that computes all points and directions of the skeleton."""
+
     def build() -> tuple[Named, Named]:
         q = SX.sym("q", system.nq)
         poses = base_poses(system.tree, link_poses(system.tree, normalised(system.tree, q)))

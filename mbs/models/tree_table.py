@@ -119,7 +119,7 @@ class TreeLoops:
 
 
 def _shape(function: Function) -> list[object]:
-    """Names and sizes of the inputs and outputs of a Function."""
+    """Return the names and sizes of the inputs and outputs of a Function."""
     return [
         *((function.name_in(k), function.size_in(k)) for k in range(function.n_in())),
         *((function.name_out(k), function.size_out(k)) for k in range(function.n_out())),
@@ -127,7 +127,7 @@ def _shape(function: Function) -> list[object]:
 
 
 def _longest_branch(system: System) -> int:
-    """Largest number of velocities on a path from the base to a leaf."""
+    """Return the largest number of velocities on a path from the base to a leaf."""
     behind: list[int] = []
     for link in system.tree.links:
         before = behind[link.antecedent] if link.antecedent >= 0 else 0
@@ -144,7 +144,7 @@ def shapes_of(system: System, table: TreeTable) -> dict[str, Function]:
 
 
 def _depth_first(links: Sequence[Link]) -> list[int]:
-    """Link indices in depth-first order: each subtree is contiguous."""
+    """Return link indices in depth-first order, so that each subtree is contiguous."""
     behind: list[list[int]] = [[] for _ in links]
     waiting: list[int] = []
     for j, link in enumerate(links):

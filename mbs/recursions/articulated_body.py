@@ -69,7 +69,7 @@ class ArticulatedInertia:
         return ArticulatedInertia(self.M + other.M, self.H + other.H, self.J + other.J)
 
     def rotate(self, R: Rotation) -> ArticulatedInertia:
-        """Express the inertia in the axes of frame i, about the same point."""
+        """Express in the axes of frame i, where R is the orientation of the current axes in i."""
         return ArticulatedInertia(
             R.apply_to_tensor(self.M), R.apply_to_square(self.H), R.apply_to_tensor(self.J)
         )
@@ -87,7 +87,10 @@ class ArticulatedInertia:
         return casadi.vertcat(self.H[:, direction - 3], self.J[:, direction - 3])
 
     def without(self, pivot: Pivot) -> ArticulatedInertia:
-        """Return the inertia of the body if it is free to move along the direction of the pivot."""
+        """Return the articulated inertia after the joint velocity of `pivot` is eliminated.
+
+        The body then resists motion along this direction by the inertia of the drive only.
+        """
         felt = _without(
             self.M, self.H, self.J, pivot.column, pivot.gain, pivot.rest, pivot.direction
         )
@@ -112,7 +115,10 @@ def _slid(M: SX, old: SX, tensor: SX, t: SX, axis: int) -> tuple[SX, SX]:
 
 @formula((3, 3), (3, 3), (3, 3), (6, 1), (6, 1), (6, 1))
 def _without(M: SX, H: SX, J: SX, column: SX, g: SX, own: SX, direction: int) -> tuple[SX, SX, SX]:
-    """Return M, H and J of an articulated body after elimination of the velocity of a pivot."""
+    """Return M, H and J of an articulated body after elimination of a joint velocity.
+
+    Arguments `column`, `g` and `own` are column, gain and rest of its `Pivot`.
+    """
     k, u = direction % 3, SX(column)
     u[direction] = 0
     M, H, J = (
@@ -171,11 +177,20 @@ class Pivot:
         return Pivot(direction, *_pivot(column, drive.inertia, drive.momentum, direction))
 
     def transmit(self, wrench: SX, effort: SX) -> tuple[SX, SX]:
-        """Return the wrench (6, 1) on the antecedent and the effort that accelerates the joint."""
+        """Eliminate a joint from the wrench (6, 1) of a body at zero joint acceleration.
+
+        Returns:
+            Wrench on the antecedent, and the effort left to accelerate the joint.
+        """
         return _transmitted(wrench, effort, self.gain, self.ratio, self.direction)
 
     def accelerate(self, twist: SX, left: SX) -> tuple[SX, SX]:
-        """Return the acceleration (6, 1) after the joint, and the joint acceleration."""
+        """Return the acceleration (6, 1) of the link after the joint, and of the joint.
+
+        Args:
+            twist: (6, 1) acceleration before the joint.
+            left: effort left to accelerate the joint, from `transmit`.
+        """
         return _accelerated(twist, left, self.gain, self.inverse, self.ratio, self.direction)
 
 
@@ -195,6 +210,7 @@ def _pivot(column: SX, inertia: SX, momentum: SX, direction: int) -> tuple[SX, S
 
 @formula((6, 1), (1, 1), (6, 1), (1, 1))
 def _transmitted(wrench: SX, effort: SX, gain: SX, ratio: SX, direction: int) -> tuple[SX, SX]:
+    """Return wrench and remaining effort of `Pivot.transmit`."""
     left = effort - wrench[direction]
     wrench = wrench - gain * left
     wrench[direction] = effort - ratio * left
@@ -205,6 +221,7 @@ def _transmitted(wrench: SX, effort: SX, gain: SX, ratio: SX, direction: int) ->
 def _accelerated(
     twist: SX, left: SX, gain: SX, inverse: SX, ratio: SX, direction: int
 ) -> tuple[SX, SX]:
+    """Return the acceleration after a joint and the joint acceleration of `Pivot.accelerate`."""
     before = twist[direction]
     own = casadi.dot(gain, twist) - inverse * left + ratio * before
     twist = SX(twist)
@@ -304,7 +321,7 @@ def articulated_accelerations(
 
 
 def inertia_pivots(tree: Tree, poses: list[LinkPose]) -> tuple[SX, SX]:
-    """Return the inertia (nv, 1) of each velocity, with free and with locked descendant joints.
+    """Return two inertias (nv, 1) of each velocity: descendant joints free to move, and locked.
 
     If the first is negligible relative to the second, the inertia matrix is singular.
     """
@@ -324,14 +341,14 @@ def inertia_pivots(tree: Tree, poses: list[LinkPose]) -> tuple[SX, SX]:
 
 
 def _numbers(link: Link) -> range:
-    """Indices in v of the velocities of a link."""
+    """Return the indices in v of the velocities of the joint of a link."""
     return range(link.v.start, link.v.stop)
 
 
 def _eliminations(
     tree: Tree, poses: list[LinkPose], bodies: Sequence[Inertia]
 ) -> list[JointElimination]:
-    """Eliminate every joint, from the leaves to the base; the result is ordered by link."""
+    """Return the elimination of each joint, by link; computed from the leaves to the base."""
     rigid = regroup(tree, poses, list(bodies))
     articulated = [ArticulatedInertia.of(body) for body in rigid]
     leaves = set(range(len(tree.links))) - {link.antecedent for link in tree.links}
@@ -373,7 +390,14 @@ def _drive(tree: Tree, poses: list[LinkPose], j: int) -> RotorDrive:
 def _solution(
     tree: Tree, joints: list[JointElimination], wrenches: Sequence[SX], efforts: SX
 ) -> SX:
-    """Joint accelerations (nv, 1); `wrenches` (6, 1) are needed at zero joint accelerations."""
+    """Return joint accelerations (nv, 1) for joint efforts (nv, 1).
+
+    Args:
+        tree: links of the mechanism.
+        joints: eliminations of the joints, by link.
+        wrenches: (6, 1) wrench that each link needs at zero joint accelerations.
+        efforts: (nv, 1) joint efforts.
+    """
     needed, left = list(wrenches), zeros(tree.nv)
     for j in reversed(range(len(tree.links))):
         link, joint = tree.links[j], joints[j]
@@ -393,11 +417,12 @@ def _solution(
 
 
 def _moved_wrench(steps: Sequence[Displacement], wrench: SX) -> SX:
+    """Transform a wrench (6, 1) from the frame after displacements to the frame before them."""
     return casadi.vertcat(*transform_wrench_along(steps, wrench[:3], wrench[3:]))
 
 
 def _moved_twist(steps: Sequence[Displacement], twist: SX) -> SX:
-    """Transform a twist from the frame before the steps to the frame after them."""
+    """Transform a twist (6, 1) from the frame before displacements to the frame after them."""
     v, w = twist[:3], twist[3:]
     for step in steps:
         p = step.point(zeros())

@@ -98,6 +98,7 @@ def free_pose(values: SX, sign: int = 1) -> Pose:
 
 
 def _spherical_pose(quaternion: SX, sign: int) -> Pose:
+    """Return the rotation by a quaternion (4, 1) of any norm; its inverse if sign is -1."""
     pose = Pose.rotation(quaternion_rotation(quaternion / casadi.norm_2(quaternion)))
     return pose if sign > 0 else pose.inverse()
 
@@ -121,12 +122,12 @@ class Gap:
     back: Pose | None = None
 
     def then(self, pose: Pose) -> Gap:
-        """Append a pose at the end."""
+        """Return the transform followed by `pose`."""
         back = None if self.back is None else pose.inverse() @ self.back
         return Gap(self.pose @ pose, self.pivots, back)
 
     def after(self, gap: Gap) -> Gap:
-        """Prepend another transform."""
+        """Return the transform `gap`, followed by the present transform."""
         seen = (gap.pose @ pivot for pivot in self.pivots)
         known = self.back is not None or gap.back is not None
         back = self.inverse().pose @ gap.inverse().pose if known else None
@@ -268,17 +269,17 @@ class ChainBuilder:
     gap: Gap = field(default_factory=Gap)
 
     def over(self, pose: Pose) -> None:
-        """Append a known transform."""
+        """Append a known transform to the chain."""
         self.gap = self.gap.then(pose)
 
     def through(self, joint: ChainJoint) -> None:
-        """Append an unknown joint."""
+        """Append a joint with unknown position to the chain."""
         self.joints.append(joint)
         self.gaps.append(self.gap)
         self.gap = Gap()
 
     def past(self, joint: ChainJoint) -> None:
-        """Append a joint as unknown, or as a known transform if its position is known."""
+        """Append a joint: a known transform if its position is known, else an unknown joint."""
         index = joint.index
         if index is None or index not in self.known:
             self.through(joint)
@@ -313,13 +314,14 @@ class ChainBuilder:
 
 
 def _joint(tree: Tree, k: int, sign: int, spins: Mapping[int, Spin]) -> ChainJoint:
+    """Return the chain joint of tree link k; sign is -1 if the chain passes it towards the base."""
     link = tree.links[k]
     sign = -sign if link.backward else sign
     return ChainJoint(link.name, link.motion, link.q.start, sign, spin=spins.get(link.q.start))
 
 
 def links_between(tree: Tree, a: int, b: int) -> tuple[list[int], list[int]]:
-    """Return the links from link a to the common link, and from there to link b."""
+    """Return the links from link a back to the last common ancestor, and from there to b."""
     fork = common_link(tree, a, b)
     back, out = ([k for k in tree.path(link) if k not in tree.path(fork)] for link in (a, b))
     return back[::-1], out

@@ -81,7 +81,7 @@ class JacobianFrame:
 
     @property
     def rotations(self) -> int:
-        """Number of rotations on the branch with more rotations."""
+        """Number of rotations on the path that has more of them."""
         return max(sum(isinstance(s, OtherRotation) for s in branch) for branch in self.branches)
 
 
@@ -121,7 +121,14 @@ Column = tuple[int, SX, SX]
 
 
 def _arms(branches: Sequence[list[PathStep]], reference: int | None) -> list[list[SX]]:
-    """Vectors from the end of each step of each branch to the reference, in the local axes."""
+    """Return vectors (3, 1) to the reference point from the end of each step of each path.
+
+    They are in the local axes of the step.
+
+    Args:
+        branches: paths to the moving frame and to the base.
+        reference: link whose origin is the reference point; None for the moving frame.
+    """
     place = [_place(branch, reference) for branch in branches]
     here = 0 if reference is None or place[0] is not None else 1
     number = place[here]
@@ -134,9 +141,9 @@ def _arms(branches: Sequence[list[PathStep]], reference: int | None) -> list[lis
 
 
 def _place(branch: list[PathStep], reference: int | None) -> int | None:
-    """Index of the step that ends at the reference; None if it is not on the branch.
+    """Return the index of the step at the origin of link `reference`; None if not on the path.
 
-    The index is -1 if an empty branch ends at the moving frame.
+    Without a reference it is the last step, -1 for an empty path.
     """
     if reference is None:
         return len(branch) - 1
@@ -145,7 +152,7 @@ def _place(branch: list[PathStep], reference: int | None) -> int | None:
 
 
 def _inward(branch: list[PathStep]) -> tuple[list[SX], SX]:
-    """Vectors to the end of the branch: a list, from after each step, and from the start."""
+    """Return vectors (3, 1) to the end of the path: from after each step, and from its start."""
     arm, arms = zeros(), []
     for step in reversed(branch):
         arms.append(arm)
@@ -158,7 +165,7 @@ def _inward(branch: list[PathStep]) -> tuple[list[SX], SX]:
 
 
 def _outward(branch: list[PathStep], arm: SX) -> list[SX]:
-    """Vectors to the reference from after each step; `arm` is the vector from the start."""
+    """Return vectors (3, 1) to a point from after each step; `arm` is that vector at the start."""
     arms = []
     for step in branch:
         match step:
@@ -185,7 +192,14 @@ def _local_columns(tree: Tree, branch: list[PathStep], arms: list[SX]) -> list[t
 def _columns_at_start(
     branch: list[PathStep], columns: list[tuple[int, Column]], matrices: int
 ) -> list[Column]:
-    """Rotate the columns to the axes at the beginning of the branch."""
+    """Express Jacobian columns of the joints on a path in the axes at its start.
+
+    Args:
+        branch: steps of the path.
+        columns: index of the step and local column of each joint.
+        matrices: number of rotations that are multiplied to one matrix first; the others rotate
+            each column.
+    """
     turns = [number for number, step in enumerate(branch) if isinstance(step, OtherRotation)]
     split = turns[matrices] if matrices < len(turns) else len(branch)
     R, near = Pose.identity().R, []
@@ -203,11 +217,13 @@ def _columns_at_start(
 
 
 def _rotate(R: SX, column: Column) -> Column:
+    """Return a Jacobian column (index, linear, angular) rotated by a matrix R (3, 3)."""
     k, V, w = column
     return k, casadi.mtimes(R, V), casadi.mtimes(R, w)
 
 
 def _rotate_by(rotation: Rotation, column: Column) -> Column:
+    """Return a Jacobian column (index, linear, angular) rotated by a rotation."""
     k, V, w = column
     V, w = along(rotation, [V, w])
     return k, V, w
@@ -251,7 +267,7 @@ class JacobianSamples:
     units: Array
 
     def combine(self, G: Array) -> JacobianSamples:
-        """Return the survey for m other velocities u with v = G u, where G is (samples, nv, m)."""
+        """Return the same data for m other velocities u, with v = G u and G (samples, nv, m)."""
         parts = G / self.units[:, None]
         sizes = np.abs(parts).max(axis=(0, 1))
         units = 1 / np.where(sizes > 0, sizes, 1.0)
@@ -292,7 +308,10 @@ class JacobianSamples:
         return kept[::-1]
 
     def arm(self, reference: int | None) -> Array:
-        """(samples, 3) scaled vector from a reference to the moving frame, in the required axes."""
+        """Return scaled vectors (samples, 3) from frames[reference] to the moving frame.
+
+        They are in the required axes. Zero if the reference is None.
+        """
         if reference is None:
             return np.zeros_like(self.target_p)
         arm = self.target_p - self.p[reference]
@@ -300,7 +319,7 @@ class JacobianSamples:
 
 
 def survey(target: VelocityTarget) -> JacobianSamples:
-    """Evaluate the Jacobian of a target at random configurations and parameters."""
+    """Evaluate the Jacobian of a moving frame, and frames on its path, at random configurations."""
     tree, q, frame, axes = target.tree, target.q, target.frame, target.axes
     path = tree.path(frame[0])
     poses = base_poses(tree, link_poses(tree, q))
@@ -334,6 +353,7 @@ def random_samples(tree: Tree, parameters: int) -> list[tuple[Array, Array]]:
 
 
 def _random_position(tree: Tree, rng: np.random.Generator) -> Array:
+    """Return random positions (nq,) in [0.3, 2.8] rad or m, with unit quaternions."""
     # [rad or m], between zero and pi, because angles of zero and pi are not generic
     q = rng.uniform(0.3, 2.8, tree.nq)
     for link in tree.links:
@@ -459,7 +479,7 @@ def arm_from(target: VelocityTarget, reference: int | None) -> SX:
 def _rank(
     found: JacobianSamples, intermediate: int | None, reference: int | None
 ) -> list[tuple[int, int | None]]:
-    """Sort pairs of axes and reference by the number of varying, then non-zero entries of J."""
+    """Sort pairs (axes, reference link) by the number of varying, then nonzero entries of J."""
     links = [found.frames[k][0] for k in found.on_path]
     places = spread(found.on_path)
     axes = places if intermediate is None else [links.index(intermediate)]

@@ -123,7 +123,12 @@ def revolute_line(dot: SX, ddot: SX, vd: SX) -> Line:
 
 
 def prismatic_line(dot: SX, ddot: SX) -> Line:
-    """Return the unit motion and rates of a prismatic joint along z; see `revolute_line`."""
+    """Return the unit motion and rates of a prismatic joint along z.
+
+    Args:
+        dot: (3, 1) rate of the axis.
+        ddot: (3, 1) second rate of the axis.
+    """
     return Line(
         unit=Twist(vector([0, 0, 1]), zeros()),
         spin=zeros(),
@@ -138,6 +143,7 @@ def free_lines(link: Link, pose: LinkPose, seen: LineObserver) -> tuple[Line, ..
 
 
 def _free_line(unit: Twist, seen: LineObserver) -> Line:
+    """Return a unit motion `unit` of a joint with several velocities, and its rates."""
     t, s = unit.linear, unit.angular
     t_dot, s_dot = cross(seen.w, t), cross(seen.w, s)
     rate = Twist(t_dot + cross(seen.v, s), s_dot)
@@ -213,7 +219,15 @@ def joint_axes(
 def _of_several(
     link: Link, pose: LinkPose, before: Acceleration, own: Acceleration, v: SX
 ) -> JointAxes:
-    """Axes of a joint with several velocities: the frame of the link."""
+    """Return the axes of a joint with several velocities, equal to the axes of the link frame.
+
+    Args:
+        link: link after the joint.
+        pose: pose of the link relative to its antecedent.
+        before: motion of the antecedent.
+        own: motion of the link.
+        v: joint velocities.
+    """
     linear, angular = motion_behind(link, pose, v)
     path: tuple[AxesStep, ...] = (
         *_drift(linear),
@@ -232,7 +246,15 @@ def _of_several(
 def _of_one(
     link: Link, pose: LinkPose, before: Acceleration, own: Acceleration, v: SX
 ) -> JointAxes:
-    """Axes of a joint with one velocity: the joint frame on the antecedent, shifted along z."""
+    """Return the axes of a joint with one velocity: joint frame on the antecedent, shifted along z.
+
+    Args:
+        link: link after the joint.
+        pose: pose of the link relative to its antecedent.
+        before: motion of the antecedent.
+        own: motion of the link.
+        v: (1, 1) joint velocity.
+    """
     w, wd = pose.at_seat(before.w), pose.at_seat(before.wd)
     dot = vector([w[1], -w[0], 0])
     ddot = vector([wd[1] + w[0] * w[2], w[1] * w[2] - wd[0], own.rate.U[2, 2]])
@@ -255,7 +277,14 @@ def _of_one(
 
 
 def _continue(pose: LinkPose, rotation: Rotation, axes: JointAxes, own: Acceleration) -> JointAxes:
-    """Axes parallel to the axes of the antecedent, to which `rotation` rotates from its frame."""
+    """Return axes parallel to those of the antecedent's joint, for a joint with a parallel axis.
+
+    Args:
+        pose: pose of the link relative to its antecedent.
+        rotation: rotation from the frame of the antecedent to its joint axes.
+        axes: joint axes of the antecedent.
+        own: motion of the link.
+    """
     p = rotation.apply(pose.p)
     shift = tuple(ScrewDisplacement.about(axis, SX(0), p[k]) for k, axis in enumerate("xyz"))
     path: tuple[AxesStep, ...] = (*shift, *_drift(cross(axes.w, p)))
@@ -266,4 +295,5 @@ def _continue(pose: LinkPose, rotation: Rotation, axes: JointAxes, own: Accelera
 
 
 def _drift(velocity: SX) -> tuple[MovingFrame, ...]:
+    """Return the change of observer for a relative velocity (3, 1); () if it is zero."""
     return () if is_zero(velocity) else (MovingFrame(2 * velocity),)

@@ -89,9 +89,9 @@ class VelocityField:
         return VelocityField(f, m, f_rate, m_rate, drag)
 
     def row(self, link: Link, w: SX) -> SX:
-        """Return the entries of B in the row of u and the columns of a link.
+        """Return the entries of B in the row of this unit velocity and the columns of a link.
 
-        The directions of the joint of the link rotate at w (3, 1).
+        B is the Coriolis matrix. The axes of the joint of `link` rotate at w (3, 1).
         """
         return effort_at_joint(link, cross(self.f, w), cross(self.m, w) + self.drag)
 
@@ -320,7 +320,7 @@ def _places(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_Form
 
 
 def _follows(tree: Tree, poses: list[LinkPose], j: int, w: list[SX]) -> bool:
-    """Whether joint j is parallel to the previous joint, and the direction of the axis varies.
+    """Whether joint j is parallel to its predecessor and the common direction varies.
 
     If the direction is constant, the links move in a plane, and one rotation per joint keeps more
     zeros.

@@ -29,16 +29,16 @@ from mbs.spatial import PseudoInertia, Wrench, add_wrenches, cross, is_zero, zer
 
 
 def momentum_on(link: Link, carrier: int) -> SX:
-    """(3, 1) angular momentum of the rotor on link `carrier` per unit joint velocity [kg m^2].
+    """Return the angular momentum (3, 1) of a joint's rotor per unit joint velocity [kg m^2].
 
-    It is in the frame of the carrier. Zero if the joint has no rotor, or a rotor on another link.
+    It is in the frame of link `carrier`. Zero if the joint has no rotor on this link.
     """
     rotor = link.rotor
     return rotor.momentum if rotor is not None and rotor.carrier == carrier else zeros()
 
 
 def spin_momenta(tree: Tree, v: SX) -> dict[int, SX]:
-    """Angular momentum (3, 1) of the rotors on each link relative to it, by carrier index [N m s].
+    """Return the angular momentum (3, 1) of rotors relative to their carrier, by link [N m s].
 
     Index -1 is the base. Links without rotors have no entry.
     """
@@ -51,7 +51,7 @@ def spin_momenta(tree: Tree, v: SX) -> dict[int, SX]:
 
 
 def rotor_efforts(tree: Tree, a: SX, motions: list[Acceleration], base: Acceleration) -> SX:
-    """(nv, 1) joint efforts that accelerate the spin of the rotors [N m or N]."""
+    """Return joint efforts (nv, 1) that accelerate the rotation of the rotors [N m or N]."""
     total = SX.zeros(tree.nv)
     for link in tree.links:
         if link.rotor is not None:
@@ -63,7 +63,7 @@ def rotor_efforts(tree: Tree, a: SX, motions: list[Acceleration], base: Accelera
 
 
 def rotor_moments(tree: Tree, v: SX, a: SX, motions: list[Acceleration]) -> dict[int, SX]:
-    """Moment (3, 1) that each link exerts on its rotors to change their spin, by index [N m]."""
+    """Return the moment (3, 1) that each link exerts on its rotors, by index of the link [N m]."""
     total: dict[int, SX] = {}
     for link in tree.links:
         if link.rotor is None or link.rotor.carrier < 0:
@@ -205,12 +205,14 @@ def spring_energy(tree: Tree, q: SX) -> SX:
 
 
 def _spring_effort(link: Link, q: SX) -> SX:
+    """Return the effort of the spring of a joint at position q; zero without a spring."""
     if link.stiffness.is_zero():
         return zeros(link.motion.nv)
     return link.stiffness * (q - link.rest)
 
 
 def _rotor_and_friction(link: Link, v: SX, a: SX) -> SX:
+    """Return efforts of rotor inertia and friction of a joint at velocity v, acceleration a."""
     total = zeros(link.motion.nv)
     if link.motion is Motion.FREE:  # the linear velocity is in rotating axes
         a = a + casadi.vertcat(cross(v[3:6], v[0:3]), zeros())

@@ -307,7 +307,7 @@ def links_by_base(tree: Tree, axes: list[JointAxes]) -> set[int]:
 
 
 def _cost(step: AxesStep) -> int:
-    """Number of operations to transform a column along a step."""
+    """Return the number of operations that transform a derivative column along a step."""
     match step:
         case MovingFrame():
             return _DRIFT
@@ -358,6 +358,7 @@ def base_axes(tree: Tree, axes: list[JointAxes]) -> list[BaseAxes]:
 
 
 def _after(step: AxesStep, R: SX, p: SX, twice: SX) -> tuple[SX, SX, SX]:
+    """Return orientation R, origin p and doubled velocity of axes after a step, in the base."""
     if isinstance(step, MovingFrame):
         return R, p, twice + casadi.mtimes(R, step.twice)
     p = p + casadi.mtimes(R, step.point(zeros()))
@@ -436,6 +437,7 @@ def newton_euler_derivatives(
 def _fill(
     result: EffortDerivatives, tree: Tree, axes: list[JointAxes], subtrees: list[SubtreeMotion]
 ) -> None:
+    """Fill the derivatives of the efforts, joint by joint with all ancestor joints."""
     by_base = links_by_base(tree, axes)
     placed = base_axes(tree, axes) if by_base else []
     for j, link in enumerate(tree.links):
@@ -464,9 +466,9 @@ def _fill(
 def _rotor_couples(
     tree: Tree, axes: list[JointAxes], j: int
 ) -> tuple[RotorMoment | None, RotorMoment | None]:
-    """Moment derivatives of the rotor of joint j, if it is on link j, and if on the antecedent.
+    """Return moment derivatives of the rotor of joint j: if on link j, if on its antecedent.
 
-    At least one of the two results is None.
+    At least one of the two is None.
     """
     rotor = tree.links[j].rotor
     if rotor is None or rotor.carrier < 0:

@@ -176,6 +176,7 @@ class _Check:
             ) from error
 
     def _mapping(self, method: str, at: At | None = None) -> Mapping[str, Any]:
+        """Return the dict that a method of the component returns; raise if it is no dict."""
         found = self._returned(method, at)
         if not isinstance(found, Mapping):
             raise AssemblyError(
@@ -184,6 +185,10 @@ class _Check:
         return found
 
     def _loads(self) -> Mapping[str, Any]:
+        """Return the loads of the component by port, or minus the derivatives of its energy.
+
+        Empty if the component exerts no load.
+        """
         if not self.element.acts:
             return {}
         if not self.element.has("loads"):
@@ -203,6 +208,7 @@ class _Check:
         return found
 
     def _require_wrench(self, port: str, load: Any) -> None:
+        """Raise AssemblyError unless the load of a frame port is a force and a moment."""
         if not isinstance(load, FrameLoad):
             raise AssemblyError(
                 f"{self._title}: loads gives {_kind(load)} at the frame {port}; give"
@@ -237,6 +243,7 @@ class _Check:
         return {name: self._value(f"{method} of {name}", found[name]) for name in wanted}
 
     def _outputs(self) -> Mapping[str, SX]:
+        """Return the outputs of the component, with one value for each of their names."""
         self.seen.__dict__["lam"] = self.at.row_efforts().get(self.part.name, {})
         return self._named("outputs", self.element.output_names)
 
@@ -254,6 +261,7 @@ class _Check:
             ) from error
 
     def _rows(self) -> None:
+        """Check unit, symbols and number of the constraint rows; velocity rows must be linear."""
         count, bound = 0, list[SX]()
         for method in ("rows", "velocity_rows"):
             if not self.element.has(method):
@@ -292,6 +300,11 @@ class _Check:
             )
 
     def _events(self, modes: Sequence[str]) -> None:
+        """Check events: types, labels, and modes that they set.
+
+        Args:
+            modes: names of the component states that are modes.
+        """
         set_somewhere: set[str] = set()
         for label, event in (self._mapping("events") if self.element.has("events") else {}).items():
             if not isinstance(event, Event):
@@ -365,6 +378,7 @@ class _Check:
                     self._require_free_of(value, f"a limit of {port}", every, "the motion")
 
     def _contact(self, label: str, law: Friction | Stop | OneWay) -> None:
+        """Check the law of a stop, friction or one-way element."""
         own = {*self.element.output_names, *self.part.states, *self.part.inputs}
         for column in ("mode", "effort"):
             if not label and column in own:
@@ -464,6 +478,7 @@ class _Check:
                 raise AssemblyError(f"{self._title}: {what} is {x:.6g} at a random state; {told}")
 
     def _crossings(self) -> None:
+        """Check the event indicators of the component: known symbols only, and no inputs."""
         for label, given in self._mapping("crossings", self.at.at(self.part)).items():
             what, value = f"the crossing {label!r}", given
             if isinstance(given, Approach):
@@ -474,6 +489,7 @@ class _Check:
             self._require_free_of(self._value(what, value), what, self.system.u, "inputs")
 
     def _scalar(self, method: str) -> SX | None:
+        """Return the expression that a method returns; None if the component has no such method."""
         if not self.element.has(method):
             return None
         return self._value(method, self._returned(method))
@@ -497,6 +513,7 @@ class _Check:
     # Checks of the symbols in expressions.
 
     def _require_known(self, value: SX, what: str) -> None:
+        """Raise AssemblyError if a value contains a symbol that the system does not have."""
         known = casadi.vertcat(
             self.q,
             self.v,
@@ -529,6 +546,7 @@ class _Check:
                 )
 
     def _require_free_of(self, value: SX, what: str, symbols: SX, name: str) -> None:
+        """Raise AssemblyError if a value depends on `symbols`, called `name` in the message."""
         if symbols.numel() and casadi.depends_on(value, symbols):
             remedy = "; use velocity_rows" if "row" in what and name == "velocities" else ""
             raise AssemblyError(
@@ -536,6 +554,7 @@ class _Check:
             )
 
     def _require_linear(self, label: str, value: SX) -> None:
+        """Raise AssemblyError unless a velocity row is linear in v, without a constant term."""
         slopes = casadi.jacobian(value, self.v)
         rest = casadi.substitute(value, self.v, SX.zeros(self.v.numel()))
         if casadi.depends_on(slopes, self.v) or not casadi.simplify(rest).is_zero():
@@ -582,6 +601,7 @@ class _Check:
                 self._require_balance((P - back[0]) / 2, (dE - back[1]) / 2, 0.0, sizes.max())
 
     def _require_balance(self, P: float, dE: float, heat: float, size: float) -> None:
+        """Raise AssemblyError unless P + dE + heat is zero, relative to `size` [W]."""
         if abs(P + dE + heat) > _SAME * size:
             raise AssemblyError(
                 f"{self._title}: its loads have the power {P:.6g} W at a random state, but its"
@@ -590,6 +610,7 @@ class _Check:
             )
 
     def _power(self, loads: Mapping[str, Any]) -> SX:
+        """Return the power [W] of all loads of the component along its ports."""
         total = SX(0)
         for port, load in loads.items():
             seen = getattr(self.seen, port)
@@ -619,16 +640,17 @@ class _Check:
 
     @property
     def _title(self) -> str:
+        """Name and class of the component, for error messages."""
         return f"{self.part.name} ({type(self.element).__name__})"
 
 
 def _of(label: str) -> str:
-    """Text " of 'label'" for error messages; empty for an empty label."""
+    """Return " of 'label'" for error messages; empty for an empty label."""
     return f" of {label!r}" if label else ""
 
 
 def _kind(value: Any) -> str:
-    """Short description of a value for error messages."""
+    """Return a short description of a value for error messages."""
     if value is None:
         return "nothing"
     if isinstance(value, SX):

@@ -68,6 +68,7 @@ def later_sources(system: System) -> list[WireSource]:
 
 
 def _is_later(attached: AttachedSensor, name: str) -> bool:
+    """Whether a sensor's signal depends on accelerations or forces, which are computed later."""
     if attached.sensor.reads in ("absolute", "relative"):
         return name in ("a", "wd")
     return name == "a" if attached.sensor.reads == "coordinate" else attached.joint is not None
@@ -125,9 +126,11 @@ class PartsAt:
         return self._seen(part, {name: partial(_same, value) for name, value in inputs.items()})
 
     def _inputs_of(self, part: ComponentInstance) -> Mapping[str, Callable[[], SX]]:
+        """Return functions that evaluate the inputs of a component, by name."""
         return {name: partial(self._input, part, name) for name in part.inputs}
 
     def _seen(self, part: ComponentInstance, inputs: Mapping[str, Callable[[], Any]]) -> At:
+        """Return the ports, inputs and parameters of a component as its methods access them."""
         element, values = part.element, dict[str, Callable[[], Any]](inputs)
         # ports on points of bodies
         frames = dict(zip(element.frames, part.frames, strict=True))
@@ -147,11 +150,13 @@ class PartsAt:
         return At(part.name, part.symbols, values)
 
     def _frame(self, port: str, frames: Mapping[str, Frame]) -> FrameAt:
+        """Return the motion of the frame that a port of a component is attached to."""
         return FrameAt(port, lambda seen_from: self._relative(seen_from, port, frames))
 
     def _relative(
         self, seen_from: FrameAt | None, port: str, frames: Mapping[str, Frame]
     ) -> RelativeMotion:
+        """Return the motion of a port's frame relative to another port's frame, or to the base."""
         a = BASE if seen_from is None else frames[seen_from.port]
         motion = relative_motion(self.tree, a, frames[port], self.q, self.moving)
         if not self._twists:
@@ -163,6 +168,7 @@ class PartsAt:
         return RelativeMotion(motion.p, R, V, motion.w + casadi.mtimes(R, t_b[3:]) - t_a[3:])
 
     def _coordinate(self, part: ComponentInstance, port: str) -> CoordinateAt | FlangeAt | SX:
+        """Return position and velocity of the coordinate that a port of a component acts on."""
         levers = part.coordinates[port]
         q: SX | None = self._shifts.get(port, SX(0))
         for lever in levers:
@@ -184,6 +190,7 @@ class PartsAt:
     # Signals.
 
     def _input(self, part: ComponentInstance, name: str) -> SX:
+        """Return the signal or constant expression that is wired to an input."""
         given = part.inputs[name]
         return given if isinstance(given, SX) else self.signal(given)
 
@@ -365,6 +372,7 @@ class PartsAt:
         return total
 
     def _add_efforts(self, total: SX, part: ComponentInstance, sign: int) -> None:
+        """Add sign times the efforts on the coordinates of a component to `total` (nv, 1)."""
         loads = self.loads(part)
         for port, levers in part.coordinates.items():
             if port in loads:
@@ -537,6 +545,7 @@ class PartsAt:
 
 
 def _same(value: Any) -> Any:
+    """Return the value unchanged."""
     return value
 
 

@@ -213,7 +213,7 @@ def path_twist_rates(
 
 
 def _of_directions(tree: Tree, pose: LinkPose, velocities: list[Velocity], j: int) -> Velocity:
-    """Velocity, in frame j, of the link on which the unit motions of joint j are fixed."""
+    """Return the velocity, in frame j, of the link to which the directions of joint j are fixed."""
     if not tree.links[j].backward:
         return velocities[j]
     i = tree.links[j].antecedent
@@ -234,6 +234,7 @@ def seen_by_links(tree: Tree, poses: list[LinkPose], vector: SX) -> list[SX]:
 
 
 def _unit_twists(tree: Tree, poses: list[LinkPose]) -> list[list[PathTwist]]:
+    """Return the twists of the unit joint velocities of each link, in the frame of the link."""
     return [
         [PathTwist(link.v.start + k, t, n) for k, (t, n) in enumerate(unit_motions(link, pose))]
         for link, pose in zip(tree.links, poses, strict=True)
@@ -404,7 +405,10 @@ def position_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Veloc
 
 
 def _level_rows(tree: Tree, paths: list[list[PathTwist]], ups: list[SX]) -> set[int]:
-    """Indices of velocities without gravity effort: vertical rotation axes, level translations."""
+    """Return indices in v of velocities without gravity effort.
+
+    They belong to vertical rotation axes and horizontal translations.
+    """
     own = [
         (twist, ups[j])
         for j, link in enumerate(tree.links)
@@ -442,5 +446,14 @@ def unit_lifts(up: SX) -> list[Unit]:
 def _element(
     twist: PathTwist | None, rate: PathTwist, lifts: list[Unit], units: list[Unit], k: int
 ) -> SX:
+    """Return an element of the regressor for the inertial parameter of index k.
+
+    Args:
+        twist: motion along which `lifts` does work; None without gravity effort.
+        rate: rate of the unit motion of the joint, whose product with `units` is subtracted.
+        lifts: wrenches that hold the link against gravity, per unit parameter.
+        units: momenta of the link per unit parameter.
+        k: index of the parameter.
+    """
     lifted = SX(0) if twist is None else work(twist, lifts[k])
     return lifted - work(rate, units[k])

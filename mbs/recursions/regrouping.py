@@ -48,7 +48,10 @@ def regroup(tree: Tree, poses: list[LinkPose], bodies: list[Body]) -> list[Body]
 
 
 def _parts(motion: Motion, body: Body) -> tuple[Body, Body]:
-    """Split a body of link j into the part it keeps and the part for link i, both in frame j."""
+    """Split a body of link j into the part that stays and the part regrouped to its antecedent.
+
+    Both are in frame j.
+    """
     match motion:
         case Motion.REVOLUTE:
             return body.along_axis()
@@ -79,11 +82,13 @@ def _join(body: Body, part: Body) -> Body:
 
 
 def _sum(a: SX, b: SX) -> SX:
+    """Return a + b; numbers that cancel become structural zeros."""
     entries = (exact_sum(x, y) for x, y in zip(elements(a), elements(b), strict=True))
     return casadi.reshape(casadi.vertcat(*entries), *a.shape)
 
 
 def _moments(body: Body) -> tuple[SX, SX, SX]:
+    """Return the moments of a body of order 2, 1 and 0."""
     return body.J if isinstance(body, Inertia) else body.S, body.ms, body.m
 
 
@@ -116,7 +121,13 @@ def shift_frames(
 
 
 def _rises(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
-    """Shift of each frame along its axis [m]."""
+    """Return the shift [m] of each link frame along its joint axis that saves operations.
+
+    Args:
+        tree: links of the mechanism.
+        poses: pose of each link relative to its antecedent.
+        base_rests: whether the base does not rotate.
+    """
     resting = _resting(tree, poses) if base_rests else set()
     rise = [SX(0)] * len(poses)
     for j in reversed(range(len(poses))):
@@ -132,7 +143,7 @@ def _rises(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
 
 
 def _resting(tree: Tree, poses: list[LinkPose]) -> set[int]:
-    """Indices of the links whose foot of the axis is at rest."""
+    """Return indices of links whose joint axis has a fixed origin in the base."""
     found: set[int] = set()
     for j, link in enumerate(tree.links):
         i = link.antecedent

@@ -113,6 +113,7 @@ def path_to(tree: Tree, q: SX, frame: tuple[int, Pose]) -> list[PathStep]:
 
 
 def _link_steps(k: int, link: Link, q: SX) -> list[PathStep]:
+    """Return the steps from the antecedent of link k to its frame, at joint position q."""
     place, motion = link.placement, link.motion
     height = place.r + q if motion is Motion.PRISMATIC else place.r
     steps = [step for frame in link.via for step in _fixed_steps(frame)] + _seat_steps(place)
@@ -151,6 +152,7 @@ def _fixed_steps(frame: Khalil) -> list[PathStep]:
 
 
 def _is_idle(step: PathStep) -> bool:
+    """Whether a step is the identity."""
     match step:
         case RotationAboutZ(angle=angle):
             return bool(angle.is_zero())
@@ -167,6 +169,7 @@ def reverse_path(steps: Iterable[PathStep]) -> list[PathStep]:
 
 
 def _inverse(step: PathStep) -> PathStep:
+    """Return a step in the opposite direction."""
     match step:
         case RotationAboutZ(angle=angle, backwards=backwards):
             return RotationAboutZ(angle, not backwards)
@@ -215,15 +218,17 @@ def join_rotations(steps: Sequence[PathStep], tree: Tree) -> list[PathStep]:
 
 
 def _along_z(link: Link) -> bool:
+    """Whether the joint of a link moves about or along its z axis."""
     return link.motion in (Motion.REVOLUTE, Motion.PRISMATIC)
 
 
 def _one_rotation(rotations: list[RotationAboutZ]) -> list[PathStep]:
+    """Return successive rotations about z as one step; [] if there are none."""
     return [OtherRotation(_total(rotations))] if rotations else []
 
 
 def _total(rotations: list[RotationAboutZ]) -> AxisRotation:
-    """Join rotations about z; angles are added in the order of the tree in both directions."""
+    """Join rotations about parallel z axes. Angles are added in the order of the tree."""
     forward, backward = (
         [rotation.angle for rotation in rotations if rotation.backwards is backwards]
         for backwards in (False, True)
@@ -236,6 +241,7 @@ def _total(rotations: list[RotationAboutZ]) -> AxisRotation:
 
 
 def _sum(angles: list[SX]) -> SX:
+    """Return the sum of expressions, added from first to last."""
     total = SX(0)
     for angle in angles:
         total = total + angle
@@ -388,7 +394,7 @@ def relative_acceleration(
 
 
 def _acceleration(frame: Frame, motions: list[Acceleration]) -> tuple[SX, SX, SX]:
-    """Origin acceleration, angular velocity and angular acceleration of a frame, in its axes."""
+    """Return the origin acceleration, angular velocity and angular acceleration of a frame."""
     link, pose = frame
     if link < 0:
         return zeros(), zeros(), zeros()

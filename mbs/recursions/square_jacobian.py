@@ -191,6 +191,7 @@ def _back(rows: Sequence[int], R_V: SX, R_w: SX, arm: SX) -> SX:
 def _sign(
     B: SX, values: Array, blocks: tuple[Block, ...] | None, X_inverse: SX, whole: Array
 ) -> SquareJacobian:
+    """Return the square Jacobian with the sign of its determinant relative to its blocks."""
     if blocks is None or _always_singular(values):
         return SquareJacobian(B, None, X_inverse, 1)
     parts = [np.linalg.det(values[0][np.ix_(block.rows, block.columns)]) for block in blocks]
@@ -199,6 +200,7 @@ def _sign(
 
 
 def _always_singular(values: Array) -> bool:
+    """Whether the matrices (samples, n, n) are singular at all samples."""
     singular = np.linalg.svd(values, compute_uv=False)
     return bool((singular[:, -1] < _SINGULAR * singular[:, 0]).all())
 
@@ -245,6 +247,7 @@ def _leaks(arm: Array, R: Array, w: Array, V_rows: Sequence[int], w_kept: Sequen
 
 
 def _with_zeros(A: SX, pattern: NDArray[np.bool_]) -> SX:
+    """Return A with exact zeros outside the nonzero `pattern`."""
     exact = casadi.densify(SX(A))
     for row, column in np.argwhere(~pattern).tolist():
         exact[row, column] = SX(0)

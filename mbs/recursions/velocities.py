@@ -38,6 +38,7 @@ def motion_at_joint(link: Link, v: SX) -> tuple[SX, SX]:
 
 
 def _along_z(v: SX) -> SX:
+    """Return the vector (3, 1) of length v along z."""
     column = zeros()
     column[2] = v
     return column
@@ -158,6 +159,7 @@ def rotation_rate(w: SX, wd: SX, across: SX | None = None) -> RotationRate:
 
 @formula((3, 1), (3, 1), (1, 1))
 def _rotation_rate(w: SX, wd: SX, across: SX, known: bool) -> tuple[SX, SX, SX, SX]:
+    """Return U = skew(wd) + skew(w) skew(w), and three differences of its squared terms."""
     x, y, z = w[0], w[1], w[2]
     xx, zz, xy, xz, yz = x * x, z * z, x * y, x * z, y * z
     xy_square = across if known else xx + y * y
@@ -188,6 +190,7 @@ def moment_of_rotation(S: SX, rate: RotationRate) -> SX:
 
 @formula((3, 3), (3, 3), (1, 1), (1, 1), (1, 1))
 def _moment_of_rotation(S: SX, U: SX, s_x: SX, s_y: SX, s_z: SX, signs: tuple[int, ...]) -> SX:
+    """Return the moment (3, 1) of `moment_of_rotation` from S, U and the spread of U."""
     rows = []
     for k, spread in enumerate((s_x, s_y, s_z)):
         m, n = (k + 1) % 3, (k + 2) % 3

@@ -46,6 +46,7 @@ def eliminated(stage: PaulStage) -> Iterator[Candidate]:
 def _of(
     stage: PaulStage, rows: list[Equation], variable: Variable, others: Variables
 ) -> Iterator[Candidate]:
+    """Yield steps for `variable` from linear equations, with the variables `others` eliminated."""
     width = len(columns(others))
     for chosen in combinations(rows, width + 1):
         K = _stack(chosen, others)
@@ -70,6 +71,7 @@ def _of(
 
 
 def _stack(rows: tuple[Equation, ...], variables: Variables) -> Matrix:
+    """Return the coefficients of several equations as matrices (samples, rows, columns)."""
     return np.stack(np.broadcast_arrays(*(row_values(row, variables) for row in rows)), axis=-2)
 
 
@@ -83,6 +85,10 @@ def _minors(K: Matrix) -> Matrix:
 def _built(
     stage: PaulStage, rows: tuple[Equation, ...], variable: Variable, others: Variables
 ) -> SequenceStep:
+    """Return the step of X cos q + Y sin q = Z, whose coefficients are determinants.
+
+    The determinants eliminate the variables `others` from the equations `rows`.
+    """
     K = [row_factors(stage, row, others)[:-1] for row in rows]
     own = [row_factors(stage, row, (variable,)) for row in rows]
     X, Y, Z = (

@@ -221,6 +221,7 @@ def _variables(terms: list[Members], prismatic: frozenset[int]) -> tuple[Variabl
 
 
 def _key(term: Members, variables: tuple[Variable, ...]) -> Key:
+    """Return the exponent of each variable in a term."""
     powers = dict(term)
     return tuple(powers.get(variable.members[0][0], 0) for variable in variables)
 
@@ -375,7 +376,10 @@ def _along(
     path: tuple[SplitRow, list[tuple[str, int]], int],
     chosen: Mapping[int, int],
 ) -> SX:
-    """Return the element of w at the end of a path."""
+    """Return the element of w at the end of a path through joints and known transforms.
+
+    The vector w (15,) contains products of origin and z axis of a frame.
+    """
     row, steps, direction = path
     r = SX(1, SIZE)
     r[0, row.element] = 1

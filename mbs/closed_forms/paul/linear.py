@@ -50,7 +50,7 @@ def linear(stage: PaulStage) -> Iterator[Candidate]:
 
 
 def columns(variables: Variables) -> list[tuple[Variable, str]]:
-    """Return the columns of linear equations: length, or cosine and sine, of each variable."""
+    """Return the unknown columns of linear equations: a length, or cosine and sine of an angle."""
     return [
         (variable, kind) for variable in variables for kind in ("r" if variable.prismatic else "cs")
     ]
@@ -65,7 +65,7 @@ def key_of(variable: Variable, equation: Equation) -> Key | None:
 
 
 def row_values(equation: Equation, variables: Variables) -> Matrix:
-    """Return the coefficients (samples, columns) of an equation."""
+    """Return the numeric coefficients (samples, columns) of an equation's variables."""
     values = []
     for variable, kind in columns(variables):
         key = key_of(variable, equation)
@@ -135,6 +135,10 @@ def _built(stage: PaulStage, rows: tuple[Equation, ...], variables: Variables) -
 
 
 def _kind(variables: Variables) -> str:
+    """Return the type of the equations: "linear" for several unknowns, else "type 1" or "type 3".
+
+    Type 1 has a single length, type 3 a single angle.
+    """
     if len(variables) > 1:
         return "linear"
     return "type 1" if variables[0].prismatic else "type 3"
@@ -154,6 +158,7 @@ def _cramer(A: SX, b: SX) -> tuple[SX, list[SX]]:
 def _text(
     stage: PaulStage, table: list[list[SX]], variables: Variables
 ) -> tuple[dict[str, SX], str]:
+    """Return named coefficients of linear equations, and the equations as text."""
     named, lines = dict[str, SX](), list[str]()
     for letter, row in zip(_letters(len(table)), table, strict=True):
         pieces, right = list[str](), "0"
@@ -172,4 +177,8 @@ def _text(
 
 
 def _letters(count: int) -> list[str]:
+    """Return letters a, b, ... that distinguish the coefficients of several equations.
+
+    A single equation has an empty letter.
+    """
     return [""] if count == 1 else list("abcdefgh"[:count])

@@ -45,7 +45,7 @@ class PaulStage:
     equations: tuple[Equation, ...]
 
     def factor(self, equation: Equation, key: Key) -> Factor:
-        """Return the coefficient of a product of the variables (key) of an equation."""
+        """Return the coefficient of the product of variables with exponents `key`."""
         return factor(self.knowledge, self.matrices, equation, key)
 
     def number(self, variable: Variable) -> str:
@@ -103,6 +103,7 @@ def one_unknown(stage: PaulStage) -> Iterator[Candidate]:
 
 
 def _type_2(stage: PaulStage, equation: Equation) -> Candidate:
+    """Return the step of an equation X cos q + Y sin q = Z in one unknown angle."""
     G, Z = equation.at((1,)), equation.at((0,))
     # rank 4 or 5: after the linear equations (1 to 3), single joints before sums
     order = 4.0 if equation.variables[0].single else 5.0
@@ -154,6 +155,7 @@ def _roots(index: int, XYZ: tuple[SX, SX, SX], sign: SX, scale: SX) -> Found:
 
 
 def _quadratic(stage: PaulStage, equation: Equation) -> Candidate:
+    """Return the step of a quadratic equation in one unknown length."""
     order = (4.0, 1.0, unsteady(equation.at((2,)).real), float(equation.cost))
 
     def build() -> SequenceStep:

@@ -57,10 +57,15 @@ def _alone(stage: PaulStage) -> Iterator[tuple[Variable, SX, str]]:
 
 
 def _angle(knowledge: KnownFrames, k: int) -> Variable:
+    """Return the variable of a single joint k: its angle, or its displacement."""
     return Variable(not knowledge.ring.joints[k].is_rotational, ((k, 1),))
 
 
 def _combine(first: Variable, second: Variable, sense: int) -> dict[int, int]:
+    """Return the signs of the joints in the sum first + sense second, by joint.
+
+    Empty if a coefficient is not 1 or -1.
+    """
     total = dict(first.members)
     for k, sign in second.members:
         total[k] = total.get(k, 0) + sense * sign
@@ -68,6 +73,7 @@ def _combine(first: Variable, second: Variable, sense: int) -> dict[int, int]:
 
 
 def _unit(total: dict[int, int]) -> bool:
+    """Whether all coefficients of a sum of angles are -1, 0 or 1."""
     return all(abs(sign) <= 1 for sign in total.values())
 
 
@@ -169,6 +175,7 @@ def _cheapest(stage: PaulStage) -> tuple[SequenceStep, tuple[Variable, ...]] | N
 
 
 def _require_simple(problem: Problem) -> None:
+    """Raise NoClosedForm for a joint that is not revolute or prismatic, or has no index."""
     for joint in problem.ring.joints:
         if joint.motion not in _SIMPLE or joint.index is None:
             raise NoClosedForm(
@@ -187,6 +194,7 @@ def _refusal(stage: PaulStage, steps: Sequence[SequenceStep]) -> str:
 
 
 def _simplest(stage: PaulStage) -> str:
+    """Return text with the unknowns of the simplest equations that remain unsolved."""
     if not stage.equations:
         return "every equation of every split of the loop has more than two unknowns"
     groups = dict.fromkeys(

@@ -92,7 +92,7 @@ class KnownFrames:
         return self.problem.size + len(self.sums)
 
     def can_hold(self, variable: Variable) -> bool:
-        """Whether a variable is new, and x has a free index for it."""
+        """Whether a variable is new, and the vector x of unknowns has a free index for it."""
         held = [known.members for known, _, _ in self.open_sums()]
         return variable.single or (
             variable.members not in held and self.index(variable) < self.problem.x.numel()
@@ -140,6 +140,10 @@ def beginning(problem: Problem, ring: Ring) -> KnownFrames:
 
 
 def _samples(problem: Problem, ring: Ring) -> LoopSamples:
+    """Return the loop transforms and positions at the random configurations of the problem.
+
+    Lengths are divided by the mean length of the transforms.
+    """
     stacked = casadi.vertcat(*(gap.pose.matrix for gap in ring.gaps))
     function = Function("gaps", [problem.given], [casadi.densify(stacked)])
     n, indices = len(ring.joints), [joint.index or 0 for joint in ring.joints]
@@ -168,7 +172,7 @@ _P, _L, _X, _M = slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15)
 
 
 def represented(T: Matrix) -> Matrix:
-    """Return the matrices (..., 15, 15) of rigid transforms (..., 4, 4) that act on w."""
+    """Return matrices (..., 15, 15) of transforms (..., 4, 4) that act on the vector w."""
     R, t = T[..., :3, :3], T[..., :3, 3]
     tt, cross = np.sum(t * t, axis=-1)[..., None, None], _skew(t)
     back = np.einsum("...ji,...j->...i", R, t)
@@ -235,6 +239,7 @@ def inverse(T: Matrix) -> Matrix:
 
 
 def _skew(t: Matrix) -> Matrix:
+    """Return the matrices (..., 3, 3) of the cross product with vectors t (..., 3)."""
     S = np.zeros((*t.shape, 3))
     S[..., 0, 1], S[..., 0, 2], S[..., 1, 2] = -t[..., 2], t[..., 1], -t[..., 0]
     return S - np.swapaxes(S, -1, -2)
@@ -380,6 +385,7 @@ def _walk_on(pieces: _Pieces, first: Tensor, e: int, turned: bool) -> Mapping[in
 
 
 def _over(side: Side, matrix: Matrix) -> Side:
+    """Return one side of the loop equation multiplied by a matrix."""
     S, d = matrix.shape[:2]
     values = matrix @ side.values.reshape(S, d, -1)
     return Side(side.joints, values.reshape(side.values.shape))
@@ -394,6 +400,10 @@ def _through(side: Side, k: int, basis: Tensor) -> Side:
 
 
 def _pieces(knowledge: KnownFrames, block: slice) -> _Pieces:
+    """Return the matrices of the unknown joints and of the transforms between them.
+
+    The slice `block` selects rows and columns of the representation on w (15,).
+    """
     joints = knowledge.unknown
     gaps = [_merge(knowledge, k) for k in joints]
     ways = [represented(T)[:, block, block] for T in gaps]
@@ -503,6 +513,7 @@ def _collect(
     row: int,
     sign: int,
 ) -> None:
+    """Add the masked terms of a row of a side, times `sign`, to the terms found so far."""
     side, terms, mask = source
     for k in np.flatnonzero(mask):
         term = terms[k]
@@ -533,6 +544,7 @@ class _Table:
 
 @lru_cache(maxsize=4096)
 def _table(joints: tuple[int, ...], prismatic: frozenset[int]) -> _Table:
+    """Return the products of powers of joint variables that occur on one side of an equation."""
     every = list(product((-1, 0, 1), repeat=len(joints)))
     terms = list[Members | None]()
     for row in every:

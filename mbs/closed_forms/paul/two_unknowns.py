@@ -96,6 +96,7 @@ def two_unknowns(stage: PaulStage) -> Iterator[Candidate]:
 
 
 def _fits(row: Equation, stays: int) -> bool:
+    """Whether an equation is linear in the variable to eliminate and of low degree in the other."""
     most = 2 if row.variables[stays].prismatic else 1
     return any(key[1 - stays] for key in row.parts) and all(
         abs(key[1 - stays]) <= 1 and abs(key[stays]) <= most for key in row.parts
@@ -142,11 +143,14 @@ def _common_power(forms: Sequence[_Form]) -> int | None:
 
 
 def _spread(G: list[Complex]) -> list[Complex]:
+    """Return pairs of arrays, all broadcast to one shape."""
     arrays = np.broadcast_arrays(*(part for pair in G for part in pair))
     return [(arrays[2 * k], arrays[2 * k + 1]) for k in range(len(G))]
 
 
 def _form_of_values(row: Equation, stays: int) -> _Form:
+    """Return the form of an equation with numeric coefficients."""
+
     def part(key: Key) -> Complex:
         values = row.at(key)
         return values.real, -values.imag
@@ -187,6 +191,10 @@ def _resultant(forms: Sequence[_Form], power: int, prismatic: bool) -> Numbers:
 
 
 def _square(B: Numbers, prismatic: bool) -> Numbers:
+    """Return the coefficients of the square of B[0] + B[1] y + B[2] y^2 of a length y.
+
+    For an angle, B multiplies 1, cos y, sin y, and the result multiplies 1, c, s, c2, s2.
+    """
     z, x, y = B
     if prismatic:
         return [z * z, 2 * z * x, x * x + 2 * z * y, 2 * x * y, y * y]
@@ -194,6 +202,10 @@ def _square(B: Numbers, prismatic: bool) -> Numbers:
 
 
 def _size(G: list[Complex], prismatic: bool) -> Numbers:
+    """Return the coefficients of the squared magnitude of the complex form G in y.
+
+    They have the order of `_square`.
+    """
     if prismatic:
         parts = [_square([part[k] for part in G], True) for k in (0, 1)]
         return [one + two for one, two in zip(*parts, strict=True)]
@@ -227,7 +239,7 @@ def _built(stage: PaulStage, pair: _Pair, shares: Any) -> SequenceStep:
 
 
 def _kind(pair: _Pair) -> str:
-    """Return the type of the two equations in the table of Khalil."""
+    """Return the type of a pair of equations in the table of Khalil: "type 4" to "type 8"."""
     goes = 1 - pair.stays
     factors = {abs(key[pair.stays]) for row in pair.rows for key in row.parts if key[goes]}
     if pair.variable.prismatic:

@@ -125,12 +125,14 @@ def _clear(row: SX, values: Array) -> SX:
 
 
 def _right_side(elimination: Elimination, ways: Sequence[Pose]) -> SX:
+    """Return the side of the loop equation with joints 1 and 2, by their monomials."""
     u = _pair(ways[5].inverse())[elimination.elements.tolist()]
     once = _carry(elimination, ways[0].inverse(), _moved(elimination.first, u))
     return _carry(elimination, ways[1].inverse(), _moved(elimination.second, once))
 
 
 def _left_side(elimination: Elimination, ways: Sequence[Pose]) -> list[SX]:
+    """Return the side of the loop equation with the joints 3, 4 and 5, by parts of joint 3."""
     w = _pair(ways[4])[elimination.elements.tolist()]
     once = _carry(elimination, ways[3], _moved(elimination.fifth, w))
     twice = _carry(elimination, ways[2], _moved(elimination.fourth, once))
@@ -143,6 +145,7 @@ def _moved(parts: Array, columns: SX) -> SX:
 
 
 def _carry(elimination: Elimination, T: Pose, columns: SX) -> SX:
+    """Return columns of w transformed by a symbolic pose T."""
     own = elimination.elements.tolist()
     X = SX(SIZE, SIZE)
     for t, slope in zip(casadi.vertsplit(T.p), SLOPES, strict=True):
@@ -153,12 +156,14 @@ def _carry(elimination: Elimination, T: Pose, columns: SX) -> SX:
 
 
 def _pair(T: Pose) -> SX:
+    """Return w (15, 1): 1 and the products of origin p and z axis of a pose."""
     p, z = T.p, T.R[:, 2]
     pp, pz = casadi.dot(p, p), casadi.dot(p, z)
     return SX(casadi.vertcat(1, pp, pz, p, z, casadi.cross(p, z), pp * z - 2 * pz * p))
 
 
 def _constant(part: NDArray[np.float64]) -> SX:
+    """Return a numeric matrix as a sparse expression."""
     return SX(casadi.sparsify(DM(part)))
 
 
@@ -277,6 +282,7 @@ def _numbers(problem: Problem, ring: Ring, length: float) -> Array:
 
 
 def _characteristic(problem: Problem, loop: _Loop) -> Characteristic:
+    """Return the matrix whose determinant vanishes at the positions of joint 3."""
     elimination, joint = loop.pencil.elimination, loop.ring.joints[2]
     A = table(elimination, loop.ways)
     columns = len(elimination.first) * len(elimination.second) - 1
@@ -311,6 +317,7 @@ def _in_joint(parts: list[SX], loop: _Loop) -> tuple[SX, ...]:
 
 
 def _place(joint: ChainJoint) -> int:
+    """Return the index of a joint among the unknowns. Raise NoClosedForm if it has none."""
     if joint.index is None:
         raise NoClosedForm(f"joint {joint.name} has no place among the unknowns of the problem")
     return joint.index

@@ -29,6 +29,7 @@ LINEAR = np.array([0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11])
 
 
 def _skew(t: Array) -> Array:
+    """Return the matrix (3, 3) of the cross product with t (3,)."""
     return np.array([[0, -t[2], t[1]], [t[2], 0, -t[0]], [-t[1], t[0], 0]])
 
 
@@ -76,7 +77,7 @@ def pair(T: Field) -> Field:
 
 
 def rho(T: Array) -> Array:
-    """Return the matrices (..., 15, 15) that act on w, for displacements T (..., 4, 4)."""
+    """Return matrices (..., 15, 15) of displacements T (..., 4, 4) that act on w; see `pair`."""
     X = np.tensordot(T[..., :3, 3], SLOPES, axes=1)
     turned = np.zeros((*T.shape[:-2], SIZE, SIZE), T.dtype)
     turned[..., range(3), range(3)] = 1.0
@@ -233,6 +234,7 @@ def eliminations(prismatic: Joints) -> list[Elimination]:
 
 
 def _elimination(prismatic: Joints, elements: NDArray[np.int64], raised: int) -> Elimination:
+    """Return the tables of an elimination for the types of the joints."""
     slides = [bool(joint) for joint in prismatic]
     highest = 3 if len(elements) == SIZE else 2
     counts = [highest if slide else 3 for slide in slides]
@@ -352,6 +354,7 @@ class Arrangement:
         return ways
 
     def _pose(self, T: Array) -> Array:
+        """Return the pose T (..., 4, 4), inverted if the loop runs along the arm."""
         return inverse(T) if self.sign > 0 else T
 
     def configurations(self, u: Array) -> Array:
@@ -397,6 +400,7 @@ def loop_length(arm: Arm) -> float:
 
 
 def _scale(T: Array, length: float) -> Array:
+    """Return transforms (..., 4, 4) with their translations divided by a length."""
     T = np.array(T, dtype=float)
     T[..., :3, 3] /= length
     return T

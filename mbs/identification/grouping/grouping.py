@@ -43,6 +43,7 @@ def quotient(value: SX, divisor: SX) -> SX:
 
 
 def _factors(value: SX) -> list[SX]:
+    """Return the factors of a product expression."""
     if value.is_op(casadi.OP_MUL):
         return _factors(value.dep(0)) + _factors(value.dep(1))
     if value.is_op(casadi.OP_SQ):
@@ -196,7 +197,7 @@ def equation(name: str, terms: Mapping[str, SX]) -> str:
 
 
 def _sign(coefficient: SX) -> tuple[str, str]:
-    """Return the sign of a coefficient and the text of its magnitude as a factor."""
+    """Return the sign ("+" or "-") of a coefficient and its magnitude as the text of a factor."""
     negative, size = _split(coefficient)
     return "-" if negative else "+", _factor(size)
 

@@ -98,6 +98,7 @@ def _share(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
 
 
 def _along(freedom: Freedom) -> Pose:
+    """Return the rotation that aligns the z axis with the axis of a freedom."""
     return Pose.rotation(align_z(freedom.axis))
 
 
@@ -153,6 +154,7 @@ def _link_poses(system: System, configurations: ClosedConfigurations) -> tuple[A
 
 
 def _constant(values: Array) -> bool:
+    """Whether values are equal in all configurations (first axis)."""
     return bool(np.max(np.abs(values - values[0])) < _SAME)
 
 

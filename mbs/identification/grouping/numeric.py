@@ -174,6 +174,7 @@ def random_states(system: System, p: Array, count: int, seed: int) -> States:
 
 
 def _any(system: System, count: int, rng: np.random.Generator) -> Array:
+    """Return random positions (nq, count) with unit quaternions."""
     scale = np.array([np.pi if c.unit == "rad" else 1.0 for c in system.coordinates])
     q = scale[:, None] * rng.uniform(-1, 1, (system.nq, count))
     return _normalise(system, q)
@@ -248,6 +249,10 @@ class _ConfigurationWalk:
         return q
 
     def _step(self, q: Array, direction: Array) -> Array | None:
+        """Return the closed configuration after a step along independent velocities.
+
+        None if the loops do not close nearby, or the result is near a singular configuration.
+        """
         p = self.closing.p
         arguments = (q, p) if p.size else (q,)
         G = np.array(self.G(*arguments))
@@ -262,6 +267,7 @@ class _ConfigurationWalk:
 
 
 def _normalise(system: System, q: Array) -> Array:
+    """Return positions (nq, count) with quaternions of unit length, changed in place."""
     for part in quaternion_slices(system.tree):
         q[part] /= np.linalg.norm(q[part], axis=0)
     return q
@@ -415,6 +421,7 @@ def relation_texts(
 
 
 def _inexact(error: float) -> str:
+    """Return the error text for rules that do not reproduce the regressor."""
     return (
         f"the rules are not exact: the grouped regressor differs by {error:.2g} of its longest"
         " column"
@@ -422,6 +429,7 @@ def _inexact(error: float) -> str:
 
 
 def _verdict(count: int, rank: int, relations: Sequence[str]) -> str:
+    """Return text that compares the number of kept parameters to the rank of the regressor."""
     if count == rank:
         return f"the rules keep {count} parameters, which is the rank of the regressor"
     told = "; ".join(relations)
@@ -429,6 +437,7 @@ def _verdict(count: int, rank: int, relations: Sequence[str]) -> str:
 
 
 def _gap(found: Dependence) -> str:
+    """Return text on the gap of the singular values at the rank; empty if it is infinite."""
     if np.isinf(found.gap):
         return ""
     doubt = ", so narrow that the rank is in doubt" if found.gap < _NARROW else ""
@@ -436,4 +445,5 @@ def _gap(found: Dependence) -> str:
 
 
 def _sentence(text: str) -> str:
+    """Return the text with an upper-case first letter."""
     return text[0].upper() + text[1:]

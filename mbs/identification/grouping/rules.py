@@ -117,6 +117,7 @@ class Structure:
         return not self.base_moves and all(self._holds(k, points) for k in before)
 
     def _holds(self, k: int, points: Array) -> bool:
+        """Whether points (samples, 3) are on the axis, or at the centre, of joint k."""
         match self.tree.links[k].motion:
             case Motion.REVOLUTE:
                 return self.on_axis(points, k)
@@ -175,6 +176,7 @@ def structure_of(system: System, *, base_moves: bool = False) -> Structure:
 
 
 def _vanishes(values: Array) -> bool:
+    """Whether all values are zero up to rounding."""
     return bool(np.max(np.abs(values), initial=0.0) < _SAME)
 
 
@@ -200,6 +202,7 @@ def resting_height(structure: Structure, j: int) -> SX | None:
 
 
 def _height_where_all_meet(structure: Structure, j: int, k: int) -> SX | None:
+    """Return the coordinate along axis j of its intersection with axis k; None if it moves."""
     axes = structure.axes
     between = structure.origins[:, k] - structure.origins[:, j]
     normal = np.cross(axes[:, j], axes[:, k])
@@ -299,6 +302,7 @@ def _moved_to_antecedent(structure: Structure, j: int) -> Iterator[Removal]:
 
 
 def _without_effect(structure: Structure, j: int) -> Iterator[Removal]:
+    """Yield parameters of link j that have no effect on the efforts."""
     match structure.tree.links[j].motion:
         case Motion.REVOLUTE:
             yield from _revolute(structure, j)
@@ -433,6 +437,7 @@ def _mass_before(link: Link) -> dict[Key, SX]:
 
 
 def _column(through: SX, name: str) -> SX:
+    """Return the column of a matrix that belongs to an inertial parameter by name."""
     return through[:, TEN_PARAMETERS.index(name)]
 
 
@@ -443,4 +448,5 @@ def on_link(link: int, column: SX) -> dict[Key, SX]:
 
 
 def _nothing(j: int, names: Iterable[str]) -> Iterator[Removal]:
+    """Yield removals of parameters of link j that have no effect at all."""
     yield from (Removal((j, name), {}) for name in names)

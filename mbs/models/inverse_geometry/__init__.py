@@ -7,8 +7,8 @@ from mbs.models.inverse_geometry._solve import solve
 from mbs.models.inverse_geometry._solve_many import ManySolutions, solve_many
 from mbs.models.inverse_geometry._solver import PoseAnswer, PoseSolver, solver
 from mbs.models.inverse_geometry.functions import InverseGeometry, function
+from mbs.models.inverse_geometry.listing import text
 from mbs.models.inverse_geometry.self_motions import Family
-from mbs.models.inverse_geometry.sheet import text
 from mbs.models.inverse_geometry.solutions import Solution, Solutions
 
 __all__ = [

@@ -33,7 +33,7 @@ from mbs.models.inverse_geometry.solutions import (
     RobotSolution,
     Solution,
     Solutions,
-    Wishes,
+    SolveOptions,
     bounds,
     leaves_out,
 )
@@ -242,7 +242,7 @@ class FreeOrientation:
         held = {k for k, c in enumerate(system.coordinates) if c.name in still}
         held |= {k for coupling in system.couplings for k in coupling.coordinates}
         ends = bounds(system, limits, set(range(system.nq)) - held)
-        wishes = Wishes(system, near, ends, leaves_out(limits), seed is not None)
+        wishes = SolveOptions(system, near, ends, leaves_out(limits), seed is not None)
         drafts, others = list[RobotSolution](), list[Array]()
         for solution in found:
             x = solution.q[:n]

@@ -15,7 +15,7 @@ from mbs.closed_forms.arm_search import nearest
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.answer import (
     Examined,
-    Question,
+    PoseProblem,
     answer,
     named,
     new_among,
@@ -41,7 +41,7 @@ from mbs.models.inverse_geometry.solutions import (
     Given,
     RegularSolutions,
     Solutions,
-    Wishes,
+    SolveOptions,
     bounds,
     leaves_out,
 )
@@ -128,7 +128,7 @@ class _Shell:
 
     kernel: PoseKernel
     names: tuple[str, ...]
-    plain: Wishes
+    plain: SolveOptions
 
     def solutions(self, T: Any, seed: Seed) -> Solutions | None:
         """Return the solutions of a regular pose, or None if `solve` must use other methods."""
@@ -255,7 +255,7 @@ def solve_at(
     return answer(*_asked(chain, r, T, method, p, limits, seed))
 
 
-_Asked = tuple[Question, list[ChainRoot], str]
+_Asked = tuple[PoseProblem, list[ChainRoot], str]
 """Problem, solutions of its chain, and name of the method that computed them."""
 
 
@@ -271,7 +271,7 @@ def _asked(
     require_method(chain.system, method, METHODS)
     own = chain.locked_at(r) if chain.varied else chain
     wishes = _wishes(chain.system, own, limits, seed)
-    question = Question(own, Target(own.arm(p), T), p, wishes)
+    question = PoseProblem(own, Target(own.arm(p), T), p, wishes)
     if chain.varied:  # one closed form serves all positions
         found, used = solved(question, method, chain, r)
         return question, named(question, found, _signs(chain, method, p)), used
@@ -296,7 +296,7 @@ def _signs(chain: FrameChain, method: str, p: Array) -> tuple[str, ...]:
 
 
 def solved(
-    question: Question, method: str, varied: FrameChain, r: Array
+    question: PoseProblem, method: str, varied: FrameChain, r: Array
 ) -> tuple[list[ChainRoot], str]:
     """Return the distinct solutions of a chain and the name of the method that computed them.
 
@@ -348,7 +348,7 @@ def _joined(asked: list[_Asked], samples: LockedSamples, near: Array | None) -> 
     return replace(answers[0], reason=reason)
 
 
-def _away(question: Question) -> float:
+def _away(question: PoseProblem) -> float:
     """Return the distance of the nearest reachable pose: [arm lengths] plus [rad]."""
     arm = question.target.arm
     found = nearest(arm, question.target.T)
@@ -384,14 +384,14 @@ def _wishes(
     chain: FrameChain | None,
     limits: bool | Given | None,
     seed: Mapping[str, float] | Sequence[float] | None,
-) -> Wishes:
+) -> SolveOptions:
     names = [coordinate.name for coordinate in system.coordinates]
     locked_indices = [] if chain is None else [names.index(name) for name in chain.locked]
     turning = None if chain is None or system.is_closed else chain.indices
     coupled = [k for c in system.couplings for k in c.coordinates]
     limited = bounds(system, limits, set(turning or range(system.nq)) - {*locked_indices, *coupled})
     near = _near(system, chain, seed)
-    return Wishes(system, near, limited, leaves_out(limits), seed is not None)
+    return SolveOptions(system, near, limited, leaves_out(limits), seed is not None)
 
 
 def _near(system: System, chain: FrameChain | None, seed: Seed) -> Array:

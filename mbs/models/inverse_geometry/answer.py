@@ -11,12 +11,17 @@ from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Array
 from mbs.closed_forms.arm_search import Nearest, nearest
-from mbs.models.inverse_geometry.branches import Anatomy, anatomy, labels
+from mbs.models.inverse_geometry.branches import BranchLabels, anatomy, labels
 from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.gathering import Gathered
 from mbs.models.inverse_geometry.root import MOST_ROOTS, ChainRoot
 from mbs.models.inverse_geometry.self_motions import Family, connected, curve, family, freedoms
-from mbs.models.inverse_geometry.solutions import RobotSolution, Solutions, Wishes, unreachable
+from mbs.models.inverse_geometry.solutions import (
+    RobotSolution,
+    Solutions,
+    SolveOptions,
+    unreachable,
+)
 from mbs.models.inverse_geometry.target import (
     ONE,
     SINGULAR,
@@ -239,7 +244,7 @@ NO_LOOP = "the loops stay open: the joints on the way to the frame reach the pos
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Question:
+class PoseProblem:
     """Inverse geometric problem: target pose of the end frame of a chain.
 
     Attributes:
@@ -252,7 +257,7 @@ class Question:
     chain: FrameChain
     target: Target
     p: Array
-    wishes: Wishes
+    wishes: SolveOptions
 
     @property
     def chain_indices(self) -> ChainIndices:
@@ -274,7 +279,7 @@ class Question:
         return [ClosedConfiguration(whole, "", 0.0)]
 
 
-def answer(question: Question, found: list[ChainRoot], method: str) -> Solutions:
+def answer(question: PoseProblem, found: list[ChainRoot], method: str) -> Solutions:
     """Return the solutions of the robot, or the reason if there is none.
 
     Args:
@@ -292,7 +297,7 @@ def answer(question: Question, found: list[ChainRoot], method: str) -> Solutions
     return question.wishes.solutions(drafts, method, "" if drafts else NO_LOOP)
 
 
-def _drafts(question: Question, found: list[ChainRoot]) -> list[RobotSolution]:
+def _drafts(question: PoseProblem, found: list[ChainRoot]) -> list[RobotSolution]:
     """Return the solutions of the robot, one per chain solution and loop branch."""
     target = question.target
     q = np.array([root.q for root in found])
@@ -313,7 +318,7 @@ def _drafts(question: Question, found: list[ChainRoot]) -> list[RobotSolution]:
 
 
 def named(
-    question: Question, found: list[ChainRoot], branches: tuple[str, ...] = ()
+    question: PoseProblem, found: list[ChainRoot], branches: tuple[str, ...] = ()
 ) -> list[ChainRoot]:
     """Return the roots with branch names or numbers, without repeated self-motions.
 
@@ -326,7 +331,7 @@ def named(
     found = _shown(question, found)
     chain, arm = question.chain, question.target.arm
     key = ("anatomy", *chain.key, question.p.tobytes())
-    has: Anatomy = chain.system.cached(key, lambda: anatomy(arm))
+    has: BranchLabels = chain.system.cached(key, lambda: anatomy(arm))
     meeting = np.array([root.multiplicity != 1 for root in found], dtype=bool)
     names = labels(arm, has, np.array([root.q for root in found]).reshape(-1, arm.size), meeting)
     # keep the closed-form label if it is a branch name, or if no other name exists
@@ -343,7 +348,7 @@ def named(
     return result
 
 
-def _shown(question: Question, found: list[ChainRoot]) -> list[ChainRoot]:
+def _shown(question: PoseProblem, found: list[ChainRoot]) -> list[ChainRoot]:
     """Move each self-motion to its representative configuration and drop repeated ones."""
     shown = list[ChainRoot]()
     for root in found:
@@ -368,7 +373,7 @@ _SEEDED = 1e-6
 of singular solutions."""
 
 
-def _representative(question: Question, family: Family) -> Array:
+def _representative(question: PoseProblem, family: Family) -> Array:
     """Return the configuration (n,) of a self-motion within limits, nearest to the seed.
 
     Nearness is measured at the free joint. A seed on the self-motion and within limits is returned.
@@ -387,7 +392,7 @@ def _representative(question: Question, family: Family) -> Array:
     return first
 
 
-def _is_of(question: Question, family: Family, q: Array) -> bool:
+def _is_of(question: PoseProblem, family: Family, q: Array) -> bool:
     """Whether a configuration q (n,) reaches the pose and belongs to a self-motion.
 
     For several freedoms only one curve is known, so the joints that do not move are compared.
@@ -402,7 +407,7 @@ def _is_of(question: Question, family: Family, q: Array) -> bool:
     return bool(np.max(np.abs(away), initial=0.0) < _SEEDED)
 
 
-def _whole(question: Question, found: Nearest) -> Nearest:
+def _whole(question: PoseProblem, found: Nearest) -> Nearest:
     """Complete the nearest pose with the robot configuration (nq,), NaN if loops stay open."""
     whole = question.whole(found.q)
     if not np.all(np.isfinite(whole)):

@@ -29,7 +29,7 @@ double root by 2e-7, and solutions up to 1e-6 apart are one."""
 
 
 @dataclass(frozen=True, slots=True)
-class Anatomy:
+class BranchLabels:
     """Parts of an arm that distinguish named branches.
 
     Attributes:
@@ -45,19 +45,21 @@ class Anatomy:
     wrist: bool
 
 
-def anatomy(arm: Arm) -> Anatomy:
+def anatomy(arm: Arm) -> BranchLabels:
     """Return whether an arm has a shoulder, an elbow and a spherical wrist."""
     if arm.size != 6 or any(arm.prismatic[3:]) or not _wrist_meets(arm):
-        return Anatomy(False, False, False)
+        return BranchLabels(False, False, False)
     axes, origins = arm.lines(np.zeros(6))
     shoulder = not any(arm.prismatic[:2]) and abs(axes[0] @ axes[1]) < _PARALLEL
     parallel = np.linalg.norm(np.cross(axes[1], axes[2])) < _PARALLEL
     apart = np.linalg.norm(np.cross(axes[1], origins[2] - origins[1])) > _PARALLEL * arm.length
     elbow = shoulder and not arm.prismatic[2] and bool(parallel and apart)
-    return Anatomy(bool(shoulder), elbow, True)
+    return BranchLabels(bool(shoulder), elbow, True)
 
 
-def labels(arm: Arm, has: Anatomy, q: Array, meeting: NDArray[np.bool_] | None = None) -> list[str]:
+def labels(
+    arm: Arm, has: BranchLabels, q: Array, meeting: NDArray[np.bool_] | None = None
+) -> list[str]:
     """Return branch names of configurations, such as "shoulder right, elbow up, no flip".
 
     A part of the name is omitted at the boundary of two branches. For an arm without a spherical
@@ -82,7 +84,7 @@ def labels(arm: Arm, has: Anatomy, q: Array, meeting: NDArray[np.bool_] | None =
     return [_label(has, *four) for four in zip(right, bend, turn, zero, strict=True)]
 
 
-def _label(has: Anatomy, right: float, bend: float, turn: float, zero: float) -> str:
+def _label(has: BranchLabels, right: float, bend: float, turn: float, zero: float) -> str:
     names = []
     if has.shoulder and abs(right) > zero:
         names.append("shoulder right" if right > 0 else "shoulder left")
@@ -166,7 +168,7 @@ def branch_labels(chain: FrameChain, sequence: StepSequence, p: Array) -> tuple[
 
 
 def _names_at_samples(
-    chain: FrameChain, sequence: StepSequence, p: Array, arm: Arm, has: Anatomy
+    chain: FrameChain, sequence: StepSequence, p: Array, arm: Arm, has: BranchLabels
 ) -> list[str]:
     """Return the name of each branch at all samples, "" if it has no unique name."""
     rng = np.random.default_rng(_SEED)

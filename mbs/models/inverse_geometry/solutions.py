@@ -505,7 +505,7 @@ class RobotSolution:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Wishes:
+class SolveOptions:
     """Options of an inverse geometric problem.
 
     Attributes:

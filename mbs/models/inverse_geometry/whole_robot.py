@@ -26,7 +26,7 @@ from mbs.loops.plan import (
 from mbs.loops.pose import Goal, goal
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry.chain import FrameChain
-from mbs.models.inverse_geometry.solutions import RobotSolution, Solutions, Wishes
+from mbs.models.inverse_geometry.solutions import RobotSolution, Solutions, SolveOptions
 
 # Configurations of trees and of robots with closed loops, from the joints between base and frame.
 #
@@ -288,7 +288,7 @@ _SINGULAR = 1e-6
 roots at a distance of 1e-6 count as one."""
 
 
-def parallel(wishes: Wishes, frame: str | int | None, T: Array, p: Array) -> Solutions:
+def parallel(wishes: SolveOptions, frame: str | int | None, T: Array, p: Array) -> Solutions:
     """Compute all configurations of a robot with loops for a pose of a frame.
 
     Args:

@@ -9,7 +9,7 @@ from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.models.inverse_geometry import solve
-from mbs.models.inverse_geometry.branches import Anatomy, anatomy, labels
+from mbs.models.inverse_geometry.branches import BranchLabels, anatomy, labels
 from mbs.models.inverse_geometry.chain import frame_chain
 
 
@@ -25,10 +25,10 @@ def label(name, q):
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
-        ("puma560", Anatomy(shoulder=True, elbow=True, wrist=True)),
-        ("rx90", Anatomy(shoulder=True, elbow=True, wrist=True)),
-        ("stanford", Anatomy(shoulder=True, elbow=False, wrist=True)),
-        ("scara", Anatomy(shoulder=False, elbow=False, wrist=False)),
+        ("puma560", BranchLabels(shoulder=True, elbow=True, wrist=True)),
+        ("rx90", BranchLabels(shoulder=True, elbow=True, wrist=True)),
+        ("stanford", BranchLabels(shoulder=True, elbow=False, wrist=True)),
+        ("scara", BranchLabels(shoulder=False, elbow=False, wrist=False)),
     ],
 )
 def test_anatomy(name, expected):

@@ -12,7 +12,7 @@ from support.catalogue_systems import catalogue_system
 import mbs
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry import function, text
-from mbs.models.inverse_geometry.sheet import expression_lines
+from mbs.models.inverse_geometry.listing import expression_lines
 from mbs.operations.graph import graph_of
 
 

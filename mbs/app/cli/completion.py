@@ -18,7 +18,7 @@ def robot_names() -> list[str]:
     if found is None or found.origin is None:
         return []
     text = Path(found.origin).read_text(encoding="utf-8")
-    return re.findall(r"^from mbs\.robots\.(\w+) import \1$", text, re.MULTILINE)
+    return re.findall(r"^from mbs\.robots\._(\w+) import \1$", text, re.MULTILINE)
 
 
 def robots(incomplete: str) -> list[str]:

@@ -7,7 +7,8 @@ from fmu_models import pendulum, slider_crank
 from fmu_structures import ball, two_cranks
 from support.catalogue_systems import catalogue_system
 
-from mbs.export.fmu.system_fmu import Contents, fmu_model
+from mbs.export.fmu.options import FmuOptions
+from mbs.export.fmu.system_fmu import fmu_model
 from mbs.export.fmu.xml import dependencies, linearity, structure
 
 SEED = 20261122
@@ -123,7 +124,7 @@ def test_kinds_with_modes_and_fixed_parameters():
 
 def test_outputs_of_a_loop_depend_on_all_states_of_the_host_or_on_none():
     """Near singular configurations the states are tangent coordinates, which move all joints."""
-    model = fmu_model(catalogue_system("slider_crank"), Contents(outputs=["energy"]))
+    model = fmu_model(catalogue_system("slider_crank"), FmuOptions(outputs=["energy"]))
     names = [entry.variable.name for entry in model.entries]
     running = structure(model).running
 

@@ -53,7 +53,7 @@ def test_columns_times_values_are_the_efforts():
     D = ident.regressor(system, laws=LAWS)
     assert [c.name for c in D.columns[-4:]] == list(LAWS)
     assert [c.unit for c in D.columns[-4:]] == ["N/m", "N.s/m", "kg/m", "N.m.s/rad"]
-    K = ident.regressors.numbers_of(system, D.columns)
+    K = ident.regressors.numeric_parameters(system, D.columns)
     known = ident.known_efforts(system, laws=LAWS)
     idm = mbs.models.inverse_dynamics(system)
     for q, v, a in states():
@@ -92,7 +92,7 @@ def test_base_parameters_and_estimates_have_them():
     D = ident.regressor(system, laws=("k", "drag"))
     rows, right = [], []
     rng = np.random.default_rng(8)
-    K = ident.regressors.numbers_of(system, D.columns)
+    K = ident.regressors.numeric_parameters(system, D.columns)
     for _ in range(60):
         q, v, a = rng.uniform(-2, 2, (3, 2))
         rows.append(np.array(D(q, v, a)))

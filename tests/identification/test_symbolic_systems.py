@@ -86,7 +86,7 @@ def test_instruments_and_excitation_of_a_system_with_parameters():
     assert found[0].residuals.total_percent == pytest.approx(
         found[1].residuals.total_percent, rel=1e-6
     )
-    series = ident.Series(period=4.0, harmonics=3, samples=20)
+    series = ident.FourierSettings(period=4.0, harmonics=3, samples=20)
     limits = {"position": 1.5, "velocity": 4.0, "effort": 100.0}
     plane = ident.Plane("link2", (0.1, 0, 0), (0, 1, 0), -0.9)
     motions = [

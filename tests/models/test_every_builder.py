@@ -110,7 +110,7 @@ def with_hessian(model, at, k):
         ("four_bar", "energy"),
         ("loop", "inverse_dynamics"),
         ("driven", "transform"),
-        ("rolling", "closure"),
+        ("rolling", "closure_residual"),
     ],
 )
 def test_machine_code_with_two_derivatives(name, builder):

@@ -11,15 +11,20 @@ from mbs.native import compiler_found
 from mbs.robots import n_four_bar
 
 INTEGRATE = sys.modules["mbs.solvers._integrate"]
+SCALAR = sys.modules["mbs.native.scalar_source"]
 SINGULAR = sys.modules["mbs.models.state.singular_configurations"]
 
 
 @pytest.mark.skipif(not compiler_found(), reason="there is no compiler")
 def test_code_in_pieces_gives_the_same_bits(monkeypatch):
     """Three seconds lead through two configurations in which all rods lie on one line."""
-    motions = []
-    for long in (10**9, 0):
-        monkeypatch.setattr(INTEGRATE, "_LONG", long)
+    monkeypatch.setattr(INTEGRATE, "_WRITING", (0.0, 0.0))
+    monkeypatch.setattr(INTEGRATE, "_COMPILING", (0.0, 0.0))
+    whole, motions = SCALAR._body, []
+    for size in (10**9, 50):
+        monkeypatch.setattr(
+            SCALAR, "_body", lambda f, real, _, least, size=size: whole(f, real, size, least)
+        )
         motion = mbs.simulate.run(n_four_bar(2).assemble(), duration=3, v0={"a0": -1.0})
         motions.append(np.column_stack([motion[name] for name in motion.names]))
     assert np.array_equal(*motions)

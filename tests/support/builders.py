@@ -78,7 +78,7 @@ BUILDERS = {
 CLOSED_ALONE = {
     "acceleration_closure": models.acceleration_closure,
     "velocity_closure": models.velocity_closure,
-    "closure": loops.closure_residual,
+    "closure_residual": loops.closure_residual,
     "closure_jacobian": loops.closure_jacobian,
     "reduction_matrix": loops.reduction_matrix,
 }

@@ -45,11 +45,11 @@ def test_a_wrong_document_is_refused_with_its_sentence():
 
 
 def test_any_other_end_is_one_sentence_and_the_details_are_logged(caplog):
-    with pytest.raises(jobs.Broken, match=r"ZeroDivisionError.*please report it") as caught:
+    with pytest.raises(jobs.JobError, match=r"ZeroDivisionError.*please report it") as caught:
         run(web_tasks.broken)
     assert "\n" not in str(caught.value)
     assert "Traceback" in caplog.text
-    with pytest.raises(jobs.Broken, match="ended without an answer"):
+    with pytest.raises(jobs.JobError, match="ended without an answer"):
         run(web_tasks.vanished)
 
 

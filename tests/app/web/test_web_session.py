@@ -6,7 +6,7 @@ import pytest
 from mbs import MbsError, Mechanism
 from mbs.app.web.document.document import Document
 from mbs.app.web.document.tables import Cell
-from mbs.app.web.session import Session, assembly_modes, carried, handles, mode_of, moved
+from mbs.app.web.session import Session, carried, handles, listed_modes, mode_of, moved
 from mbs.components import Free, PointMass
 from mbs.errors import Unclosable
 from mbs.loops import configuration_report
@@ -111,13 +111,12 @@ def test_the_other_joints_follow():
 
 def test_a_large_move_stays_on_its_branch():
     system = Document.of_name("four_bar").system()
-    first = mode_of(assembly_modes(system, system.configuration), system.configuration)
+    first = mode_of(listed_modes(system, system.configuration), system.configuration)
     q = moved(system, system.configuration, 0, 2.5)
-    found = assembly_modes(system, q)
+    found = listed_modes(system, q)
     assert len(found) == 2
     assert (
-        found[mode_of(found, q)].branch
-        == assembly_modes(system, system.configuration)[first].branch
+        found[mode_of(found, q)].branch == listed_modes(system, system.configuration)[first].branch
     )
 
 
@@ -129,15 +128,15 @@ def test_what_cannot_be_reached_is_told_with_the_end_of_the_branch():
 
 def test_assembly_modes_are_listed_or_a_sentence_says_why_not():
     system = Document.of_name("andrews_squeezer").system()
-    found = assembly_modes(system, system.configuration)
+    found = listed_modes(system, system.configuration)
     assert len(found) == 4
     for mode in found:
         assert configuration_report(system, mode.q).residual < 1e-9
     delta = Document.of_name("delta").system()
-    assert len(assembly_modes(delta, delta.configuration)) == 16
+    assert len(listed_modes(delta, delta.configuration)) == 16
     bicycle = Document.of_name("whipple_bicycle").system()
-    assert "by iteration" in assembly_modes(bicycle, bicycle.configuration)
-    assert assembly_modes(Document.of_name("rx90").system(), [0.0] * 6) == ()
+    assert "by iteration" in listed_modes(bicycle, bicycle.configuration)
+    assert listed_modes(Document.of_name("rx90").system(), [0.0] * 6) == ()
 
 
 def test_quaternions_keep_unit_length_and_the_part_that_is_moved():

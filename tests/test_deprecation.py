@@ -4,18 +4,43 @@ import importlib
 
 import pytest
 
-import mbs
-import mbs.components
+RENAMED = {
+    "mbs.components.Mechanism": "mbs.Mechanism",
+    "mbs.components.Placed": "mbs.components.SubMechanism",
+    "mbs.components.Attraction": "mbs.components.PointGravity",
+    "mbs.components.Note": "mbs.components.ImportNote",
+    "mbs.loops.examine": "mbs.loops.configuration_report",
+    "mbs.loops.ConfigurationState": "mbs.loops.ConfigurationReport",
+    "mbs.loops.modes": "mbs.loops.assembly_modes",
+    "mbs.loops.closure": "mbs.loops.closure_residual",
+    "mbs.identification.joint_side": "mbs.identification.motor_to_joint",
+    "mbs.identification.held_out": "mbs.identification.holdout_residuals",
+    "mbs.identification.recovered": "mbs.identification.full_parameters",
+    "mbs.identification.reweighted": "mbs.identification.iteratively_reweighted",
+    "mbs.identification.robust": "mbs.identification.huber",
+    "mbs.identification.consistent": "mbs.identification.physically_consistent",
+    "mbs.identification.values_of": "mbs.identification.symbolic_parameters",
+    "mbs.identification.numbers_of": "mbs.identification.numeric_parameters",
+    "mbs.identification.Series": "mbs.identification.FourierSettings",
+    "mbs.bridges.invariants": "mbs.bridges.constraint_residuals",
+    "mbs.spatial.Movable": "mbs.spatial.Transformable",
+    "mbs.spatial.body_through": "mbs.spatial.transform_inertia_along",
+    "mbs.spatial.wrench_through": "mbs.spatial.transform_wrench_along",
+}
+"""Public names of version 0.1 and their present names."""
 
 
-def test_a_name_that_has_moved():
-    with pytest.warns(
-        DeprecationWarning, match=r"mbs\.components\.Mechanism is now mbs\.Mechanism"
-    ):
-        assert mbs.components.Mechanism is mbs.Mechanism
+def found(name):
+    module, _, attribute = name.rpartition(".")
+    return getattr(importlib.import_module(module), attribute)
+
+
+@pytest.mark.parametrize(("old", "new"), RENAMED.items())
+def test_an_old_name(old, new):
+    with pytest.warns(DeprecationWarning, match=rf"{old} is now {new}; change the import"):
+        assert found(old) is found(new)
 
 
 def test_an_unknown_name():
-    module = importlib.import_module("mbs.components")
-    with pytest.raises(AttributeError, match=r"module .mbs\.components. has no attribute .Gadget."):
-        _ = module.Gadget
+    with pytest.raises(AttributeError, match=r"module 'mbs\.components' has no attribute 'Gadget'"):
+        found("mbs.components.Gadget")

@@ -157,3 +157,8 @@ def in_docstring(text: str) -> str:
 
 def _without_backslashes(text: str) -> str:
     return one_line(text).replace("\\", "/")
+
+
+def joint_label(name: str) -> str:
+    """Return the part of a coordinate name for derived names: "2" for q2, else the name itself."""
+    return name[1:] if re.fullmatch(r"q\d+", name) else name

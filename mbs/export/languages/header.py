@@ -13,7 +13,7 @@ from casadi import Function
 from mbs.export.languages.language import Argument
 from mbs.operations.counts import Count, count_graph
 from mbs.operations.graph import Graph, Port
-from mbs.text import ascii_line
+from mbs.text import ascii_line, joint_label
 from mbs.version import __version__
 
 # Names of scalars from the classic notation and from the models.
@@ -77,11 +77,6 @@ def element_names(port: Port, elements: Elements) -> list[str]:
         return [f"{start}{row}{elements[p.column][0]}" for p, row in place.items()]
     between = "_" if max(rows, columns) > 9 else ""
     return [f"{port.name}{p.row + 1}{between}{p.column + 1}" for p in places(port)]
-
-
-def joint_label(name: str) -> str:
-    """Return the part of a coordinate name for derived names: "2" for q2, else the name itself."""
-    return name[1:] if re.fullmatch(r"q\d+", name) else name
 
 
 def angle_names(graph: Graph, inputs: Sequence[Sequence[str]]) -> dict[int, str]:

@@ -922,7 +922,6 @@ def _largest(reader: Reader, key: str) -> float | None:
 # Shapes of links for pictures: visuals, or else collision shapes.
 
 
-Colour = tuple[float, float, float]
 _PRIMITIVES = {"box": ("size",), "sphere": ("radius",)} | dict.fromkeys(
     ("cylinder", "capsule"), ("radius", "length")
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +20,7 @@ from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_po
 from mbs.models.inverse_geometry.gathering import ILL_CONDITIONED, general_ready
 from mbs.models.inverse_geometry.many import draft_solutions
 from mbs.models.inverse_geometry.target import NEARLY_SINGULAR
-from mbs.text import quoted
+from mbs.text import joint_label, quoted
 
 if TYPE_CHECKING:
     pass
@@ -355,8 +354,3 @@ def _names(chain: FrameChain, sequence: StepSequence, leaf: Leaf, branch: SX) ->
 def _is_negative(value: SX) -> bool:
     """Whether an expression is a negation, whose operand is used in the equations."""
     return bool(value.op() == casadi.OP_NEG)
-
-
-def joint_label(name: str) -> str:
-    """Return the suffix of names derived from a coordinate: "2" for q2, else the name itself."""
-    return name[1:] if re.fullmatch(r"q\d+", name) else name

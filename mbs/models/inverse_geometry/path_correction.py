@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,10 +57,7 @@ def correct(
 
 def nearby_solution(led: Follower, x: Array, T: Array) -> Array | None:
     """Return a solution (n,) of pose T near x, which may be singular, or None."""
-
-    def residual(z: Array) -> tuple[Array, Array]:
-        r, J = led.rows(z, T)
-        return -r, J
+    residual = _residual_of(led, T)
 
     def missing(z: Array) -> float:
         return float(np.max(np.abs(led.rows(z, T)[0])))
@@ -82,11 +81,17 @@ def _descended(led: Follower, x: Array, T: Array) -> Array:
         better = polish(arm, T, (x * led.scale)[None]).q[0]
         return x + arm.wrapped(better - x * led.scale) / led.scale
 
+    return levenberg_marquardt(_residual_of(led, T), x).x
+
+
+def _residual_of(led: Follower, T: Array) -> Callable[[Array], tuple[Array, Array]]:
+    """Return the function from positions (n,) to the residual of pose T and its Jacobian."""
+
     def residual(z: Array) -> tuple[Array, Array]:
         r, J = led.rows(z, T)
         return -r, J
 
-    return levenberg_marquardt(residual, x).x
+    return residual
 
 
 def nearest_solution(led: Follower, x: Array, T: Array) -> Array | None:

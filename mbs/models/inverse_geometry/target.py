@@ -150,9 +150,6 @@ def nearly_singular(arm: Arm, q: Array, bound: float = NEARLY_SINGULAR) -> NDArr
 
 _SAME, _CLOSE = 1e-9, 1e-2
 """Distances [rad or arm lengths] below which two solutions are equal, and may be equal."""
-_SPLIT = 1e-7
-"""Distance [rad or arm lengths] below which solutions of two closed-form branches are equal:
-rounding splits a double root by 1e-8, the square root of 1e-16."""
 _FLOOR, _WORSE = 2e-15, 4.0
 """Residual half way between two solutions, relative to max(1 m, arm length), that is a rounding
 error of the forward model (some units of 2e-16), and its largest ratio to the residual of the worse

@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 
 from mbs.arguments import MadeOnce, names_given, values_given
 from mbs.assembly import System
-from mbs.assembly.degrees import like_degrees
 from mbs.assembly.model_function import require_system
 from mbs.assembly.pickling import Packed, content_of, packed, unpacked
-from mbs.assembly.variable_names import GUESSES, POSITIONS
+from mbs.assembly.variable_names import GUESSES, POSITIONS, like_degrees
 from mbs.errors import Interrupted, ModelError
 from mbs.loops.configuration import Guess, Start, Values, start, start_position, start_velocity
 from mbs.models._inverse_dynamics import bias

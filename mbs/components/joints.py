@@ -699,3 +699,22 @@ class Fixed(Joint):
     def facing(self, pose: Pose) -> list[SX]:
         """Return the cosines x-x, y-y, z-z of both frames, positive if the axes are not opposed."""
         return diagonal(pose)
+
+
+# Smoothed sign of a velocity, for all laws of Coulomb friction without events.
+
+
+def smooth_sign(v: SX, width: SX) -> SX:
+    """Return tanh(v / width), or sign(v) for a width of zero, elementwise.
+
+    Args:
+        v: velocities [rad/s or m/s].
+        width: (1, 1) velocity over which the sign changes, a number or an expression. Its value may
+            be zero: derivatives stay finite.
+    """
+    if width.is_zero():
+        return casadi.sign(v)
+    if width.is_constant():
+        return casadi.tanh(v / width)
+    vanishes = width == 0
+    return casadi.if_else(vanishes, casadi.sign(v), casadi.tanh(v / (width + vanishes)))

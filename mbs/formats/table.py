@@ -28,9 +28,9 @@ from mbs.components import (
     Spherical,
     Universal,
 )
+from mbs.components.bodies import mount_of
 from mbs.components.component import Placement
 from mbs.components.joints import motor_range
-from mbs.components.mounting import mount_of
 from mbs.components.notes import ImportNote
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, number, parameters_of, to_float

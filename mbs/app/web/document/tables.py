@@ -12,8 +12,8 @@ import numpy as np
 
 from mbs.app.tasks.mounting import mounting_of
 from mbs.components import Rotor
+from mbs.components.bodies import mount_of
 from mbs.components.component import Placement, in_rotated_axes
-from mbs.components.mounting import mount_of
 from mbs.errors import DescriptionError, ExpressionError, MbsError
 from mbs.expressions import Expression, Number, Scalar, expression, parameters_of, to_float
 from mbs.expressions import number as number_of

@@ -614,7 +614,7 @@ class FmuModel(Experiment):
         documentation: text for `documentation/index.html`. A blank line starts a paragraph.
         terminals: groups of variables that are connected together.
         sources: names and texts of further C files, which are compiled with the FMU.
-        arrays: array variables of FMI 3.0, see `mbs.export.fmu.arrays`.
+        arrays: array variables of FMI 3.0, see `mbs.export.fmu.system_fmu`.
         about: tables and drawing of the documentation, or None.
     """
 

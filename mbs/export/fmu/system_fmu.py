@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import casadi
@@ -12,9 +14,17 @@ from mbs.assembly import System, symbolic
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tree import quaternion_slices
 from mbs.assembly.validity import field_rows, quaternion_rows
-from mbs.export.fmu.arrays import Group, in_arrays
 from mbs.export.fmu.controller import controller_of, read_sources
-from mbs.export.fmu.description import Experiment, FmuModel, Origin, Rules
+from mbs.export.fmu.description import (
+    Array,
+    Experiment,
+    FmuModel,
+    FmuState,
+    FmuVariable,
+    Kind,
+    Origin,
+    Rules,
+)
 from mbs.export.fmu.documentation import about
 from mbs.export.fmu.interface import (
     interface_of,
@@ -148,7 +158,7 @@ def fmu_model(system: System, options: FmuOptions | None = None) -> FmuModel:
         sources=controller.sources,
         about=about(system),
     )
-    return in_arrays(model, _arrays(state)) if options.arrays else model
+    return _in_arrays(model, _arrays(state)) if options.arrays else model
 
 
 def _rules(system: System, state: MinimalState) -> Rules | None:
@@ -180,22 +190,89 @@ def _sines(system: System, state: MinimalState) -> Function | None:
     return Function("sines", [x, z, p], [casadi.vertcat(leads, row_independence(system)(q, p))])
 
 
-def _arrays(state: MinimalState) -> tuple[Group, ...]:
-    """Return the arrays of consecutive joint variables, in the order of x, u, y and z."""
-    m, k, n = len(state.accelerations), len(state.dependents), len(state.passive)
-    return (
-        Group("q", "state", 0, len(state.positions), "positions of"),
-        Group("v", "state", len(state.positions), len(state.velocities), "velocities of"),
-        Group("tau", "input", 0, len(state.inputs), "efforts of the motors of"),
-        Group("a", "output", 0, m, "accelerations of"),
-        Group("q_dependent", "output", m, k, "positions, which loops determine, of"),
-        Group("v_dependent", "output", m + k, n, "velocities, which loops determine, of"),
-        Group("a_dependent", "output", m + k + n, n, "accelerations, which loops determine, of"),
-        Group("q_solved", "dependent", 0, k, "positions, whose starts choose the branch, of"),
-    )
-
-
 def _passive(state: MinimalState) -> tuple[int, int, int]:
     """Return the first index in y of velocities and of accelerations of dependent joints, and n."""
     first, count = len(state.accelerations) + len(state.shown), len(state.passive)
     return first, first + count, count
+
+
+# Arrays of FMI 3.0: q, v, a and tau instead of scalar variables for each joint.
+
+
+@dataclass(frozen=True, slots=True)
+class _Group:
+    """Request to combine consecutive variables of the same kind into an array.
+
+    Attributes:
+        name: name of the array.
+        kind: kind of its elements.
+        first: index of its first element among the variables of that kind, 0-based.
+        size: number of elements. A group of size 0 is skipped.
+        text: beginning of the description, before the names of the joints.
+    """
+
+    name: str
+    kind: Kind
+    first: int
+    size: int
+    text: str
+
+
+def _arrays(state: MinimalState) -> tuple[_Group, ...]:
+    """Return the arrays of consecutive joint variables, in the order of x, u, y and z."""
+    m, k, n = len(state.accelerations), len(state.dependents), len(state.passive)
+    return (
+        _Group("q", "state", 0, len(state.positions), "positions of"),
+        _Group("v", "state", len(state.positions), len(state.velocities), "velocities of"),
+        _Group("tau", "input", 0, len(state.inputs), "efforts of the motors of"),
+        _Group("a", "output", 0, m, "accelerations of"),
+        _Group("q_dependent", "output", m, k, "positions, which loops determine, of"),
+        _Group("v_dependent", "output", m + k, n, "velocities, which loops determine, of"),
+        _Group("a_dependent", "output", m + k + n, n, "accelerations, which loops determine, of"),
+        _Group("q_solved", "dependent", 0, k, "positions, whose starts choose the branch, of"),
+    )
+
+
+def _in_arrays(model: FmuModel, groups: Iterable[_Group]) -> FmuModel:
+    """Return a copy of a model in which groups of variables are arrays.
+
+    Elements are renamed to `q[1]`, `q[2]`, .... Terminals with a renamed member are dropped.
+
+    Args:
+        model: model without arrays.
+        groups: arrays to form. An array of states also makes an array of their derivatives.
+    """
+    changed: dict[Kind, list[FmuVariable]] = {
+        "state": list(model.states),
+        "input": list(model.inputs),
+        "output": list(model.outputs),
+        "dependent": list(model.dependents),
+    }
+    arrays = []
+    for group in groups:
+        if not group.size:
+            continue
+        variables, indices = changed[group.kind], range(group.first, group.first + group.size)
+        owners = ", ".join(variables[k].name.rpartition(".")[0] for k in indices)
+        words, first = f"{group.text} {owners}", model.first(group.kind) + group.first
+        arrays.append(Array(group.name, first, group.size, words))
+        if group.kind == "state":
+            rates = model.first("derivative") + group.first
+            words = f"derivatives of the {words}"
+            arrays.append(Array(f"der({group.name})", rates, group.size, words))
+        for number, k in enumerate(indices, 1):
+            variables[k] = replace(variables[k], name=f"{group.name}[{number}]")
+    if model.slots:
+        n, text = len(model.slots), "states of the model"
+        arrays.append(Array("state", model.first("slot"), n, text))
+        arrays.append(Array("der(state)", model.first("rate"), n, f"derivatives of the {text}"))
+    names = {variable.name for variables in changed.values() for variable in variables}
+    return replace(
+        model,
+        states=tuple(v for v in changed["state"] if isinstance(v, FmuState)),
+        inputs=tuple(changed["input"]),
+        outputs=tuple(changed["output"]),
+        dependents=tuple(changed["dependent"]),
+        arrays=tuple(arrays),
+        terminals=tuple(t for t in model.terminals if {m.variable for m in t.members} <= names),
+    )

@@ -212,11 +212,6 @@ def plain_files(
     return files
 
 
-def standard_header(fmi: str) -> str:
-    """Return the name of the header of the standard that declares its functions."""
-    return FACES[fmi].standard[0]
-
-
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # date of all files, so that equal models give equal archives
 
 
@@ -263,7 +258,7 @@ def write_fmu(
     texts.update(model.sources)
     files = {
         "modelDescription.xml": _identify(unnamed, guid).encode(),
-        **plain_files(model, fmi, texts[standard_header(fmi)], compiled),
+        **plain_files(model, fmi, texts[face.standard[0]], compiled),
         **results,
         **_binaries(model, fmi, texts, goals),
         **{f"sources/{name}": text.encode() for name, text in texts.items()},

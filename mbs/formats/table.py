@@ -29,12 +29,11 @@ from mbs.components import (
     Universal,
 )
 from mbs.components.bodies import mount_of
-from mbs.components.component import Placement
+from mbs.components.component import Placement, component_name
 from mbs.components.joints import motor_range
 from mbs.components.notes import ImportNote
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, number, parameters_of, to_float
-from mbs.formats.files import component_name
 from mbs.mechanism import Mechanism
 from mbs.spatial.inertia import TEN_PARAMETERS
 from mbs.text import did_you_mean, quoted

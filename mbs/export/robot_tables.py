@@ -40,7 +40,7 @@ from mbs.formats.rotations import inverse
 from mbs.formats.table import BODY_SCALARS, GEOMETRY, POSE, base_pose_texts
 from mbs.formats.urdf.shared import GRAVITY
 from mbs.operations.graph import graph_of
-from mbs.recursions.poses import link_poses
+from mbs.recursions.link_motions import link_poses
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Khalil, Pose, align_z, frames_to, origin
 from mbs.spatial.inertia import TEN_PARAMETERS

@@ -29,10 +29,9 @@ from mbs.components.custom import Friction, OneWay, Row, Stop
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
 from mbs.recursions.force_elements import element_efforts
+from mbs.recursions.link_motions import link_poses, resting_base
 from mbs.recursions.newton_euler import joint_efforts, newton_euler
 from mbs.recursions.parts import PartsAt
-from mbs.recursions.poses import link_poses
-from mbs.recursions.velocities import resting_base
 from mbs.solvers.block_triangular import solve_large
 from mbs.solvers.rank import independent_rows, rank
 from mbs.text import listed

@@ -18,6 +18,7 @@ from mbs.models.symbols import (
 )
 from mbs.models.tree_table import TreeLoops
 from mbs.recursions.force_elements import element_efforts
+from mbs.recursions.link_motions import resting_base
 from mbs.recursions.newton_euler import (
     Dynamics,
     joint_efforts,
@@ -26,7 +27,6 @@ from mbs.recursions.newton_euler import (
     spring_effort,
 )
 from mbs.recursions.parts import PartsAt
-from mbs.recursions.velocities import resting_base
 
 
 def inverse_dynamics(

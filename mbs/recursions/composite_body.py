@@ -12,10 +12,9 @@ from casadi import SX
 
 from mbs.assembly.tree import Tree
 from mbs.components.joints import Motion
+from mbs.recursions.link_motions import LinkPose, effort, unit_motions
 from mbs.recursions.newton_euler import momentum_on
-from mbs.recursions.poses import LinkPose
 from mbs.recursions.regrouping import regroup, shift_frames
-from mbs.recursions.velocities import effort, unit_motions
 from mbs.spatial import Wrench, transform_inertia_along, transform_wrench_along, zeros
 
 

@@ -12,9 +12,14 @@ from casadi import SX
 
 from mbs.assembly.tree import Link, Tree
 from mbs.components.joints import Motion, smooth_sign
-from mbs.recursions.poses import LinkPose
+from mbs.recursions.link_motions import (
+    Acceleration,
+    LinkPose,
+    effort,
+    link_accelerations,
+    moment_of_rotation,
+)
 from mbs.recursions.regrouping import regroup, shift_frames
-from mbs.recursions.velocities import Acceleration, effort, link_accelerations, moment_of_rotation
 from mbs.spatial import PseudoInertia, Wrench, add_wrenches, cross, is_zero, zeros
 
 # Rotors that spin with joints: efforts on joints and moments on carrier links.

@@ -322,6 +322,10 @@ class _Exchange(_Run):
         super().__init__(instance, plan, recording, events=True)
         self._after, self._check = plan.begin, check
         self._solver: Any = None
+        described = plan.description
+        names = [unknown.variable.name for unknown in described.eventIndicators]
+        unnamed = described.numberOfEventIndicators - len(names)  # FMI 2.0 names none
+        self._indicators = [*names, *[recording.name] * unnamed]
 
     def start(self) -> tuple[float, bool]:
         following, ended = self.update()
@@ -343,9 +347,7 @@ class _Exchange(_Run):
         wanted = ended = False
         if self.plan.description.modelExchange.needsCompletedIntegratorStep:
             wanted, ended = self.instance.completedIntegratorStep()
-        names = [unknown.variable.name for unknown in self.plan.description.eventIndicators]
-        names += [self.recording.name] * (len(roots) - len(names))  # FMI 2.0 names none
-        fired = tuple(names[k] for k in np.flatnonzero(roots))
+        fired = tuple(self._indicators[k] for k in np.flatnonzero(roots))
         return Reached(time, bool(fired or wanted), bool(ended), fired)
 
     def event(self, time: float, jumped: bool) -> tuple[float, bool]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs import identification as identified_by
-from mbs.app.tasks.simulation import number
+from mbs.app.tasks.laws import number
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError

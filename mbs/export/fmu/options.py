@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from mbs.assembly import System
 from mbs.assembly._symbolic import GROUPS
 from mbs.errors import ExportError
 from mbs.export.fmu.controller import Law
@@ -143,7 +144,7 @@ class Additions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FmuOptions(Origin, Additions, Experiment, Contents):
-    """Options of `mbs.export.fmu`, in the order of its signature.
+    """Options of an FMU, in the order of the signature of `mbs.export.fmu`.
 
     A dataclass takes the fields of its last base first.
     """
@@ -164,3 +165,11 @@ class FmuOptions(Origin, Additions, Experiment, Contents):
                 " or leave arrays out"
             )
         check_options(self, name)
+
+
+@dataclass(frozen=True, slots=True)
+class FmuArguments(FmuOptions):
+    """Arguments of `mbs.export.fmu`."""
+
+    system: System = field(metadata=described("assembled mechanism, open or closed."))
+    path: PathLike = field(metadata=described("file to write."))

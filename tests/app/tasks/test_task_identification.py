@@ -40,7 +40,9 @@ def arm():
 @pytest.fixture(scope="module")
 def motion(arm):
     laws = {"q1.q": "0.5*sin(2*t) + 0.3*cos(5*t)", "q2.q": "0.7*sin(3*t) + 0.2*cos(7*t)"}
-    return simulate(arm, SimulationSettings(duration=10, step=0.005, motion=laws), quiet=True)
+    return simulate(
+        arm, SimulationSettings(duration=10, options={"step": 0.005}, motion=laws), quiet=True
+    )
 
 
 @pytest.fixture(scope="module")

@@ -23,6 +23,8 @@ from typing import (
     get_type_hints,
 )
 
+from mbs.text import quoted
+
 _KEY = "mbs.option"
 _WIDTH = 96
 """Longest line of a docstring [characters]: a line of the source without its indentation."""
@@ -33,6 +35,17 @@ Check = Callable[[str, object], str]
 
 def _always_valid(label: str, value: object) -> str:
     return ""
+
+
+def one_of(names: Sequence[str]) -> Check:
+    """Return the check that a value is one of some names."""
+
+    def check(label: str, value: object) -> str:
+        if isinstance(value, str) and value in names:
+            return ""
+        return f"{label} is {quoted(value)}; use {' or '.join(map(repr, names))}"
+
+    return check
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

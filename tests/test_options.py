@@ -154,6 +154,15 @@ def test_the_signatures_of_a_simulation_are_its_options(action: Any, names: str)
     assert all(f"\n    {name}: " in text for name in names.split() if name != "self")
 
 
+def test_the_signature_of_a_c_library_is_its_options() -> None:
+    signature = inspect.signature(mbs.export.c_library)
+    defaults = {name: parameter.default for name, parameter in signature.parameters.items()}
+    assert list(defaults) == ["functions", "folder", "target", "real", "checked"]
+    assert list(defaults.values())[2:] == ["hosted", "double", True]
+    text = inspect.getdoc(mbs.export.c_library) or ""
+    assert all(f"\n    {name}: " in text for name in defaults)
+
+
 def test_options_of_a_motion_have_commands_and_fields_of_a_form() -> None:
     found = option_fields(MotionOptions)
     assert list(found) == ["step", "tolerance", "max_step", "method"]

@@ -118,7 +118,7 @@ def _parameters(
         if option.command:
             kind = "flag" if _flag(option) else kinds[name]
             type_, default, about = _TYPED[kind](field, option)
-            shown = typer.Option(option.command, help=_help(option, kind), **about)
+            shown = typer.Option(_names(field, option), help=_help(option, kind), **about)
             yield inspect.Parameter(
                 name,
                 inspect.Parameter.KEYWORD_ONLY,
@@ -128,7 +128,7 @@ def _parameters(
 
 
 _TYPED: dict[ValueKind, Callable[[Field[Any], OptionInfo], tuple[Any, Any, dict[str, Any]]]] = {
-    "flag": lambda field, option: (bool, False, {}),
+    "flag": lambda field, option: (bool, field.default is True, {}),
     "number": lambda field, option: (
         str,
         default_text(field),
@@ -143,9 +143,20 @@ _TYPED: dict[ValueKind, Callable[[Field[Any], OptionInfo], tuple[Any, Any, dict[
         {"metavar": "NAME", "show_default": False},
     ),
     "choice": lambda field, option: (str, field.default, {"metavar": "|".join(option.choices)}),
-    "text": lambda field, option: (str, field.default, {"metavar": "TEXT"}),
+    "text": lambda field, option: (
+        str,
+        field.default,
+        {"metavar": "TEXT", "show_default": bool(field.default)},
+    ),
 }
 """Type, default and appearance of an option of the command line, by the kind of its values."""
+
+
+def _names(field: Field[Any], option: OptionInfo) -> str:
+    """Return the name of an option, and the name that turns off what is on by default."""
+    if field.default is True:
+        return f"{option.command}/{option.command.replace('--', '--no-', 1)}"
+    return option.command
 
 
 def _flag(option: OptionInfo) -> str:

@@ -79,7 +79,8 @@ class Contents:
         default=(),
         metadata=described(
             "names of parameters that are constant after the initialization. All other parameters"
-            " are tunable."
+            " are tunable.",
+            command="--fixed",
         ),
     )
     flanges: Sequence[str] = field(
@@ -87,7 +88,8 @@ class Contents:
         metadata=described(
             "names of frames at which another part of a mechanism is coupled. Their poses,"
             " velocities and accelerations are outputs, and the wrenches on them are inputs. In"
-            " FMI 3.0 each flange is a terminal."
+            " FMI 3.0 each flange is a terminal.",
+            command="--flange",
         ),
     )
     controller: Law = field(
@@ -124,13 +126,20 @@ class Additions:
 
     reference: bool = field(
         default=False,
-        metadata=described("whether to include the results of the default experiment."),
+        metadata=described(
+            "whether to include the results of the default experiment.",
+            command="--reference",
+            command_text="include the results of the default experiment.",
+        ),
     )
     arrays: bool = field(
         default=False,
         metadata=described(
             "whether positions, velocities, accelerations and efforts of the joints are the arrays"
-            " q, v, a and tau of FMI 3.0. Dependent joints are in `q_dependent` and so on."
+            " q, v, a and tau of FMI 3.0. Dependent joints are in `q_dependent` and so on.",
+            command="--arrays",
+            command_text="write motion and efforts of the joints as the arrays q, v, a and tau of"
+            " FMI 3.0.",
         ),
     )
     description: str = field(
@@ -138,6 +147,7 @@ class Additions:
         metadata=described(
             "one-line description. By default the first line of the report of the system.",
             check=lambda label, value: printable(label, value) if value else "",
+            command="--description",
         ),
     )
 

@@ -7,10 +7,13 @@ import re
 from dataclasses import dataclass, field
 from typing import Any, get_type_hints
 
+import numpy as np
 import pytest
 
 import mbs
+from mbs.errors import ModelError
 from mbs.export.fmu.options import FmuOptions
+from mbs.models.inverse_geometry.options import PoseOptions
 from mbs.options import (
     arguments_of,
     described,
@@ -175,3 +178,13 @@ def test_options_of_a_motion_have_commands_and_fields_of_a_form() -> None:
     ]
     others = set(option_fields(RunArguments)) - set(found)
     assert not any(option_fields(RunArguments)[name][1].command for name in others)
+
+
+def test_the_methods_of_a_pose_are_those_of_the_solver() -> None:
+    (option,) = (option for _, option in option_fields(PoseOptions).values())
+    system = mbs.load("scara").assemble()
+    with pytest.raises(ModelError, match="method is 'none'") as stopped:
+        mbs.models.inverse_geometry.solve(system, np.eye(4), method="none")
+    assert set(option.choices) <= set(re.findall(r"\w+", str(stopped.value)))
+    text = inspect.getdoc(mbs.models.inverse_geometry.solve) or ""
+    assert " ".join(option.text.split()) in " ".join(text.split())

@@ -62,7 +62,11 @@ def _start(
     """
 
 
-_OPTIONS = {"simulate": simulate.motion_options, "sweep": simulate.motion_options}
+_OPTIONS = {
+    "simulate": simulate.motion_options,
+    "sweep": simulate.motion_options,
+    "solve-ik": solve_ik.pose_options,
+}
 """Functions that return the dataclass from which options of a command are derived."""
 
 application.callback(help=help_of(_start))(_start)

@@ -157,8 +157,15 @@ def option_fields(options: Any) -> dict[str, tuple[Field[Any], OptionInfo]]:
         options: dataclass or its instance. Fields without `OptionInfo` are left out.
     """
     return {
-        field.name: (field, option_of(field)) for field in fields(options) if _KEY in field.metadata
+        field.name: (field, option_of(field))
+        for field in _in_order(options)
+        if _KEY in field.metadata
     }
+
+
+def _in_order(options: Any) -> list[Field[Any]]:
+    """Return the fields in the order of the arguments: those that are keyword-only are last."""
+    return sorted(fields(options), key=lambda field: field.kw_only is True)
 
 
 def faults(options: Any) -> Iterator[str]:
@@ -233,7 +240,7 @@ def _with_fields(action: Callable[..., Any], options: Any) -> Any:
     Its text is executed, as for the methods of a dataclass, so that wrong arguments raise the
     errors of Python with the name of the action.
     """
-    every = sorted(fields(options), key=lambda field: field.kw_only is True)
+    every = _in_order(options)
     own = inspect.signature(action)
     first = [p for p in own.parameters.values() if p.name != "options"]
     taken = [inspect.Parameter(f.name, _kind_of(f), default=_default_of(f)) for f in every]

@@ -66,6 +66,7 @@ _OPTIONS = {
     "simulate": simulate.motion_options,
     "sweep": simulate.motion_options,
     "solve-ik": solve_ik.pose_options,
+    "identify": identify.identify_options,
 }
 """Functions that return the dataclass from which options of a command are derived."""
 

@@ -17,6 +17,8 @@ from mbs.options import OptionInfo, ValueKind, default_text, option_fields, valu
 
 _METAVARS = {"s": "SECONDS"}
 """Words for the value of a number by its unit. Other numbers are NUMBER."""
+_LONGEST = 40
+"""Longest list of choices in the column of values [characters]: half of a terminal."""
 
 
 def add_derived(
@@ -142,7 +144,7 @@ _TYPED: dict[ValueKind, Callable[[Field[Any], OptionInfo], tuple[Any, Any, dict[
         None,
         {"metavar": "NAME", "show_default": False},
     ),
-    "choice": lambda field, option: (str, field.default, {"metavar": "|".join(option.choices)}),
+    "choice": lambda field, option: (str, field.default, {"metavar": _choices(field, option)}),
     "text": lambda field, option: (
         str,
         field.default,
@@ -150,6 +152,12 @@ _TYPED: dict[ValueKind, Callable[[Field[Any], OptionInfo], tuple[Any, Any, dict[
     ),
 }
 """Type, default and appearance of an option of the command line, by the kind of its values."""
+
+
+def _choices(field: Field[Any], option: OptionInfo) -> str:
+    """Return all choices, or a word if they are too long for the column of the help page."""
+    every = "|".join(option.choices)
+    return every if len(every) <= _LONGEST else field.name.upper()
 
 
 def _names(field: Field[Any], option: OptionInfo) -> str:

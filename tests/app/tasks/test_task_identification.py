@@ -104,9 +104,8 @@ def test_tables_hold_the_same_numbers(found):
 
 
 def test_settings_reach_the_estimation(arm, record):
-    chosen = IdentificationSettings(
-        20, "least_squares", "energy", rotors=False, offsets=True, velocities="measured"
-    )
+    options = {"method": "least_squares", "equations": "energy", "rotors": False, "offsets": True}
+    chosen = IdentificationSettings(20, "measured", options)
     found = identify(arm, record, chosen, quiet=True)
     names = {row.name for row in found.rows}
     assert not any(name.startswith("Ia") for name in names)
@@ -159,8 +158,8 @@ def test_malformed_files_are_refused_with_a_sentence(arm, content, parts):
 @pytest.mark.parametrize(
     ("given", "parts"),
     [
-        ({"method": "magic"}, ("'magic'", "weighted")),
-        ({"equations": "static"}, ("'static'", "dynamic")),
+        ({"options": {"method": "magic"}}, ("'magic'", "weighted")),
+        ({"options": {"equations": "static"}}, ("'static'", "dynamic")),
         ({"velocities": "guessed"}, ("'guessed'", "measured")),
         ({"bandwidth": "high"}, ("bandwidth", "'high'")),
         ({"bandwidth": 5000}, ("bandwidth", "100 Hz")),

@@ -101,12 +101,33 @@ def option_row(options: type, values: FormValues) -> None:
                 field.bind_visibility_from(choices[other], "value", needed.__contains__)
 
 
+def flags_field(options: type, values: FormValues, look: FieldLook) -> None:
+    """Create one field for all options that are either on or off.
+
+    Args:
+        options: dataclass of the options.
+        values: values of the form, complete. They are updated when the user chooses.
+        look: appearance of the field.
+    """
+    kinds = value_kinds(options)
+    shown = {name: option for name, (_, option) in option_fields(options).items() if option.in_form}
+    flags = {name: option.label or name for name, option in shown.items() if kinds[name] == "flag"}
+
+    def take(chosen: Sequence[str]) -> None:
+        values.update({name: name in chosen for name in flags})
+
+    several_field(look, flags, [name for name in flags if values[name]], take)
+
+
 def _text(values: FormValues, key: str, look: FieldLook) -> ui.input:
     return text_field(look, values[key], partial(values.__setitem__, key))
 
 
 def _choice(values: FormValues, name: str, option: OptionInfo) -> ui.select:
-    labels = {one: f"{one}, {word}" if word else one for one, word in option.choices.items()}
+    labels = {
+        one: f"{one}, {word}" if word else one.replace("_", " ")
+        for one, word in option.choices.items()
+    }
     width = max(_CHOICE, _MENU + _LETTER * max(map(len, labels.values())))
     look = FieldLook(title_of(name, option), f"{width}px", name)
     return choice_field(look, labels, values[name], partial(values.__setitem__, name))

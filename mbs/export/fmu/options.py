@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from mbs.assembly import System
@@ -19,8 +19,8 @@ _OUTPUTS = tuple(shown.group for shown in KINDS.values() if shown.group)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Contents:
-    """Version and variables of an FMU, its controller and its platforms."""
+class FmuVersion:
+    """Version of FMI."""
 
     __slots__ = ()
 
@@ -34,6 +34,14 @@ class Contents:
             in_form=True,
         ),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contents:
+    """Variables of an FMU, its controller and the C files of the controller."""
+
+    __slots__ = ()
+
     inputs: Sequence[str] = field(
         default=(),
         metadata=described(
@@ -106,6 +114,14 @@ class Contents:
             "C files and headers of the controller, which are compiled with the FMU."
         ),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Platforms:
+    """Target platforms of an FMU."""
+
+    __slots__ = ()
+
     platforms: Sequence[str] | None = field(
         default=None,
         metadata=described(
@@ -153,7 +169,7 @@ class Additions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FmuOptions(Origin, Additions, Experiment, Contents):
+class FmuOptions(Origin, Additions, Experiment, Platforms, Contents, FmuVersion):
     """Options of an FMU, in the order of the signature of `mbs.export.fmu`.
 
     A dataclass takes the fields of its last base first.
@@ -182,4 +198,45 @@ class FmuArguments(FmuOptions):
     """Arguments of `mbs.export.fmu`."""
 
     system: System = field(metadata=described("assembled mechanism, open or closed."))
+    path: PathLike = field(metadata=described("file to write."))
+
+
+# Inverse geometric model of an arm.
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmPose:
+    """Method, frame and first configuration of an inverse geometric model."""
+
+    __slots__ = ()
+
+    method: str = field(
+        default="auto",
+        metadata=described(
+            '"pieper", "paul", "general", or "auto". "auto" takes the cheaper of the first two'
+            " closed forms, or the general method if both fail."
+        ),
+    )
+    frame: str | int | None = field(
+        default=None,
+        metadata=described("body, named frame, index of a link, or None for the terminal frame."),
+    )
+    locked: Mapping[str, float] | None = field(
+        default=None, metadata=described("fixed positions of joints, by name [rad or m].")
+    )
+    start: Mapping[str, float] | Sequence[float] | None = field(
+        default=None,
+        metadata=described(
+            "configuration at the start, (nq,) or by name. By default the assembled one."
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class InverseGeometryFmuArguments(Platforms, FmuVersion, ArmPose):
+    """Arguments of `mbs.export.inverse_geometry_fmu`."""
+
+    system: System = field(
+        metadata=described("open chain that has a closed form, or six joints without symbols.")
+    )
     path: PathLike = field(metadata=described("file to write."))

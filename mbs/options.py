@@ -265,15 +265,18 @@ def _with_fields(action: Callable[..., Any], options: Any) -> Any:
 
 
 def _kind_of(field: Field[Any]) -> Any:
+    """Return the kind of the parameter of a field, as in `inspect.Parameter`."""
     kinds = inspect.Parameter
     return kinds.KEYWORD_ONLY if field.kw_only else kinds.POSITIONAL_OR_KEYWORD
 
 
 def _default_of(field: Field[Any]) -> Any:
+    """Return the default of a parameter, or `inspect.Parameter.empty` if it has none."""
     return inspect.Parameter.empty if field.default is MISSING else field.default
 
 
 def _passed(field: Field[Any]) -> str:
+    """Return the text that passes the value of a parameter to its field."""
     return f"{field.name}={field.name}" if field.kw_only else field.name
 
 

@@ -93,6 +93,7 @@ def export_c(
 
 
 def _c_options() -> type:
+    """Return the dataclass of the options of a C library."""
     from mbs.export.c_options import CLibraryOptions
 
     return CLibraryOptions

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal, get_args
 
 import casadi
 import numpy as np
@@ -131,7 +132,10 @@ def modes_at(times: Array, first: Array, events: tuple[IntegrationEvent, ...]) -
     return values[passed]
 
 
-METHODS = ("dopri5", "rodas")
+Method = Literal["dopri5", "rodas"]
+"""Integration method: the explicit pair of Dormand and Prince, or RODAS5P for stiff systems."""
+
+METHODS: tuple[Method, ...] = get_args(Method)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,7 +15,7 @@ from mbs.assembly import System
 from mbs.errors import ExportError, ModelError
 from mbs.models.state.tree import TreeState
 from mbs.native.scalar_source import Target
-from mbs.options import described, faults
+from mbs.options import described, faults, one_of
 from mbs.text import quoted
 from mbs.units import UNITS
 from mbs.view.drawing import Drawing
@@ -197,28 +197,35 @@ def _known_solver(label: str, value: object) -> str:
     return f"{label} is {value!r}; use {' or '.join(_SOLVERS)}"
 
 
-def _known_target(label: str, value: object) -> str:
-    if isinstance(value, str) and value in _TARGETS:
-        return ""
-    return f"{label} is {quoted(value)}; use {' or '.join(map(repr, _TARGETS))}"
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
     """Author and licence of a model. Empty texts are left out of the FMU."""
 
     author: str = field(
         default="",
-        metadata=described("person or organisation, for the model description.", check=printable),
+        metadata=described(
+            "person or organisation, for the model description.",
+            check=printable,
+            command="--author",
+        ),
     )
-    version: str = field(default="", metadata=described("version of the model.", check=printable))
+    version: str = field(
+        default="",
+        metadata=described("version of the model.", check=printable, command="--model-version"),
+    )
     copyright: str = field(
         default="",
-        metadata=described('copyright notice, such as "(c) 2026 Example Ltd.".', check=printable),
+        metadata=described(
+            'copyright notice, such as "(c) 2026 Example Ltd.".',
+            check=printable,
+            command="--copyright",
+        ),
     )
     license: str = field(
         default="",
-        metadata=described("name, text or address of the licence.", check=printable),
+        metadata=described(
+            "name, text or address of the licence.", check=printable, command="--license"
+        ),
     )
 
 
@@ -276,6 +283,7 @@ class Experiment:
             label="internal step",
             only_with=("solver", ("rk4",)),
             check=_positive,
+            command="--internal-step",
             in_form=True,
         ),
     )
@@ -300,7 +308,7 @@ class Experiment:
             " FMI 2.0 the callbacks of the importer allocate its memory, in FMI 3.0 two functions"
             ' in memory.c, which may be replaced. Results are bit-identical to target="hosted".',
             _TARGETS,
-            check=_known_target,
+            check=one_of(tuple(_TARGETS)),
             command="--bare",
             command_text="for microcontrollers: no heap, Co-Simulation by rk4 only, no events.",
         ),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,7 +32,7 @@ from mbs.export.fmu.interface import (
     observed_variables,
     terminals,
 )
-from mbs.export.fmu.options import FmuOptions
+from mbs.export.fmu.options import FmuArguments, FmuOptions
 from mbs.export.fmu.pack import require_writable, write_fmu
 from mbs.export.fmu.variables import (
     dependents,
@@ -48,11 +47,11 @@ from mbs.files import path_of
 from mbs.loops.examination import configuration_health, row_independence
 from mbs.models.state.independent import MinimalState, consistent_start, minimal_state
 from mbs.models.state.tree import tree_state
-from mbs.options import group_values, keywords_of
+from mbs.options import arguments_of, group_values
 
 
-@keywords_of(FmuOptions)
-def fmu(system: System, path: str | os.PathLike[str], *, options: FmuOptions) -> Path:
+@arguments_of(FmuArguments)
+def fmu(options: FmuArguments) -> Path:
     """Write a mechanism as an FMU for Model Exchange and Co-Simulation.
 
     Inputs are the efforts `name.tau` of the actuated joints. A joint that a drive line with its own
@@ -66,9 +65,7 @@ def fmu(system: System, path: str | os.PathLike[str], *, options: FmuOptions) ->
     adjoint derivatives in FMI 3.0, are exact also for closed loops.
 
     Args:
-        system: assembled mechanism, open or closed.
-        path: file to write.
-        options: see `FmuOptions`.
+        options: see `FmuArguments`.
 
     Returns:
         Path of the file.
@@ -82,12 +79,12 @@ def fmu(system: System, path: str | os.PathLike[str], *, options: FmuOptions) ->
         CompilerError: no C compiler is installed, the sources do not compile, or the platform is
             unknown.
     """
-    require_system(system)
-    options.check(system.name)
-    require_writable(path_of(path))
+    require_system(options.system)
+    options.check(options.system.name)
+    require_writable(path_of(options.path))
     return write_fmu(
-        fmu_model(system, options),
-        path,
+        fmu_model(options.system, options),
+        options.path,
         fmi=options.fmi,
         platforms=options.platforms,
         reference=options.reference,

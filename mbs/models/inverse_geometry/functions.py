@@ -17,8 +17,8 @@ from mbs.closed_forms.sequence import Leaf, SequenceStep, StepSequence
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.branches import branch_labels
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose, target_poses
-from mbs.models.inverse_geometry.gathering import ILL_CONDITIONED, general_ready
-from mbs.models.inverse_geometry.many import draft_solutions
+from mbs.models.inverse_geometry.draft import ILL_CONDITIONED, general_ready
+from mbs.models.inverse_geometry.draft_many import draft_solutions
 from mbs.models.inverse_geometry.target import NEARLY_SINGULAR
 from mbs.text import joint_label, quoted
 

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Arm, Array
-from mbs.errors import NoClosedForm
-from mbs.models.inverse_geometry.closed_form import sequence_of
-from mbs.models.inverse_geometry.many import batch
+from mbs.models.inverse_geometry.closed_form import sequence_or_none
+from mbs.models.inverse_geometry.draft_many import batch
 from mbs.models.inverse_geometry.path_equations import (
     LARGEST_STEP,
     Follower,
@@ -134,9 +133,8 @@ def branch_block(
     if poses.count < _SHORT and known is None:
         return None
     p = led.target.closing.p
-    try:
-        sequence = sequence_of(led.chain, "auto", p)
-    except NoClosedForm:
+    sequence = sequence_or_none(led.chain, "auto", p)
+    if sequence is None:
         return None
     T = poses.poses[number : number + _BLOCK]
     every = batch(led.chain, sequence, p, T, np.zeros((len(T), 0)))

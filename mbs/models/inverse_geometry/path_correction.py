@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mbs.closed_forms.arm import Array
 from mbs.closed_forms.arm_search import polish
 from mbs.models.inverse_geometry._solve import solve_at
-from mbs.models.inverse_geometry.gathering import NOT_VARIED
+from mbs.models.inverse_geometry.draft import NOT_VARIED
 from mbs.models.inverse_geometry.path_equations import (
     POSE_ERROR,
     SINGULAR,
@@ -78,7 +78,7 @@ def _descended(led: Follower, x: Array, T: Array) -> Array:
     """Minimise the pose error from x, also if the Jacobian is rank-deficient; return (n,)."""
     if led.chain is not None:
         arm = led.chain.arm(led.target.closing.p)
-        better = polish(arm, T, (x * led.scale)[None]).q[0]
+        better = polish(arm, T, (x * led.scale)[None])[0][0]
         return x + arm.wrapped(better - x * led.scale) / led.scale
 
     return levenberg_marquardt(_residual_of(led, T), x).x

@@ -8,7 +8,7 @@ from support.catalogue_systems import catalogue_system
 
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.chain import frame_chain
-from mbs.models.inverse_geometry.gathering import by_search, gather, gather_further, joined
+from mbs.models.inverse_geometry.draft import by_search, gather, gather_further, join
 from mbs.models.inverse_geometry.target import Target
 
 NONE = np.zeros(0)
@@ -30,16 +30,16 @@ REGULAR = [0.3, -0.5, 0.7, 0.4, 0.9, 0.2]
 def test_leaves_carry_their_signs():
     found = gather(way("puma560"), target("puma560", REGULAR), "auto", NONE)
     assert found.method == "pieper"
-    assert not found.doubtful
+    assert found.certain
     assert len(found.q) == len(set(found.labels)) == 8
     assert np.max(target("puma560", REGULAR).residual(found.q)) < 1e-14
 
 
-def test_a_degenerate_pose_is_doubtful():
+def test_a_degenerate_pose_is_not_certain():
     aim = target("puma560", [0.3, -0.5, 0.7, 0.4, 0.0, 0.2])
     found = gather(way("puma560"), aim, "pieper", NONE)
-    assert found.doubtful
-    more = joined(gather_further(way("puma560"), aim, found, NONE), by_search(aim))
+    assert not found.certain
+    more = join(gather_further(way("puma560"), aim, found, NONE), by_search(aim))
     assert len(more.q) > len(found.q)
     assert more.labels[: len(found.labels)] == found.labels
     assert np.max(aim.residual(more.q)) < aim.tolerance

@@ -26,7 +26,7 @@ from mbs.models.inverse_geometry.chain import (
     target_pose,
     target_poses,
 )
-from mbs.models.inverse_geometry.path_redundancy import Redundancy
+from mbs.models.inverse_geometry.path_equations import Redundancy
 from mbs.models.inverse_geometry.redundancy import Locked, Redundant
 from mbs.models.inverse_geometry.solutions import (
     Given,
@@ -214,10 +214,10 @@ class FreeOrientation:
             # the virtual joints keep the last virtual link at the start orientation
             return self._pose(T, T0[:3, :3])
 
-        led: Any = (lambda s: posed(path(s))) if callable(path) else np.array([*map(posed, path)])
+        poses: Any = (lambda s: posed(path(s))) if callable(path) else np.array([*map(posed, path)])
         found = follow_poses(
             self.robot,
-            led,
+            poses,
             own,
             "tool",
             samples=samples,

@@ -14,9 +14,8 @@ from mbs.models.inverse_geometry.path_equations import (
     smallest,
 )
 from mbs.models.inverse_geometry.path_poses import curve_segment
-from mbs.models.inverse_geometry.path_prediction import FAIR, lagrange, relative_correction
 from mbs.models.inverse_geometry.path_state import PathState
-from mbs.models.inverse_geometry.path_steps import advance
+from mbs.models.inverse_geometry.path_steps import FAIR, advance, lagrange, relative_correction
 from mbs.models.inverse_geometry.path_stop import stop_reason
 
 _TRAIL = 40
@@ -56,14 +55,14 @@ def _stays(state: PathState) -> bool:
         rows = state.tracker.rows(x, state.curve(state.u + part * way))[0]
         if np.max(np.abs(rows), initial=0.0) > POSE_ERROR:
             return False
-    q = state.led.whole(state.start, x)
-    state.arrive(x[None], [state.led.residual(q, state.poses.poses[state.number])])
+    q = state.joints.whole(state.start, x)
+    state.arrive(x[None], [state.joints.residual(q, state.poses.poses[state.number])])
     return True
 
 
 def _follow_branch(state: PathState) -> bool:
     """Advance over poses on one branch of the closed form; return whether there are any."""
-    state.block = branch_block(state.led, state.poses, state.number - 1, state.block)
+    state.block = branch_block(state.joints, state.poses, state.number - 1, state.block)
     if state.block is None:
         return False
     run, missed = state.block.after(state.number - 1, state.point.x)
@@ -99,8 +98,8 @@ def _smooth_step(state: PathState) -> bool:
 
 def _step_on(state: PathState) -> str:
     """Step to the next pose or past a singularity. Return the reason of a stop, or ""."""
-    led, number, way = state.led, state.number, list[tuple[float, PathPoint]]()
-    allowed = not led.redundant or state.tracker.may(state.point.x)
+    joints, number, way = state.joints, state.number, list[tuple[float, PathPoint]]()
+    allowed = not joints.redundant or state.tracker.may(state.point.x)
     segment = curve_segment(state.curve, state.u, number)
     last, at = state.point, 0.0
     if allowed:
@@ -118,11 +117,11 @@ def _step_on(state: PathState) -> str:
         state.land(crossing)
         return ""
     state.point = last
-    q = led.whole(state.start, last.x)
+    q = joints.whole(state.start, last.x)
     if stopped:
-        return stop_reason(led, state.poses, number, q, state.u - number + 1)
+        return stop_reason(joints, state.poses, number, q, state.u - number + 1)
     state.found[number] = last.x
-    state.residual[number] = led.residual(q, state.poses.poses[number])
+    state.residual[number] = joints.residual(q, state.poses.poses[number])
     state.number += 1
     return ""
 

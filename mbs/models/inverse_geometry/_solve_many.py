@@ -15,14 +15,13 @@ from mbs.closed_forms.sequence import StepSequence
 from mbs.models.inverse_geometry._solve import solve_at, solve_rigid
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_poses
 from mbs.models.inverse_geometry.closed_form import require_method, sequence_or_none
-from mbs.models.inverse_geometry.draft import METHODS
+from mbs.models.inverse_geometry.draft import METHODS, regular_general
 from mbs.models.inverse_geometry.draft_many import (
     Booleans,
     draft_solutions,
     general_draft,
     general_draft_varied,
     nothing,
-    ready,
     with_configurations,
 )
 from mbs.models.inverse_geometry.redundancy import Locked, LockedSamples, Redundant, samples_of
@@ -160,7 +159,7 @@ class _Robot:
         if self.method in ("auto", "general"):
             if self.chain.varied:
                 return general_draft_varied(self.chain, self.p, T, r)
-            general = ready(self.chain, self.p)
+            general = regular_general(self.chain, self.p)
             if general is not None:
                 return general_draft(general, T)
         return nothing(len(self.chain.names), len(T))

@@ -17,7 +17,7 @@ from mbs.models.inverse_geometry.solutions import (
     SolveOptions,
     unreachable,
 )
-from mbs.models.inverse_geometry.target import Target, distinct
+from mbs.models.inverse_geometry.target import SINGULAR_ERROR, Target, distinct
 from mbs.models.inverse_geometry.verify import ChainIndices
 from mbs.models.inverse_geometry.whole_robot import close, why_searched
 
@@ -147,11 +147,6 @@ def _is_same(target: Target, other: Solution, family: Family, q: Array) -> bool:
     return len(distinct(target, np.array([other.q, q]))) == 1
 
 
-_SEEDED = 1e-6
-"""Largest difference [rad or arm lengths] of joints that do not move in a self-motion: the accuracy
-of singular solutions."""
-
-
 def _representative(problem: PoseProblem, family: Family) -> Array:
     """Return the configuration (n,) of a self-motion within limits, nearest to the seed.
 
@@ -183,7 +178,7 @@ def _is_of(problem: PoseProblem, family: Family, q: Array) -> bool:
         return bool(family.meets(q[None])[0])
     still = [k for k, name in enumerate(problem.chain.names) if name not in family.moving]
     away = target.wrapped((family.chain_samples[:1] - q) / target.unit)[0, still]
-    return bool(np.max(np.abs(away), initial=0.0) < _SEEDED)
+    return bool(np.max(np.abs(away), initial=0.0) < SINGULAR_ERROR)
 
 
 def _whole(problem: PoseProblem, found: Nearest) -> Nearest:

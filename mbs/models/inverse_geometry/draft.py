@@ -43,7 +43,7 @@ _DEGENERATE = 1e-5
 5 of 16 digits in the square and half as many in the angle."""
 EXACT = 2e-15
 """Residual, relative to max(1 m, arm length), that is a rounding error of the forward model."""
-ILL_CONDITIONED = 1e-9
+_ILL_CONDITIONED = 1e-9
 """Regularity of the general method below which it may miss solutions: a simple root has seven
 correct digits there, a double root three."""
 NOT_VARIED = np.zeros(0)
@@ -366,7 +366,7 @@ def _leaves(chain: FrameChain, sequence: StepSequence, p: Array) -> Function:
 
 def _by_general(target: Target, ready: General) -> PoseDraft:
     q = general(ready, target.T)
-    certain = not ready.prepared.regularity < ILL_CONDITIONED
+    certain = not ready.prepared.regularity < _ILL_CONDITIONED
     return _polish(target, q, ("",) * len(q), "general", certain)
 
 
@@ -415,3 +415,9 @@ def general_ready(chain: FrameChain, p: Array) -> General | None:
     key = (*chain.key, p.tobytes())
     ready: General | None = chain.system.recent("general", key, build, _KEPT)
     return ready
+
+
+def regular_general(chain: FrameChain, p: Array) -> General | None:
+    """Return the general method of a chain for p (np,), or None if it is ill-conditioned."""
+    found = general_ready(chain, p)
+    return found if found and found.prepared.regularity >= _ILL_CONDITIONED else None

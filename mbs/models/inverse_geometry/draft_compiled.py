@@ -25,7 +25,7 @@ from mbs.models.inverse_geometry.closed_form import (
     plain_branches,
     sequence_or_none,
 )
-from mbs.models.inverse_geometry.draft import ILL_CONDITIONED, general_ready
+from mbs.models.inverse_geometry.draft import regular_general
 from mbs.models.inverse_geometry.draft_many import MANY, draft_solutions, general_draft
 from mbs.models.inverse_geometry.solutions import PoseDraft
 from mbs.models.inverse_geometry.target import NEARLY_SINGULAR
@@ -181,10 +181,8 @@ def kernel_of(chain: FrameChain, p: Array, method: str = "auto") -> PoseKernel |
         sequence = sequence_or_none(chain, method, p)
         if sequence is not None:
             return PoseKernel(chain, p, closed_form_name(chain, sequence, p), sequence)
-        ready = None if method == "search" else general_ready(chain, p)
-        if ready is None or ready.prepared.regularity < ILL_CONDITIONED:
-            return None
-        return PoseKernel(chain, p, "general", ready)
+        general = None if method == "search" else regular_general(chain, p)
+        return None if general is None else PoseKernel(chain, p, "general", general)
 
     kernel: PoseKernel | None = chain.system.cached(
         ("pose kernel", method, *chain.key, p.tobytes()), made

@@ -20,7 +20,7 @@ from mbs.models.inverse_geometry.closed_form import (
     bounds_of,
     plain_branches,
 )
-from mbs.models.inverse_geometry.draft import ILL_CONDITIONED, general_ready
+from mbs.models.inverse_geometry.draft import regular_general
 from mbs.models.inverse_geometry.solutions import ManySolutions
 from mbs.models.inverse_geometry.target import (
     SOLVED,
@@ -294,12 +294,6 @@ def _nearest_columns(arm: Arm, branches: Array, q: Array) -> list[int]:
 # Solutions of the general method at many poses, and a mask of the poses that are not certified.
 
 
-def ready(chain: FrameChain, p: Array) -> General | None:
-    """Return the general method of a chain for p (np,), or None if it is ill-conditioned."""
-    found = general_ready(chain, p)
-    return found if found and found.prepared.regularity >= ILL_CONDITIONED else None
-
-
 def general_draft(general: General, T: Array) -> ManySolutions:
     """Solve N poses by the general method; the order of columns has no meaning.
 
@@ -331,7 +325,7 @@ def general_draft_varied(chain: FrameChain, p: Array, T: Array, r: Array) -> Man
     draft = nothing(len(chain.names), len(T))
     positions, which = np.unique(r, axis=0, return_inverse=True)
     for number, position in enumerate(positions):
-        general = ready(chain.locked_at(position), p)
+        general = regular_general(chain.locked_at(position), p)
         if general is None:
             continue
         rows = np.flatnonzero(which.ravel() == number)

@@ -15,14 +15,12 @@ from mbs.models.inverse_geometry.path_equations import (
 from mbs.models.inverse_geometry.path_poses import Path
 from mbs.models.inverse_geometry.path_steps import nearest_solution, residual_of
 from mbs.models.inverse_geometry.solutions import apart
+from mbs.models.inverse_geometry.target import SINGULAR_ERROR
 from mbs.solvers.least_squares import gauss_newton, levenberg_marquardt
 
 _AT_LIMIT = 1e-6
 """Distance from a joint limit [rad or m] below which the limit is the reason to stop. Step halving
 ends much nearer, and a stop for another reason is rarely so near."""
-_REACHED = 1e-6
-"""Largest error row at a reachable pose: 1e-6 is the square root of 1e-12, the error of solutions,
-and rounding has this effect at a double root."""
 _STARTS, _SEED = 6, 20260109
 _NUDGE = 1e-3
 """Move of a joint [rad or arm lengths] to find the joint that changes the smallest singular value
@@ -49,7 +47,7 @@ def stop_reason(joints: PathJoints, poses: Path, number: int, q: Array, at: floa
         name = joints.system.coordinates[index].name
         return f"joint {name} passes its limit {limit:.6g} before {title}"
     nearest, left = _nearest(joints, x, T)
-    if left > _REACHED:
+    if left > SINGULAR_ERROR:
         return f"{title} is out of reach: {_miss(joints, joints.whole(q, nearest), T)}"
     where = f"between the start and pose 0 of {poses.count}"
     if number:
@@ -101,7 +99,7 @@ def _nearest(joints: PathJoints, x: Array, T: Array) -> tuple[Array, float]:
         left = float(np.max(np.abs(joints.rows(root.x, T)[0])))
         if left < least:
             best, least = root.x, left
-        if least < _REACHED:
+        if least < SINGULAR_ERROR:
             break
     return best, least
 

@@ -172,10 +172,6 @@ def _pair(system: System, name: str, pair: object) -> tuple[float, float]:
     return low, high
 
 
-def _remainder(x: Array) -> Array:
-    return np.asarray(np.mod(x + np.pi, _TURN) - np.pi)
-
-
 _MOST_ROWS = 64
 
 

@@ -21,6 +21,7 @@ from mbs.models.inverse_geometry.target import (
     NEARLY_SINGULAR,
     ONE,
     SINGULAR,
+    SINGULAR_ERROR,
     TWO,
     Target,
     distinct,
@@ -40,9 +41,6 @@ _REFINEMENTS = 8
 _SETTLED = 1e-7
 """Move [rad or arm lengths] below which the centre of a multiple root has converged. Rounding moves
 a double root by 1e-8, the square root of 1e-16."""
-_ONE_ROOT = 1e-6
-"""Distance [rad or arm lengths] from a known root below which a solution is a copy of the root. At
-a larger distance it is another root, however small the difference of their poses."""
 _EXACT = 0.06
 """Rounding error as a fraction of the tolerance of solutions (6e-14 of the length). A singular root
 of multiplicity 1 with a larger residual is not certain to be isolated."""
@@ -142,7 +140,8 @@ def new_among(target: Target, found: list[Solution], more: PoseDraft) -> PoseDra
     for root in found:
         if root.family is None:
             away = target.wrapped((more.q - root.q) / target.unit)
-            known |= np.max(np.abs(away), axis=1, initial=0.0) < _ONE_ROOT
+            # farther away it is another solution, however small the difference of the poses
+            known |= np.max(np.abs(away), axis=1, initial=0.0) < SINGULAR_ERROR
         elif root.family.dimension == 1:
             asked = np.flatnonzero(~known)
             known[asked] = root.family.meets(more.q[asked])

@@ -27,6 +27,7 @@ from mbs.loops.pose import Goal, goal
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.solutions import Solution, Solutions, SolveOptions
+from mbs.models.inverse_geometry.target import SINGULAR_ERROR
 
 # Configurations of trees and of robots with closed loops, from the joints between base and frame.
 #
@@ -261,11 +262,6 @@ def _largest(rows: Array) -> float:
 # Robots whose frame has spherical joints or too many joints in its chain: closure of the legs.
 
 
-_SINGULAR = 1e-6
-"""Singular value of the pose and closure equations below which a solution has multiplicity 0: two
-roots at a distance of 1e-6 count as one."""
-
-
 def parallel(options: SolveOptions, frame: str | int | None, T: Array, p: Array) -> Solutions:
     """Compute all configurations of a robot with loops for a pose of a frame.
 
@@ -294,6 +290,6 @@ def parallel(options: SolveOptions, frame: str | int | None, T: Array, p: Array)
 def _completed(solution: Solution, slope: Array, number: int) -> Solution:
     """Return a solution with the smallest singular value of pose and loop equations."""
     sigma = float(np.linalg.svd(slope, compute_uv=False)[-1])
-    count = 1 if sigma > _SINGULAR else 0
+    count = 1 if sigma > SINGULAR_ERROR else 0  # two roots at this distance count as one
     name = solution.branch or str(number + 1)
     return replace(solution, branch=name, sigma_min=sigma, multiplicity=count)

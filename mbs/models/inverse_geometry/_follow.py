@@ -133,7 +133,7 @@ def _conditioning(joints: PathJoints, poses: Path, x: Array) -> Conditioning:
     if joints.chain is not None:
         return Conditioning(joints.chain.arm(joints.target.closing.p), x)
     J = [joints.rows(one, T)[1] for one, T in zip(x, poses.poses, strict=False)]
-    return Conditioning(None, np.array([smallest(joints.tracker, one) for one in J]))
+    return Conditioning(None, np.array([smallest(joints, one) for one in J]))
 
 
 def _start(system: System, start: Any, locked: Mapping[str, float] | None) -> Array:

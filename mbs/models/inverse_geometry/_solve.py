@@ -19,11 +19,11 @@ from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_po
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, require_method, sequence_or_none
 from mbs.models.inverse_geometry.draft import (
     METHODS,
-    beside,
-    by_search,
-    gather,
-    gather_further,
-    join,
+    extend_draft,
+    join_drafts,
+    pose_draft,
+    search_draft,
+    valley_draft,
 )
 from mbs.models.inverse_geometry.draft_compiled import PoseKernel, kernel_of
 from mbs.models.inverse_geometry.redundancy import LockedSamples, Redundant, samples_of
@@ -262,24 +262,24 @@ def _distinct_solutions(
         r: (k,) positions of the varied joints in `problem` [rad or m].
     """
     chain, target, p = problem.chain, problem.target, problem.p
-    draft = gather(varied, target, method, p, r)
+    draft = pose_draft(varied, target, method, p, r)
     if method not in ("auto", *CLOSED_FORMS) or not _is_doubtful(target, draft):
         return verify(target, draft, problem.chain_indices), draft.method
-    draft = gather_further(chain, target, draft, p)
+    draft = extend_draft(chain, target, draft, p)
     examined: Examined = {}
     found = verify(target, draft, problem.chain_indices, examined)
     for root in found:
         if root.family is not None and root.family.dimension == 1:
             samples = root.family.chain_samples / target.unit
-            draft = join(draft, new_among(target, found, beside(target, samples)))
+            draft = join_drafts(draft, new_among(target, found, valley_draft(target, samples)))
     if any(root.family is not None for root in found):
         found = verify(target, draft, problem.chain_indices, examined)
     if draft.method == "search":
         return merge_connected(target, found), draft.method
     # a search also finds points of known self-motions, which are dropped here
-    more = new_among(target, found, by_search(target))
+    more = new_among(target, found, search_draft(target))
     if len(more.q):
-        found = verify(target, join(draft, more), problem.chain_indices, examined)
+        found = verify(target, join_drafts(draft, more), problem.chain_indices, examined)
     return merge_connected(target, found), draft.method
 
 

@@ -18,11 +18,11 @@ from mbs.models.inverse_geometry.closed_form import require_method, sequence_or_
 from mbs.models.inverse_geometry.draft import METHODS, regular_general
 from mbs.models.inverse_geometry.draft_many import (
     Booleans,
-    draft_solutions,
+    closed_form_draft,
+    empty_draft,
     general_draft,
     general_draft_varied,
-    nothing,
-    with_configurations,
+    replace_solutions,
 )
 from mbs.models.inverse_geometry.redundancy import Locked, LockedSamples, Redundant, samples_of
 from mbs.models.inverse_geometry.solutions import (
@@ -115,7 +115,7 @@ def solve_many(
             q = repair(arm, pose)
         else:
             q, draft.undecided[k] = robot.solved(pose, r[k])
-        draft = with_configurations(draft, int(k), arm, q, pose)
+        draft = replace_solutions(draft, int(k), arm, q, pose)
     q, valid = robot.whole(draft.q, r), draft.valid
     if leaves_out(limits):
         names, indices = list(redundant or {}), list(chain.indices)
@@ -155,14 +155,14 @@ class _Robot:
     def draft(self, T: Array, r: Array) -> ManySolutions:
         """Solve poses T (N, 4, 4) for the chain by the closed form, else by the general method."""
         if self.sequence is not None:
-            return draft_solutions(self.chain, self.sequence, self.p, T, r)
+            return closed_form_draft(self.chain, self.sequence, self.p, T, r)
         if self.method in ("auto", "general"):
             if self.chain.varied:
                 return general_draft_varied(self.chain, self.p, T, r)
             general = regular_general(self.chain, self.p)
             if general is not None:
                 return general_draft(general, T)
-        return nothing(len(self.chain.names), len(T))
+        return empty_draft(len(self.chain.names), len(T))
 
     def solved(self, pose: Array, r: Array) -> tuple[Array, bool]:
         """Solve one pose with varied joints at r (k,): chain positions (m, n), undecided flag."""

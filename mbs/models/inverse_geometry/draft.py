@@ -53,7 +53,7 @@ _KEPT = 256
 """Maximum number of cached arms, one per position of locked joints, tens of kilobytes each."""
 
 
-def gather(
+def pose_draft(
     chain: FrameChain, target: Target, method: str, p: Array, r: Array = NOT_VARIED
 ) -> PoseDraft:
     """Compute solutions by one method, or by the first method that applies to the chain.
@@ -75,7 +75,7 @@ def gather(
     if sequence is not None:
         return _by_closed_form(chain, target, sequence, p, r)
     if method == "search":
-        return by_search(target)
+        return search_draft(target)
     ready = general_ready(chain.locked_at(r) if chain.varied else chain, p)
     if ready is None and method == "general":
         raise ModelError(
@@ -83,18 +83,18 @@ def gather(
             f" {', '.join(chain.names)}: it is for six joints, and not for all with prismatic ones;"
             " use method='search'"
         )
-    return by_search(target) if ready is None else _by_general(target, ready)
+    return search_draft(target) if ready is None else _by_general(target, ready)
 
 
-def gather_further(chain: FrameChain, target: Target, draft: PoseDraft, p: Array) -> PoseDraft:
+def extend_draft(chain: FrameChain, target: Target, draft: PoseDraft, p: Array) -> PoseDraft:
     """Add the solutions of the general method and the solutions along valleys."""
     ready = general_ready(chain, p)
     if draft.method not in ("general", "search") and ready is not None:
-        draft = join(draft, _by_general(target, ready))
-    return along_valleys(target, draft)
+        draft = join_drafts(draft, _by_general(target, ready))
+    return _add_valley_solutions(target, draft)
 
 
-def join(draft: PoseDraft, more: PoseDraft) -> PoseDraft:
+def join_drafts(draft: PoseDraft, more: PoseDraft) -> PoseDraft:
     """Return the union of two drafts, marked as certain."""
     q = np.concatenate([draft.q, more.q])
     residual = np.concatenate([draft.residual, more.residual])
@@ -119,7 +119,7 @@ _STEPS_ALONG = 32  # number of steps along a valley, a full revolution
 _CROSSINGS = 8  # iterations of false position; along a sine each doubles the number of digits
 
 
-def along_valleys(target: Target, draft: PoseDraft) -> PoseDraft:
+def _add_valley_solutions(target: Target, draft: PoseDraft) -> PoseDraft:
     """Add the solutions along the valleys that start at singular solutions."""
     if target.arm.size != 6:
         return draft
@@ -133,7 +133,7 @@ def along_valleys(target: Target, draft: PoseDraft) -> PoseDraft:
     if not found:
         return draft
     q = wrapped(target.arm, np.concatenate(found) * target.unit)
-    return join(draft, _solutions_among(target, q))
+    return join_drafts(draft, _solutions_among(target, q))
 
 
 def _far_ends(target: Target, start: Array) -> list[Array]:
@@ -159,7 +159,7 @@ def _far_ends(target: Target, start: Array) -> list[Array]:
 _FEW_ENDS = 4
 
 
-def beside(target: Target, x: Array) -> PoseDraft:
+def valley_draft(target: Target, x: Array) -> PoseDraft:
     """Find solutions along the valleys that branch off a self-motion with samples x (k, 6).
 
     Valleys start at minima of the second smallest singular value, where another motion of the arm
@@ -370,7 +370,7 @@ def _by_general(target: Target, ready: General) -> PoseDraft:
     return _polish(target, q, ("",) * len(q), "general", certain)
 
 
-def by_search(target: Target) -> PoseDraft:
+def search_draft(target: Target) -> PoseDraft:
     """Compute solutions by a search from many starts."""
     q = search(target.arm, target.T, _STARTS)
     return _polish(target, q, ("",) * len(q), "search", True)

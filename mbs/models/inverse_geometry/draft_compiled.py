@@ -26,7 +26,7 @@ from mbs.models.inverse_geometry.closed_form import (
     sequence_or_none,
 )
 from mbs.models.inverse_geometry.draft import regular_general
-from mbs.models.inverse_geometry.draft_many import MANY, draft_solutions, general_draft
+from mbs.models.inverse_geometry.draft_many import MANY, closed_form_draft, general_draft
 from mbs.models.inverse_geometry.solutions import PoseDraft
 from mbs.models.inverse_geometry.target import NEARLY_SINGULAR
 from mbs.native._compiled import MachineCode, machine_code
@@ -123,7 +123,7 @@ class PoseKernel:
         if isinstance(self._solves, General):
             draft = general_draft(self._solves, T[None])
         else:
-            draft = draft_solutions(self.chain, self._solves, self.p, T[None], np.zeros((1, 0)))
+            draft = closed_form_draft(self.chain, self._solves, self.p, T[None], np.zeros((1, 0)))
         valid = np.flatnonzero(draft.valid[0])
         q = draft.q[0, valid]
         turned = np.where(self.arm.prismatic | (np.abs(q) <= np.pi), q, self.arm.wrapped(q))

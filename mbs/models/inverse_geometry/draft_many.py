@@ -39,7 +39,7 @@ MANY = 1000
 takes (about one second)."""
 
 
-def batch(
+def evaluate_branches(
     chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64], T: Array, r: Array
 ) -> PoseBatch:
     """Evaluate all branches of a closed form at N poses.
@@ -116,7 +116,7 @@ _ALIKE = 12 * _MEETING
 # joint is undetermined.
 
 
-def nothing(joints: int, count: int) -> ManySolutions:
+def empty_draft(joints: int, count: int) -> ManySolutions:
     """Return an empty result of `count` poses, all marked for other methods."""
     shape = count, 0
     empty = np.empty((*shape, joints)), np.zeros(shape, dtype=bool), np.empty(shape)
@@ -180,7 +180,7 @@ def arm_rows(chain: FrameChain, p: Array, r: Array) -> ArmRows:
     return ArmRows(Arm(chain.names, prismatic, gaps[0]), gaps)
 
 
-def draft_solutions(
+def closed_form_draft(
     chain: FrameChain, sequence: StepSequence, p: Array, T: Array, r: Array
 ) -> ManySolutions:
     """Solve N poses by a closed form.
@@ -192,7 +192,7 @@ def draft_solutions(
         T: (N, 4, 4) poses [m].
         r: (N, k) positions of the varied joints of the chain [rad or m].
     """
-    every, arms = batch(chain, sequence, p, T, r), arm_rows(chain, p, r)
+    every, arms = evaluate_branches(chain, sequence, p, T, r), arm_rows(chain, p, r)
     arm, scale = arms.first, arms.scale
     close = every.residual <= _DOUBTFUL * scale
     doubtful = close & (every.residual > _EXACT * scale)
@@ -248,9 +248,7 @@ def _merge(arm: Arm, every: PoseBatch, valid: Booleans) -> Booleans:
     return meeting
 
 
-def with_configurations(
-    draft: ManySolutions, k: int, arm: Arm, q: Array, T: Array
-) -> ManySolutions:
+def replace_solutions(draft: ManySolutions, k: int, arm: Arm, q: Array, T: Array) -> ManySolutions:
     """Replace the solutions of one pose, each in the column of the nearest branch.
 
     Args:
@@ -322,7 +320,7 @@ def general_draft_varied(chain: FrameChain, p: Array, T: Array, r: Array) -> Man
 
     A separate arm is prepared for each distinct row of r.
     """
-    draft = nothing(len(chain.names), len(T))
+    draft = empty_draft(len(chain.names), len(T))
     positions, which = np.unique(r, axis=0, return_inverse=True)
     for number, position in enumerate(positions):
         general = regular_general(chain.locked_at(position), p)

@@ -31,7 +31,7 @@ from mbs.models.inverse_geometry.closed_form import (
     whole_configuration,
 )
 from mbs.models.inverse_geometry.draft import regular_general
-from mbs.models.inverse_geometry.draft_many import draft_solutions
+from mbs.models.inverse_geometry.draft_many import closed_form_draft
 from mbs.models.inverse_geometry.target import NEARLY_SINGULAR
 from mbs.text import joint_label, quoted
 
@@ -127,7 +127,7 @@ class AllBranches(InverseGeometry):
         one = np.ndim(T) == 2
         poses = target_poses(self.system, [T] if one else T)
         p, none = np.array(self.system.parameter_values(parameters)), np.zeros((len(poses), 0))
-        found = ~draft_solutions(self._chain, self._sequence, p, poses, none).searched
+        found = ~closed_form_draft(self._chain, self._sequence, p, poses, none).searched
         return bool(found[0]) if one else found
 
 

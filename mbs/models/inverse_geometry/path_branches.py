@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Arm, Array
 from mbs.models.inverse_geometry.closed_form import sequence_or_none
-from mbs.models.inverse_geometry.draft_many import batch
+from mbs.models.inverse_geometry.draft_many import evaluate_branches
 from mbs.models.inverse_geometry.path_equations import (
     LARGEST_STEP,
     PathJoints,
@@ -137,11 +137,11 @@ def branch_block(
     if sequence is None:
         return None
     T = poses.poses[number : number + _BLOCK]
-    every = batch(joints.chain, sequence, p, T, np.zeros((len(T), 0)))
+    every = evaluate_branches(joints.chain, sequence, p, T, np.zeros((len(T), 0)))
     arm = joints.chain.arm(p)
     good = every.residual <= SOLVED * max(1.0, arm.length)
     size = np.minimum(every.real, every.regular)
     good &= size > 0
     return BranchBlock(
-        number, every.q / joints.scale, every.residual, good, size, arm, joints.limits
+        number, every.q / joints.scale, every.residual, good, size, arm, (joints.low, joints.high)
     )

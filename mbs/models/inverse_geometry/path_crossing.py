@@ -72,7 +72,7 @@ def singularity_crossing(state: PathState, stopped: bool) -> SingularityCrossing
         stopped: whether the continuation stopped before the next pose.
     """
     near = state.trail[-1][1]
-    if stopped and smallest(state.tracker, near.J) > _WATCHED:
+    if stopped and smallest(state.joints, near.J) > _WATCHED:
         return None
     if state.poses.function is None and state.joints.chain is not None:
         between = _crossing_between_poses(state, stopped)
@@ -81,7 +81,7 @@ def singularity_crossing(state: PathState, stopped: bool) -> SingularityCrossing
     if stopped:
         return _crossing_along_curve(state, state.trail, _NEAREST)
     if state.joints.redundant and state.poses.function is not None:
-        singular = [smallest(state.tracker, point.J) for _, point in state.trail]
+        singular = [smallest(state.joints, point.J) for _, point in state.trail]
         trail = state.trail[: int(np.argmin(singular)) + 1]
         return _crossing_along_curve(state, trail, _LEAST_DISTANCE)
     return None
@@ -97,7 +97,7 @@ def _crossing_along_curve(
         trail: configurations up to the singular configuration.
         least: smallest distance to either side, in segments between poses.
     """
-    tracker, poses, number = state.tracker, state.poses, state.number
+    joints, poses, number = state.joints, state.poses, state.number
     at, end = trail[-1][0], float(poses.count - 1)
     # straight lines between poses have corners at the poses
     start = max(trail[0][0], number - 1.0 if poses.function is None else min(0.0, at - 1.0))
@@ -112,10 +112,10 @@ def _crossing_along_curve(
         if to - at < _NEAREST:  # the path ends at the singular configuration
             behind = nearby_solution(state.joints, predicted, poses.poses[-1])
         else:
-            corrected = correct(tracker, predicted, state.curve(to))
+            corrected = correct(joints, predicted, state.curve(to))
             behind = None if corrected is None else corrected.x
         ratio = np.inf
-        if behind is not None and tracker.may(behind):
+        if behind is not None and joints.may(behind):
             ratio = relative_correction(predicted, behind, np.asarray(x[-1]))
         smooth = ratio < FAIR and ratio < max(_LITTLE, _SMOOTH * before)
         if behind is not None and smooth and _goes_across(state.joints, np.asarray(x[-1]), behind):
@@ -137,7 +137,7 @@ def _configuration_at(
     if at == u:
         return point.x
     segment = curve_segment(state.curve, at, u)
-    last, reached, _ = advance(state.tracker, point, segment, 1.0, curved=True)
+    last, reached, _ = advance(state.joints, point, segment, 1.0, curved=True)
     return last.x if reached == 1.0 else None
 
 
@@ -159,7 +159,7 @@ def _crossing_to(
     state: PathState, nodes: list[float], x: Array, to: int
 ) -> SingularityCrossing | None:
     """Cross from configurations x (k, n) at pose indices `nodes` to the pose `to`, or None."""
-    joints, poses, number, may = state.joints, state.poses, state.number, state.tracker.may
+    joints, poses, number, may = state.joints, state.poses, state.number, state.joints.may
     predicted = lagrange(nodes, x, float(min(to, poses.count - 1)))
     if to >= poses.count:  # the path ends at the singular configuration
         last = nearby_solution(joints, predicted, poses.poses[-1])
@@ -214,7 +214,7 @@ def _passed_poses(
         own = [y for u, y in zip(nodes, x, strict=True) if u == k]
         T, predicted = state.poses.poses[k], lagrange(nodes, x, float(k))
         y = own[0] if own else nearby_solution(state.joints, predicted, T)
-        if y is None or not state.tracker.may(y):
+        if y is None or not state.joints.may(y):
             return None
         passed.append(y)
     return np.array(passed).reshape(len(passed), x.shape[1])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -42,78 +42,6 @@ may be the singular one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tracker:
-    """Equations, limits and redundancy of the predictor-corrector continuation.
-
-    Attributes:
-        rows: pose error and Jacobian of a scaled configuration x. Lengths are divided by a
-            reference length, so that they compare with angles.
-        slack: dimension of the null space of the Jacobian at a regular configuration: idle spins
-            of rods and redundant freedoms.
-        exact: whether every nearby pose can be reached. If so, the error is zero between the given
-            poses too; if not, it is minimised.
-        low, high: (n,) limits of x, infinite for unlimited coordinates.
-        redundant: number of redundant freedoms, included in `slack`.
-        slope: gradient (n,) of a cost that redundant joints decrease, as a function of x, or None.
-    """
-
-    rows: Rows
-    slack: int
-    exact: bool
-    low: Array
-    high: Array
-    redundant: int = 0
-    slope: Callable[[Array], Array] | None = None
-
-    def may(self, x: Array) -> bool:
-        """Whether a configuration is within the limits."""
-        return not np.any(self.beyond(x))
-
-    def beyond(self, x: Array) -> NDArray[np.bool_]:
-        """Return (n,) whether each coordinate of x is beyond its limits."""
-        return np.asarray((x < self.low - WITHIN) | (x > self.high + WITHIN))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PathPoint:
-    """Configuration on a path, with its Jacobian and pose error.
-
-    Attributes:
-        x: (n,) scaled configuration.
-        J: (m, n) Jacobian at x.
-        left: largest absolute error row at x.
-    """
-
-    x: Array
-    J: Array
-    left: float
-
-
-def point_at(tracker: Tracker, x: Array, T: Array) -> PathPoint:
-    """Return the path point of a configuration x (n,), with its error to the pose T (4, 4)."""
-    r, J = tracker.rows(x, T)
-    return PathPoint(x, J, float(np.max(np.abs(r))))
-
-
-def smallest(tracker: Tracker, J: Array) -> float:
-    """Return the smallest singular value of J (m, n) outside its regular null space."""
-    values = np.linalg.svd(J, compute_uv=False)
-    return float(values[J.shape[1] - 1 - tracker.slack])
-
-
-def pseudo_inverse(tracker: Tracker, J: Array, stopped: int = 0) -> tuple[Array, float]:
-    """Return the pseudo-inverse of J, truncated to its regular rank, and its norm.
-
-    J lacks the columns of `stopped` joints, which lowers the dimension of its null space.
-    """
-    U, values, V = np.linalg.svd(J, full_matrices=False)
-    kept = J.shape[1] - max(tracker.slack - stopped, 0)
-    inverse = 1 / np.maximum(values[:kept], NONZERO)
-    back: Array = (V[:kept].T * inverse) @ U[:, :kept].T
-    return back, float(inverse[-1])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class PathJoints:
     """Joints that track a path, and their equations. Scaled positions are x = q / scale.
 
@@ -122,12 +50,15 @@ class PathJoints:
         indices: indices in q of the joints that move.
         scale: (n,) unit of each x: 1 for angles, reference length [m] for prismatic joints.
         rows: pose error and its Jacobian, as functions of x and the target pose.
-        slack: dimension of the regular null space of the Jacobian, redundant freedoms included.
-        exact: whether every nearby pose can be reached.
+        slack: dimension of the null space of the Jacobian at a regular configuration: idle spins
+            of rods and redundant freedoms.
+        exact: whether every nearby pose can be reached. If so, the error is zero between the given
+            poses too; if not, it is minimised.
         bounds: limits of the coordinates, or None to ignore limits.
         chain: open chain of the joints, or None for a robot with loops.
         redundant: number of freedoms beyond those that the pose determines.
-        slope: gradient (n,) of a cost that redundant joints decrease, or None.
+        slope: gradient (n,) of a cost that redundant joints decrease, as a function of x, or None.
+        low, high: (n,) limits of x, infinite for unlimited coordinates.
     """
 
     target: Goal
@@ -140,6 +71,15 @@ class PathJoints:
     chain: FrameChain | None = None
     redundant: int = 0
     slope: Callable[[Array], Array] | None = None
+    low: Array = field(init=False)
+    high: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        free = np.full(len(self.indices), np.inf)
+        low = -free if self.bounds is None else self.scaled(self.bounds.low)
+        high = free if self.bounds is None else self.scaled(self.bounds.high)
+        object.__setattr__(self, "low", low)
+        object.__setattr__(self, "high", high)
 
     @property
     def system(self) -> System:
@@ -147,22 +87,17 @@ class PathJoints:
         return self.target.closing.system
 
     @property
-    def tracker(self) -> Tracker:
-        """Equations and scaled limits for the continuation."""
-        low, high = self.limits
-        return Tracker(self.rows, self.slack, self.exact, low, high, self.redundant, self.slope)
-
-    @property
     def length(self) -> float:
         """Reference length [m]: the length of the arm, or 1 m for a robot with loops."""
         return 1.0 if self.chain is None else self.chain.arm(self.target.closing.p).length
 
-    @property
-    def limits(self) -> tuple[Array, Array]:
-        """Lower and upper limits (n,) of the moving joints, scaled."""
-        if self.bounds is None:
-            return np.full(len(self.indices), -np.inf), np.full(len(self.indices), np.inf)
-        return self.scaled(self.bounds.low), self.scaled(self.bounds.high)
+    def may(self, x: Array) -> bool:
+        """Whether a configuration is within the limits."""
+        return not np.any(self.beyond(x))
+
+    def beyond(self, x: Array) -> NDArray[np.bool_]:
+        """Return (n,) whether each coordinate of x is beyond its limits."""
+        return np.asarray((x < self.low - WITHIN) | (x > self.high + WITHIN))
 
     def scaled(self, q: Array) -> Array:
         """Return the scaled positions (n,) of the moving joints in a configuration q (nq,)."""
@@ -202,6 +137,45 @@ class PathJoints:
         return None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class PathPoint:
+    """Configuration on a path, with its Jacobian and pose error.
+
+    Attributes:
+        x: (n,) scaled configuration.
+        J: (m, n) Jacobian at x.
+        left: largest absolute error row at x.
+    """
+
+    x: Array
+    J: Array
+    left: float
+
+
+def point_at(joints: PathJoints, x: Array, T: Array) -> PathPoint:
+    """Return the path point of a configuration x (n,), with its error to the pose T (4, 4)."""
+    r, J = joints.rows(x, T)
+    return PathPoint(x, J, float(np.max(np.abs(r))))
+
+
+def smallest(joints: PathJoints, J: Array) -> float:
+    """Return the smallest singular value of J (m, n) outside its regular null space."""
+    values = np.linalg.svd(J, compute_uv=False)
+    return float(values[J.shape[1] - 1 - joints.slack])
+
+
+def pseudo_inverse(joints: PathJoints, J: Array, stopped: int = 0) -> tuple[Array, float]:
+    """Return the pseudo-inverse of J, truncated to its regular rank, and its norm.
+
+    J lacks the columns of `stopped` joints, which lowers the dimension of its null space.
+    """
+    U, values, V = np.linalg.svd(J, full_matrices=False)
+    kept = J.shape[1] - max(joints.slack - stopped, 0)
+    inverse = 1 / np.maximum(values[:kept], NONZERO)
+    back: Array = (V[:kept].T * inverse) @ U[:, :kept].T
+    return back, float(inverse[-1])
+
+
 # Redundancy resolution: minimum-norm motion, plus gradient descent of a cost in the null space.
 #
 # dx = J+ dr - k (1 - J+ J) grad H
@@ -236,7 +210,7 @@ def slope_of(
             " gradient of a cost"
         )
     if redundancy == "limits":
-        return _from_limits(*joints.limits)
+        return _from_limits(joints.low, joints.high)
     return _to_manipulability(joints) if redundancy == "manipulability" else None
 
 

@@ -28,7 +28,6 @@ from mbs.models.inverse_geometry.path_equations import (
     SMALL,
     PathJoints,
     PathPoint,
-    Tracker,
     pseudo_inverse,
     smallest,
 )
@@ -47,22 +46,22 @@ FAIR = 0.1
 
 
 def predicted(
-    tracker: Tracker, point: PathPoint, r: Array, free: NDArray[np.bool_], aim: Array
+    joints: PathJoints, point: PathPoint, r: Array, free: NDArray[np.bool_], aim: Array
 ) -> tuple[Array, Array]:
     """Return the predicted configuration and the pseudo-inverse of the free joints' Jacobian.
 
     Args:
-        tracker: equations and limits of the continuation.
+        joints: joints that track the path.
         point: configuration before the step.
         r: (m,) pose error from `point` to the next pose.
         free: (n,) whether each joint is not stopped at a limit.
         aim: (n,) positions, of which the stopped joints take theirs.
     """
     J, move = point.J[:, free], np.where(free, 0.0, aim - point.x)
-    back, _ = pseudo_inverse(tracker, J, int(np.sum(~free)))
+    back, _ = pseudo_inverse(joints, J, int(np.sum(~free)))
     move[free] = back @ (r - point.J @ move)
-    if tracker.slope is not None and np.sum(~free) < tracker.redundant:
-        downhill = -_GAIN * float(np.linalg.norm(r)) * tracker.slope(point.x)[free]
+    if joints.slope is not None and np.sum(~free) < joints.redundant:
+        downhill = -_GAIN * float(np.linalg.norm(r)) * joints.slope(point.x)[free]
         still = downhill - back @ (J @ downhill)
         # at most as long as the move along the path, which must dominate the step
         most, length = float(np.linalg.norm(move)), float(np.linalg.norm(still))
@@ -98,26 +97,26 @@ _BESIDE = 0.1
 
 
 def correct(
-    tracker: Tracker, x: Array, T: Array, free: NDArray[np.bool_] | None = None
+    joints: PathJoints, x: Array, T: Array, free: NDArray[np.bool_] | None = None
 ) -> PathPoint | None:
     """Newton's method from x to pose T. None without contraction or with a residual error."""
     before, free = np.inf, np.ones(x.size, dtype=bool) if free is None else free
     stopped = int(np.sum(~free))
     x = x.copy()
-    r, J = tracker.rows(x, T)
+    r, J = joints.rows(x, T)
     for _ in range(_ITERATIONS):
-        back, gain = pseudo_inverse(tracker, J[:, free], stopped)
+        back, gain = pseudo_inverse(joints, J[:, free], stopped)
         move, noise = back @ r, _NOISE * gain
         length = float(np.linalg.norm(move))
         if length > max(_CONTRACTION * before, noise):
             return None
         x[free] += move
         before = length
-        r, J = tracker.rows(x, T)
+        r, J = joints.rows(x, T)
         if length < noise:
             break
     left = float(np.max(np.abs(r)))
-    return None if tracker.exact and left > SMALL else PathPoint(x, J, left)
+    return None if joints.exact and left > SMALL else PathPoint(x, J, left)
 
 
 def nearby_solution(joints: PathJoints, x: Array, T: Array) -> Array | None:
@@ -192,7 +191,7 @@ _MOST_STEPS = 200
 
 
 def advance(
-    tracker: Tracker,
+    joints: PathJoints,
     start: PathPoint,
     pose: Callable[[float], Array],
     step: float,
@@ -202,7 +201,7 @@ def advance(
     """Continue a configuration along a pose curve from parameter 0 to parameter 1.
 
     Args:
-        tracker: equations and limits of the continuation.
+        joints: joints that track the path.
         start: point at parameter 0.
         pose: target pose (4, 4) as a function of the parameter in [0, 1].
         step: first step of the parameter.
@@ -215,15 +214,15 @@ def advance(
     """
     point, at = start, 0.0
     for _ in range(_MOST_STEPS):
-        if at == 1.0 or step <= _SMALLEST_STEP or smallest(tracker, point.J) <= SINGULAR:
+        if at == 1.0 or step <= _SMALLEST_STEP or smallest(joints, point.J) <= SINGULAR:
             break
         to = min(1.0, at + step)
         T = pose(to)
-        found = _step(tracker, point, T, tracker.rows(point.x, T)[0])
+        found = _step(joints, point, T, joints.rows(point.x, T)[0])
         if found is None and curved:
             # near a singular configuration the curvature is amplified: predict from the tangent
             part = _TANGENT * (to - at)
-            found = _step(tracker, point, T, tracker.rows(point.x, pose(at + part))[0] / _TANGENT)
+            found = _step(joints, point, T, joints.rows(point.x, pose(at + part))[0] / _TANGENT)
         if found is None:
             step = (to - at) / 2
         else:
@@ -233,30 +232,30 @@ def advance(
     return point, at, step
 
 
-def _step(tracker: Tracker, point: PathPoint, T: Array, r: Array) -> PathPoint | None:
+def _step(joints: PathJoints, point: PathPoint, T: Array, r: Array) -> PathPoint | None:
     """Return the configuration at the next pose, or None if the step is too long.
 
     A redundant joint that would exceed its limit stops at the limit, and the other joints move.
 
     Args:
-        tracker: equations and limits of the continuation.
+        joints: joints that track the path.
         point: configuration before the step.
         T: (4, 4) next pose.
         r: (m,) pose error from `point` to T, or its linear estimate.
     """
     free = np.ones(point.x.size, dtype=bool)
     aim = point.x.copy()
-    for _ in range(tracker.redundant + 1):
-        guess, back = predicted(tracker, point, r, free, aim)
-        found = correct(tracker, guess, T, free)
+    for _ in range(joints.redundant + 1):
+        guess, back = predicted(joints, point, r, free, aim)
+        found = correct(joints, guess, T, free)
         reached = guess if found is None else found.x
-        beyond = tracker.beyond(reached) & free
+        beyond = joints.beyond(reached) & free
         if not np.any(beyond):
             break
         free &= ~beyond
-        aim = np.clip(reached, tracker.low, tracker.high)
+        aim = np.clip(reached, joints.low, joints.high)
         found = None
-    if found is None or not tracker.may(found.x):
+    if found is None or not joints.may(found.x):
         return None
     ahead, miss = np.linalg.norm(guess - point.x), np.linalg.norm(found.x - guess)
     near = np.max(np.abs(found.x - point.x)) < LARGEST_STEP and miss <= _CHANGE * ahead + SMALL

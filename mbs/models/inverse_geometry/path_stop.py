@@ -109,7 +109,7 @@ def _singular(joints: PathJoints, q: Array) -> str:
     x, T = joints.scaled(q), joints.pose(q)
 
     def value(y: Array) -> float:
-        return smallest(joints.tracker, joints.rows(y, T)[1])
+        return smallest(joints, joints.rows(y, T)[1])
 
     moved = np.eye(x.size) * _NUDGE
     rises = [value(x + step) + value(x - step) for step in moved]

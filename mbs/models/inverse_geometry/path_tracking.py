@@ -48,11 +48,11 @@ def track(state: PathState) -> str:
 
 def _stays(state: PathState) -> bool:
     """Keep a singular configuration if the next pose is equal; return whether it is."""
-    if smallest(state.tracker, state.point.J) > SINGULAR:
+    if smallest(state.joints, state.point.J) > SINGULAR:
         return False
     way, x = state.number - state.u, state.point.x
     for part in _PARTS:
-        rows = state.tracker.rows(x, state.curve(state.u + part * way))[0]
+        rows = state.joints.rows(x, state.curve(state.u + part * way))[0]
         if np.max(np.abs(rows), initial=0.0) > POSE_ERROR:
             return False
     q = state.joints.whole(state.start, x)
@@ -82,7 +82,7 @@ def _smooth_step(state: PathState) -> bool:
     if (
         own is None
         or relative_correction(predicted, own[0], x[-1]) > FAIR
-        or not state.tracker.may(own[0])
+        or not state.joints.may(own[0])
     ):
         return False
     nodes, x = [*nodes[1:], float(number)], np.vstack([x[1:], own[0]])
@@ -99,12 +99,12 @@ def _smooth_step(state: PathState) -> bool:
 def _step_on(state: PathState) -> str:
     """Step to the next pose or past a singularity. Return the reason of a stop, or ""."""
     joints, number, way = state.joints, state.number, list[tuple[float, PathPoint]]()
-    allowed = not joints.redundant or state.tracker.may(state.point.x)
+    allowed = not joints.redundant or state.joints.may(state.point.x)
     segment = curve_segment(state.curve, state.u, number)
     last, at = state.point, 0.0
     if allowed:
         curved, first = state.poses.function is not None, min(1.0, state.step)
-        last, at, state.step = advance(state.tracker, state.point, segment, first, way, curved)
+        last, at, state.step = advance(state.joints, state.point, segment, first, way, curved)
     u, way_left = state.u, number - state.u
     state.trail = state.trail[-_TRAIL:] + [(u + s * way_left, passed) for s, passed in way]
     state.u = float(number) if at == 1.0 else u + at * way_left
@@ -138,4 +138,4 @@ def _turns_off(state: PathState, point: PathPoint) -> bool:
     if float(np.linalg.norm(point.x - predicted)) <= max(_TURN_OFF * before, SMALL):
         return False
     longest = max(before, float(np.linalg.norm(point.x - known[-1])))
-    return smallest(state.tracker, point.J) < _NEAR_STEPS * longest
+    return smallest(state.joints, point.J) < _NEAR_STEPS * longest

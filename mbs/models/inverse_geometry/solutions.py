@@ -172,7 +172,11 @@ def _pair(system: System, name: str, pair: object) -> tuple[float, float]:
     return low, high
 
 
+# Types that pass solutions through the pipeline: see the docstring of the package.
+
+
 _MOST_ROWS = 64
+"""Largest number of solutions in the text of `Solutions`."""
 
 
 class PoseDraft:
@@ -200,16 +204,10 @@ class PoseDraft:
         method: str,
         near: Array | None = None,
     ) -> None:
-        """Store the configurations.
+        """Store the configurations and their names.
 
-        Args:
-            q: attribute of that name.
-            residual: attribute of that name.
-            names: name by branch index; without `branch`, the name of each configuration.
-            branch: (m,) index of the branch of each configuration.
-            certain: attribute of that name.
-            method: attribute of that name.
-            near: attribute of that name.
+        `names` are the names of the branches, by the index that `branch` (m,) contains for each
+        configuration. Without `branch`, they are the names of the configurations.
         """
         self.q, self.residual, self.certain, self.method = q, residual, certain, method
         self._names, self._branch, self.near = names, branch, near
@@ -230,12 +228,11 @@ def _no_windings() -> Array:
     return np.empty((0, 0))
 
 
+# Until `answer` completes it, q of a solution contains the positions (n,) of a chain, and residual,
+# singular value and limits are not known.
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
     """Configuration at which the frame has the target pose.
-
-    Until `answer` completes it, a solution has the positions (n,) of a chain instead of q, and
-    neither residual, nor singular value, nor limits.
 
     Attributes:
         q: (nq,) positions [rad or m].

@@ -356,6 +356,8 @@ def _random_starts(
 
 
 _TRIES, _LEAST, _SEED = 500, 60, 20260103
+"""Largest and smallest number of starts, and seed of the random numbers. A mode that every twelfth
+start reaches is missed by 60 starts with a probability of half a percent."""
 _LOOSE = 1e-5
 """Relative singular value below which joints can move: closed to 1e-12, a mode that can move has an
 error of the square root, 1e-6, and its singular value has the same size."""
@@ -476,6 +478,8 @@ def _require_isolated(target: Goal, q: Vector) -> None:
 
 
 _START_TRIES, _LEAST_STARTS, _START_SEED = 300, 40, 20260107
+"""Largest and smallest number of starts, fewer than for `working_modes` because locked positions
+leave fewer configurations; and seed of the random numbers."""
 _REACH = np.pi
 """Largest difference of a random start from the given positions [rad or m]: half a rotation covers
 all angles."""

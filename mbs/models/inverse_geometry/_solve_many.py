@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,17 +11,13 @@ import numpy as np
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, Array
-from mbs.closed_forms.sequence import StepSequence
 from mbs.models.inverse_geometry._solve import solve_at, solve_rigid
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_poses
-from mbs.models.inverse_geometry.closed_form import require_method, sequence_or_none
-from mbs.models.inverse_geometry.draft import METHODS, regular_general
+from mbs.models.inverse_geometry.closed_form import require_method
+from mbs.models.inverse_geometry.draft import METHODS
 from mbs.models.inverse_geometry.draft_many import (
     Booleans,
-    closed_form_draft,
-    empty_draft,
-    general_draft,
-    general_draft_varied,
+    many_draft,
     replace_solutions,
 )
 from mbs.models.inverse_geometry.redundancy import Locked, LockedSamples, Redundant, samples_of
@@ -104,19 +100,19 @@ def solve_many(
         ]
         return _gather_samples(_stack(system, answers), samples)
     chain = frame_chain(system, frame, samples.locked, samples.varied)
-    robot = _Robot(chain, p, method, sequence_or_none(chain, method, p))
     count, number, joints = samples.r.shape
     r = samples.r.reshape(count * number, joints)
     many = poses if number == 1 else np.repeat(poses, number, axis=0)
-    draft = robot.draft(many, r)
+    draft = many_draft(chain, method, p, many, r)
     for k in np.flatnonzero(draft.searched):
         pose, arm = many[k], chain.locked_at(r[k]).arm(p)
         if repair:
             q = repair(arm, pose)
         else:
-            q, draft.undecided[k] = robot.solved(pose, r[k])
+            found = solve_at(chain, r[k], pose, method, p)
+            q, draft.undecided[k] = found.q[:, list(chain.indices)], found.undecided
         draft = replace_solutions(draft, int(k), arm, q, pose)
-    q, valid = robot.whole(draft.q, r), draft.valid
+    q, valid = _whole(chain, draft.q, r), draft.valid
     if leaves_out(limits):
         names, indices = list(redundant or {}), list(chain.indices)
         indices += [k for k, c in enumerate(system.coordinates) if c.name in names]
@@ -143,42 +139,16 @@ def _gather_samples(many: ManySolutions, samples: LockedSamples) -> ManySolution
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Robot:
-    """Chain, parameter values and method of a robot; `sequence` is None without a closed form."""
-
-    chain: FrameChain
-    p: Array
-    method: str
-    sequence: StepSequence | None
-
-    def draft(self, T: Array, r: Array) -> ManySolutions:
-        """Solve poses T (N, 4, 4) for the chain by the closed form, else by the general method."""
-        if self.sequence is not None:
-            return closed_form_draft(self.chain, self.sequence, self.p, T, r)
-        if self.method in ("auto", "general"):
-            if self.chain.varied:
-                return general_draft_varied(self.chain, self.p, T, r)
-            general = regular_general(self.chain, self.p)
-            if general is not None:
-                return general_draft(general, T)
-        return empty_draft(len(self.chain.names), len(T))
-
-    def solved(self, pose: Array, r: Array) -> tuple[Array, bool]:
-        """Solve one pose with varied joints at r (k,): chain positions (m, n), undecided flag."""
-        found = solve_at(self.chain, r, pose, self.method, self.p)
-        return found.q[:, list(self.chain.indices)], found.undecided
-
-    def whole(self, q: Array, r: Array) -> Array:
-        """Return the positions (N, branches, nq) of all joints; others as assembled or locked."""
-        system = self.chain.system
-        if self.chain.indices == tuple(range(system.nq)):
-            return q
-        every = np.empty((*q.shape[:2], system.nq))
-        every[...] = system.position(self.chain.locked)
-        every[..., list(self.chain.indices)] = q
-        every[..., list(self.chain.varied_indices)] = r[:, None]
-        return every
+def _whole(chain: FrameChain, q: Array, r: Array) -> Array:
+    """Return the positions (N, branches, nq) of all joints; others as assembled or locked."""
+    system = chain.system
+    if chain.indices == tuple(range(system.nq)):
+        return q
+    every = np.empty((*q.shape[:2], system.nq))
+    every[...] = system.position(chain.locked)
+    every[..., list(chain.indices)] = q
+    every[..., list(chain.varied_indices)] = r[:, None]
+    return every
 
 
 def _stack(system: System, answers: list[Solutions]) -> ManySolutions:

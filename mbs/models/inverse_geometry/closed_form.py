@@ -36,6 +36,7 @@ Numbers: TypeAlias = NDArray[np.float64] | None
 """Parameter values (np,), or None to keep parameters symbolic."""
 
 _FEW = 8
+"""Number of branches of an arm with a spherical wrist, which no method can reduce."""
 
 
 def sequence_of(chain: FrameChain, method: str = "auto", p: Numbers = None) -> StepSequence:

@@ -19,6 +19,7 @@ from mbs.models.inverse_geometry.closed_form import (
     at_poses,
     bounds_of,
     plain_branches,
+    sequence_or_none,
 )
 from mbs.models.inverse_geometry.draft import regular_general
 from mbs.models.inverse_geometry.solutions import ManySolutions
@@ -333,3 +334,28 @@ def general_draft_varied(chain: FrameChain, p: Array, T: Array, r: Array) -> Man
         draft.q[rows, columns], draft.valid[rows, columns] = part.q, part.valid
         draft.residual[rows, columns], draft.searched[rows] = part.residual, part.searched
     return draft
+
+
+def many_draft(chain: FrameChain, method: str, p: Array, T: Array, r: Array) -> ManySolutions:
+    """Solve N poses by a closed form, else by the general method; others are marked as `searched`.
+
+    Args:
+        chain: chain that is solved for.
+        method: argument of `solve`.
+        p: (np,) parameter values.
+        T: (N, 4, 4) poses [m].
+        r: (N, k) positions of the varied joints of the chain [rad or m].
+
+    Raises:
+        NoClosedForm: method is "pieper" or "paul" and does not apply to the chain.
+    """
+    sequence = sequence_or_none(chain, method, p)
+    if sequence is not None:
+        return closed_form_draft(chain, sequence, p, T, r)
+    if method in ("auto", "general"):
+        if chain.varied:
+            return general_draft_varied(chain, p, T, r)
+        general = regular_general(chain, p)
+        if general is not None:
+            return general_draft(general, T)
+    return empty_draft(len(chain.names), len(T))

@@ -264,7 +264,7 @@ def _to_manipulability(joints: PathJoints) -> Callable[[Array], Array]:
 # Joints and equations that track poses of a frame, from the options of the user.
 
 
-_WHOLE = 6
+_WHOLE = 6  # freedoms of a rigid body, all of which a pose determines
 
 
 def path_joints(

@@ -22,6 +22,8 @@ _AT_LIMIT = 1e-6
 """Distance from a joint limit [rad or m] below which the limit is the reason to stop. Step halving
 ends much nearer, and a stop for another reason is rarely so near."""
 _STARTS, _SEED = 6, 20260109
+"""Starts for the nearest pose: the last configuration, then random ones at growing distances up to
+one radian. They decide only between two error texts. Seed of the random numbers."""
 _NUDGE = 1e-3
 """Move of a joint [rad or arm lengths] to find the joint that changes the smallest singular value
 most: longer than the distance to the singular configuration (1e-7), shorter than to the next."""

@@ -22,11 +22,15 @@ _STEP = 0.1
 """Largest step along a self-motion [rad or arm lengths]: 63 steps make one revolution. The tracing
 itself, with its other limits, is `arm_descend.c` of the run-time library."""
 _MOST_STEPS, _FEW_STEPS = 2000, 60
+"""Maximum number of steps along a curve of one freedom (thirty revolutions) and of several
+freedoms, for which one curve of a revolution is an example."""
 _SHORTEST = 1.0
+"""Shortest open self-motion [rad or arm lengths]: a valley at a multiple root is far shorter."""
 _AWAY = 0.05
 """Distance [rad or arm lengths] at which a self-motion must still hold the pose. At a double root
 the residual there is about 1e-3, far above the tolerance, and the null space is still tangent."""
 _TRIES = 24
+"""Random null-space directions in which a self-motion is searched if there are several."""
 _SEED = 20260108
 _INTEGER = 1e-3
 """Distance from integers within which slopes are rounded. A singular configuration and its null
@@ -172,7 +176,7 @@ which the joint moves."""
 _AS_NEAR = 1e-3
 """Difference [rad or arm lengths] below which distances of samples are equal. The ends of a curve
 are known to 1e-5, the square root of the tolerance over the curvature; samples are 0.1 apart."""
-_REFINEMENTS = 5
+_REFINEMENTS = 5  # of the end of a range; each divides the step by eight: 0.1 to 3e-6
 _COMPARABLE = 0.5
 """Fraction of the largest joint range above which a joint nearer to the base is the free joint."""
 

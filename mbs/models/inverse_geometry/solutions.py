@@ -34,6 +34,7 @@ WITHIN = 1e-9
 _TURNS = 4
 """Maximum number of revolutions to either side of the nearest position of a coordinate."""
 _MOST_WINDINGS = 64
+"""Maximum number of configurations that differ by full revolutions, as six joints of two each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -497,6 +498,8 @@ def _numbers(system: str, q: object) -> Array:
 
 
 _REASON_STARTS, _STEPS, _SEED = 40, 60, 20260109
+"""Random starts, and damped steps of each, that decide whether position or orientation alone can be
+reached. They decide only between error texts. Seed of the random numbers."""
 _REACHED = 1e-9
 """Largest dimensionless error of equations that have a solution. Damped steps end far below. A pose
 that is out of reach by less (1 nm per metre) is reported by its distance."""

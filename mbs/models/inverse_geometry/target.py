@@ -270,9 +270,9 @@ _MEETING = DECIDED
 # is used at which Newton's method converges and a polynomial of degree 8 fits g up to rounding.
 _RADII = (0.05, 0.012, 3e-3, 7e-4, 1.5e-4, 3e-5, 6e-6)
 _ROUNDING = 3e-15  # rounding error of g, some tens of 1e-16: largest error of a fitted polynomial
-_HIGHEST = 4
+_HIGHEST = 4  # largest order of a root in one unknown that is examined
 _FARTHEST = 0.4  # largest step h [rad or arm lengths]: polynomials are invalid beyond 8 radii
-_DEGREE = 8
+_DEGREE = 8  # of the fitted polynomials: terms above are below rounding within the radius
 _SEED = 20260107
 
 

@@ -37,7 +37,7 @@ from mbs.models.inverse_geometry.target import (
 MOST_ROOTS = 16
 """Largest number of isolated solutions of a six-joint chain for one pose (16); shorter chains have
 fewer."""
-_REFINEMENTS = 8
+_REFINEMENTS = 8  # maximum number of moves to the centre of a multiple root, until `_SETTLED`
 _SETTLED = 1e-7
 """Move [rad or arm lengths] below which the centre of a multiple root has converged. Rounding moves
 a double root by 1e-8, the square root of 1e-16."""

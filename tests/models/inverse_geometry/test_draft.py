@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 from support.catalogue_systems import catalogue_system
+from support.plain_arms import manseur_doty
 
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.chain import frame_chain
@@ -61,3 +62,7 @@ def test_what_does_not_fit_is_refused():
         pose_draft(way("scara"), aim, "general", NONE)
     with pytest.raises(ModelError, match=r"method is .newton., which is not known"):
         pose_draft(way("scara"), aim, "newton", NONE)
+
+
+def test_the_search_has_enough_starts():
+    assert len(search_draft(Target(*manseur_doty())).q) == 16

@@ -58,7 +58,25 @@ def stop_reason(led: Follower, poses: Path, number: int, q: Array, at: float) ->
             f"between poses {number - 1} and {number} of {poses.count}, at {part:.4g} of the path"
         )
     behind = _jump(led, x, poses.poses[min(number + (1 - at < AT_POSE), poses.count - 1)])
-    return f"stopped {where}: singular configuration, {_singular(led, q)}{behind}"
+    beyond = _start_beyond(led, x, poses, number) if at < AT_POSE else ""
+    return f"stopped {where}: singular configuration, {_singular(led, q)}{behind}{beyond}"
+
+
+def _start_beyond(led: Follower, x: Array, poses: Path, number: int) -> str:
+    """Text on how to go on from a singular pose: by a start at the pose that follows it.
+
+    Empty for the way to the first pose, and if no solution was found.
+    """
+    if led.redundant or not number:
+        return ""
+    found = nearest_solution(led, x, poses.poses[number])
+    if found is None:
+        return ""
+    start = ", ".join(f"{float(value):.6g}" for value in found * led.scale)
+    return (
+        f"; branches part at this pose: follow the path from pose {number} on with a start on one of"
+        f" them, such as {start}, or another solution of inverse_geometry.solve for this pose"
+    )
 
 
 def _jump(led: Follower, x: Array, T: Array) -> str:

@@ -74,8 +74,8 @@ def _start_beyond(led: Follower, x: Array, poses: Path, number: int) -> str:
         return ""
     start = ", ".join(f"{float(value):.6g}" for value in found * led.scale)
     return (
-        f"; branches part at this pose: follow the path from pose {number} on with a start on one of"
-        f" them, such as {start}, or another solution of inverse_geometry.solve for this pose"
+        f"; branches part at this pose: follow the path from pose {number} on with a start on one"
+        f" of them, such as {start}, or another solution of inverse_geometry.solve for this pose"
     )
 
 

@@ -110,7 +110,7 @@ def test_a_path_that_leaves_a_singular_configuration_stops_where_it_leaves(puma)
 def test_a_singular_start_names_a_start_from_which_the_path_goes_on(puma):
     start = ELBOW_UP.copy()
     start[4] = 0.0
-    T = poses(puma, 6, line(start, ELBOW_UP + [0.05, 0.05, -0.05, 0, 0, 0], 10))
+    T = poses(puma, 6, line(start, ELBOW_UP + np.array([0.05, 0.05, -0.05, 0, 0, 0]), 10))
     found = follow(puma, T, start, limits=False)
     assert found.reached == 0
     text = found.reason.partition("from pose 1 on with a start on one of them, such as ")[2]

@@ -305,6 +305,7 @@ _INITIAL = {
     "slot": "exact",
     "rate": "calculated",
     "chart": "calculated",
+    "cut": "approx",
 }
 _NOTHING: Known = {}
 TOOL = f"mbs {__version__}"
@@ -368,7 +369,7 @@ def structure(model: FmuModel) -> ModelStructure:
         derivatives=derivatives,
         indicators=[
             *range(model.first("indicator"), model.first("slot")),
-            *range(model.first("chart"), len(model.entries)),
+            *range(model.first("chart"), model.first("cut")),
         ],
         initial=derivatives + calculated,
         running=running,

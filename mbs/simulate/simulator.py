@@ -156,7 +156,7 @@ class Simulator(MadeOnce):
         longest = math.inf
         if options.max_step is not None:
             longest = positive(options.max_step, "max_step [s]", system.name)
-        elif _is_opaque(self._effort) or _is_opaque(self._inputs):
+        elif self._has_opaque_laws:
             longest = duration / _MIN_STEPS
         steps = count_steps(duration, positive(options.step, "step [s]", system.name), system.name)
         own = system.parameter_values(options.parameters)
@@ -215,6 +215,11 @@ class Simulator(MadeOnce):
             )
         defaults = [one.default for one in self._given]
         return list(by_name(self.system, "inputs", inputs, quantities, defaults))
+
+    @functools.cached_property
+    def _has_opaque_laws(self) -> bool:
+        """Whether pulses of the laws cannot be located beforehand."""
+        return _is_opaque(self._effort) or _is_opaque(self._inputs)
 
     @functools.cached_property
     def _key(self) -> Packed | None:

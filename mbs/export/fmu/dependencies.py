@@ -347,7 +347,7 @@ def structure(model: FmuModel) -> ModelStructure:
         derivatives=derivatives,
         indicators=[
             *range(model.first("indicator"), model.first("slot")),
-            *range(model.first("chart"), len(model.entries)),
+            *range(model.first("chart"), model.first("cut")),
         ],
         initial=derivatives + calculated,
         running=running,

@@ -91,6 +91,8 @@ def _check_functions(model: FmuModel) -> None:
         )
     if model.closure is not None:
         _check_shape(model, "closure", model.closure, (nx, nz, n_p), (nz, 1))
+    if model.cut_positions is not None:
+        _check_shape(model, "cuts", model.cut_positions, (nx, nz, n_p), (len(model.cuts),))
     if model.jumps is not None:
         point, k = (1, nx, nz, nu, n_p + n_m), len(model.jumps.names)
         _check_shape(model, "first", model.jumps.first, point, (n_m, k))
@@ -413,10 +415,11 @@ Kind = Literal[
     "slot",
     "rate",
     "chart",
+    "cut",
 ]
 
 
-WITH_START: tuple[Kind, ...] = ("state", "input", "parameter", "dependent", "slot")
+WITH_START: tuple[Kind, ...] = ("state", "input", "parameter", "dependent", "slot", "cut")
 """Kinds of variables that have a start value."""
 
 
@@ -600,6 +603,8 @@ class FmuModel(Experiment):
         outputs: variables of y: the outputs that are not states.
         parameters: variables of p, tunable or fixed.
         dependents: variables of z, the coordinates that closed loops determine.
+        cuts: positions of the joints that are cut. Their start values are guesses too.
+        cut_positions: `cut_positions(x, z, p)`, positions of `cuts`; None if there are none.
         loop_size: size of the mechanism [m], the unit of distances of displacements from guesses.
         rhs: `rhs(t, x, z, u, p) -> (xdot, y)`.
         closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step of z and the largest
@@ -635,6 +640,8 @@ class FmuModel(Experiment):
     outputs: tuple[FmuVariable, ...] = ()
     parameters: tuple[FmuVariable, ...] = ()
     dependents: tuple[FmuVariable, ...] = ()
+    cuts: tuple[FmuVariable, ...] = ()
+    cut_positions: casadi.Function | None = None
     loop_size: float = 1.0
     closure: casadi.Function | None = None
     slopes: casadi.Function | None = None
@@ -722,6 +729,7 @@ class FmuModel(Experiment):
             ("slot", len(self.slots)),
             ("rate", len(self.slots)),
             ("chart", int(self.charted)),
+            ("cut", len(self.cuts)),
         )
         place = 0
         for name, count in order:
@@ -764,3 +772,4 @@ def _entries(model: FmuModel) -> Iterator[FmuEntry]:
     if model.charted:
         text = "positive while the present states serve"
         yield FmuEntry("chart", FmuVariable(name="indicator.coordinates", description=text))
+    yield from (FmuEntry("cut", v) for v in model.cuts)

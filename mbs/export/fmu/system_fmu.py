@@ -35,6 +35,7 @@ from mbs.export.fmu.interface import (
 from mbs.export.fmu.options import FmuArguments, FmuOptions
 from mbs.export.fmu.pack import require_writable, write_fmu
 from mbs.export.fmu.variables import (
+    cuts,
     dependents,
     inputs,
     jumps,
@@ -44,6 +45,7 @@ from mbs.export.fmu.variables import (
     states,
 )
 from mbs.files import path_of
+from mbs.loops.cut_positions import cut_positions
 from mbs.loops.examination import configuration_health, row_independence
 from mbs.models.state.independent import MinimalState, consistent_start, minimal_state
 from mbs.models.state.tree import tree_state
@@ -127,6 +129,7 @@ def fmu_model(system: System, options: FmuOptions | None = None) -> FmuModel:
             crossings=crossings,
         )
     x, z = consistent_start(system, state)
+    positions = _cut_positions(system, state)
     x_variables = states(system, state, x)
     u_variables = (*inputs(system, state, interface.wrenches), *controller.inputs)
     shown = outputs(system, state, branches=tree is not None)
@@ -140,6 +143,8 @@ def fmu_model(system: System, options: FmuOptions | None = None) -> FmuModel:
         outputs=y_variables,
         parameters=tuple(parameters(system, options.fixed)),
         dependents=dependents(system, state, z),
+        cuts=() if positions is None else cuts(system),
+        cut_positions=positions,
         loop_size=loop_size(system),
         rhs=state.rhs,
         closure=state.closure,
@@ -180,11 +185,26 @@ def _sines(system: System, state: MinimalState) -> Function | None:
     if state.closure is None or system.closure is None:
         return None
     x, z, p = (SX.sym(name, state.closure.size1_in(k)) for k, name in enumerate("xzp"))
+    q = _positions(system, state, x, z)
+    leads = configuration_health(system)(q, p)[1]
+    return Function("sines", [x, z, p], [casadi.vertcat(leads, row_independence(system)(q, p))])
+
+
+def _cut_positions(system: System, state: MinimalState) -> Function | None:
+    """Return `FmuModel.cut_positions`, or None if no position of a cut joint can be guessed."""
+    if state.closure is None or not system.cut_coordinates:
+        return None
+    x, z, p = (SX.sym(name, state.closure.size1_in(k)) for k, name in enumerate("xzp"))
+    found = cut_positions(system)(_positions(system, state, x, z), p)
+    return Function("cuts", [x, z, p], [casadi.densify(found)])
+
+
+def _positions(system: System, state: MinimalState, x: SX, z: SX) -> SX:
+    """Return the positions q (nq, 1) at states x and dependent positions z."""
     q = SX.zeros(system.nq)
     q[list(state.positions)] = x[: len(state.positions)]
     q[list(state.dependents)] = z
-    leads = configuration_health(system)(q, p)[1]
-    return Function("sines", [x, z, p], [casadi.vertcat(leads, row_independence(system)(q, p))])
+    return q
 
 
 def _passive(state: MinimalState) -> tuple[int, int, int]:

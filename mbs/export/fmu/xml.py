@@ -40,6 +40,7 @@ _INITIAL = {
     "slot": "exact",
     "rate": "calculated",
     "chart": "calculated",
+    "cut": "approx",
 }
 _TOOL = f"mbs {__version__}"
 _CATEGORIES = {

@@ -58,7 +58,25 @@ def stop_reason(joints: PathJoints, poses: Path, number: int, q: Array, at: floa
             f"between poses {number - 1} and {number} of {poses.count}, at {part:.4g} of the path"
         )
     behind = _jump(joints, x, poses.poses[min(number + (1 - at < AT_POSE), poses.count - 1)])
-    return f"stopped {where}: singular configuration, {_singular(joints, q)}{behind}"
+    beyond = _start_beyond(joints, x, poses, number) if at < AT_POSE else ""
+    return f"stopped {where}: singular configuration, {_singular(joints, q)}{behind}{beyond}"
+
+
+def _start_beyond(joints: PathJoints, x: Array, poses: Path, number: int) -> str:
+    """Text on how to go on from a singular pose: by a start at the pose that follows it.
+
+    Empty for the way to the first pose, and if no solution was found.
+    """
+    if joints.redundant or not number:
+        return ""
+    found = nearest_solution(joints, x, poses.poses[number])
+    if found is None:
+        return ""
+    start = ", ".join(f"{float(value):.6g}" for value in found * joints.scale)
+    return (
+        f"; branches part at this pose: follow the path from pose {number} on with a start on one"
+        f" of them, such as {start}, or another solution of inverse_geometry.solve for this pose"
+    )
 
 
 def _jump(joints: PathJoints, x: Array, T: Array) -> str:

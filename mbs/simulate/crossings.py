@@ -106,9 +106,9 @@ def _watch_crossings(
     if events is not None:
         indicators.insert(0, events.indicators.call(at)[0])
         jumps = casadi.mmax(fired_others)
-        after_others, *changed = events.jump.call([*at, fired_others])  # modes, if any
+        after_others, *changed = events.jump.call([*at, fired_others])
         state_after = casadi.if_else(jumps, after_others, x)
-        after = [casadi.if_else(jumps, now, pm[own:n_p]) for now in changed]
+        after = [casadi.if_else(jumps, now, pm[own:n_p]) for now in changed if now.numel()]
     after += [casadi.if_else(fired_contacts > 0, -contact_sides, contact_sides), then, duration]
     approaches = None
     if state.approaches is not None:

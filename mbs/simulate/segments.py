@@ -267,7 +267,7 @@ def _integrate(
             " no single point of a disc touches; end the run before, or keep it upright",
             time=end,
         )
-    watched = Events(*state.events) if state.events else None
+    watched = Events(state.events.indicators, state.events.jump) if state.events else None
     motion = _integrate_motion(state, x0, times, watched, p, options)
     part_events = motion.events if state.events else ()
     reached = times[: len(motion.x)]
@@ -385,7 +385,8 @@ def _integrate_with_contacts(
 ) -> tuple[list[Segment], StopReason]:
     assert state.events is not None
     first = initial_modes(system, x0, system_parameters(system, p)) if modes is None else modes
-    motion = _integrate_motion(state, x0, times, Events(*state.events, first), p, options)
+    events = Events(state.events.indicators, state.events.jump, first)
+    motion = _integrate_motion(state, x0, times, events, p, options)
     contact = ContactMotion(first, motion.modes, motion.events)
     reached = times[: len(motion.x)]
     return [Segment(state, reached, motion.x, contact, motion.first_slope)], motion.stop
@@ -402,7 +403,7 @@ def _integrate_to_end(
 ) -> tuple[Segment, EventMotion, float | None]:
     """Integrate one segment up to the limit; after it the state is held constant until the end."""
     n, n_p = len(x0), len(p)
-    count = state.events[0].numel_out(0) if state.events else 0
+    count = len(state.events.names) if state.events else 0
     t, x, pm, fired = (
         SX.sym(k, m) for k, m in (("t", 1), ("x", n), ("p", n_p + 1), ("f", count + 1))
     )
@@ -418,10 +419,10 @@ def _integrate_to_end(
     left = limit.measure(x[: system.nq], parameters[: len(system.parameters)]) - limit.level
     watched, after = left, x
     if state.events:
-        own, jump = state.events
-        watched = casadi.vertcat(own(t, x, parameters), left)
+        own = state.events
+        watched = casadi.vertcat(own.indicators(t, x, parameters), left)
         jumps = casadi.mmax(fired[:count])
-        after = casadi.if_else(jumps, jump(t, x, parameters, fired[:count]), x)
+        after = casadi.if_else(jumps, own.jump(t, x, parameters, fired[:count])[0], x)
     events = Events(
         Function("watched", [t, x, pm], [casadi.if_else(ended, 1, watched)]),
         Function("end", [t, x, pm, fired], [after, casadi.fmax(ended, fired[count])]),

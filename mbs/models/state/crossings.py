@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.models.state.drive import DriveInputs
-from mbs.models.state.events import MinimalEvents
+from mbs.models.state.events import StateEvents
 from mbs.models.state.laws import Conditions, conditions_of, distinct
 from mbs.models.symbols import dense_function
 from mbs.operations.graph import Graph, Node, Port, function_of, graph_of, value_of
@@ -339,8 +339,8 @@ def _function(
 
 
 def join_crossings(
-    events: MinimalEvents | None, values: WatchedCrossings, point: Sequence[SX], source: str
-) -> MinimalEvents:
+    events: StateEvents | None, values: WatchedCrossings, point: Sequence[SX], source: str
+) -> StateEvents:
     """Append the events of crossings, which only change modes.
 
     Args:
@@ -385,7 +385,7 @@ def join_crossings(
         rows = casadi.horzcat(near * casadi.repmat(awake, 1, 2), place > 0)
         rows = casadi.vertcat(known_rows, rows, SX.zeros(k + m - c, 3))
         approaches = dense_function("approaches", every, [rows])
-    return MinimalEvents(
+    return StateEvents(
         modes=(
             *(events.modes if events else ()),
             *(f"{name}.{kind}" for kind in kinds for name in names),
@@ -408,12 +408,12 @@ def join_crossings(
 
 def with_part_crossings(
     system: System,
-    events: MinimalEvents | None,
+    events: StateEvents | None,
     motion: tuple[SX, SX],
     point: Sequence[SX],
     *,
     wanted: bool,
-) -> tuple[MinimalEvents | None, WatchedCrossings]:
+) -> tuple[StateEvents | None, WatchedCrossings]:
     """Append the events of component crossings, and return them with the crossings.
 
     Args:
@@ -431,7 +431,7 @@ def with_part_crossings(
 
 
 def held_by(function: Function, values: WatchedCrossings, point: Sequence[SX]) -> Function:
-    """Return a function of (t, x, z, u, p) with the modes of crossings at the end of p.
+    """Return a function of the same arguments, with the modes of crossings at the end of p.
 
     The conditions in the function are replaced by these modes.
 
@@ -446,7 +446,7 @@ def held_by(function: Function, values: WatchedCrossings, point: Sequence[SX]) -
     if not k:
         return function
     *others, p = point
-    before = SX.sym("before", function.numel_in(4) - p.numel())
+    before = SX.sym("before", function.numel_in(len(others)) - p.numel())
     modes = SX.sym("own", GUARD_MODES * k)
     at, inputs = [*others, casadi.vertcat(p, before)], [*others, casadi.vertcat(p, before, modes)]
     every, loose = casadi.vertcat(sides, counts), values.approaches.shape[0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import casadi
 from casadi import SX, Function
@@ -33,9 +33,9 @@ class StateArguments:
     """
 
     point: Point
-    modes: SX
-    every_mode: bool
-    replaced: tuple[tuple[SX, SX], ...]
+    modes: SX = field(default_factory=lambda: SX(0, 1))
+    every_mode: bool = False
+    replaced: tuple[tuple[SX, SX], ...] = ()
 
     @property
     def symbols(self) -> list[SX]:

@@ -12,13 +12,7 @@ from casadi import MX, SX, Function
 
 from mbs.assembly import System
 from mbs.models.state.arguments import Point
-from mbs.models.state.crossings import (
-    WatchedCrossings,
-    drive_crossings,
-    held_by,
-    join_crossings,
-    with_part_crossings,
-)
+from mbs.models.state.crossings import drive_crossings, part_crossings, with_crossings
 from mbs.models.state.drive import DriveInputs
 from mbs.models.state.events import StateEvents
 from mbs.models.symbols import dense_function
@@ -58,25 +52,28 @@ def with_laws_and_crossings(
         Functions and events with the remaining inputs; modes of crossings are the last elements of
         p.
     """
-    events, values = with_part_crossings(system, events, motion, point, wanted=crossings)
-    found = [held_by(function, values, point) for function in functions]
+    p = point[-1]
+    of_parts = part_crossings(system) if crossings else None
+    if of_parts is not None:
+        of_parts = Function(
+            "crossings", list(point), of_parts.call([*motion, system.z, system.u, p])
+        )
+    found, events = with_crossings(of_parts, point, functions, events, "laws")
     if drive.effort is None and drive.device is None:
         return found, events
-    tau, u, rest = sizes
-    at = dense_function("motion", list(point), list(motion))
-    left = (0 if drive.effort else tau, 0 if drive.device else u, rest, extra)
-    wiring = _Wiring(drive, at, sizes, left)
+    tau, inputs, rest = sizes
+    left = (0 if drive.effort else tau, 0 if drive.device else inputs, rest, extra)
+    wiring = _Wiring(drive, dense_function("motion", list(point), list(motion)), sizes, left)
     found, events = [_driven(wiring, function) for function in found], _events(wiring, events)
-    jumps = drive_crossings(system, drive, extra) if crossings else None
-    if jumps is None:
+    of_laws = drive_crossings(system, drive, extra) if crossings else None
+    if of_laws is None:
         return found, events
-    left_point = _symbols(wiring, at, SX)
-    t, x, z, inputs, p = left_point
-    _, _, others, w = _parts(inputs, wiring.left)
-    q, v = at.call([t, x, z, _fill(wiring, SX, others), p])
-    of_laws = WatchedCrossings(*jumps.call([t, q, v, w, p]))
-    events = join_crossings(events, of_laws, left_point, "controller")
-    return [held_by(function, of_laws, left_point) for function in found], events
+    left_point = tuple(_symbols(wiring, wiring.motion, SX))
+    t, x, z, u, p = left_point
+    _, _, others, w = _parts(u, wiring.left)
+    q, v = wiring.motion.call([t, x, z, _fill(wiring, SX, others), p])
+    of_laws = Function("crossings", list(left_point), of_laws.call([t, q, v, w, p]))
+    return with_crossings(of_laws, left_point, found, events, "controller")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.errors import ModelError
+from mbs.models.state.arguments import Point, StateArguments
 from mbs.models.state.drive import DriveInputs
 from mbs.models.state.events import StateEvents
 from mbs.models.state.laws import Conditions, conditions_of, distinct
@@ -30,6 +31,8 @@ from mbs.recursions.parts import PartsAt
 
 CONTACTS = "contacts"
 """Prefix of the names of contact crossings in FMUs."""
+DURATION = "duration"
+"""Name of the last mode in a simulation, the duration of the motion [s]."""
 GUARD_MODES = 4
 """Number of modes per crossing: place, whether asleep, number of events in a row, time of event."""
 _OFTEN = 4
@@ -237,7 +240,7 @@ def _anywhere(random: np.random.Generator, size: int) -> NDArray[np.float64]:
     return random.choice([-1.0, 1.0], size) * 10 ** random.uniform(*_SIZES, size)
 
 
-# Crossings in the state equations of FMUs.
+# Crossings in state equations.
 
 
 _SPAN = 1.0
@@ -250,18 +253,25 @@ class WatchedCrossings:
     """Crossings of a state equation.
 
     Attributes:
-        sides: (n, 1) values at whose zeros laws jump or bend, sides of the k contacts first.
+        contacts: (c, 1) sides of contacts between bodies, whose laws are continuous there.
+        sides: (n, 1) values at whose zeros laws jump or bend.
         counts: (m, 1) values at whose integer values laws jump.
-        approaches: (k, 2) speeds and paces of the k contacts, as in `Approach`.
+        approaches: (c, 2) speeds and paces of the contacts, as in `Approach`.
     """
 
-    sides: SX
-    counts: SX
+    contacts: SX = field(default_factory=lambda: SX(0, 1))
+    sides: SX = field(default_factory=lambda: SX(0, 1))
+    counts: SX = field(default_factory=lambda: SX(0, 1))
     approaches: SX = field(default_factory=lambda: SX(0, 2))
+
+    @property
+    def every(self) -> SX:
+        """(c + n + m, 1) values of all crossings."""
+        return casadi.vertcat(self.contacts, self.sides, self.counts)
 
 
 def part_crossings(system: System) -> Function | None:
-    """Return `f(q, v, z, u, p) -> sides, counts, approaches` at which component laws jump.
+    """Return `f(q, v, z, u, p)` with the crossings at which laws of components jump.
 
     Bends of laws are left to error control.
 
@@ -279,16 +289,18 @@ def part_crossings(system: System) -> Function | None:
     given = [one for one in parts.crossings(of_bends=False) if casadi.depends_on(one.value, states)]
     contacts = [one for one in given if not one.pace.is_zero()]
     others = [one.value for one in given if one.pace.is_zero()]
-    found = _function(point, [*others, *laws.crossings], laws.counts, states)
-    if not contacts:
-        return found
-    sides, counts = (SX(0, 1), SX(0, 1)) if found is None else found.call(point)
-    every = casadi.vertcat(*(one.value for one in contacts), sides)
-    return dense_function("crossings", point, [every, counts, parts.approaches(contacts)])
+    column = casadi.vertcat(SX(0, 1), *(one.value for one in contacts))
+    values = WatchedCrossings(
+        contacts=column,
+        sides=_distinct_of([*others, *laws.crossings], states),
+        counts=_distinct_of(laws.counts, states),
+        approaches=parts.approaches(contacts),
+    )
+    return crossings_function(StateArguments(tuple(point)), values)
 
 
 def drive_crossings(system: System, drive: DriveInputs, extra: int) -> Function | None:
-    """Return `f(t, q, v, w, p) -> sides, counts` at which the control laws of a drive jump.
+    """Return `f(t, q, v, w, p)` with the crossings at which the control laws of a drive jump.
 
     Args:
         system: open or closed system.
@@ -296,7 +308,8 @@ def drive_crossings(system: System, drive: DriveInputs, extra: int) -> Function 
         extra: number of the inputs w of the laws.
 
     Returns:
-        Function, or None if no law jumps or if laws are external functions.
+        Function with the outputs of `WatchedCrossings`, or None if no law jumps or if laws are
+        external functions.
     """
     laws = [law for law in (drive.effort, drive.device) if law is not None]
     if not laws or not all(law.is_a("SXFunction") for law in laws):
@@ -305,8 +318,12 @@ def drive_crossings(system: System, drive: DriveInputs, extra: int) -> Function 
     point = [t, q, v, SX.sym("w", extra), system.p]
     values = [casadi.vec(law.call(point)[0]) for law in laws]
     found = _jumps(casadi.vertcat(*values), t, q, system.p)
-    sides = [*found.crossings, *found.zeros]
-    return _function(point, sides, [*found.counts, *found.wholes], casadi.vertcat(t, q, v))
+    states = casadi.vertcat(t, q, v)
+    crossings = WatchedCrossings(
+        sides=_distinct_of([*found.crossings, *found.zeros], states),
+        counts=_distinct_of([*found.counts, *found.wholes], states),
+    )
+    return crossings_function(StateArguments(tuple(point)), crossings)
 
 
 def _jumps(laws: SX, t: SX, q: SX, constants: SX) -> Conditions:
@@ -325,132 +342,246 @@ def _jumps(laws: SX, t: SX, q: SX, constants: SX) -> Conditions:
     )
 
 
-def _function(
-    point: Sequence[SX], sides: Sequence[SX], counts: Sequence[SX], of: SX
-) -> Function | None:
-    """Return the Function of the expressions that depend on the symbols `of`, None if empty."""
-    kept = [
-        [value for value in distinct(values, []) if casadi.depends_on(value, of)]
-        for values in (sides, counts)
-    ]
-    if not any(kept):
-        return None
-    return dense_function("crossings", list(point), [casadi.vertcat(SX(0, 1), *v) for v in kept])
+def _distinct_of(values: Sequence[SX], symbols: SX) -> SX:
+    """Return the distinct expressions that depend on symbols, in one column."""
+    kept = (value for value in distinct(values, []) if casadi.depends_on(value, symbols))
+    return casadi.vertcat(SX(0, 1), *kept)
 
 
-def join_crossings(
-    events: StateEvents | None, values: WatchedCrossings, point: Sequence[SX], source: str
-) -> StateEvents:
-    """Append the events of crossings, which only change modes.
+def crossings_function(arguments: StateArguments, values: WatchedCrossings) -> Function | None:
+    """Return a Function with the outputs of `WatchedCrossings`, None without crossings.
 
     Args:
-        events: other events, or None.
-        values: expressions of the crossings in the symbols `point`.
-        point: symbols t, x, z, u and p, without modes.
-        source: prefix of the names of the crossings.
+        arguments: arguments of the Function.
+        values: crossings as expressions of the arguments.
     """
-    sides, counts, near = values.sides, values.counts, values.approaches
-    k, n, m = sides.numel() + counts.numel(), sides.numel(), counts.numel()
-    *others, p = point
-    t, x = point[:2]
-    c = near.shape[0]
-    names = [f"{CONTACTS}.side{j + 1}" for j in range(c)]
-    names += [f"{source}.side{j + 1}" for j in range(n - c)]
-    names += [f"{source}.count{j + 1}" for j in range(m)]
-    before = SX.sym("modes", len(events.modes) if events else 0)
-    own, known = SX.sym("own", GUARD_MODES * k), len(events.names) if events else 0
-    every = [*others, casadi.vertcat(p, before, own)]
-    fired = SX.sym("fired", known + k + m)
-    first_fired, own_fired = casadi.vertsplit(fired, [0, known, known + k + m])
-    starts = casadi.vertcat(casadi.sign(sides), casadi.floor(counts), SX.zeros(2 * k))
-    since = casadi.fmod(casadi.floor(ticks_of(t, _SPAN)), _WRAP)
-    starts = casadi.vertcat(starts, casadi.repmat(since, k, 1))
-    watched, then = guard(t, casadi.vertcat(sides, counts), m, own, own_fired, _SPAN)
-    first, beyond, indicators, after, now = SX(0, 1), SX(0, 1), SX(0, 1), x, before
-    if events:
-        at = [*others, casadi.vertcat(p, before)]
-        first, beyond = events.first.call(at)
-        (indicators,) = events.indicators.call(at)
-        there, changed = events.jump.call([*at, first_fired])
-        jumps = casadi.mmax(first_fired)
-        after, now = casadi.if_else(jumps, there, x), casadi.if_else(jumps, changed, before)
-    kinds = ("place", "asleep", "row", "time")
-    approaches = None
-    if c or (events and events.approaches is not None):
-        place, asleep = own[:c], own[k : k + c]
-        awake = casadi.logic_and(casadi.logic_not(asleep), place)
-        known_rows = SX.zeros(known, 3)
-        if events and events.approaches is not None:
-            (known_rows,) = events.approaches.call([*others, casadi.vertcat(p, before)])
+    if not values.every.numel():
+        return None
+    outputs = [values.contacts, values.sides, values.counts, values.approaches]
+    return arguments.function("crossings", outputs)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CrossingModes:
+    """Modes that crossings add to the functions of a state equation, after other modes.
+
+    In an FMU every crossing is guarded, and the duration is assumed. In a simulation contacts are
+    always watched: their mode is the side, 1 or -1.
+
+    Attributes:
+        point: symbols of the arguments without modes: t and x first, the parameters p last.
+        before: (b, 1) symbols of the other modes.
+        values: crossings as expressions of `point` and `before`.
+        watched: (c, 1) modes of the contacts if they are always watched; else empty.
+        guarded: (4 k, 1) modes of the other crossings, see `guard`.
+        duration: duration of the motion [s], the last mode; empty in an FMU.
+    """
+
+    point: Point
+    before: SX
+    values: WatchedCrossings
+    watched: SX
+    guarded: SX
+    duration: SX
+
+    @property
+    def _known(self) -> list[SX]:
+        """Arguments of the functions without the modes of crossings."""
+        *others, p = self.point
+        return [*others, casadi.vertcat(p, self.before)]
+
+    @property
+    def symbols(self) -> list[SX]:
+        """Arguments of the functions with the modes of crossings."""
+        *others, p = self._known
+        return [*others, casadi.vertcat(p, self.watched, self.guarded, self.duration)]
+
+    @property
+    def _watched_values(self) -> SX:
+        """(c, 1) values of the crossings that are always watched."""
+        return self._split_values[0]
+
+    @property
+    def _guarded_values(self) -> SX:
+        """(k, 1) values of the guarded crossings."""
+        return self._split_values[1]
+
+    @property
+    def _split_values(self) -> list[SX]:
+        every = self.values.every
+        return list(casadi.vertsplit(every, [0, self.watched.numel(), every.numel()]))
+
+    @property
+    def _span(self) -> SX | float:
+        """Duration of the motion that `guard` assumes [s]."""
+        return self.duration if self.duration.numel() else _SPAN
+
+    def idle(self, function: Function) -> Function:
+        """Return a function with the modes of crossings, on which it does not depend."""
+        return Function(function.name(), self.symbols, function.call(self._known))
+
+    def held(self, function: Function) -> Function:
+        """Return a state equation in which modes replace the conditions of its laws.
+
+        Conditions of contacts, whose laws do not jump, are not replaced.
+        """
+        return hold_sides(
+            function,
+            self._known,
+            self._guarded_values,
+            self.guarded,
+            self.values.counts.numel(),
+            self.symbols,
+            loose=0 if self.watched.numel() else self.values.contacts.numel(),
+        )
+
+    def events(self, others: StateEvents | None, source: str) -> StateEvents:
+        """Return other events, followed by the events of crossings, which only change modes.
+
+        Args:
+            others: events with the modes `before`, or None.
+            source: prefix of the names of the crossings.
+        """
+        t, x = self.point[:2]
+        n_before = len(others.names) if others else 0
+        k, m = self._guarded_values.numel(), self.values.counts.numel()
+        c = self.watched.numel()
+        fired = SX.sym("fired", n_before + c + k + m)
+        fired_before, fired_watched, fired_guarded = casadi.vertsplit(
+            fired, [0, n_before, n_before + c, n_before + c + k + m]
+        )
+        values = self._guarded_values
+        guards, then = guard(t, values, m, self.guarded, fired_guarded, self._span)
+        first, beyond, indicators = SX(0, 1), SX(0, 1), SX(0, 1)
+        after, now = x, self.before
+        if others:
+            first, beyond = others.first.call(self._known)
+            (indicators,) = others.indicators.call(self._known)
+            there, changed = others.jump.call([*self._known, fired_before])
+            jumps = casadi.mmax(fired_before)
+            after = casadi.if_else(jumps, there, x)
+            now = casadi.if_else(jumps, changed, self.before)
+        side = self.watched
+        turned = casadi.if_else(fired_watched > 0, -side, side)
+        names = [f"{CONTACTS}.side{j + 1}" for j in range(self.values.contacts.numel())]
+        names += [f"{source}.side{j + 1}" for j in range(self.values.sides.numel())]
+        names += [f"{source}.count{j + 1}" for j in range(m)]
+        kinds, guarded_names = ("place", "asleep", "row", "time"), names[c:]
+        return StateEvents(
+            modes=(
+                *(others.modes if others else ()),
+                *names[:c],
+                *(f"{name}.{kind}" for kind in kinds for name in guarded_names),
+                *(DURATION for _ in range(self.duration.numel())),
+            ),
+            names=(
+                *(others.names if others else ()),
+                *names[: len(names) - m],
+                *(f"{name} {what}" for what in ("falls", "rises") for name in names[c + k - m :]),
+            ),
+            first=dense_function(
+                "first",
+                self.symbols,
+                [
+                    casadi.vertcat(first, self._starts(), self.duration),
+                    casadi.vertcat(beyond, -SX.ones(c + k + m)),
+                ],
+            ),
+            indicators=dense_function(
+                "indicators",
+                self.symbols,
+                [casadi.vertcat(indicators, side * self._watched_values, guards)],
+            ),
+            jump=dense_function(
+                "jump",
+                [*self.symbols, fired],
+                [after, casadi.vertcat(now, turned, then, self.duration)],
+            ),
+            approaches=self._approaches(others),
+        )
+
+    def _starts(self) -> SX:
+        """Return the modes at the start, without the duration: all awake, no events before."""
+        k, m = self._guarded_values.numel(), self.values.counts.numel()
+        sides, counts = casadi.vertsplit(self._guarded_values, [0, k - m, k])
+        watched = casadi.if_else(self._watched_values > 0, 1, -1)
+        since = casadi.fmod(casadi.floor(ticks_of(self.point[0], self._span)), _WRAP)
+        return casadi.vertcat(
+            watched,
+            casadi.sign(sides),
+            casadi.floor(counts),
+            SX.zeros(2 * k),
+            casadi.repmat(since, k, 1),
+        )
+
+    def _approaches(self, others: StateEvents | None) -> Function | None:
+        """Return the function `approaches` of the events, None if all are zero."""
+        near = self.values.approaches
+        known = others.approaches if others else None
+        c, k, m = near.shape[0], self._guarded_values.numel(), self.values.counts.numel()
+        if not c and known is None:
+            return None
+        place, awake = self.watched, SX.ones(c)
+        if not self.watched.numel():
+            place, _, asleep, _ = casadi.vertsplit(self.guarded, [0, c, k, k + c, 4 * k])
+            awake = casadi.logic_and(casadi.logic_not(asleep), place)
+        first = SX.zeros(len(others.names) if others else 0, 3)
+        if known is not None:
+            (first,) = known.call(self._known)
         rows = casadi.horzcat(near * casadi.repmat(awake, 1, 2), place > 0)
-        rows = casadi.vertcat(known_rows, rows, SX.zeros(k + m - c, 3))
-        approaches = dense_function("approaches", every, [rows])
-    return StateEvents(
-        modes=(
-            *(events.modes if events else ()),
-            *(f"{name}.{kind}" for kind in kinds for name in names),
-        ),
-        names=(
-            *(events.names if events else ()),
-            *names[:n],
-            *(f"{name} {what}" for what in ("falls", "rises") for name in names[n:]),
-        ),
-        first=dense_function(
-            "first",
-            every,
-            [casadi.vertcat(first, starts), casadi.vertcat(beyond, -SX.ones(k + m))],
-        ),
-        indicators=dense_function("indicators", every, [casadi.vertcat(indicators, watched)]),
-        jump=dense_function("jump", [*every, fired], [after, casadi.vertcat(now, then)]),
-        approaches=approaches,
+        left = SX.zeros(self.watched.numel() + k + m - c, 3)
+        return dense_function("approaches", self.symbols, [casadi.vertcat(first, rows, left)])
+
+
+def crossing_modes(
+    point: Point, before: int, crossings: Function, *, in_simulation: bool
+) -> CrossingModes:
+    """Return the modes of crossings in a state equation.
+
+    Args:
+        point: symbols of the arguments without modes.
+        before: number of other modes, which follow the parameters.
+        crossings: function of the arguments, without or with the other modes, that returns the
+            elements of `WatchedCrossings`.
+        in_simulation: whether contacts are always watched and the duration is a mode.
+    """
+    *others, p = point
+    modes = SX.sym("modes", before)
+    own = casadi.vertcat(p, modes) if crossings.numel_in(len(others)) != p.numel() else p
+    values = WatchedCrossings(*crossings.call([*others, own]))
+    count, contacts = values.every.numel(), values.contacts.numel()
+    n_watched = contacts if in_simulation else 0
+    return CrossingModes(
+        point=point,
+        before=modes,
+        values=values,
+        watched=SX.sym("watched", n_watched),
+        guarded=SX.sym("guarded", GUARD_MODES * (count - n_watched)),
+        duration=SX.sym("duration", int(in_simulation and count > n_watched)),
     )
 
 
-def with_part_crossings(
-    system: System,
+def with_crossings(
+    crossings: Function | None,
+    point: Point,
+    functions: Sequence[Function],
     events: StateEvents | None,
-    motion: tuple[SX, SX],
-    point: Sequence[SX],
-    *,
-    wanted: bool,
-) -> tuple[StateEvents | None, WatchedCrossings]:
-    """Append the events of component crossings, and return them with the crossings.
+    source: str,
+) -> tuple[list[Function], StateEvents | None]:
+    """Return functions and events of an FMU with the modes of crossings.
 
     Args:
-        system: open or closed system.
+        crossings: function of `point` that returns the elements of `WatchedCrossings`, or None.
+        point: symbols t, x, z, u and p, without modes.
+        functions: state equations in which modes replace the conditions of laws.
         events: other events, or None.
-        motion: positions and velocities of the tree.
-        point: symbols t, x, z, u and p, without modes.
-        wanted: whether crossings are included; if not, `events` is returned.
+        source: prefix of the names of the crossings.
     """
-    found = part_crossings(system) if wanted else None
-    if found is None:
-        return events, WatchedCrossings(SX(0, 1), SX(0, 1))
-    values = WatchedCrossings(*found.call([*motion, system.z, system.u, system.p]))
-    return join_crossings(events, values, point, "laws"), values
-
-
-def held_by(function: Function, values: WatchedCrossings, point: Sequence[SX]) -> Function:
-    """Return a function of the same arguments, with the modes of crossings at the end of p.
-
-    The conditions in the function are replaced by these modes.
-
-    Args:
-        function: state equation; its p may end with other modes.
-        values: expressions of the crossings in the symbols `point`. Conditions of contacts, whose
-            laws do not jump, are not replaced.
-        point: symbols t, x, z, u and p, without modes.
-    """
-    sides, counts = values.sides, values.counts
-    k = sides.numel() + counts.numel()
-    if not k:
-        return function
-    *others, p = point
-    before = SX.sym("before", function.numel_in(len(others)) - p.numel())
-    modes = SX.sym("own", GUARD_MODES * k)
-    at, inputs = [*others, casadi.vertcat(p, before)], [*others, casadi.vertcat(p, before, modes)]
-    every, loose = casadi.vertcat(sides, counts), values.approaches.shape[0]
-    return hold_sides(function, at, every, modes, counts.numel(), inputs, loose=loose)
+    if crossings is None:
+        return list(functions), events
+    before = len(events.modes) if events else 0
+    own = crossing_modes(point, before, crossings, in_simulation=False)
+    return [own.held(function) for function in functions], own.events(events, source)
 
 
 def with_more_modes(function: Function, count: int) -> Function:

@@ -21,7 +21,7 @@ from mbs.models._energy import energy
 from mbs.models.contacts import tree_jump
 from mbs.models.state.arguments import Point, StateArguments, state_arguments
 from mbs.models.state.control_laws import with_laws_and_crossings
-from mbs.models.state.crossings import with_more_modes
+from mbs.models.state.crossings import WatchedCrossings, crossings_function, with_more_modes
 from mbs.models.state.drive import DriveInputs, TreeMotion
 from mbs.models.state.equations import (
     Actions,
@@ -247,14 +247,9 @@ class FullState:
         events: events of rigid stops, Coulomb friction and components, or None. Contact modes are
             the last elements of p.
         passage: functions for steps through singular configurations of the loops, or None.
-        crossings: `crossings(t, x, p)`, a column of event indicators; None if the system has
-            none. The indicators of the k contacts come first, then the sides, then the counts. A
-            law jumps or bends if a side changes its sign, or a count its integer part.
-        approaches: `approaches(t, x, p)`, (k, 2), the speeds and paces of the contacts, as
-            in `Approach`; None if there are no contacts.
-        sides: number of the crossings that may stay at zero or cross it infinitely often, such as
-            the velocity in a law of dry friction.
-        counts: number of the last crossings, at whose integer values laws jump.
+        crossings: `crossings(t, x, p)` with the outputs of `WatchedCrossings`, or None if the
+            system has none. Sides may stay at zero or cross it infinitely often, such as the
+            velocity in a law of dry friction.
         short: whether a smooth law may act only briefly after a crossing.
         timing: time-dependent parts of efforts, inputs and prescribed motions, or None.
         prepared: cache of the integrator between runs.
@@ -266,9 +261,6 @@ class FullState:
     events: StateEvents | None = None
     passage: Passage | None = None
     crossings: Function | None = None
-    approaches: Function | None = None
-    sides: int = 0
-    counts: int = 0
     short: bool = False
     timing: TimeLaws | None = None
     prepared: dict[Any, Any] = field(default_factory=dict)
@@ -316,20 +308,19 @@ def full_state(
     given_crossings = parts.crossings()
     contacts = [one for one in given_crossings if not one.pace.is_zero()]
     bends = [one.value for one in given_crossings if one.pace.is_zero()]
-    sides = casadi.vertcat(SX(0, 1), *bends, sides)
-    crossed = casadi.vertcat(SX(0, 1), *(one.value for one in contacts), sides, counts)
-    approaches = parts.approaches(contacts)
-    is_near = approaches.numel() and not approaches.is_zero()
+    crossings = WatchedCrossings(
+        contacts=casadi.vertcat(SX(0, 1), *(one.value for one in contacts)),
+        sides=casadi.vertcat(SX(0, 1), *bends, sides),
+        counts=counts,
+        approaches=parts.approaches(contacts),
+    )
     return FullState(
         rhs=arguments.function("rhs", [tree.rate]),
         project=arguments.function("project", tree.projected) if has_constraints else None,
         observe=arguments.function("observe", shown),
         events=tree.events,
         passage=tree.passage,
-        crossings=arguments.function("crossings", [crossed]) if crossed.numel() else None,
-        sides=sides.numel(),
-        counts=counts.numel(),
-        approaches=arguments.function("approaches", [approaches]) if is_near else None,
+        crossings=crossings_function(arguments, crossings),
         short=short or len(given_crossings) > 0,
         timing=timing,
     )

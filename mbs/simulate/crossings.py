@@ -8,7 +8,7 @@ import numpy as np
 from casadi import SX, Function
 from numpy.typing import NDArray
 
-from mbs.models.state.crossings import DURATION, crossing_modes
+from mbs.models.state.crossing_modes import DURATION, crossing_modes
 from mbs.models.state.events import StateEvents
 from mbs.models.state.tree import FullState
 from mbs.solvers import EventMotion, Events

@@ -12,7 +12,8 @@ from casadi import MX, SX, Function
 
 from mbs.assembly import System
 from mbs.models.state.arguments import Point
-from mbs.models.state.crossings import drive_crossings, part_crossings, with_crossings
+from mbs.models.state.crossing_modes import add_crossings
+from mbs.models.state.crossings import drive_crossings, part_crossings
 from mbs.models.state.drive import DriveInputs
 from mbs.models.state.events import StateEvents
 from mbs.models.symbols import dense_function
@@ -58,7 +59,7 @@ def with_laws_and_crossings(
         of_parts = Function(
             "crossings", list(point), of_parts.call([*motion, system.z, system.u, p])
         )
-    found, events = with_crossings(of_parts, point, functions, events, "laws")
+    found, events = add_crossings(of_parts, point, functions, events, "laws")
     if drive.effort is None and drive.device is None:
         return found, events
     tau, inputs, rest = sizes
@@ -73,7 +74,7 @@ def with_laws_and_crossings(
     _, _, others, w = _parts(u, wiring.left)
     q, v = wiring.motion.call([t, x, z, _fill(wiring, SX, others), p])
     of_laws = Function("crossings", list(left_point), of_laws.call([t, q, v, w, p]))
-    return with_crossings(of_laws, left_point, found, events, "controller")
+    return add_crossings(of_laws, left_point, found, events, "controller")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -21,7 +21,8 @@ from mbs.models._energy import energy
 from mbs.models.contacts import tree_jump
 from mbs.models.state.arguments import Point, StateArguments, state_arguments
 from mbs.models.state.control_laws import with_laws_and_crossings
-from mbs.models.state.crossings import WatchedCrossings, crossings_function, with_more_modes
+from mbs.models.state.crossing_modes import with_more_modes
+from mbs.models.state.crossings import crossings_function, simulation_crossings
 from mbs.models.state.drive import DriveInputs, TreeMotion
 from mbs.models.state.equations import (
     Actions,
@@ -32,13 +33,12 @@ from mbs.models.state.equations import (
 )
 from mbs.models.state.events import StateEvents, contact_events, join_part_events
 from mbs.models.state.independent import motion_of
-from mbs.models.state.laws import TimeLaws, conditions_of, distinct, time_laws
+from mbs.models.state.laws import TimeLaws
 from mbs.models.state.layout import actions_of, minimal_layout, outputs_vector, point_of
 from mbs.models.state.projection import project_step
-from mbs.models.state.signals import GivenInput, Prescribed, with_inputs
+from mbs.models.state.signals import GivenInput, Prescribed
 from mbs.models.state.singular_configurations import passage, without_passages
 from mbs.models.symbols import outputs_of, state_count
-from mbs.recursions.parts import PartsAt
 from mbs.solvers.problem import Passage
 
 
@@ -303,69 +303,16 @@ def full_state(
     contact_efforts = contact.efforts if contact else SX(0, 1)
     shown = [response.a, response.tau, u, tree.at.shown, contact_efforts, E, U, openness]
     has_constraints = system.is_closed or motions or contact or quaternion_slices(system.tree)
-    signals = effort, inputs
-    timing, sides, counts, short = _law_conditions(system, (t, q, v), u, signals, motions, parts)
-    given_crossings = parts.crossings()
-    contacts = [one for one in given_crossings if not one.pace.is_zero()]
-    bends = [one.value for one in given_crossings if one.pace.is_zero()]
-    crossings = WatchedCrossings(
-        contacts=casadi.vertcat(SX(0, 1), *(one.value for one in contacts)),
-        sides=casadi.vertcat(SX(0, 1), *bends, sides),
-        counts=counts,
-        approaches=parts.approaches(contacts),
-    )
+    laws = [law(t, q, v, system.p) for law in (effort, inputs) if law is not None]
+    laws += [law for one in motions for law in one.law(t, system.z, system.p)]
+    found = simulation_crossings(system, (t, q, v), u, laws, parts)
     return FullState(
         rhs=arguments.function("rhs", [tree.rate]),
         project=arguments.function("project", tree.projected) if has_constraints else None,
         observe=arguments.function("observe", shown),
         events=tree.events,
         passage=tree.passage,
-        crossings=crossings_function(arguments, crossings),
-        short=short or len(given_crossings) > 0,
-        timing=timing,
+        crossings=crossings_function(arguments, found.crossings),
+        short=found.short,
+        timing=found.timing,
     )
-
-
-def _law_conditions(
-    system: System,
-    point: tuple[SX, SX, SX],
-    u: SX,
-    signals: Sequence[Function | None],
-    motions: Sequence[Prescribed],
-    parts: PartsAt,
-) -> tuple[TimeLaws | None, SX, SX, bool]:
-    """Return purely time-dependent laws, sides, counts, and the flag `short` of `FullState`.
-
-    Laws jump or bend at sign changes of the sides and at integer values of the counts.
-
-    Args:
-        system: open or closed system.
-        point: symbols t, q and v.
-        u: (nu, 1) values of the inputs of components.
-        signals: functions of (t, q, v, p), or None.
-        motions: coordinates with prescribed motions.
-        parts: equations of all components.
-    """
-    t, q, v = point
-    values = [signal(t, q, v, system.p) for signal in signals if signal is not None]
-    values += [law for one in motions for law in one.law(t, system.z, system.p)]
-    constants = casadi.vertcat(system.p, parts.modes())
-    found = conditions_of(casadi.vertcat(SX(0, 1), *values), t, q, constants)
-    own = conditions_of(parts.laws(), SX(0, 1), q, constants)
-    crossings, counts = with_inputs(system, own.crossings, u), with_inputs(system, own.counts, u)
-    known = [one.value for one in parts.crossings()]
-    states = casadi.vertcat(q, v, system.z)
-    results = []
-    for every, others, of_time in (
-        ([*found.crossings, *crossings], known, found.zeros),
-        ([*found.counts, *counts], [], found.wholes),
-    ):
-        kept = list[SX]()
-        for value in distinct(every, others):
-            if casadi.depends_on(value, states):
-                kept.append(value)
-            elif casadi.depends_on(value, t):
-                of_time.append(value)
-        results.append(casadi.vertcat(SX(0, 1), *kept))
-    short = bool(found.short or own.short)
-    return time_laws(found, t, system.p), results[0], results[1], short

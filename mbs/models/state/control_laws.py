@@ -10,42 +10,37 @@ from typing import Any
 import casadi
 from casadi import MX, SX, Function
 
-from mbs.assembly import System
-from mbs.models.state.arguments import Point
+from mbs.models.state.arguments import StateArguments
 from mbs.models.state.crossing_modes import add_crossings
 from mbs.models.state.crossings import drive_crossings, part_crossings
-from mbs.models.state.drive import DriveInputs
+from mbs.models.state.drive import DriveInputs, TreeMotion
 from mbs.models.state.events import StateEvents
+from mbs.models.state.layout import StateInputs
 from mbs.models.symbols import dense_function
 
 
 def with_laws_and_crossings(
-    system: System,
-    drive: DriveInputs,
-    point: Point,
-    motion: tuple[SX, SX],
+    inputs: StateInputs,
+    arguments: StateArguments,
+    motion: TreeMotion,
     functions: Sequence[Function],
     events: StateEvents | None,
-    sizes: tuple[int, int, int],
-    extra: int,
     *,
     crossings: bool,
 ) -> tuple[list[Function], StateEvents | None]:
-    """Add the control laws of a drive, and the events at which laws jump.
+    """Add the control laws of a state equation, and the events at which laws jump.
 
     Control laws replace efforts and inputs of components in u, and add their inputs w to it. The
     functions are SX if the laws are. Otherwise they contain calls of the laws, which may be
     external functions.
 
     Args:
-        system: open or closed system.
-        drive: drive with or without laws.
-        point: symbols t, x, z, u and p, without modes; u starts with the values of the laws.
-        motion: positions and velocities of the tree as expressions of these symbols.
-        functions: functions of these symbols, with the modes of `events` after p.
+        inputs: inputs of the state equation.
+        arguments: arguments t, x, z, u and p of the functions; u starts with the values of the
+            laws.
+        motion: positions and velocities of the tree as expressions of the arguments.
+        functions: functions of the arguments.
         events: events of contacts and components, or None.
-        sizes: sizes of the parts of u: efforts, inputs of components, remaining inputs.
-        extra: size of w, the last elements of the new u.
         crossings: whether events end steps at discontinuities of the laws of components and of the
             control laws.
 
@@ -53,18 +48,21 @@ def with_laws_and_crossings(
         Functions and events with the remaining inputs; modes of crossings are the last elements of
         p.
     """
+    system, drive, point = inputs.system, inputs.drive, arguments.point
     p = point[-1]
     of_parts = part_crossings(system) if crossings else None
     if of_parts is not None:
         of_parts = Function(
-            "crossings", list(point), of_parts.call([*motion, system.z, system.u, p])
+            "crossings", list(point), of_parts.call([motion.q, motion.v, system.z, system.u, p])
         )
     found, events = add_crossings(of_parts, point, functions, events, "laws")
     if drive.effort is None and drive.device is None:
         return found, events
-    tau, inputs, rest = sizes
-    left = (0 if drive.effort else tau, 0 if drive.device else inputs, rest, extra)
-    wiring = _Wiring(drive, dense_function("motion", list(point), list(motion)), sizes, left)
+    extra, sizes = inputs.layout.extra, inputs.symbols.sizes
+    tau, devices, rest = sizes
+    left = (0 if drive.effort else tau, 0 if drive.device else devices, rest, extra)
+    at = dense_function("motion", list(point), [motion.q, motion.v])
+    wiring = _Wiring(drive, at, sizes, left)
     found, events = [_driven(wiring, function) for function in found], _events(wiring, events)
     of_laws = drive_crossings(system, drive, extra) if crossings else None
     if of_laws is None:

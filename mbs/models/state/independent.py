@@ -15,7 +15,6 @@ from mbs.assembly import System
 from mbs.assembly.tree import position_rate, quaternion_slices
 from mbs.loops.closing import relative_rows
 from mbs.loops.closure_equations import facing, square_closure
-from mbs.models.contacts import contacts_of, require_lasting_rows
 from mbs.models.state.arguments import state_arguments
 from mbs.models.state.control_laws import with_laws_and_crossings
 from mbs.models.state.drive import DriveInputs, TreeMotion, input_motions, tree_motion
@@ -35,12 +34,10 @@ from mbs.models.state.events import (
 )
 from mbs.models.state.layout import (
     MinimalLayout,
+    StateInputs,
     StatePoint,
-    actions_of,
-    minimal_layout,
-    outputs_vector,
-    point_of,
     rows_of,
+    state_inputs,
 )
 from mbs.models.state.orientations import (
     NORM_RATE,
@@ -101,17 +98,25 @@ def minimal_state(
         ModelError: `drive` is inconsistent with the system, or the independent rows of the loops
             change with the configuration, which contacts do not support.
     """
-    require_lasting_rows(system, contacts_of(system))
-    drive = DriveInputs() if drive is None else drive
-    layout = minimal_layout(system, drive)
-    motors = layout.effort_inputs(system, drive)
-    s = point_of(system, layout, motors)
+    return independent_state(state_inputs(system, drive), observe, crossings=crossings)
+
+
+def independent_state(
+    inputs: StateInputs, observe: Observe | None = None, *, crossings: bool = False
+) -> MinimalState:
+    """Return the state equation of the independent joints for given inputs.
+
+    Args:
+        inputs: inputs and outputs.
+        observe: argument of `minimal_state`.
+        crossings: argument of `minimal_state`.
+    """
+    system, layout, s = inputs.system, inputs.layout, inputs.symbols
     motion = motion_of(system, layout, s)
-    actions = actions_of(system, layout, s, motors)
-    at = equations_of_motion(system, motion, actions, independent_accelerations)
+    at = equations_of_motion(system, motion, inputs.actions(), independent_accelerations)
     contact, states = at.response.contact, (layout.positions, layout.velocities)
     arguments = state_arguments(system, (s.t, s.x, s.z, s.u, system.p), contact)
-    y = outputs_vector(system, layout, s.t, at, observe)
+    rate = _rate(system, layout, at)
     events = None
     if contact:
         events = contact_events(
@@ -121,17 +126,14 @@ def minimal_state(
             lambda fired: minimal_jump(system, contact, motion, (s.x, fired), states),
         )
     (rhs,), events = with_laws_and_crossings(
-        system,
-        drive,
-        arguments.point,
-        (motion.q, motion.v),
-        [arguments.function("rhs", [_rate(system, layout, at), y])],
+        inputs,
+        arguments,
+        motion,
+        [arguments.function("rhs", [rate, inputs.outputs(at, observe)])],
         join_part_events(system, arguments, events, at.parts.events()),
-        s.sizes,
-        layout.extra,
         crossings=crossings,
     )
-    closure, slopes = _closure_step(system, layout) if layout.dependents else (None, None)
+    closure, slopes = _closure_step(system, layout, s) if layout.dependents else (None, None)
     return MinimalState(
         **{field.name: getattr(layout, field.name) for field in fields(layout)},
         rhs=rhs,
@@ -186,9 +188,11 @@ def _steadied_rate(system: System, motion: TreeMotion) -> SX:
     return rate
 
 
-def _closure_step(system: System, layout: MinimalLayout) -> tuple[Function, Function | None]:
+def _closure_step(
+    system: System, layout: MinimalLayout, s: StatePoint
+) -> tuple[Function, Function | None]:
     """Return the functions `closure` and `slopes` of `MinimalState`."""
-    dependents, s = list(layout.dependents), point_of(system, layout, ())
+    dependents = list(layout.dependents)
     symbols, z = SX.sym("q", system.nq), s.z
     raw, q = positions_of(system, layout, s)
     ties = tie_orientations(system, layout.orientations, raw, symbols)

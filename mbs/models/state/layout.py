@@ -11,7 +11,7 @@ from casadi import SX
 
 from mbs.assembly import System
 from mbs.assembly.tree import Frame
-from mbs.models.contacts import contacts_of
+from mbs.models.contacts import contacts_of, require_lasting_rows
 from mbs.models.geometry import terminal_frame
 from mbs.models.state.drive import (
     DriveInputs,
@@ -71,10 +71,6 @@ class MinimalLayout:
     passive: tuple[int, ...]
     efforts: tuple[int, ...]
     contacts: tuple[ContactEffort, ...]
-
-    def effort_inputs(self, system: System, drive: DriveInputs) -> tuple[int, ...]:
-        """Return the indices in v of the efforts that are inputs or values of a control law."""
-        return self.inputs if drive.effort is None else tuple(range(system.nv))
 
 
 def motors_of(system: System, prescribed: Sequence[int] = ()) -> tuple[int, ...]:
@@ -184,53 +180,76 @@ def _split(values: SX, sizes: Sequence[int]) -> list[SX]:
     return list(casadi.vertsplit(values, [0, *accumulate(sizes)]))
 
 
-def actions_of(
-    system: System, layout: MinimalLayout, s: StatePoint, motors: Sequence[int]
-) -> Actions:
-    """Return the efforts, wrenches and accelerations that the inputs of a state equation prescribe.
+@dataclass(frozen=True, slots=True, eq=False)
+class StateInputs:
+    """Inputs and outputs of a state equation, which are the same in every form of the state.
+
+    Attributes:
+        system: open or closed system.
+        drive: additional inputs, and control laws.
+        layout: layout of states, inputs and outputs.
+        symbols: symbols of the state equation of the independent joints. The values of a control
+            law are at their place in u, and w is not.
+    """
+
+    system: System
+    drive: DriveInputs
+    layout: MinimalLayout
+    symbols: StatePoint
+
+    def actions(self) -> Actions:
+        """Return the efforts, wrenches and accelerations that the inputs u prescribe."""
+        system, layout, s = self.system, self.layout, self.symbols
+        efforts = SX.zeros(system.nv)
+        efforts[list(_efforts_in_u(system, layout, self.drive))] = s.efforts
+        laws = input_motions(layout.motions, s.motions)
+        given = {m.velocity: law[2] for m, law in zip(layout.motions, laws, strict=True)}
+        return Actions(efforts, given, layout.frames, s.wrenches)
+
+    def outputs(self, at: EquationsOfMotion, observe: Observe | None) -> SX:
+        """Return the outputs y.
+
+        Args:
+            at: equations of motion.
+            observe: function that returns the additional outputs at the end of y, or None.
+        """
+        layout, motion, response = self.layout, at.motion, at.response
+        efforts = response.contact.efforts if response.contact else SX(0, 1)
+        return casadi.vertcat(
+            rows_of(response.a, layout.accelerations),
+            rows_of(motion.q, layout.shown),
+            rows_of(motion.v, layout.passive),
+            rows_of(response.a, layout.passive),
+            _terminal_pose(self.system, motion.q),
+            at.shown,
+            rows_of(response.tau, layout.efforts),
+            rows_of(efforts, [effort.row for effort in layout.contacts]),
+            *observed(self.system, self.symbols.t, at, observe),
+        )
+
+
+def state_inputs(system: System, drive: DriveInputs | None = None) -> StateInputs:
+    """Return the inputs and outputs of the state equations of a system.
 
     Args:
         system: open or closed system.
-        layout: layout of the inputs.
-        s: symbols of the state equation.
-        motors: indices in v of the efforts in u.
+        drive: additional inputs, and control laws that replace the efforts of motors or the inputs
+            of components.
+
+    Raises:
+        ModelError: `drive` is inconsistent with the system, or the independent rows of the loops
+            change with the configuration, which contacts do not support.
     """
-    efforts = SX.zeros(system.nv)
-    efforts[list(motors)] = s.efforts
-    laws = input_motions(layout.motions, s.motions)
-    given = {m.velocity: law[2] for m, law in zip(layout.motions, laws, strict=True)}
-    return Actions(efforts, given, layout.frames, s.wrenches)
+    require_lasting_rows(system, contacts_of(system))
+    drive = DriveInputs() if drive is None else drive
+    layout = minimal_layout(system, drive)
+    efforts = _efforts_in_u(system, layout, drive)
+    return StateInputs(system, drive, layout, point_of(system, layout, efforts))
 
 
-def outputs_vector(
-    system: System,
-    layout: MinimalLayout,
-    t: SX,
-    at: EquationsOfMotion,
-    observe: Observe | None = None,
-) -> SX:
-    """Return the outputs y of a state equation with the inputs and outputs of a layout.
-
-    Args:
-        system: open or closed system.
-        layout: layout of y.
-        t: time [s].
-        at: equations of motion.
-        observe: function that returns the additional outputs at the end of y, or None.
-    """
-    motion, response = at.motion, at.response
-    efforts = response.contact.efforts if response.contact else SX(0, 1)
-    return casadi.vertcat(
-        rows_of(response.a, layout.accelerations),
-        rows_of(motion.q, layout.shown),
-        rows_of(motion.v, layout.passive),
-        rows_of(response.a, layout.passive),
-        _terminal_pose(system, motion.q),
-        at.shown,
-        rows_of(response.tau, layout.efforts),
-        rows_of(efforts, [effort.row for effort in layout.contacts]),
-        *observed(system, t, at, observe),
-    )
+def _efforts_in_u(system: System, layout: MinimalLayout, drive: DriveInputs) -> tuple[int, ...]:
+    """Return the indices in v of the efforts that are inputs or values of a control law."""
+    return layout.inputs if drive.effort is None else tuple(range(system.nv))
 
 
 def rows_of(vector: SX, numbers: Sequence[int]) -> SX:

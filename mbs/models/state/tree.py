@@ -23,7 +23,7 @@ from mbs.models.state.arguments import Point, StateArguments, state_arguments
 from mbs.models.state.control_laws import with_laws_and_crossings
 from mbs.models.state.crossing_modes import with_more_modes
 from mbs.models.state.crossings import crossings_function, simulation_crossings
-from mbs.models.state.drive import DriveInputs, TreeMotion
+from mbs.models.state.drive import TreeMotion
 from mbs.models.state.equations import (
     Actions,
     EquationsOfMotion,
@@ -34,7 +34,7 @@ from mbs.models.state.equations import (
 from mbs.models.state.events import StateEvents, contact_events, join_part_events
 from mbs.models.state.independent import motion_of
 from mbs.models.state.laws import TimeLaws
-from mbs.models.state.layout import actions_of, minimal_layout, outputs_vector, point_of
+from mbs.models.state.layout import StateInputs
 from mbs.models.state.projection import project_step
 from mbs.models.state.signals import GivenInput, Prescribed
 from mbs.models.state.singular_configurations import passage, without_passages
@@ -144,11 +144,7 @@ class TreeState:
 
 
 def tree_state(
-    system: System,
-    observe: Observe | None = None,
-    drive: DriveInputs | None = None,
-    *,
-    crossings: bool = False,
+    inputs: StateInputs, observe: Observe | None = None, *, crossings: bool = False
 ) -> TreeState | None:
     """Return the state equation of the tree with the inputs and outputs of `minimal_state`.
 
@@ -156,38 +152,30 @@ def tree_state(
     nonholonomic constraints, or if `passage` is None for holonomic loops.
 
     Args:
-        system: open or closed system.
+        inputs: inputs and outputs.
         observe: argument of `minimal_state`.
-        drive: argument of `minimal_state`.
         crossings: argument of `minimal_state`.
     """
-    drive = DriveInputs() if drive is None else drive
-    layout = minimal_layout(system, drive)
+    system, layout, s = inputs.system, inputs.layout, inputs.symbols
     slips = system.closure is not None and bool(system.closure.slips)
     if layout.motions or not (layout.dependents or slips):
         return None
-    motors = layout.effort_inputs(system, drive)
-    s = point_of(system, layout, motors)
     nq, n = system.nq, system.nq + system.nv
     X, none = casadi.vertcat(SX.sym("X", n), system.z), SX.sym("z", 0)
-    actions = actions_of(system, layout, s, motors)
-    tree = tree_equations(system, (s.t, X, none, s.u, system.p), actions)
-    arguments, motion, through = tree.arguments, tree.at.motion, tree.passage
+    tree = tree_equations(system, (s.t, X, none, s.u, system.p), inputs.actions())
+    arguments, through = tree.arguments, tree.passage
     passes = through is not None
     if through is None and slips:
         through = without_passages(system, arguments)
     if through is None:
         return None
-    y = outputs_vector(system, layout, s.t, tree.at, observe)
+    y = inputs.outputs(tree.at, observe)
     (rhs, forces), events = with_laws_and_crossings(
-        system,
-        drive,
-        arguments.point,
-        (motion.q, motion.v),
+        inputs,
+        arguments,
+        tree.at.motion,
         [arguments.function("tree_rhs", [tree.rate, y]), through.forces],
         tree.events,
-        s.sizes,
-        layout.extra,
         crossings=crossings,
     )
     more = _mode_count(events) - _mode_count(tree.events)

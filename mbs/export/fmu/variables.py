@@ -16,7 +16,7 @@ from mbs.loops.closing import Closing, closure_parameters
 from mbs.loops.cut_positions import cut_positions
 from mbs.models.contacts import contacts_of
 from mbs.models.geometry import terminal_frame
-from mbs.models.state.crossings import CONTACTS
+from mbs.models.state.crossing_modes import CONTACTS
 from mbs.models.state.drive import InputMotion
 from mbs.models.state.events import element_names
 from mbs.models.state.independent import MinimalState
